@@ -1,0 +1,25 @@
+# Sets FLASH_HAVE_CUDA: whether the CUDA language is enabled. The CPU backend never depends on it.
+set(FLASH_HAVE_CUDA OFF)
+if(FLASH_CUDA)
+  # CMake's own default is compute capability 75 alone. Real code for each current architecture, PTX for later ones.
+  if(NOT CMAKE_CUDA_ARCHITECTURES)
+    set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90-real 100-real 120)
+  endif()
+  # CMake 3.25 does not know nvcc's switch for C++20.
+  set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)
+  set(CMAKE_CUDA20_EXTENSION_COMPILE_OPTION -std=c++20)
+  set(CMAKE_CUDA_STANDARD 20)
+  set(CMAKE_CUDA_RUNTIME_LIBRARY Static)  # starts without a driver; the first call then reports its absence
+  find_program(CMAKE_CUDA_COMPILER nvcc PATHS /usr/local/cuda/bin)
+  include(CheckLanguage)
+  if(CMAKE_CUDA_COMPILER)
+    check_language(CUDA)
+  endif()
+  if(CMAKE_CUDA_COMPILER)
+    enable_language(CUDA)
+    set(FLASH_HAVE_CUDA ON)
+  elseif(NOT FLASH_CUDA STREQUAL "AUTO")
+    message(FATAL_ERROR "FLASH_CUDA=ON: no CUDA compiler found; set CMAKE_CUDA_COMPILER or put nvcc on the PATH")
+  endif()
+endif()
+message(STATUS "CUDA backend: ${FLASH_HAVE_CUDA}")

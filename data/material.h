@@ -1,0 +1,23 @@
+#pragma once
+
+namespace flash::data {
+
+enum class Constitutive { tri_arap, tri_corotated, tri_stvk, tri_neohookean, tet_arap, tet_corotated, tet_neohookean };
+
+/// How curvature is measured; `plate` (Morley) gives D and nu on any flat mesh, the others are for parity.
+enum class BendingModel { plate, isometric, hinge };
+
+/// A thin sheet as the simulation sees it. Motion depends on E t / rho_A, D / rho_A, nu and friction only.
+struct SheetMaterial {
+  Constitutive constitutive = Constitutive::tri_corotated;
+  BendingModel bending_model = BendingModel::plate;
+  double membrane_stiffness = 100.0;  ///< E t [N/m]
+  double poissons_ratio = 0.3;        ///< in (-1, 1/2]
+  double areal_density = 0.2;         ///< rho_A [kg/m^2]
+  double bending_rigidity = 1e-5;     ///< D [N m]
+  double friction = 0.3;              ///< Coulomb coefficient against the table
+  double air_drag = 0.0;              ///< mass-proportional damping [1/s]
+  double stiffness_damping = 0.0;     ///< Rayleigh, stiffness-proportional [s]
+};
+
+}  // namespace flash::data

@@ -1,0 +1,22 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+namespace flash::data {
+
+/// Poses over time, T_parent_child: translation [m], rotation; times [s] strictly increasing.
+struct Trajectory {
+  std::vector<double> times;
+  std::vector<Eigen::Isometry3d> poses;
+};
+
+/// Pose at time t [s]: linear in translation, slerp in rotation, held constant outside the recorded span.
+Eigen::Isometry3d pose_at(const Trajectory& trajectory, double t);
+
+/// TUM lines `t tx ty tz qx qy qz qw`, `#` comments. Throws InputError naming the line unless times increase strictly
+/// and quaternions are unit to 1e-3.
+Trajectory load_tum(const std::string& path);
+void save_tum(const Trajectory& trajectory, const std::string& path);
+
+}  // namespace flash::data

@@ -1,0 +1,331 @@
+#include "sim/block_cholesky.h"
+
+#include <metis.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace flash::sim {
+
+namespace {
+
+/// Columns eliminated together; `rows` are the vertices below them that they touch (permuted numbering, sorted).
+struct Supernode {
+  int first_column = 0, column_count = 0;
+  std::vector<int> rows;
+  int parent = -1;
+  std::vector<int> rows_in_parent;  ///< position of each of `rows` in the parent's front
+  std::vector<int> children;
+  long factor_offset = 0;
+};
+
+struct Placement {
+  int front_row, front_column;  ///< block position in the supernode's front
+  bool transpose;
+  int block;
+};
+
+int front_size(const Supernode& node) { return node.column_count + static_cast<int>(node.rows.size()); }
+
+std::vector<int> nested_dissection(const BlockPattern& pattern) {
+  std::vector<std::vector<idx_t>> neighbours(pattern.size);
+  for (const auto& [row, column] : pattern.pairs) {
+    neighbours[row].push_back(column);
+    neighbours[column].push_back(row);
+  }
+  std::vector<idx_t> starts = {0}, adjacency;
+  for (const auto& list : neighbours) {
+    adjacency.insert(adjacency.end(), list.begin(), list.end());
+    starts.push_back(static_cast<idx_t>(adjacency.size()));
+  }
+  idx_t size = pattern.size;
+  std::vector<idx_t> order(pattern.size), position(pattern.size);
+  if (adjacency.empty()) {
+    std::iota(order.begin(), order.end(), 0);
+  } else {
+    idx_t options[METIS_NOPTIONS];
+    METIS_SetDefaultOptions(options);
+    options[METIS_OPTION_SEED] = 1;
+    METIS_NodeND(&size, starts.data(), adjacency.data(), nullptr, options, order.data(), position.data());
+  }
+  return {order.begin(), order.end()};
+}
+
+/// Elimination tree of the pattern under `position` (Liu 1990, with path compression).
+std::vector<int> elimination_tree(int size, const std::vector<std::vector<int>>& earlier_neighbours) {
+  std::vector<int> parent(size, -1), ancestor(size, -1);
+  for (int column = 0; column < size; ++column) {
+    for (int neighbour : earlier_neighbours[column]) {
+      for (int node = neighbour; node != -1 && node < column;) {
+        const int next = ancestor[node];
+        ancestor[node] = column;
+        if (next == -1) parent[node] = column;
+        node = next;
+      }
+    }
+  }
+  return parent;
+}
+
+std::vector<int> postorder(const std::vector<int>& parent) {
+  const int size = static_cast<int>(parent.size());
+  std::vector<std::vector<int>> children(size);
+  std::vector<int> order, stack;
+  for (int node = size - 1; node >= 0; --node) {
+    if (parent[node] < 0) stack.push_back(node);
+    else children[parent[node]].push_back(node);
+  }
+  std::vector<char> opened(size, 0);
+  while (!stack.empty()) {
+    const int node = stack.back();
+    if (opened[node]) {
+      order.push_back(node);
+      stack.pop_back();
+    } else {
+      opened[node] = 1;
+      stack.insert(stack.end(), children[node].begin(), children[node].end());
+    }
+  }
+  return order;
+}
+
+std::vector<std::vector<int>> earlier_neighbours(const BlockPattern& pattern, const std::vector<int>& position) {
+  std::vector<std::vector<int>> lists(pattern.size);
+  for (const auto& [row, column] : pattern.pairs) {
+    const auto [low, high] = std::minmax(position[row], position[column]);
+    lists[high].push_back(low);
+  }
+  return lists;
+}
+
+/// Zeros that merging `child` into its parent would store, in blocks.
+long merge_zeros(const Supernode& child, const Supernode& parent) {
+  return static_cast<long>(child.column_count) * (front_size(parent) - static_cast<long>(child.rows.size()));
+}
+
+}  // namespace
+
+struct SymbolicFactor {
+  int size = 0;
+  std::vector<int> position;           ///< vertex -> elimination position
+  std::vector<Supernode> supernodes;   ///< in elimination order
+  std::vector<std::vector<Placement>> placements;  ///< matrix blocks that enter each front
+  long entries = 0;
+  long stack_entries = 0;
+  int largest_front = 0;
+};
+
+std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern) {
+  const int size = pattern.size;
+  std::vector<int> order = nested_dissection(pattern);
+  std::vector<int> position(size);
+  for (int i = 0; i < size; ++i) position[order[i]] = i;
+  const std::vector<int> post = postorder(elimination_tree(size, earlier_neighbours(pattern, position)));
+  std::vector<int> renumber(size);
+  for (int i = 0; i < size; ++i) renumber[post[i]] = i;
+  for (int& p : position) p = renumber[p];
+
+  const auto earlier = earlier_neighbours(pattern, position);
+  const std::vector<int> parent = elimination_tree(size, earlier);
+  std::vector<std::vector<int>> structure(size);  // rows below the diagonal, column by column
+  for (int row = 0; row < size; ++row)
+    for (int column : earlier[row]) structure[column].push_back(row);
+  std::vector<std::vector<int>> children(size);
+  for (int column = 0; column < size; ++column) {
+    auto& rows = structure[column];
+    for (int child : children[column])
+      for (int row : structure[child])
+        if (row != column) rows.push_back(row);
+    std::sort(rows.begin(), rows.end());
+    rows.erase(std::unique(rows.begin(), rows.end()), rows.end());
+    if (parent[column] >= 0) children[parent[column]].push_back(column);
+  }
+
+  // Fundamental supernodes, then merged with the parent where few zeros are stored: larger dense fronts run faster.
+  std::vector<Supernode> nodes;
+  for (int column = 0; column < size; ++column) {
+    const bool extends = !nodes.empty() && parent[column - 1] == column &&
+                         structure[column - 1].size() == structure[column].size() + 1;
+    if (extends) {
+      ++nodes.back().column_count;
+      nodes.back().rows = structure[column];
+    } else {
+      nodes.push_back({column, 1, structure[column], -1, {}, {}, 0});
+    }
+    while (nodes.size() >= 2) {
+      Supernode& last = nodes.back();
+      Supernode& before = nodes[nodes.size() - 2];
+      const int end = last.first_column + last.column_count;
+      const bool complete = column + 1 == size || parent[column] != column + 1 ||
+                            structure[column].size() != structure[column + 1].size() + 1;
+      if (!complete || before.rows.empty() || before.rows.front() < last.first_column || before.rows.front() >= end) break;
+      const long zeros = merge_zeros(before, last);
+      const int columns = before.column_count + last.column_count;
+      const long stored = static_cast<long>(columns) * (columns + static_cast<long>(last.rows.size()));
+      if (!(columns <= 4 || zeros * 10 <= stored)) break;
+      before.column_count = columns;
+      before.rows = last.rows;
+      nodes.pop_back();
+    }
+  }
+
+  auto symbolic = std::make_shared<SymbolicFactor>();
+  symbolic->size = size;
+  symbolic->position = position;
+  std::vector<int> owner(size);
+  for (int s = 0; s < static_cast<int>(nodes.size()); ++s)
+    for (int c = 0; c < nodes[s].column_count; ++c) owner[nodes[s].first_column + c] = s;
+  const auto front_position = [&](const Supernode& node, int row) {
+    if (row < node.first_column + node.column_count) return row - node.first_column;
+    return node.column_count +
+           static_cast<int>(std::lower_bound(node.rows.begin(), node.rows.end(), row) - node.rows.begin());
+  };
+  long stack = 0;
+  for (int s = 0; s < static_cast<int>(nodes.size()); ++s) {
+    Supernode& node = nodes[s];
+    node.factor_offset = symbolic->entries;
+    symbolic->entries += 9L * node.column_count * front_size(node);
+    symbolic->largest_front = std::max(symbolic->largest_front, front_size(node));
+    for (int child : node.children) stack -= 9L * nodes[child].rows.size() * nodes[child].rows.size();
+    stack += 9L * node.rows.size() * node.rows.size();
+    // A front's update is written before the children's are dropped.
+    long children_entries = 0;
+    for (int child : node.children) children_entries += 9L * nodes[child].rows.size() * nodes[child].rows.size();
+    symbolic->stack_entries = std::max(symbolic->stack_entries, stack + children_entries);
+    if (node.rows.empty()) continue;
+    node.parent = owner[node.rows.front()];
+    nodes[node.parent].children.push_back(s);
+    for (int row : node.rows) node.rows_in_parent.push_back(front_position(nodes[node.parent], row));
+  }
+  symbolic->placements.resize(nodes.size());
+  for (int vertex = 0; vertex < size; ++vertex) {
+    const int s = owner[position[vertex]];
+    const int local = position[vertex] - nodes[s].first_column;
+    symbolic->placements[s].push_back({local, local, false, vertex});
+  }
+  for (int k = 0; k < static_cast<int>(pattern.pairs.size()); ++k) {
+    const int row = position[pattern.pairs[k].first], column = position[pattern.pairs[k].second];
+    const bool transpose = row < column;
+    const int s = owner[std::min(row, column)];
+    symbolic->placements[s].push_back({front_position(nodes[s], std::max(row, column)),
+                                       std::min(row, column) - nodes[s].first_column, transpose, size + k});
+  }
+  symbolic->supernodes = std::move(nodes);
+  return symbolic;
+}
+
+long factor_entries(const SymbolicFactor& symbolic) { return symbolic.entries; }
+
+template <typename Scalar>
+BlockCholesky<Scalar>::BlockCholesky(std::shared_ptr<const SymbolicFactor> symbolic)
+    : symbolic_(std::move(symbolic)),
+      factor_(symbolic_->entries),
+      stack_(symbolic_->stack_entries),
+      gathered_(3 * symbolic_->largest_front),
+      permuted_(3 * symbolic_->size) {}
+
+template <typename Scalar>
+bool BlockCholesky<Scalar>::factorize(const BlockValues<Scalar>& values) {
+  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  using View = Eigen::Map<Matrix, 0, Eigen::OuterStride<>>;
+  const auto& nodes = symbolic_->supernodes;
+  std::vector<long> update_offset(nodes.size());
+  long top = 0;
+  for (size_t s = 0; s < nodes.size(); ++s) {
+    const Supernode& node = nodes[s];
+    const int front = 3 * front_size(node), columns = 3 * node.column_count, rows = front - columns;
+    Scalar* factor = factor_.data() + node.factor_offset;
+    std::fill(factor, factor + static_cast<long>(front) * columns, Scalar(0));
+    for (const Placement& place : symbolic_->placements[s]) {
+      const Scalar* block = values.data() + 9L * place.block;
+      Scalar* target = factor + 3L * place.front_column * front + 3L * place.front_row;
+      for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) target[c * front + r] = place.transpose ? block[3 * r + c] : block[3 * c + r];
+    }
+    // This front's update matrix is built above the children's; it moves down onto them once they are consumed.
+    Scalar* update = stack_.data() + top;
+    std::fill(update, update + static_cast<long>(rows) * rows, Scalar(0));
+    for (int child : node.children) {
+      const auto& map = nodes[child].rows_in_parent;
+      const int child_rows = 3 * static_cast<int>(map.size());
+      const Scalar* child_update = stack_.data() + update_offset[child];
+      for (size_t bc = 0; bc < map.size(); ++bc) {
+        const int target_column = 3 * map[bc];
+        for (int c = 0; c < 3; ++c) {
+          const Scalar* source = child_update + (3L * bc + c) * child_rows;
+          Scalar* column = target_column < columns ? factor + static_cast<long>(target_column + c) * front
+                                                   : update + static_cast<long>(target_column - columns + c) * rows - columns;
+          for (size_t br = bc; br < map.size(); ++br) {
+            Scalar* entry = column + 3 * map[br];
+            entry[0] += source[3 * br];
+            entry[1] += source[3 * br + 1];
+            entry[2] += source[3 * br + 2];
+          }
+        }
+      }
+    }
+    View pivot(factor, columns, columns, Eigen::OuterStride<>(front));
+    Eigen::LLT<Eigen::Ref<Matrix, 0, Eigen::OuterStride<>>> llt(pivot);
+    if (llt.info() != Eigen::Success) return false;
+    if (rows > 0) {
+      View below(factor + columns, rows, columns, Eigen::OuterStride<>(front));
+      pivot.template triangularView<Eigen::Lower>().transpose().template solveInPlace<Eigen::OnTheRight>(below);
+      View schur(update, rows, rows, Eigen::OuterStride<>(rows));
+      schur.template selfadjointView<Eigen::Lower>().rankUpdate(below, Scalar(-1));
+    }
+    if (!node.children.empty()) {
+      const long base = update_offset[node.children.front()];
+      std::copy(update, update + static_cast<long>(rows) * rows, stack_.data() + base);
+      top = base;
+    }
+    update_offset[s] = top;
+    top += static_cast<long>(rows) * rows;
+  }
+  return true;
+}
+
+template <typename Scalar>
+void BlockCholesky<Scalar>::solve_in_place(Eigen::Matrix<Scalar, Eigen::Dynamic, 1>& x) const {
+  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
+  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+  using ConstView = Eigen::Map<const Matrix, 0, Eigen::OuterStride<>>;
+  const auto& nodes = symbolic_->supernodes;
+  for (int vertex = 0; vertex < symbolic_->size; ++vertex)
+    for (int c = 0; c < 3; ++c) permuted_[3 * symbolic_->position[vertex] + c] = x[3 * vertex + c];
+
+  for (const Supernode& node : nodes) {
+    const int front = 3 * front_size(node), columns = 3 * node.column_count, rows = front - columns;
+    const Scalar* factor = factor_.data() + node.factor_offset;
+    Eigen::Map<Vector> own(permuted_.data() + 3 * node.first_column, columns);
+    ConstView(factor, columns, columns, Eigen::OuterStride<>(front)).template triangularView<Eigen::Lower>().solveInPlace(own);
+    if (rows == 0) continue;
+    Eigen::Map<Vector> gathered(gathered_.data(), rows);
+    gathered.noalias() = ConstView(factor + columns, rows, columns, Eigen::OuterStride<>(front)) * own;
+    for (size_t r = 0; r < node.rows.size(); ++r)
+      for (int c = 0; c < 3; ++c) permuted_[3 * node.rows[r] + c] -= gathered[3 * r + c];
+  }
+  for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) {
+    const int front = 3 * front_size(*node), columns = 3 * node->column_count, rows = front - columns;
+    const Scalar* factor = factor_.data() + node->factor_offset;
+    Eigen::Map<Vector> own(permuted_.data() + 3 * node->first_column, columns);
+    if (rows > 0) {
+      Eigen::Map<Vector> gathered(gathered_.data(), rows);
+      for (size_t r = 0; r < node->rows.size(); ++r)
+        for (int c = 0; c < 3; ++c) gathered[3 * r + c] = permuted_[3 * node->rows[r] + c];
+      own.noalias() -= ConstView(factor + columns, rows, columns, Eigen::OuterStride<>(front)).transpose() * gathered;
+    }
+    ConstView(factor, columns, columns, Eigen::OuterStride<>(front))
+        .transpose()
+        .template triangularView<Eigen::Upper>()
+        .solveInPlace(own);
+  }
+  for (int vertex = 0; vertex < symbolic_->size; ++vertex)
+    for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted_[3 * symbolic_->position[vertex] + c];
+}
+
+template class BlockCholesky<double>;
+template class BlockCholesky<float>;
+
+}  // namespace flash::sim

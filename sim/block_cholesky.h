@@ -1,0 +1,50 @@
+#pragma once
+#include <Eigen/Core>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace flash::sim {
+
+/// Sparsity of a symmetric matrix of 3 x 3 blocks: every diagonal block and the listed pairs (row, column), row != column,
+/// each unordered pair once.
+struct BlockPattern {
+  int size = 0;                            ///< vertices
+  std::vector<std::pair<int, int>> pairs;  ///< off-diagonal blocks
+};
+
+/// Values over a BlockPattern: `size` diagonal blocks, then one block a pair, 9 numbers each, column-major.
+template <typename Scalar>
+using BlockValues = std::vector<Scalar>;
+
+/// Ordering, elimination tree and supernodes of a pattern: computed once a mesh, shared by all environments and threads.
+/// Nested dissection by METIS on the vertex graph (three unknowns a vertex stay together).
+struct SymbolicFactor;
+std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern);
+
+/// Entries of L, in scalars.
+long factor_entries(const SymbolicFactor& symbolic);
+
+/// Multifrontal Cholesky factorization (Duff and Reid 1983; Liu 1992) with dense fronts of 3 x 3 blocks.
+template <typename Scalar>
+class BlockCholesky {
+ public:
+  explicit BlockCholesky(std::shared_ptr<const SymbolicFactor> symbolic);
+
+  /// L L^T = values. Returns false where a pivot is not positive; the factor is then unusable.
+  bool factorize(const BlockValues<Scalar>& values);
+
+  /// x <- (L L^T)^-1 x, for x of 3 * size entries, vertex by vertex.
+  void solve_in_place(Eigen::Matrix<Scalar, Eigen::Dynamic, 1>& x) const;
+
+ private:
+  std::shared_ptr<const SymbolicFactor> symbolic_;
+  std::vector<Scalar> factor_;  ///< per supernode: column-major [L11; L21]
+  std::vector<Scalar> stack_;   ///< update matrices waiting for their parent
+  mutable std::vector<Scalar> gathered_, permuted_;
+};
+
+extern template class BlockCholesky<double>;
+extern template class BlockCholesky<float>;
+
+}  // namespace flash::sim

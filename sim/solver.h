@@ -1,0 +1,57 @@
+#pragma once
+#include <memory>
+#include <vector>
+
+#include "sim/environment.h"
+#include "sim/sheet.h"
+
+namespace flash::sim {
+
+struct SolverSettings {
+  double time_step = 0.01;      ///< h [s]
+  int max_iterations = 60;      ///< Newton iterations a step
+  double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
+};
+
+/// How one step of one environment went.
+struct StepReport {
+  double residual = 0;            ///< |r| / |M g|; without gravity over the largest inertial force
+  int iterations = 0;
+  bool converged = false;
+  double penetration_max = 0;     ///< deepest vertex below a surface [m]
+  double complementarity = 0;     ///< max |min(gap, lambda / stiffness)| [m]
+  double cone_violation = 0;      ///< max(|lambda_t| - mu lambda_n) [N]
+  double kinetic = 0, membrane = 0, bending = 0, potential = 0;  ///< energies [J]
+  std::vector<Eigen::Vector3d> grasp_forces;     ///< gripper on sheet, one a grasp [N]
+  std::vector<Eigen::Vector3d> obstacle_forces;  ///< obstacle on sheet, one an obstacle [N]
+  Eigen::Vector3d fixed_force = Eigen::Vector3d::Zero();  ///< supports on sheet [N]
+};
+
+/// Steps environments of one Sheet by implicit Euler. Holds only what depends on the sheet and on the last
+/// factorization; one Solver a thread.
+class Solver {
+ public:
+  Solver(const Sheet& sheet, const SolverSettings& settings);
+  ~Solver();
+  Solver(Solver&&) noexcept;
+
+  /// Advances environment.state by one time step. An unconverged step is reported, never thrown.
+  StepReport step(Environment& environment);
+
+ private:
+  struct Workspace;
+  std::unique_ptr<Workspace> workspace_;
+};
+
+/// Positions of every step (index 0 is the start) and the reports of the steps.
+struct Rollout {
+  std::vector<data::Points> positions;
+  std::vector<StepReport> reports;
+};
+
+/// Runs `steps` steps of each environment, environments spread over `threads`. Result i equals environment i alone,
+/// bitwise.
+std::vector<Rollout> simulate(const Sheet& sheet, std::vector<Environment> environments, int steps,
+                              const SolverSettings& settings, int threads);
+
+}  // namespace flash::sim
