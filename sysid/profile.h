@@ -1,57 +1,38 @@
 #pragma once
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "sysid/grid_results.h"
+#include "sysid/summary.h"
 
 namespace flash::sysid {
 
-/// What the searched range says about one parameter.
-enum class Identifiable {
-  yes,          ///< the interval closes on both sides inside the range
-  no,           ///< no value of the range is excluded
-  lower_bound,  ///< only small values are excluded
-  upper_bound   ///< only large values are excluded
-};
-enum class Edge { none, low, high };
-
-const char* name_of(Identifiable verdict);  ///< "yes", "no", "lower_bound", "upper_bound"
-
-/// Where the spread of a keyframe's score comes from.
-struct Uncertainty {
+struct ProfileSettings {
   std::optional<double>
-      repeatability;  ///< trial-to-trial distance per keyframe [m]; absent: the best residual
-  double confidence = 0.95;
+      repeatability;         ///< trial-to-trial distance of a keyframe [m]; absent: the best residual
+  double confidence = 0.95;  ///< of intervals and of the region
 };
 
-/// One parameter after the search: the lowest score over all others at each of its values, and what follows.
-struct ParameterProfile {
-  std::string name;
-  std::vector<double> values;  ///< axis values, increasing
-  std::vector<double> scores;  ///< lowest score at that value [m]; infinity where no candidate was usable
-  std::vector<double> chi_squared;  ///< rise of the misfit over the best candidate, in units of variance
-  double estimate = 0;              ///< vertex of the parabola through the best value and its neighbours
-  double low = 0, high = 0;         ///< interval at the asked confidence, cut at the searched range
-  Identifiable identifiable = Identifiable::no;
-  Edge edge = Edge::none;  ///< the best value is the first or last of the range
-  std::string note;        ///< one sentence for a person; empty when there is nothing to say
-};
-
+/// What a grid search says about its parameters.
 struct GridVerdict {
   int best = -1;             ///< index into GridResults::candidates; -1: no candidate was usable
   double score = 0;          ///< of the best [m]
-  double sigma = 0;          ///< used per keyframe [m]
+  double sigma = 0;          ///< spread of a keyframe's score used [m]
   std::string sigma_source;  ///< "residual" or "repeatability"
   int keyframes = 0;         ///< sample count: keyframes that carried points, over all recordings
-  std::vector<ParameterProfile> parameters;
+  double level = 0;          ///< candidates that score below are inside the confidence region [m]
+  std::vector<ParameterFinding> parameters;  ///< one an axis of more than one value
 };
 
-/// Gaussian model with the keyframe, not the point, as the sample: with n keyframes of score s and spread
-/// sigma the misfit of a candidate rises by chi^2 = n (s^2 - s_best^2) / sigma^2, sigma = max(repeatability,
-/// s_best). A value belongs to the interval while the lowest chi^2 over all other parameters stays below the
-/// quantile for one degree of freedom; crossings are interpolated along the axis (in its logarithm where it
-/// is logarithmic).
-GridVerdict profile_grid(const GridResults& results, const Uncertainty& uncertainty = {});
+/// Gaussian model with the keyframe, not the point, as the sample: n keyframes of score s and spread sigma. A
+/// candidate's misfit rises over the best by chi^2 = n (s^2 - s_best^2) / sigma^2 with sigma =
+/// max(repeatability, s_best). The profile of a parameter is the lowest score over all others at each of its
+/// values; its interval is where chi^2 of the profile stays below the quantile for one degree of freedom,
+/// crossings interpolated along the axis (along its logarithm where it is logarithmic); the estimate is the
+/// vertex of the parabola through the best value and its neighbours. Verdict: closed on both sides "yes", on
+/// neither "no", closed above only "upper_bound", below only "lower_bound".
+GridVerdict profile_grid(const GridResults& results, const ProfileSettings& settings = {});
 
 }  // namespace flash::sysid
