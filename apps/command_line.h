@@ -1,0 +1,22 @@
+#pragma once
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace flash {
+
+/// How the tools end: 0 done, 1 failed, 2 bad usage or input, 3 finished but the answer as a whole cannot be
+/// used.
+enum ExitCode { exit_done = 0, exit_failed = 1, exit_bad_input = 2, exit_unusable = 3 };
+
+/// Runs the body of a tool and returns its exit code. data::InputError becomes 2 and any other exception 1,
+/// each as the one line "name: message" on stderr.
+int run_tool(const char* name, const std::function<int()>& body);
+
+/// Parses the command line of `app`, then runs `body`. Help and version print and return 0; a parse error
+/// returns 2 with one line on stderr.
+int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& body);
+
+}  // namespace flash
