@@ -4,12 +4,14 @@
 
 namespace flash::data {
 
-/// Bad usage or input: one line that names file, field, what was found and what was expected. Tools exit 2 on it.
+/// Bad usage or input: one line that names file, field, what was found and what was expected. Tools exit 2 on
+/// it.
 struct InputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The message "source: field: what", e.g. "towel.json: mechanical_props.poison: unknown field (did you mean ...)".
+/// The message "source: field: what", e.g. "towel.json: mechanical_props.poison: unknown field (did you mean
+/// ...)".
 inline InputError input_error(const std::string& source, const std::string& field, const std::string& what) {
   return InputError(source + ": " + field + ": " + what);
 }

@@ -2,7 +2,15 @@
 
 namespace flash::data {
 
-enum class Constitutive { tri_arap, tri_corotated, tri_stvk, tri_neohookean, tet_arap, tet_corotated, tet_neohookean };
+enum class Constitutive {
+  tri_arap,
+  tri_corotated,
+  tri_stvk,
+  tri_neohookean,
+  tet_arap,
+  tet_corotated,
+  tet_neohookean
+};
 
 /// How curvature is measured; `plate` (Morley) gives D and nu on any flat mesh, the others are for parity.
 enum class BendingModel { plate, isometric, hinge };

@@ -3,9 +3,11 @@
 
 namespace flash::data {
 
-using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;      ///< one row a point [m]
-using Triangles = Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>;      ///< one row a triangle, counter-clockwise
-using Tetrahedra = Eigen::Matrix<int, Eigen::Dynamic, 4, Eigen::RowMajor>;     ///< one row a tetrahedron, positive volume
+using Points = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;  ///< one row a point [m]
+using Triangles =
+    Eigen::Matrix<int, Eigen::Dynamic, 3, Eigen::RowMajor>;  ///< one row a triangle, counter-clockwise
+using Tetrahedra =
+    Eigen::Matrix<int, Eigen::Dynamic, 4, Eigen::RowMajor>;  ///< one row a tetrahedron, positive volume
 
 struct TriangleMesh {
   Points vertices;

@@ -14,8 +14,8 @@ struct Trajectory {
 /// Pose at time t [s]: linear in translation, slerp in rotation, held constant outside the recorded span.
 Eigen::Isometry3d pose_at(const Trajectory& trajectory, double t);
 
-/// TUM lines `t tx ty tz qx qy qz qw`, `#` comments. Throws InputError naming the line unless times increase strictly
-/// and quaternions are unit to 1e-3.
+/// TUM lines `t tx ty tz qx qy qz qw`, `#` comments. Throws InputError naming the line unless times increase
+/// strictly and quaternions are unit to 1e-3.
 Trajectory load_tum(const std::string& path);
 void save_tum(const Trajectory& trajectory, const std::string& path);
 

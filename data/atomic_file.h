@@ -1,0 +1,17 @@
+#pragma once
+#include <string>
+#include <string_view>
+
+namespace flash::data {
+
+/// Writes `contents` to a temporary file beside `path`, syncs it and renames it: readers see the old file or
+/// the new one, never half. Missing folders are made. Throws std::system_error naming the path.
+void write_atomically(const std::string& path, std::string_view contents);
+
+/// The whole file as bytes. Throws InputError naming the path.
+std::string read_file(const std::string& path);
+
+/// `path` itself if absolute, else relative to the folder of `referring_file`, the file that names it.
+std::string resolve_path(const std::string& path, const std::string& referring_file);
+
+}  // namespace flash::data

@@ -1,0 +1,38 @@
+#pragma once
+#include <string>
+
+#include "data/mesh.h"
+
+namespace flash::data {
+
+/// What a geometry file holds, of any format; faces of more than three corners are cut into fans.
+struct Geometry {
+  Points points;
+  Triangles triangles;
+  Tetrahedra tetrahedra;
+};
+
+/// Reads .ply, .obj, .vtk (legacy), .pcd or .tet by the ending of the name. Throws InputError naming the
+/// file, and what is wrong: non-finite points with their count and first index, or an index out of range with
+/// its face.
+Geometry load_geometry(const std::string& path);
+
+/// The triangles of .ply, .obj or .vtk. Also throws on no triangles, and names degenerate and duplicate ones.
+TriangleMesh load_triangle_mesh(const std::string& path);
+
+/// The tetrahedra of .vtk or .tet; negative ones are turned, flat ones are an error.
+TetMesh load_tet_mesh(const std::string& path);
+
+/// The points of .ply, .pcd, .obj or .vtk. May be empty.
+Points load_point_cloud(const std::string& path);
+
+/// Format by ending: .ply (binary, double), .obj, .vtk (ascii); clouds .ply (binary, float), .pcd. Written
+/// atomically.
+void save_triangle_mesh(const TriangleMesh& mesh, const std::string& path);
+void save_tet_mesh(const TetMesh& mesh, const std::string& path);
+void save_point_cloud(const Points& points, const std::string& path);
+
+/// Throws InputError as the loaders do; `source` names the mesh in the message.
+void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source);
+
+}  // namespace flash::data

@@ -1,0 +1,130 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <array>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/camera.h"
+#include "data/mesh.h"
+#include "data/trajectory.h"
+
+namespace flash::data {
+
+/// How the patch sits in the fingers: flat, held in one point, or folded to a ridge.
+enum class GraspShape { clamp, point, pinch };
+
+/// Which vertices a gripper takes. Exactly one of corner, vertices and position is set.
+struct GraspSelection {
+  std::optional<std::array<int, 2>>
+      corner;  ///< of the rest sheet: (0, 0) is least x, least y; (1, 1) most x, most y
+  std::vector<int> vertices;
+  std::optional<Eigen::Vector3d> position;  ///< in the gripper frame at `from` [m]
+  double within = 0.02;  ///< largest |dx|, |dy| from the corner, or distance from the position [m]
+};
+
+struct RecordedGrasp {
+  std::string gripper;                                  ///< name of a trajectory
+  double from = 0.0;                                    ///< [s]
+  double to = std::numeric_limits<double>::infinity();  ///< [s]
+  GraspSelection select;
+  GraspShape shape = GraspShape::clamp;
+  double depth = 0.01;  ///< pinch: height of the ridge [m]
+  Eigen::Vector3d direction =
+      Eigen::Vector3d::Zero();  ///< pinch: along the ridge, base frame; zero: the sheet's diagonal
+  double pitch = 0.0;           ///< pinch: tilt of the ridge [rad]
+};
+
+/// Axis-aligned, base frame; open sides are infinite [m].
+struct CropBox {
+  Eigen::Vector3d min = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
+  Eigen::Vector3d max = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
+  bool contains(const Eigen::Vector3d& point) const {
+    return (point.array() >= min.array()).all() && (point.array() <= max.array()).all();
+  }
+};
+
+/// One observation; paths are resolved, empty where absent.
+struct RecordedKeyframe {
+  double time = 0.0;                     ///< [s]
+  std::string cloud;                     ///< base frame [m]
+  std::string depth, mask;               ///< camera frame
+  std::string markers;                   ///< CSV: vertex,x,y,z of tracked marks, base frame [m]
+  std::string contour;                   ///< observed outline as a cloud, base frame [m]
+  std::optional<Eigen::Vector3d> force;  ///< gripper on sheet [N]
+};
+
+/// Bounds, symmetric about zero, of what is fitted beside the material.
+struct NuisanceBounds {
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< cloud against robot [m]
+  double yaw = 0.0;                                  ///< about the vertical [rad]
+  double time = 0.0;                                 ///< clock of the clouds against the robot's [s]
+  double table_height = 0.0;                         ///< [m]
+  double start_yaw = 0.0;                            ///< of the sheet on the table [rad]
+};
+
+struct RecordedCamera {
+  CameraIntrinsics intrinsics;
+  Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< T_base_camera
+  double depth_scale = 0.001;                                          ///< [m] a count of the depth images
+  std::string intrinsics_path;
+};
+
+/// A recorded interaction, "flash-recording/1".
+struct Recording {
+  std::string source;  ///< path of recording.json
+  std::string name;
+  std::string kind =
+      "free";  ///< documents only: corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free
+  Eigen::Vector3d gravity{0, 0, -9.81};                                ///< [m/s^2]
+  std::string mesh_spec;                                               ///< "sheet:..." or resolved path
+  TriangleMesh mesh;                                                   ///< rest shape, object frame [m]
+  std::string asset;                                                   ///< resolved path, or empty
+  Eigen::Isometry3d base_from_object = Eigen::Isometry3d::Identity();  ///< T_base_object at the start
+  std::string start_mesh;  ///< resolved path of start positions, or empty
+  Points start;            ///< positions at the start, base frame [m], one row a vertex
+  bool has_table = false;
+  Eigen::Vector3d table_point = Eigen::Vector3d::Zero();    ///< [m]
+  Eigen::Vector3d table_normal = Eigen::Vector3d::UnitZ();  ///< unit, up
+  std::map<std::string, Trajectory> trajectories;           ///< T_base_gripper by name
+  std::map<std::string, std::string> trajectory_paths;      ///< resolved
+  std::vector<RecordedGrasp> grasps;
+  std::optional<RecordedCamera> camera;
+  CropBox crop;
+  std::vector<RecordedKeyframe> keyframes;
+  NuisanceBounds nuisance;
+  std::vector<std::string>
+      notices;  ///< what a reader should know: empty keyframes, ends of trajectories, ...
+};
+
+/// Reads recording.json (or its folder), its mesh and trajectories and checks them: field by field, times
+/// sorted and overlapping, plausible sizes, the grasp on the mesh. Clouds are checked by load_keyframes.
+/// Throws InputError.
+Recording load_recording(const std::string& path);
+
+/// Points of the observation that lie in the crop box, base frame [m].
+struct Keyframe {
+  double time = 0.0;  ///< [s]
+  Points cloud;       ///< may be empty
+  Points contour;     ///< may be empty
+  std::vector<int> marker_vertices;
+  Points markers;                        ///< one row each of marker_vertices
+  std::optional<Eigen::Vector3d> force;  ///< [N]
+};
+
+/// Loads every keyframe; depth images become points through the camera. Throws InputError where all are
+/// empty, or a cloud is far off the scale of the mesh (millimetres read as metres). `notices` says which are
+/// empty.
+std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std::string>& notices);
+
+/// Vertices a grasp takes, in order of index. Throws InputError where there are none.
+std::vector<int> select_vertices(const Recording& recording, const RecordedGrasp& grasp);
+
+/// Writes recording.json with paths relative to it. The files it names must stand already.
+void save_recording(const Recording& recording, const std::string& path);
+
+const char* to_string(GraspShape shape);
+
+}  // namespace flash::data

@@ -1,0 +1,140 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "data/material.h"
+#include "data/mesh.h"
+#include "data/trajectory.h"
+
+namespace flash::data {
+
+/// Solver settings under the names of the file.
+struct SceneSolver {
+  std::string linear_solver = "SPARSE_CHOLESKY";  ///< linearsolver.type, e.g. SPARSE_INVERSE_CUDA
+  std::string constraint_solver =
+      "NonSmoothNewton";  ///< constraintsolver.type; "Lite..." is the inertia metric
+  std::string constraint_linear_solver = "DENSE_CHOLESKY_EIGEN";  ///< constraintsolver.linearsolver
+  double max_force = 1e10;                                        ///< constraintsolver.maxforce [N]
+  int constraint_iterations = 10;                                 ///< constraintsolver.iterations
+  double constraint_tolerance = 1e-9;                             ///< constraintsolver.tolerance [m]
+  std::string integrator = "newton";                              ///< solver.type: newton or projective
+  int max_iterations = 60;                                        ///< solver.iterations a step
+  double tolerance = 1e-3;                                        ///< solver.tolerance on |r| / |M g|
+};
+
+struct ScenePlane {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< [m]
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, out of the solid
+};
+
+struct SceneBox {
+  Eigen::Vector3d size = Eigen::Vector3d::Constant(0.02);  ///< full edges [m]
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< T_base_box
+  Trajectory trajectory;                                   ///< T_base_box(t); empty: stays at `pose`
+};
+
+struct SceneCylinder {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< on the axis [m]
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< unit
+  double radius = 0.01;                             ///< [m]
+};
+
+/// Rigid surface. `planecollisions` become obstacles like any other.
+struct SceneObstacle {
+  std::string name;
+  std::variant<ScenePlane, SceneBox, SceneCylinder> shape;
+  std::optional<double> friction;  ///< empty: the material's
+};
+
+/// Vertices held in some axes, all for the whole run.
+struct SceneFixed {
+  std::vector<int> vertices;
+  std::array<bool, 3> axes = {true, true, true};  ///< "x", "xy", ...: a roller fixes one axis
+  Points positions;                               ///< one row a vertex [m]; empty: where they start
+};
+
+/// Vertices moved rigidly: x(t) = T(t) T(from)^-1 x(from).
+struct ScenePrescribed {
+  std::vector<int> vertices;
+  Trajectory trajectory;  ///< a TUM file, or keyframes {t, translation, rotation_xyzw}
+  double from = 0.0;      ///< [s]
+  double to = std::numeric_limits<double>::infinity();  ///< [s]
+};
+
+/// The same constant force on each of some vertices (a hung mass arrives here as mass times gravity, shared
+/// evenly).
+struct SceneLoad {
+  std::vector<int> vertices;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< on each vertex [N]
+};
+
+struct SceneObject {
+  std::string name;
+  std::string asset;  ///< resolved path of the asset file
+  Eigen::Isometry3d base_from_object =
+      Eigen::Isometry3d::Identity();  ///< start.T_base_object, after the asset's own transformation
+  std::string start_mesh;             ///< resolved path of the start positions, or empty
+  Eigen::Vector3d start_velocity = Eigen::Vector3d::Zero();  ///< of every vertex [m/s]
+  std::vector<SceneFixed> fixed;
+  std::vector<ScenePrescribed> prescribed;
+  std::vector<SceneLoad> loads;
+};
+
+/// While from <= t < to the effector holds the vertices of `object` within `threshold` of its box at `from`.
+struct SceneGrasp {
+  std::string object;
+  double from = 0.0;                                    ///< [s]
+  double to = std::numeric_limits<double>::infinity();  ///< [s]
+  double threshold = 0.01;                              ///< [m]
+  bool zero_length =
+      false;  ///< true: held vertices are pulled to the effector's origin; false: they keep their offsets
+  double closing_time = 0.0;  ///< zero_length: over which they are pulled [s]
+};
+
+struct SceneEndEffector {
+  std::string name;
+  Eigen::Vector3d size = Eigen::Vector3d::Constant(0.02);  ///< full edges of its box [m]
+  Trajectory trajectory;                                   ///< T_base_effector(t)
+  bool collides = false;                                   ///< its box is an obstacle too
+  std::optional<double> friction;
+  std::vector<SceneGrasp> grasps;
+};
+
+/// Coulomb coefficient between two named bodies (objects, obstacles, end effectors).
+struct ScenePairFriction {
+  std::string a, b;
+  double friction = 0.0;
+};
+
+/// A scene as its file says it: the published one (no schema) or "flash-scene/1".
+struct Scene {
+  std::string source;
+  std::string name;
+  double time_step = 0.01;               ///< h [s]
+  int steps = 100;                       ///< "steps", or "duration" over the time step
+  Eigen::Vector3d gravity{0, -9.81, 0};  ///< [m/s^2]
+  SceneSolver solver;
+  std::optional<BendingModel> bending_model;  ///< overrides the assets'
+  std::vector<SceneObject> objects;
+  std::vector<SceneObstacle> obstacles;
+  std::vector<SceneEndEffector> end_effectors;
+  std::vector<ScenePairFriction> pair_friction;
+  std::vector<double> keyframe_times;  ///< to write [s]; empty: every step
+  std::vector<std::string> notices;
+};
+
+/// Throws InputError naming file, field, found and expected; unknown fields name the nearest known one.
+Scene load_scene(const std::string& path);
+
+/// The coefficient of `object` on `other`: the pair's, else the other body's, else empty (the material's).
+std::optional<double> friction_between(const Scene& scene, const std::string& object,
+                                       const std::string& other);
+
+}  // namespace flash::data
