@@ -1,0 +1,23 @@
+# Run with cmake -P: BUILD (tree to install), SOURCE (the consumer), CONFIG, GENERATOR, CXX, FLAGS.
+set(work ${BUILD}/consumer)
+file(REMOVE_RECURSE ${work})
+
+function(run)
+  execute_process(COMMAND ${ARGV} RESULT_VARIABLE status OUTPUT_VARIABLE output ERROR_VARIABLE output)
+  if(NOT status EQUAL 0)
+    string(JOIN " " command ${ARGV})
+    message(FATAL_ERROR "${command}: ${status}\n${output}")
+  endif()
+  set(output "${output}" PARENT_SCOPE)
+endfunction()
+
+run(${CMAKE_COMMAND} --install ${BUILD} --config ${CONFIG} --prefix ${work}/prefix)
+run(${CMAKE_COMMAND} -S ${SOURCE} -B ${work}/build -G ${GENERATOR} -DCMAKE_BUILD_TYPE=${CONFIG}
+    -DCMAKE_CXX_COMPILER=${CXX} -DCMAKE_CXX_FLAGS=${FLAGS} -DCMAKE_PREFIX_PATH=${work}/prefix)
+run(${CMAKE_COMMAND} --build ${work}/build --config ${CONFIG})
+run(${work}/build/consumer)
+
+# Ten steps of 0.01 s of implicit Euler from rest fall by g h^2 n (n + 1) / 2 = 9.81 * 1e-4 * 55 = 0.0539550 m.
+if(NOT output MATCHES "^-0\\.05395")
+  message(FATAL_ERROR "the consumer printed ${output}, expected -0.05395")
+endif()
