@@ -19,4 +19,17 @@ Eigen::Isometry3d pose_at(const Trajectory& trajectory, double t);
 Trajectory load_tum(const std::string& path);
 void save_tum(const Trajectory& trajectory, const std::string& path);
 
+/// CSV whose header names t,tx,ty,tz,qx,qy,qz,qw in any order, among other columns; separator comma or
+/// semicolon. Errors as load_tum.
+Trajectory load_trajectory_csv(const std::string& path);
+
+/// .csv as CSV, anything else as TUM.
+Trajectory load_trajectory(const std::string& path);
+
+/// Pose as translation and x y z w quaternion, the order of files.
+Eigen::Matrix<double, 7, 1> to_vector(const Eigen::Isometry3d& pose);
+
+/// Inverse of to_vector; the quaternion is normalised.
+Eigen::Isometry3d from_vector(const Eigen::Matrix<double, 7, 1>& pose);
+
 }  // namespace flash::data

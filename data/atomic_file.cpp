@@ -1,0 +1,75 @@
+#include "data/atomic_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "data/error.h"
+
+namespace flash::data {
+namespace {
+
+[[noreturn]] void throw_errno(const std::string& path) {
+  throw std::system_error(errno, std::generic_category(), path);
+}
+
+/// Closes, and removes the temporary file unless it was renamed away.
+struct TemporaryFile {
+  std::string path;
+  int descriptor = -1;
+  ~TemporaryFile() {
+    if (descriptor >= 0) ::close(descriptor);
+    if (!path.empty()) ::unlink(path.c_str());
+  }
+};
+
+}  // namespace
+
+void write_atomically(const std::string& path, std::string_view contents) {
+  const std::filesystem::path parent = std::filesystem::path(path).parent_path();
+  if (!parent.empty()) std::filesystem::create_directories(parent);
+
+  TemporaryFile file;
+  file.path = path + ".XXXXXX";
+  file.descriptor = ::mkstemp(file.path.data());
+  if (file.descriptor < 0) {
+    file.path.clear();
+    throw_errno(path);
+  }
+  while (!contents.empty()) {
+    const ssize_t written = ::write(file.descriptor, contents.data(), contents.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) throw_errno(path);
+    contents.remove_prefix(static_cast<std::size_t>(written));
+  }
+  // mkstemp makes files private; give them the mode any other new file would have.
+  const mode_t mask = ::umask(0);
+  ::umask(mask);
+  if (::fchmod(file.descriptor, 0666 & ~mask) != 0 || ::fsync(file.descriptor) != 0) throw_errno(path);
+  if (::rename(file.path.c_str(), path.c_str()) != 0) throw_errno(path);
+  file.path.clear();
+}
+
+std::string read_file(const std::string& path) {
+  if (std::filesystem::is_directory(path)) throw InputError(path + ": is a folder, expected a file");
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) throw InputError(path + ": cannot be read: " + std::strerror(errno));
+  std::ostringstream contents;
+  contents << stream.rdbuf();
+  return std::move(contents).str();
+}
+
+std::string resolve_path(const std::string& path, const std::string& referring_file) {
+  const std::filesystem::path given(path);
+  if (given.is_absolute()) return path;
+  return (std::filesystem::path(referring_file).parent_path() / given).lexically_normal().string();
+}
+
+}  // namespace flash::data

@@ -1,0 +1,80 @@
+#include "data/text.h"
+
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+
+namespace flash::data {
+
+std::vector<std::string_view> split(std::string_view line, std::string_view separators) {
+  const bool merges = separators.find(' ') != std::string_view::npos;
+  std::vector<std::string_view> words;
+  std::size_t begin = 0;
+  while (begin <= line.size()) {
+    const std::size_t end = std::min(line.find_first_of(separators, begin), line.size());
+    if (end > begin || !merges) words.push_back(line.substr(begin, end - begin));
+    begin = end + 1;
+  }
+  return words;
+}
+
+namespace {
+std::string_view without_plus(std::string_view word) {
+  return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
+}
+}  // namespace
+
+std::optional<double> parse_number(std::string_view word) {
+  word = without_plus(word);
+  double value;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+std::optional<long> parse_integer(std::string_view word) {
+  word = without_plus(word);
+  long value;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+std::string format_number(double value) {
+  char buffer[32];
+  const auto [end, error] = std::to_chars(buffer, buffer + sizeof buffer, value);
+  return std::string(buffer, end);
+}
+
+std::string format_short(double value) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.4g", value);
+  return buffer;
+}
+
+std::string format_count(std::size_t count) {
+  std::string text = std::to_string(count);
+  for (int i = static_cast<int>(text.size()) - 3; i > 0; i -= 3)
+    text.insert(static_cast<std::size_t>(i), ",");
+  return text;
+}
+
+bool LineReader::next(std::string_view& line) {
+  if (rest_.empty()) return false;
+  const std::size_t end = rest_.find('\n');
+  line = rest_.substr(0, end);
+  const std::size_t used = end == std::string_view::npos ? rest_.size() : end + 1;
+  rest_.remove_prefix(used);
+  offset_ += used;
+  ++number_;
+  if (!line.empty() && line.back() == '\r') line.remove_suffix(1);
+  return true;
+}
+
+std::string lower_extension(const std::string& path) {
+  std::string extension = std::filesystem::path(path).extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return extension;
+}
+
+}  // namespace flash::data
