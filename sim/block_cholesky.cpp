@@ -2,23 +2,24 @@
 
 #include <metis.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
 #include <numeric>
+
+#include "sim/dense_front.h"
 
 namespace flash::sim {
 
 namespace {
 
-/// Columns eliminated together; `rows` are the vertices below them that they touch (permuted numbering, sorted).
+/// Columns eliminated together; `rows` are the vertices below them that they touch (permuted numbering,
+/// sorted).
 struct Supernode {
   int first_column = 0, column_count = 0;
   std::vector<int> rows;
   int parent = -1;
   std::vector<int> rows_in_parent;  ///< position of each of `rows` in the parent's front
   std::vector<int> children;
-  long factor_offset = 0;
+  long zeros = 0;  ///< blocks stored that are zero
 };
 
 struct Placement {
@@ -74,8 +75,10 @@ std::vector<int> postorder(const std::vector<int>& parent) {
   std::vector<std::vector<int>> children(size);
   std::vector<int> order, stack;
   for (int node = size - 1; node >= 0; --node) {
-    if (parent[node] < 0) stack.push_back(node);
-    else children[parent[node]].push_back(node);
+    if (parent[node] < 0)
+      stack.push_back(node);
+    else
+      children[parent[node]].push_back(node);
   }
   std::vector<char> opened(size, 0);
   while (!stack.empty()) {
@@ -91,13 +94,21 @@ std::vector<int> postorder(const std::vector<int>& parent) {
   return order;
 }
 
-std::vector<std::vector<int>> earlier_neighbours(const BlockPattern& pattern, const std::vector<int>& position) {
+std::vector<std::vector<int>> earlier_neighbours(const BlockPattern& pattern,
+                                                 const std::vector<int>& position) {
   std::vector<std::vector<int>> lists(pattern.size);
   for (const auto& [row, column] : pattern.pairs) {
     const auto [low, high] = std::minmax(position[row], position[column]);
     lists[high].push_back(low);
   }
   return lists;
+}
+
+/// Storage of a supernode's update matrix.
+template <typename Scalar>
+long update_entries(const Supernode& node) {
+  const int rows = 3 * static_cast<int>(node.rows.size());
+  return static_cast<long>(padded<Scalar>(rows)) * rows;
 }
 
 /// Zeros that merging `child` into its parent would store, in blocks.
@@ -109,11 +120,10 @@ long merge_zeros(const Supernode& child, const Supernode& parent) {
 
 struct SymbolicFactor {
   int size = 0;
-  std::vector<int> position;           ///< vertex -> elimination position
-  std::vector<Supernode> supernodes;   ///< in elimination order
+  std::vector<int> position;                       ///< vertex -> elimination position
+  std::vector<Supernode> supernodes;               ///< in elimination order
   std::vector<std::vector<Placement>> placements;  ///< matrix blocks that enter each front
   long entries = 0;
-  long stack_entries = 0;
   int largest_front = 0;
 };
 
@@ -143,7 +153,8 @@ std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern) {
     if (parent[column] >= 0) children[parent[column]].push_back(column);
   }
 
-  // Fundamental supernodes, then merged with the parent where few zeros are stored: larger dense fronts run faster.
+  // Fundamental supernodes, then merged with the parent where few zeros are stored: larger dense fronts run
+  // faster.
   std::vector<Supernode> nodes;
   for (int column = 0; column < size; ++column) {
     const bool extends = !nodes.empty() && parent[column - 1] == column &&
@@ -160,12 +171,15 @@ std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern) {
       const int end = last.first_column + last.column_count;
       const bool complete = column + 1 == size || parent[column] != column + 1 ||
                             structure[column].size() != structure[column + 1].size() + 1;
-      if (!complete || before.rows.empty() || before.rows.front() < last.first_column || before.rows.front() >= end) break;
-      const long zeros = merge_zeros(before, last);
+      if (!complete || before.rows.empty() || before.rows.front() < last.first_column ||
+          before.rows.front() >= end)
+        break;
+      const long zeros = before.zeros + last.zeros + merge_zeros(before, last);
       const int columns = before.column_count + last.column_count;
       const long stored = static_cast<long>(columns) * (columns + static_cast<long>(last.rows.size()));
-      if (!(columns <= 4 || zeros * 10 <= stored)) break;
+      if (zeros * 16 > stored) break;
       before.column_count = columns;
+      before.zeros = zeros;
       before.rows = last.rows;
       nodes.pop_back();
     }
@@ -182,18 +196,10 @@ std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern) {
     return node.column_count +
            static_cast<int>(std::lower_bound(node.rows.begin(), node.rows.end(), row) - node.rows.begin());
   };
-  long stack = 0;
   for (int s = 0; s < static_cast<int>(nodes.size()); ++s) {
     Supernode& node = nodes[s];
-    node.factor_offset = symbolic->entries;
     symbolic->entries += 9L * node.column_count * front_size(node);
     symbolic->largest_front = std::max(symbolic->largest_front, front_size(node));
-    for (int child : node.children) stack -= 9L * nodes[child].rows.size() * nodes[child].rows.size();
-    stack += 9L * node.rows.size() * node.rows.size();
-    // A front's update is written before the children's are dropped.
-    long children_entries = 0;
-    for (int child : node.children) children_entries += 9L * nodes[child].rows.size() * nodes[child].rows.size();
-    symbolic->stack_entries = std::max(symbolic->stack_entries, stack + children_entries);
     if (node.rows.empty()) continue;
     node.parent = owner[node.rows.front()];
     nodes[node.parent].children.push_back(s);
@@ -220,106 +226,97 @@ long factor_entries(const SymbolicFactor& symbolic) { return symbolic.entries; }
 
 template <typename Scalar>
 BlockCholesky<Scalar>::BlockCholesky(std::shared_ptr<const SymbolicFactor> symbolic)
-    : symbolic_(std::move(symbolic)),
-      factor_(symbolic_->entries),
-      stack_(symbolic_->stack_entries),
-      gathered_(3 * symbolic_->largest_front),
-      permuted_(3 * symbolic_->size) {}
+    : symbolic_(std::move(symbolic)) {
+  long entries = 0, stack = 0, largest_stack = 0;
+  for (const Supernode& node : symbolic_->supernodes) {
+    offsets_.push_back(entries);
+    entries += static_cast<long>(padded<Scalar>(3 * front_size(node))) * 3 * node.column_count;
+    long children = 0;
+    for (int child : node.children) children += update_entries<Scalar>(symbolic_->supernodes[child]);
+    // The update is built above the children's, then moves down onto them.
+    largest_stack = std::max(largest_stack, stack + update_entries<Scalar>(node));
+    stack += update_entries<Scalar>(node) - children;
+  }
+  factor_.resize(entries + lanes<Scalar>);
+  stack_.resize(largest_stack);
+  update_offsets_.resize(symbolic_->supernodes.size());
+  gathered_.resize(3 * symbolic_->largest_front);
+  permuted_.resize(3 * symbolic_->size);
+}
 
 template <typename Scalar>
 bool BlockCholesky<Scalar>::factorize(const BlockValues<Scalar>& values) {
-  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
-  using View = Eigen::Map<Matrix, 0, Eigen::OuterStride<>>;
   const auto& nodes = symbolic_->supernodes;
-  std::vector<long> update_offset(nodes.size());
   long top = 0;
   for (size_t s = 0; s < nodes.size(); ++s) {
     const Supernode& node = nodes[s];
-    const int front = 3 * front_size(node), columns = 3 * node.column_count, rows = front - columns;
-    Scalar* factor = factor_.data() + node.factor_offset;
-    std::fill(factor, factor + static_cast<long>(front) * columns, Scalar(0));
+    const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
+    const int front_rows = padded<Scalar>(columns + rows), update_rows = padded<Scalar>(rows);
+    Scalar* factor = factor_.data() + offsets_[s];
+    std::fill(factor, factor + static_cast<long>(front_rows) * columns, Scalar(0));
     for (const Placement& place : symbolic_->placements[s]) {
       const Scalar* block = values.data() + 9L * place.block;
-      Scalar* target = factor + 3L * place.front_column * front + 3L * place.front_row;
+      Scalar* target = factor + 3L * place.front_column * front_rows + 3L * place.front_row;
       for (int c = 0; c < 3; ++c)
-        for (int r = 0; r < 3; ++r) target[c * front + r] = place.transpose ? block[3 * r + c] : block[3 * c + r];
+        for (int r = 0; r < 3; ++r)
+          target[c * front_rows + r] = place.transpose ? block[3 * r + c] : block[3 * c + r];
     }
-    // This front's update matrix is built above the children's; it moves down onto them once they are consumed.
     Scalar* update = stack_.data() + top;
-    std::fill(update, update + static_cast<long>(rows) * rows, Scalar(0));
+    std::fill(update, update + update_entries<Scalar>(node), Scalar(0));
     for (int child : node.children) {
       const auto& map = nodes[child].rows_in_parent;
-      const int child_rows = 3 * static_cast<int>(map.size());
-      const Scalar* child_update = stack_.data() + update_offset[child];
-      for (size_t bc = 0; bc < map.size(); ++bc) {
-        const int target_column = 3 * map[bc];
+      const int child_rows = padded<Scalar>(3 * static_cast<int>(map.size()));
+      const Scalar* child_update = stack_.data() + update_offsets_[child];
+      for (size_t column = 0; column < map.size(); ++column) {
+        const int target_column = 3 * map[column];
         for (int c = 0; c < 3; ++c) {
-          const Scalar* source = child_update + (3L * bc + c) * child_rows;
-          Scalar* column = target_column < columns ? factor + static_cast<long>(target_column + c) * front
-                                                   : update + static_cast<long>(target_column - columns + c) * rows - columns;
-          for (size_t br = bc; br < map.size(); ++br) {
-            Scalar* entry = column + 3 * map[br];
-            entry[0] += source[3 * br];
-            entry[1] += source[3 * br + 1];
-            entry[2] += source[3 * br + 2];
+          const Scalar* source = child_update + (3L * column + c) * child_rows;
+          Scalar* target =
+              target_column < columns
+                  ? factor + static_cast<long>(target_column + c) * front_rows
+                  : update + static_cast<long>(target_column - columns + c) * update_rows - columns;
+          for (size_t row = column; row < map.size(); ++row) {
+            Scalar* entry = target + 3 * map[row];
+            entry[0] += source[3 * row];
+            entry[1] += source[3 * row + 1];
+            entry[2] += source[3 * row + 2];
           }
         }
       }
     }
-    View pivot(factor, columns, columns, Eigen::OuterStride<>(front));
-    Eigen::LLT<Eigen::Ref<Matrix, 0, Eigen::OuterStride<>>> llt(pivot);
-    if (llt.info() != Eigen::Success) return false;
-    if (rows > 0) {
-      View below(factor + columns, rows, columns, Eigen::OuterStride<>(front));
-      pivot.template triangularView<Eigen::Lower>().transpose().template solveInPlace<Eigen::OnTheRight>(below);
-      View schur(update, rows, rows, Eigen::OuterStride<>(rows));
-      schur.template selfadjointView<Eigen::Lower>().rankUpdate(below, Scalar(-1));
-    }
+    if (!eliminate_columns(factor, front_rows, columns)) return false;
+    if (rows > 0) subtract_outer_product(update, update_rows, rows, factor, front_rows, columns);
     if (!node.children.empty()) {
-      const long base = update_offset[node.children.front()];
-      std::copy(update, update + static_cast<long>(rows) * rows, stack_.data() + base);
+      const long base = update_offsets_[node.children.front()];
+      std::copy(update, update + update_entries<Scalar>(node), stack_.data() + base);
       top = base;
     }
-    update_offset[s] = top;
-    top += static_cast<long>(rows) * rows;
+    update_offsets_[s] = top;
+    top += update_entries<Scalar>(node);
   }
   return true;
 }
 
 template <typename Scalar>
-void BlockCholesky<Scalar>::solve_in_place(Eigen::Matrix<Scalar, Eigen::Dynamic, 1>& x) const {
-  using Matrix = Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic>;
-  using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
-  using ConstView = Eigen::Map<const Matrix, 0, Eigen::OuterStride<>>;
+void BlockCholesky<Scalar>::solve_in_place(Scalar* x) const {
   const auto& nodes = symbolic_->supernodes;
   for (int vertex = 0; vertex < symbolic_->size; ++vertex)
     for (int c = 0; c < 3; ++c) permuted_[3 * symbolic_->position[vertex] + c] = x[3 * vertex + c];
-
-  for (const Supernode& node : nodes) {
-    const int front = 3 * front_size(node), columns = 3 * node.column_count, rows = front - columns;
-    const Scalar* factor = factor_.data() + node.factor_offset;
-    Eigen::Map<Vector> own(permuted_.data() + 3 * node.first_column, columns);
-    ConstView(factor, columns, columns, Eigen::OuterStride<>(front)).template triangularView<Eigen::Lower>().solveInPlace(own);
-    if (rows == 0) continue;
-    Eigen::Map<Vector> gathered(gathered_.data(), rows);
-    gathered.noalias() = ConstView(factor + columns, rows, columns, Eigen::OuterStride<>(front)) * own;
+  for (size_t s = 0; s < nodes.size(); ++s) {
+    const Supernode& node = nodes[s];
+    const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
+    solve_forward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns, rows,
+                  permuted_.data() + 3 * node.first_column, gathered_.data());
     for (size_t r = 0; r < node.rows.size(); ++r)
-      for (int c = 0; c < 3; ++c) permuted_[3 * node.rows[r] + c] -= gathered[3 * r + c];
+      for (int c = 0; c < 3; ++c) permuted_[3 * node.rows[r] + c] -= gathered_[3 * r + c];
   }
-  for (auto node = nodes.rbegin(); node != nodes.rend(); ++node) {
-    const int front = 3 * front_size(*node), columns = 3 * node->column_count, rows = front - columns;
-    const Scalar* factor = factor_.data() + node->factor_offset;
-    Eigen::Map<Vector> own(permuted_.data() + 3 * node->first_column, columns);
-    if (rows > 0) {
-      Eigen::Map<Vector> gathered(gathered_.data(), rows);
-      for (size_t r = 0; r < node->rows.size(); ++r)
-        for (int c = 0; c < 3; ++c) gathered[3 * r + c] = permuted_[3 * node->rows[r] + c];
-      own.noalias() -= ConstView(factor + columns, rows, columns, Eigen::OuterStride<>(front)).transpose() * gathered;
-    }
-    ConstView(factor, columns, columns, Eigen::OuterStride<>(front))
-        .transpose()
-        .template triangularView<Eigen::Upper>()
-        .solveInPlace(own);
+  for (size_t s = nodes.size(); s-- > 0;) {
+    const Supernode& node = nodes[s];
+    const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
+    for (size_t r = 0; r < node.rows.size(); ++r)
+      for (int c = 0; c < 3; ++c) gathered_[3 * r + c] = permuted_[3 * node.rows[r] + c];
+    solve_backward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns, rows,
+                   permuted_.data() + 3 * node.first_column, gathered_.data());
   }
   for (int vertex = 0; vertex < symbolic_->size; ++vertex)
     for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted_[3 * symbolic_->position[vertex] + c];

@@ -1,13 +1,12 @@
 #pragma once
-#include <Eigen/Core>
 #include <memory>
 #include <utility>
 #include <vector>
 
 namespace flash::sim {
 
-/// Sparsity of a symmetric matrix of 3 x 3 blocks: every diagonal block and the listed pairs (row, column), row != column,
-/// each unordered pair once.
+/// Sparsity of a symmetric matrix of 3 x 3 blocks: every diagonal block and the listed pairs (row, column),
+/// row != column, each unordered pair once.
 struct BlockPattern {
   int size = 0;                            ///< vertices
   std::vector<std::pair<int, int>> pairs;  ///< off-diagonal blocks
@@ -17,8 +16,8 @@ struct BlockPattern {
 template <typename Scalar>
 using BlockValues = std::vector<Scalar>;
 
-/// Ordering, elimination tree and supernodes of a pattern: computed once a mesh, shared by all environments and threads.
-/// Nested dissection by METIS on the vertex graph (three unknowns a vertex stay together).
+/// Ordering, elimination tree and supernodes of a pattern: computed once a mesh, shared by all environments
+/// and threads. Nested dissection by METIS on the vertex graph (three unknowns a vertex stay together).
 struct SymbolicFactor;
 std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern);
 
@@ -35,12 +34,14 @@ class BlockCholesky {
   bool factorize(const BlockValues<Scalar>& values);
 
   /// x <- (L L^T)^-1 x, for x of 3 * size entries, vertex by vertex.
-  void solve_in_place(Eigen::Matrix<Scalar, Eigen::Dynamic, 1>& x) const;
+  void solve_in_place(Scalar* x) const;
 
  private:
   std::shared_ptr<const SymbolicFactor> symbolic_;
-  std::vector<Scalar> factor_;  ///< per supernode: column-major [L11; L21]
+  std::vector<Scalar> factor_;  ///< per supernode: column-major [L11; L21], rows padded to whole vectors
+  std::vector<long> offsets_;   ///< of each supernode in factor_
   std::vector<Scalar> stack_;   ///< update matrices waiting for their parent
+  std::vector<long> update_offsets_;  ///< of each supernode's update in stack_
   mutable std::vector<Scalar> gathered_, permuted_;
 };
 

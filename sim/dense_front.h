@@ -1,0 +1,153 @@
+#pragma once
+#include <cmath>
+#include <cstring>
+
+namespace flash::sim {
+
+// Dense kernels of the multifrontal factorization. Column-major, leading dimensions a multiple of `lanes`, so
+// that a column is whole vectors; what the padding rows hold is never read as a matrix entry.
+
+#ifdef __AVX512F__
+inline constexpr int vector_bytes = 64;
+#else
+inline constexpr int vector_bytes = 32;
+#endif
+
+template <typename Scalar>
+inline constexpr int lanes = vector_bytes / static_cast<int>(sizeof(Scalar));
+
+template <typename Scalar>
+struct VectorOf {
+  typedef Scalar type __attribute__((vector_size(vector_bytes), aligned(sizeof(Scalar))));
+};
+
+template <typename Scalar>
+constexpr int padded(int rows) {
+  return (rows + lanes<Scalar> - 1) / lanes<Scalar> * lanes<Scalar>;
+}
+
+/// C(i, j) -= sum_k A(i, k) B(j, k) for `Width` columns j and whole vectors of rows [first_row, end_row): 2 x
+/// Width register tiles, 2 loads and Width broadcasts for 2 Width multiply-adds.
+template <int Width, typename Scalar>
+void subtract_product(Scalar* c, int ldc, const Scalar* a, const Scalar* b, int lda, int depth, int first_row,
+                      int end_row) {
+  using Vector = typename VectorOf<Scalar>::type;
+  constexpr int step = lanes<Scalar>;
+  int row = first_row;
+  for (; row + 2 * step <= end_row; row += 2 * step) {
+    Vector low[Width], high[Width];
+    for (int j = 0; j < Width; ++j) low[j] = high[j] = Vector{};
+    for (int k = 0; k < depth; ++k) {
+      const Scalar* column = a + static_cast<long>(k) * lda + row;
+      const Vector a_low = *reinterpret_cast<const Vector*>(column);
+      const Vector a_high = *reinterpret_cast<const Vector*>(column + step);
+      const Scalar* factors = b + static_cast<long>(k) * lda;
+#pragma GCC unroll 6
+      for (int j = 0; j < Width; ++j) {
+        low[j] += a_low * factors[j];
+        high[j] += a_high * factors[j];
+      }
+    }
+    for (int j = 0; j < Width; ++j) {
+      Scalar* target = c + static_cast<long>(j) * ldc + row;
+      *reinterpret_cast<Vector*>(target) -= low[j];
+      *reinterpret_cast<Vector*>(target + step) -= high[j];
+    }
+  }
+  for (; row < end_row; row += step) {
+    Vector sum[Width];
+    for (int j = 0; j < Width; ++j) sum[j] = Vector{};
+    for (int k = 0; k < depth; ++k) {
+      const Vector a_row = *reinterpret_cast<const Vector*>(a + static_cast<long>(k) * lda + row);
+      const Scalar* factors = b + static_cast<long>(k) * lda;
+#pragma GCC unroll 6
+      for (int j = 0; j < Width; ++j) sum[j] += a_row * factors[j];
+    }
+    for (int j = 0; j < Width; ++j)
+      *reinterpret_cast<Vector*>(c + static_cast<long>(j) * ldc + row) -= sum[j];
+  }
+}
+
+/// Cholesky of the leading `columns` (a multiple of 3) of a front of `padded_rows` rows: on return the lower
+/// trapezoid holds [L11; L21]. Returns false at a pivot that is not positive.
+template <typename Scalar>
+bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
+  for (int panel = 0; panel < columns;) {
+    const int width = columns - panel >= 6 ? 6 : 3;
+    const int first = panel / lanes<Scalar> * lanes<Scalar>;
+    Scalar* target = front + static_cast<long>(panel) * padded_rows;
+    if (width == 6)
+      subtract_product<6>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
+    else
+      subtract_product<3>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
+    for (int j = panel; j < panel + width; ++j) {
+      Scalar* column = front + static_cast<long>(j) * padded_rows;
+      const Scalar pivot = column[j];
+      if (!(pivot > 0)) return false;
+      const Scalar scale = 1 / std::sqrt(pivot);
+      for (int i = j; i < padded_rows; ++i) column[i] *= scale;
+      for (int k = j + 1; k < panel + width; ++k) {
+        Scalar* later = front + static_cast<long>(k) * padded_rows;
+        const Scalar factor = column[k];
+        for (int i = k; i < padded_rows; ++i) later[i] -= factor * column[i];
+      }
+    }
+    panel += width;
+  }
+  return true;
+}
+
+/// update -= L21 L21^T on the lower triangle; L21 starts `columns` rows down the front. `rows` a multiple
+/// of 3. Reads up to `lanes` entries past the front's last column.
+template <typename Scalar>
+void subtract_outer_product(Scalar* update, int padded_update_rows, int rows, const Scalar* front,
+                            int padded_rows, int columns) {
+  const Scalar* below = front + columns;
+  for (int j = 0; j < rows;) {
+    const int width = rows - j >= 6 ? 6 : 3;
+    const int first = j / lanes<Scalar> * lanes<Scalar>;
+    Scalar* target = update + static_cast<long>(j) * padded_update_rows;
+    if (width == 6)
+      subtract_product<6>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
+                          padded_update_rows);
+    else
+      subtract_product<3>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
+                          padded_update_rows);
+    j += width;
+  }
+}
+
+/// [own; below] of one right-hand side through [L11; L21]: own <- L11^-1 own, below <- L21 own.
+template <typename Scalar>
+void solve_forward(const Scalar* front, int padded_rows, int columns, int rows, Scalar* own, Scalar* below) {
+  for (int i = 0; i < rows; ++i) below[i] = 0;
+  for (int j = 0; j < columns; ++j) {
+    const Scalar* column = front + static_cast<long>(j) * padded_rows;
+    const Scalar value = own[j] /= column[j];
+    for (int i = j + 1; i < columns; ++i) own[i] -= column[i] * value;
+    for (int i = 0; i < rows; ++i) below[i] += column[columns + i] * value;
+  }
+}
+
+/// own <- L11^-T (own - L21^T below).
+template <typename Scalar>
+void solve_backward(const Scalar* front, int padded_rows, int columns, int rows, Scalar* own,
+                    const Scalar* below) {
+  using Vector = typename VectorOf<Scalar>::type;
+  constexpr int step = lanes<Scalar>;
+  for (int j = columns - 1; j >= 0; --j) {
+    const Scalar* column = front + static_cast<long>(j) * padded_rows;
+    Vector sum{};
+    int i = 0;
+    for (; i + step <= rows; i += step)
+      sum += *reinterpret_cast<const Vector*>(column + columns + i) *
+             *reinterpret_cast<const Vector*>(below + i);
+    Scalar value = own[j];
+    for (int lane = 0; lane < step; ++lane) value -= sum[lane];
+    for (; i < rows; ++i) value -= column[columns + i] * below[i];
+    for (int k = j + 1; k < columns; ++k) value -= column[k] * own[k];
+    own[j] = value / column[j];
+  }
+}
+
+}  // namespace flash::sim
