@@ -1,0 +1,51 @@
+#include "sim/contact_geometry.h"
+
+#include <cmath>
+
+namespace flash::sim {
+
+namespace {
+
+using Eigen::Vector3d;
+
+Gap gap_of(const Plane& plane, const Vector3d& point, double) {
+  return {plane.normal.dot(point - plane.point), plane.normal, Vector3d::Zero()};
+}
+
+Gap gap_of(const Cylinder& cylinder, const Vector3d& point, double) {
+  Vector3d radial = point - cylinder.point;
+  radial -= cylinder.axis * cylinder.axis.dot(radial);
+  const double length = radial.norm();
+  return {length - cylinder.radius, length > 0 ? Vector3d(radial / length) : cylinder.axis.unitOrthogonal(), Vector3d::Zero()};
+}
+
+Gap gap_of(const Box& box, const Vector3d& point, double time) {
+  const Eigen::Isometry3d pose = box.trajectory.times.empty() ? box.pose : data::pose_at(box.trajectory, time);
+  const Vector3d local = pose.inverse() * point;
+  const Vector3d excess = local.cwiseAbs() - box.half_extents;
+  Gap gap;
+  if (excess.maxCoeff() <= 0) {
+    int axis;
+    gap.distance = excess.maxCoeff(&axis);
+    gap.normal = pose.linear() * (Vector3d::Unit(axis) * std::copysign(1.0, local[axis]));
+  } else {
+    const Vector3d outside = excess.cwiseMax(0.0).cwiseProduct(local.cwiseSign());
+    gap.distance = outside.norm();
+    gap.normal = pose.linear() * (outside / gap.distance);
+  }
+  gap.surface_velocity = Vector3d::Zero();
+  if (!box.trajectory.times.empty()) {
+    const double span = 1e-3;  // [s], short against any motion of a robot
+    const Eigen::Isometry3d before = data::pose_at(box.trajectory, time - span);
+    gap.surface_velocity = (pose * local - before * local) / span;
+  }
+  return gap;
+}
+
+}  // namespace
+
+Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time) {
+  return std::visit([&](const auto& shape) { return gap_of(shape, point, time); }, obstacle.shape);
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,18 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "sim/environment.h"
+
+namespace flash::sim {
+
+/// Where a point stands against an obstacle.
+struct Gap {
+  double distance;                   ///< to the surface, negative inside [m]
+  Eigen::Vector3d normal;            ///< unit, out of the obstacle
+  Eigen::Vector3d surface_velocity;  ///< of the obstacle's material at the contact [m/s]
+};
+
+/// Signed distance of `point` [m] to the obstacle at `time` [s]. Exact outside; inside a box the nearest face decides.
+Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time);
+
+}  // namespace flash::sim
