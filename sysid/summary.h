@@ -16,15 +16,15 @@ enum class RangeEdge { none, low, high };
 
 /// One searched parameter: the estimate, how sure it is, and the profile both were read from.
 struct ParameterFinding {
-  std::string name;                                  ///< published short name: young, poisson, bending, friction, ...
-  std::optional<double> estimate;                    ///< in the unit of the asset field
-  std::optional<std::array<double, 2>> interval95;   ///< 95 % confidence
+  std::string name;                ///< published short name: young, poisson, bending, friction, ...
+  std::optional<double> estimate;  ///< in the unit of the asset field
+  std::optional<std::array<double, 2>> interval95;  ///< 95 % confidence
   Identifiable identifiable = Identifiable::no;
   RangeEdge edge = RangeEdge::none;
-  std::string note;                                  ///< why, one line
-  bool logarithmic = false;                          ///< searched on a logarithmic axis
-  std::vector<double> values;                        ///< profile: values of this parameter, increasing
-  std::vector<double> scores;                        ///< profile: best score over all others at each value [m]
+  std::string note;            ///< why, one line
+  bool logarithmic = false;    ///< searched on a logarithmic axis
+  std::vector<double> values;  ///< profile: values of this parameter, increasing
+  std::vector<double> scores;  ///< profile: best score over all others at each value [m]
 };
 
 /// A parameter that was not searched.
@@ -42,52 +42,55 @@ struct SummaryFrame {
 /// How the best candidate fits one recording, and the nuisance values found for it.
 struct SummaryRecording {
   std::string name;
-  std::string sha256;                                 ///< of recording.json and the files it names
-  Eigen::Vector3d offset = Eigen::Vector3d::Zero();   ///< observed = simulated moved by this [m]
-  double yaw = 0;                                     ///< [rad]
-  double time_offset = 0;                             ///< [s]
-  std::map<std::string, double> nuisance;             ///< the others found: table_height_m, start_yaw_rad, ...
-  double score = 0;                                   ///< [m]
-  double sigma_m = 0;                                 ///< spread of one keyframe's score [m]
-  std::string sigma_source;                           ///< "repeatability", "residual", "given"
-  std::optional<double> horizon_s;                    ///< predictable until here [s]
+  std::string sha256;                                ///< of recording.json and the files it names
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< observed = simulated moved by this [m]
+  double yaw = 0;                                    ///< [rad]
+  double time_offset = 0;                            ///< [s]
+  std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
+  double score = 0;                                  ///< [m]
+  double sigma_m = 0;                                ///< spread of one keyframe's score [m]
+  std::string sigma_source;                          ///< "repeatability", "residual", "given"
+  std::optional<double> horizon_s;                   ///< predictable until here [s]
   std::vector<SummaryFrame> frames;
 };
 
 /// The best candidate solved once more under finer settings.
 struct SolverCheck {
-  std::string what;        ///< "half_step", "double_mesh", "four_times_iterations"
-  double score = 0;        ///< [m]
+  std::string what;             ///< "half_step", "double_mesh", "four_times_iterations"
+  double score = 0;             ///< [m]
   double surface_change_m = 0;  ///< mean distance between the two surfaces [m]
 };
 
 /// All that a search found: the file summary.json (schema "flash-sysid-summary/1").
 struct Summary {
-  std::map<std::string, double> best;         ///< every material parameter of the best candidate
-  double membrane_stiffness = 0;              ///< E t of the best candidate [N/m]
-  double best_score = 0;                      ///< [m]
-  double level95 = 0;                         ///< score below which a candidate is inside the 95 % region [m]
-  std::vector<ParameterFinding> parameters;   ///< the searched ones, in the order of the axes
+  std::map<std::string, double> best;        ///< every material parameter of the best candidate
+  double membrane_stiffness = 0;             ///< E t of the best candidate [N/m]
+  double best_score = 0;                     ///< [m]
+  double level95 = 0;                        ///< score below which a candidate is inside the 95 % region [m]
+  std::vector<ParameterFinding> parameters;  ///< the searched ones, in the order of the axes
   std::map<std::string, FixedParameter> fixed;
-  Eigen::MatrixXd covariance_log;             ///< of log(parameter) in the order of `parameters`; empty: not estimated
+  Eigen::MatrixXd covariance_log;  ///< of log(parameter) in the order of `parameters`; empty: not estimated
   std::vector<SummaryRecording> recordings;
   std::vector<SolverCheck> solver_check;
   std::map<std::string, std::string> settings;  ///< constitutive, bending_model, mesh, time_step_s, ...
-  std::string asset;                          ///< path of the asset the search started from
+  std::string asset;                            ///< path of the asset the search started from
   int candidates = 0;
   int unconverged = 0;
   std::string device = "cpu";
   double wall_seconds = 0;
   std::string tool_version;
   std::vector<std::string> warnings;
-  int exit_code = 0;                          ///< 0 usable; 3 finished, but the answer cannot be used
+  int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used
 };
 
 std::string to_string(Identifiable identifiable);
 std::string to_string(RangeEdge edge);  ///< "low", "high", or "" for none
 
-/// Written to a temporary file and renamed, so that a reader never sees half of it. Throws std::runtime_error when the
-/// folder cannot be written.
+/// The text of summary.json.
+std::string summary_text(const Summary& summary);
+
+/// Written to a temporary file and renamed, so that a reader never sees half of it. Throws std::runtime_error
+/// when the folder cannot be written.
 void save_summary(const Summary& summary, const std::string& path);
 
 /// Throws data::InputError naming file and field unless the file is of schema "flash-sysid-summary/1".

@@ -1,0 +1,214 @@
+#include "sysid/report.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string_view>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "sysid/next_steps.h"
+#include "sysid/parameter_label.h"
+
+namespace flash::embedded {
+std::string_view report_template();
+std::string_view plotly();
+std::string_view plotly_licence();
+}  // namespace flash::embedded
+
+namespace flash::sysid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+template <class T>
+Json optional(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+// Whole tenths of a millimetre: a sixth of the size of decimals, and finer than a pixel.
+Json tenths_of_millimetres(const data::Points& points, int at_most) {
+  Json flat = Json::array();
+  const Eigen::Index count = std::min<Eigen::Index>(points.rows(), at_most);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index row = i * points.rows() / count;
+    for (int k = 0; k < 3; ++k) flat.push_back(static_cast<int>(std::lround(1e4 * points(row, k))));
+  }
+  return flat;
+}
+
+Json numbers(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (double value : values) list.push_back(number(value));
+  return list;
+}
+
+void add_label(Json& entry, const std::string& name, bool has_thickness) {
+  const ParameterLabel label = parameter_label(name, has_thickness);
+  entry["name"] = name;
+  entry["label"] = label.label;
+  entry["symbol"] = label.symbol;
+  entry["unit"] = label.unit;
+}
+
+Json parameters_of(const Summary& summary, bool has_thickness) {
+  Json list = Json::array();
+  for (const ParameterFinding& finding : summary.parameters) {
+    Json entry;
+    add_label(entry, finding.name, has_thickness);
+    entry["estimate"] = optional(finding.estimate);
+    entry["interval95"] = optional(finding.interval95);
+    entry["identifiable"] = to_string(finding.identifiable);
+    entry["edge"] = to_string(finding.edge);
+    entry["note"] = finding.note;
+    entry["logarithmic"] = finding.logarithmic;
+    entry["values"] = finding.values;
+    entry["scores"] = numbers(finding.scores);
+    list.push_back(entry);
+  }
+  return list;
+}
+
+Json fixed_of(const Summary& summary, bool has_thickness) {
+  Json list = Json::array();
+  for (const auto& [name, fixed] : summary.fixed) {
+    Json entry;
+    add_label(entry, name, has_thickness);
+    entry["value"] = fixed.value;
+    entry["source"] = fixed.source;
+    list.push_back(entry);
+  }
+  return list;
+}
+
+Json recordings_of(const Summary& summary) {
+  Json list = Json::array();
+  for (const SummaryRecording& recording : summary.recordings) {
+    Json frames = Json::array();
+    for (const SummaryFrame& frame : recording.frames)
+      frames.push_back({{"t", frame.t}, {"score", number(frame.score)}, {"weight", frame.weight}});
+    list.push_back({{"name", recording.name},
+                    {"offset", {recording.offset.x(), recording.offset.y(), recording.offset.z()}},
+                    {"yaw", recording.yaw},
+                    {"time_offset", recording.time_offset},
+                    {"nuisance", recording.nuisance},
+                    {"score", number(recording.score)},
+                    {"sigma_m", number(recording.sigma_m)},
+                    {"sigma_source", recording.sigma_source},
+                    {"horizon_s", optional(recording.horizon_s)},
+                    {"frames", frames}});
+  }
+  return list;
+}
+
+// Columns in the order of the findings; axes of a single value have none.
+Json table_of(const Summary& summary, const GridResults& results) {
+  std::vector<std::size_t> columns;
+  for (const ParameterFinding& finding : summary.parameters)
+    for (std::size_t k = 0; k < results.axes.size(); ++k)
+      if (results.axes[k].name == finding.name) columns.push_back(k);
+  Json values = Json::array(), scores = Json::array();
+  if (columns.size() == summary.parameters.size()) {
+    for (const CandidateResult& candidate : results.candidates) {
+      Json row = Json::array();
+      for (std::size_t k : columns) row.push_back(candidate.values[k]);
+      values.push_back(row);
+      scores.push_back(number(candidate.score));
+    }
+  }
+  return {{"values", values}, {"scores", scores}};
+}
+
+Json overlays_of(const std::vector<Overlay>& overlays, int max_cloud_points) {
+  Json list = Json::array();
+  for (const Overlay& overlay : overlays) {
+    Json frames = Json::array();
+    for (const OverlayFrame& frame : overlay.frames)
+      frames.push_back(
+          {{"t", frame.t},
+           {"score", frame.cloud.rows() > 0 ? number(frame.score) : Json(nullptr)},
+           {"mesh", tenths_of_millimetres(frame.vertices, static_cast<int>(frame.vertices.rows()))},
+           {"cloud", tenths_of_millimetres(frame.cloud, max_cloud_points)}});
+    const std::vector<int> triangles(overlay.triangles.data(),
+                                     overlay.triangles.data() + overlay.triangles.size());
+    list.push_back({{"name", overlay.name}, {"triangles", triangles}, {"frames", frames}});
+  }
+  return list;
+}
+
+Json map_axes(const Summary& summary, const std::array<std::string, 2>& names) {
+  Json axes = Json::array();
+  for (const std::string& name : names) {
+    if (name.empty()) continue;
+    std::string known;
+    std::size_t k = 0;
+    while (k < summary.parameters.size() && summary.parameters[k].name != name)
+      known += (k ? ", " : "") + summary.parameters[k].name, ++k;
+    if (k == summary.parameters.size())
+      throw data::InputError("--map: " + name + " was not searched (searched: " + known + ")");
+    axes.push_back(k);
+  }
+  return axes;
+}
+
+// Inside a script element only "</" could end it; JSON may write it as "<\/".
+std::string inside_script(const Json& json) {
+  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  for (std::size_t at = text.find("</"); at != std::string::npos; at = text.find("</", at + 3))
+    text.insert(at + 1, 1, '\\');
+  return text;
+}
+
+std::string fill(std::string_view text,
+                 const std::vector<std::pair<std::string_view, std::string_view>>& values) {
+  std::string filled;
+  for (const auto& [key, value] : values) {
+    const std::size_t at = text.find(key);
+    filled.append(text.substr(0, at)).append(value);
+    text.remove_prefix(at + key.size());
+  }
+  return filled.append(text);
+}
+
+}  // namespace
+
+std::string render_report(const Summary& summary, const GridResults& results,
+                          const std::vector<Overlay>& overlays, const ReportSettings& settings) {
+  const bool has_thickness = summary.settings.count("thickness_m") > 0;
+  Json json;
+  json["parameters"] = parameters_of(summary, has_thickness);
+  json["fixed"] = fixed_of(summary, has_thickness);
+  json["recordings"] = recordings_of(summary);
+  json["score"] = number(summary.best_score);
+  json["level95"] = number(summary.level95);
+  json["candidates"] = summary.candidates;
+  json["unconverged"] = summary.unconverged;
+  json["exit_code"] = summary.exit_code;
+  json["warnings"] = summary.warnings;
+  json["unknowns"] = standing_unknowns(summary);
+  json["next_steps"] = next_steps(summary);
+  json["solver_check"] = Json::array();
+  for (const SolverCheck& check : summary.solver_check)
+    json["solver_check"].push_back({{"what", check.what},
+                                    {"score", number(check.score)},
+                                    {"surface_change_m", number(check.surface_change_m)}});
+  json["settings"] = summary.settings;
+  json["table"] = table_of(summary, results);
+  json["map_axes"] = map_axes(summary, settings.map_axes);
+  json["replays"] = overlays_of(overlays, settings.max_cloud_points);
+  char footer[160];
+  std::snprintf(footer, sizeof footer, "flash-sysid %s · device %s · %.0f s", summary.tool_version.c_str(),
+                summary.device.c_str(), summary.wall_seconds);
+  json["footer"] = footer;
+  return fill(embedded::report_template(), {{"@DATA@", inside_script(json)},
+                                            {"@PLOTLY_LICENCE@", embedded::plotly_licence()},
+                                            {"@PLOTLY@", embedded::plotly()}});
+}
+
+void write_report(const Summary& summary, const GridResults& results, const std::vector<Overlay>& overlays,
+                  const ReportSettings& settings, const std::string& path) {
+  data::write_atomically(path, render_report(summary, results, overlays, settings));
+}
+
+}  // namespace flash::sysid
