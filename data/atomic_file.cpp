@@ -1,9 +1,9 @@
 #include "data/atomic_file.h"
 
 #include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
@@ -37,22 +37,18 @@ void write_atomically(const std::string& path, std::string_view contents) {
   if (!parent.empty()) std::filesystem::create_directories(parent);
 
   TemporaryFile file;
-  file.path = path + ".XXXXXX";
-  file.descriptor = ::mkstemp(file.path.data());
-  if (file.descriptor < 0) {
-    file.path.clear();
-    throw_errno(path);
-  }
+  static std::atomic<unsigned> serial{0};
+  const std::string name = path + "." + std::to_string(::getpid()) + "-" + std::to_string(serial++) + ".tmp";
+  file.descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (file.descriptor < 0) throw_errno(path);
+  file.path = name;
   while (!contents.empty()) {
     const ssize_t written = ::write(file.descriptor, contents.data(), contents.size());
     if (written < 0 && errno == EINTR) continue;
     if (written < 0) throw_errno(path);
     contents.remove_prefix(static_cast<std::size_t>(written));
   }
-  // mkstemp makes files private; give them the mode any other new file would have.
-  const mode_t mask = ::umask(0);
-  ::umask(mask);
-  if (::fchmod(file.descriptor, 0666 & ~mask) != 0 || ::fsync(file.descriptor) != 0) throw_errno(path);
+  if (::fsync(file.descriptor) != 0) throw_errno(path);
   if (::rename(file.path.c_str(), path.c_str()) != 0) throw_errno(path);
   file.path.clear();
 }

@@ -1,8 +1,11 @@
 #include "data/text.h"
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 
 namespace flash::data {
 
@@ -38,6 +41,12 @@ std::optional<long> parse_integer(std::string_view word) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
   return value;
+}
+
+int to_index(double value) {
+  return value >= 0 && value <= std::numeric_limits<int>::max() && value == std::floor(value)
+             ? static_cast<int>(value)
+             : -1;
 }
 
 std::string format_number(double value) {

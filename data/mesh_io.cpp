@@ -1,0 +1,138 @@
+#include "data/mesh_io.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/obj.h"
+#include "data/pcd.h"
+#include "data/ply.h"
+#include "data/text.h"
+#include "data/vtk.h"
+
+namespace flash::data {
+namespace {
+
+void check_points(const Points& points, const std::string& source) {
+  Eigen::Index count = 0, first = -1;
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    if (!points.row(i).allFinite()) {
+      if (count++ == 0) first = i;
+    }
+  if (count > 0)
+    throw InputError(source + ": " + format_count(static_cast<std::size_t>(count)) + " of " +
+                     format_count(static_cast<std::size_t>(points.rows())) +
+                     " points are not finite; first at index " + std::to_string(first));
+}
+
+template <class Rows>
+void check_indices(const Rows& rows, Eigen::Index vertices, const char* what, const std::string& source) {
+  for (Eigen::Index i = 0; i < rows.rows(); ++i)
+    for (Eigen::Index k = 0; k < rows.cols(); ++k)
+      if (rows(i, k) < 0 || rows(i, k) >= vertices)
+        throw input_error(source, std::string(what) + ' ' + std::to_string(i),
+                          "found vertex index " + std::to_string(rows(i, k)) + ", expected 0 to " +
+                              std::to_string(vertices - 1));
+}
+
+double signed_volume(const Points& x, const Eigen::Vector4i& t) {
+  const Eigen::Vector3d a = x.row(t[1]) - x.row(t[0]), b = x.row(t[2]) - x.row(t[0]),
+                        c = x.row(t[3]) - x.row(t[0]);
+  return a.cross(b).dot(c) / 6;
+}
+
+}  // namespace
+
+Geometry load_geometry(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  const auto parse = [&]() -> Geometry {
+    if (extension == ".ply") return parse_ply(read_file(path), path);
+    if (extension == ".obj") return parse_obj(read_file(path), path);
+    if (extension == ".vtk") return parse_vtk(read_file(path), path);
+    if (extension == ".tet") return parse_tet(read_file(path), path);
+    if (extension == ".pcd") return {parse_pcd(read_file(path), path), {}, {}};
+    throw InputError(path + ": ending \"" + extension +
+                     "\" is not known, expected .ply, .obj, .vtk, .pcd or .tet");
+  };
+  Geometry geometry = parse();
+  check_points(geometry.points, path);
+  check_indices(geometry.triangles, geometry.points.rows(), "triangle", path);
+  check_indices(geometry.tetrahedra, geometry.points.rows(), "tetrahedron", path);
+  return geometry;
+}
+
+void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source) {
+  check_points(mesh.vertices, source);
+  check_indices(mesh.triangles, mesh.vertices.rows(), "triangle", source);
+  if (mesh.triangles.rows() == 0) throw InputError(source + ": found no triangles");
+  std::map<std::array<int, 3>, Eigen::Index> seen;
+  for (Eigen::Index i = 0; i < mesh.triangles.rows(); ++i) {
+    const Eigen::Vector3i t = mesh.triangles.row(i);
+    const Eigen::Vector3d a = mesh.vertices.row(t[1]) - mesh.vertices.row(t[0]);
+    const Eigen::Vector3d b = mesh.vertices.row(t[2]) - mesh.vertices.row(t[0]);
+    // Twice the area against the longest edge squared: below this the rest shape cannot be inverted in
+    // double.
+    const double longest = std::max({a.squaredNorm(), b.squaredNorm(), (a - b).squaredNorm()});
+    if (a.cross(b).norm() <= 1e-10 * longest || longest == 0)
+      throw input_error(source, "triangle " + std::to_string(i),
+                        "is degenerate: vertices " + std::to_string(t[0]) + ", " + std::to_string(t[1]) +
+                            ", " + std::to_string(t[2]) + " lie on a line");
+    std::array<int, 3> key = {t[0], t[1], t[2]};
+    std::sort(key.begin(), key.end());
+    const auto [earlier, is_new] = seen.emplace(key, i);
+    if (!is_new)
+      throw input_error(source, "triangle " + std::to_string(i),
+                        "repeats triangle " + std::to_string(earlier->second));
+  }
+}
+
+TriangleMesh load_triangle_mesh(const std::string& path) {
+  Geometry geometry = load_geometry(path);
+  TriangleMesh mesh{std::move(geometry.points), std::move(geometry.triangles)};
+  check_triangle_mesh(mesh, path);
+  return mesh;
+}
+
+TetMesh load_tet_mesh(const std::string& path) {
+  Geometry geometry = load_geometry(path);
+  if (geometry.tetrahedra.rows() == 0) throw InputError(path + ": found no tetrahedra");
+  for (Eigen::Index i = 0; i < geometry.tetrahedra.rows(); ++i) {
+    const double volume = signed_volume(geometry.points, geometry.tetrahedra.row(i));
+    if (volume < 0) std::swap(geometry.tetrahedra(i, 2), geometry.tetrahedra(i, 3));
+    if (volume == 0) throw input_error(path, "tetrahedron " + std::to_string(i), "is flat");
+  }
+  return {std::move(geometry.points), std::move(geometry.tetrahedra)};
+}
+
+Points load_point_cloud(const std::string& path) { return load_geometry(path).points; }
+
+void save_triangle_mesh(const TriangleMesh& mesh, const std::string& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".ply")
+    return write_atomically(path, format_ply(mesh.vertices, mesh.triangles, PlyNumbers::float64));
+  if (extension == ".obj") return write_atomically(path, format_obj(mesh));
+  if (extension == ".vtk") return write_atomically(path, format_vtk(mesh));
+  throw InputError(path + ": ending \"" + extension +
+                   "\" is not known for meshes, expected .ply, .obj or .vtk");
+}
+
+void save_tet_mesh(const TetMesh& mesh, const std::string& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".vtk") return write_atomically(path, format_vtk(mesh));
+  if (extension == ".tet") return write_atomically(path, format_tet(mesh));
+  throw InputError(path + ": ending \"" + extension +
+                   "\" is not known for tetrahedra, expected .vtk or .tet");
+}
+
+void save_point_cloud(const Points& points, const std::string& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".ply") return write_atomically(path, format_ply(points, {}, PlyNumbers::float32));
+  if (extension == ".pcd") return write_atomically(path, format_pcd(points));
+  throw InputError(path + ": ending \"" + extension + "\" is not known for clouds, expected .ply or .pcd");
+}
+
+}  // namespace flash::data

@@ -1,0 +1,193 @@
+#include "data/mesh_io.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <limits>
+
+#include "data/procedural_mesh.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::data {
+namespace {
+
+TEST(MeshIo, TrianglesSurviveEveryFormatExactly) {
+  const TemporaryFolder folder;
+  TriangleMesh mesh = delaunay_rectangle(0.3, 0.2, 0.05, 3);
+  mesh.vertices.col(2).setConstant(1.0 / 3);
+  for (const char* name : {"a.ply", "a.obj", "a.vtk"}) {
+    SCOPED_TRACE(name);
+    save_triangle_mesh(mesh, folder / name);
+    const TriangleMesh read = load_triangle_mesh(folder / name);
+    EXPECT_EQ(read.vertices, mesh.vertices);
+    EXPECT_EQ(read.triangles, mesh.triangles);
+  }
+}
+
+TEST(MeshIo, TetrahedraSurviveEveryFormatExactly) {
+  const TemporaryFolder folder;
+  const TetMesh mesh = tet_box({0.3, 0.2, 0.1}, {3, 2, 1});
+  for (const char* name : {"a.vtk", "a.tet"}) {
+    SCOPED_TRACE(name);
+    save_tet_mesh(mesh, folder / name);
+    const TetMesh read = load_tet_mesh(folder / name);
+    EXPECT_EQ(read.vertices, mesh.vertices);
+    EXPECT_EQ(read.tetrahedra, mesh.tetrahedra);
+  }
+}
+
+TEST(MeshIo, CloudsSurviveInFloat) {
+  const TemporaryFolder folder;
+  const Points points = Points::Random(50, 3);
+  for (const char* name : {"a.ply", "a.pcd"}) {
+    SCOPED_TRACE(name);
+    save_point_cloud(points, folder / name);
+    EXPECT_EQ(load_point_cloud(folder / name), points.cast<float>().cast<double>());
+  }
+}
+
+TEST(MeshIo, EmptyCloudIsReadAsEmpty) {
+  const TemporaryFolder folder;
+  save_point_cloud({}, folder / "a.ply");
+  EXPECT_EQ(load_point_cloud(folder / "a.ply").rows(), 0);
+}
+
+TEST(MeshIo, AsciiPlySkipsWhatItDoesNotNeedAndFansPolygons) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write(
+      "a.ply",
+      "ply\r\nformat ascii 1.0\r\ncomment by hand\r\nelement thing 1\nproperty list uchar "
+      "float junk\nelement vertex 4\nproperty uchar red\n"
+      "property double x\nproperty float y\nproperty int z\nelement face 1\nproperty list uchar uint "
+      "vertex_index\nproperty float quality\nend_header\n2 0.5 0.5\n255 0 0 0\n255 1 0 0\n255 1 1 0\n255 0 1 "
+      "2\n4 0 1 2 3 0.25\n");
+  const TriangleMesh mesh = load_triangle_mesh(path);
+  Points vertices(4, 3);
+  vertices << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 2;
+  Triangles triangles(2, 3);
+  triangles << 0, 1, 2, 0, 2, 3;
+  EXPECT_EQ(mesh.vertices, vertices);
+  EXPECT_EQ(mesh.triangles, triangles);
+}
+
+TEST(MeshIo, ObjUnderstandsTexturesNormalsNegativeIndicesAndQuads) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a.obj",
+                                        "# made by hand\nmtllib x.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 "
+                                        "0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2//1 3/1\nf -4 -2 -1\n");
+  Triangles triangles(2, 3);
+  triangles << 0, 1, 2, 0, 2, 3;
+  EXPECT_EQ(load_triangle_mesh(path).triangles, triangles);
+}
+
+TEST(MeshIo, BinaryVtkIsBigEndian) {
+  const TemporaryFolder folder;
+  const auto big = [](auto value) {
+    std::string bytes(reinterpret_cast<const char*>(&value), sizeof value);
+    return std::string(bytes.rbegin(), bytes.rend());
+  };
+  std::string file = "# vtk DataFile Version 3.0\nx\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n";
+  for (const float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.5f}) file += big(value);
+  file += "\nCELLS 2 9\n";
+  for (const int value : {4, 0, 2, 1, 3, 3, 0, 1, 2}) file += big(value);
+  file += "\nCELL_TYPES 2\n";
+  for (const int value : {10, 5}) file += big(value);
+  file += "\n";
+  const std::string path = folder.write("a.vtk", file);
+  const TetMesh tets = load_tet_mesh(path);
+  EXPECT_EQ(tets.vertices(3, 2), 1.5);
+  // Written inside out: turned on loading.
+  EXPECT_EQ(tets.tetrahedra.row(0), Eigen::RowVector4i(0, 2, 3, 1));
+  EXPECT_EQ(load_triangle_mesh(path).triangles.row(0), Eigen::RowVector3i(0, 1, 2));
+}
+
+TEST(MeshIo, VtkOfVersionFiveHasOffsetsAndConnectivity) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write(
+      "a.vtk",
+      "# vtk DataFile Version 5.1\nx\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n0 0 0 1 0 0 1 1 0\n0 1 "
+      "0\nMETADATA\n"
+      "INFORMATION 0\n\nPOLYGONS 3 6\nOFFSETS vtktypeint64\n0 3 6\nCONNECTIVITY vtktypeint64\n0 1 2 0 2 3\n"
+      "POINT_DATA 4\nSCALARS s float 1\nLOOKUP_TABLE default\n1 2 3 4\n");
+  EXPECT_EQ(load_triangle_mesh(path).triangles.row(1), Eigen::RowVector3i(0, 2, 3));
+}
+
+TEST(MeshIo, AsciiPcdDropsTheHolesOfAnOrganisedCloud) {
+  const TemporaryFolder folder;
+  const std::string path =
+      folder.write("a.pcd",
+                   "# .PCD v0.7\nVERSION 0.7\nFIELDS rgb x y z\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 "
+                   "1\nWIDTH 3\nHEIGHT 1\nPOINTS 3\nDATA ascii\n9 1 2 3\n9 nan nan nan\n9 4 5 6\n");
+  const Points points = load_point_cloud(path);
+  ASSERT_EQ(points.rows(), 2);
+  EXPECT_EQ(points.row(1), Eigen::RowVector3d(4, 5, 6));
+}
+
+std::string ply(const std::string& body, int vertices, int faces) {
+  return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(vertices) +
+         "\nproperty float x\nproperty float y\nproperty float z\nelement face " + std::to_string(faces) +
+         "\nproperty list uchar int vertex_indices\nend_header\n" + body;
+}
+
+TEST(MeshIo, BrokenMeshesAreNamed) {
+  const TemporaryFolder folder;
+  const auto message = [&](const std::string& name, const std::string& contents) {
+    const std::string path = folder.write(name, contents);
+    std::string text = input_error_of([&] { load_triangle_mesh(path); });
+    return text.starts_with(path) ? text.substr(path.size()) : "no file in: " + text;
+  };
+  const std::string square = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n";
+  EXPECT_EQ(message("a.ply", ply("0 0 0\n1 nan 0\n1 inf 0\n3 0 1 2\n", 3, 1)),
+            ": 2 of 3 points are not finite; first at index 1");
+  EXPECT_EQ(message("a.ply", ply(square + "3 0 1 4\n", 4, 1)),
+            ": triangle 0: found vertex index 4, expected 0 to 3");
+  EXPECT_EQ(message("a.ply", ply(square + "3 0 1 -1\n", 4, 1)),
+            ": triangle 0: found vertex index -1, expected 0 to 3");
+  EXPECT_EQ(message("a.ply", ply(square + "3 0 1 2\n3 0 0 2\n", 4, 2)),
+            ": triangle 1: is degenerate: vertices 0, 0, 2 lie on a line");
+  EXPECT_EQ(message("a.ply", ply(square + "3 0 1 2\n3 2 0 1\n", 4, 2)), ": triangle 1: repeats triangle 0");
+  EXPECT_EQ(message("a.ply", ply(square, 4, 0)), ": found no triangles");
+  EXPECT_EQ(message("a.ply", ply(square, 5, 1)), ": ends before all elements of its header are read");
+  EXPECT_EQ(message("a.ply", ply(square + "2 0 1\n", 4, 1)), ": face 0 has 2 corners, expected 3 or more");
+  EXPECT_EQ(message("a.ply", "solid"), ": not a PLY file, expected \"ply\" on its first line");
+  EXPECT_EQ(message("a.ply", "ply\nformat binary_big_endian 1.0\n"),
+            ": header line 2: found \"format binary_big_endian 1.0\", expected format ascii or "
+            "binary_little_endian");
+  EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 x\n"), ": line 2: found \"x\", expected a coordinate");
+  EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 4\n"),
+            ": triangle 0: found vertex index 3, expected 0 to 2");
+  EXPECT_EQ(message("a.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n"),
+            ": DATASET STRUCTURED_POINTS, expected POLYDATA or UNSTRUCTURED_GRID");
+  EXPECT_EQ(message("a.stl", ""), ": ending \".stl\" is not known, expected .ply, .obj, .vtk, .pcd or .tet");
+}
+
+TEST(MeshIo, TruncatedBinaryFilesAreErrorsNotCrashes) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = parse_mesh_spec("sheet:0.1x0.1:0.05");
+  for (const char* name : {"a.ply", "a.vtk", "a.obj"}) {
+    save_triangle_mesh(mesh, folder / name);
+    std::ifstream stream(folder / name, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+    for (std::size_t size = 0; size < bytes.size(); size += 7) {
+      const std::string path = folder.write(std::string("cut_") + name, bytes.substr(0, size));
+      try {
+        load_triangle_mesh(path);  // a text file may be cut where it still makes sense
+      } catch (const InputError&) {
+      }
+    }
+  }
+}
+
+TEST(MeshIo, ReadsTheSiliconeParts) {
+  const std::string folder = std::string(FLASH_SHARED_DIR) + "/data/silicone/";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
+  for (const char* part : {"h_e_c", "h_m_c"}) {
+    const TetMesh rest = load_tet_mesh(folder + part + "_rest.vtk");
+    EXPECT_EQ(rest.vertices.rows(), 534);
+    EXPECT_EQ(rest.tetrahedra.rows(), 1750);
+    EXPECT_GT(load_point_cloud(folder + part + "_cloud.ply").rows(), 10000);
+  }
+}
+
+}  // namespace
+}  // namespace flash::data
