@@ -66,6 +66,7 @@ struct State {
   double time = 0.0;         ///< [s]
   data::Points positions;    ///< [m]
   data::Points velocities;   ///< [m/s]
+  std::vector<data::Points> grasp_offsets;  ///< of held vertices in the gripper frame [m], a grasp each; empty: open
 };
 
 /// One simulated world: its own material, motion and state over a shared Sheet.

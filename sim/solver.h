@@ -4,6 +4,7 @@
 
 #include "sim/environment.h"
 #include "sim/sheet.h"
+#include "sim/sheet_plan.h"
 
 namespace flash::sim {
 
@@ -11,11 +12,12 @@ struct SolverSettings {
   double time_step = 0.01;      ///< h [s]
   int max_iterations = 60;      ///< Newton iterations a step
   double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
+  double gap_tolerance = 1e-7;  ///< on penetration and on the gap of a touching vertex [m]
 };
 
 /// How one step of one environment went.
 struct StepReport {
-  double residual = 0;            ///< |r| / |M g|; without gravity over the largest inertial force
+  double residual = 0;            ///< |r| / |M g|; without gravity as if it were 9.81 m/s^2
   int iterations = 0;
   bool converged = false;
   double penetration_max = 0;     ///< deepest vertex below a surface [m]
@@ -32,6 +34,7 @@ struct StepReport {
 class Solver {
  public:
   Solver(const Sheet& sheet, const SolverSettings& settings);
+  Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings);
   ~Solver();
   Solver(Solver&&) noexcept;
 

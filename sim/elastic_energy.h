@@ -1,0 +1,25 @@
+#pragma once
+#include "data/material.h"
+#include "sim/sheet_plan.h"
+
+namespace flash::sim {
+
+struct ElasticEnergy {
+  double membrane = 0.0;  ///< [J]
+  double bending = 0.0;   ///< [J]
+};
+
+/// Elastic energy of the sheet at `positions`; adds its gradient to `gradient` (vertices x 3) [N].
+ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator& bending, const data::SheetMaterial& material,
+                                   const data::Points& positions, data::Points& gradient);
+
+/// Adds `scale` times the elastic Hessian, with its negative eigenvalues element by element set to zero and with the
+/// stand-in for the plate's bending.
+void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, const data::SheetMaterial& material,
+                         const data::Points& positions, double scale, BlockValues<double>& values);
+
+/// y += scale * values * x, vertex by vertex.
+void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale, const data::Points& x,
+                       data::Points& y);
+
+}  // namespace flash::sim
