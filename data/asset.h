@@ -44,9 +44,13 @@ struct Asset {
 /// Throws InputError on unknown fields (naming the nearest known one), on values out of range and on anything
 /// missing.
 Asset load_asset(const std::string& path);
-void save_asset(const Asset& asset, const std::string& path, AssetFormat format);
 
-/// An asset of another format in the terms of `format`. What that format cannot say comes back in `notices`.
+/// Writes the asset in its own format; a mesh file is named relative to `path`.
+void save_asset(const Asset& asset, const std::string& path);
+
+/// The asset in the terms of another format, E t, total mass and w = D / 3 for the published one. What that
+/// format cannot say is appended to `notices`. rest_area: of the sheet [m^2]; solids are taken over as they
+/// are.
 Asset express_as(const Asset& asset, AssetFormat format, double rest_area, std::vector<std::string>& notices);
 
 /// What was understood, and the sentences that say so ("E t = 30 N/m (young without thickness)", ...).

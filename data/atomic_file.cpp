@@ -68,4 +68,10 @@ std::string resolve_path(const std::string& path, const std::string& referring_f
   return (std::filesystem::path(referring_file).parent_path() / given).lexically_normal().string();
 }
 
+std::string relative_path(const std::string& path, const std::string& referring_file) {
+  const std::filesystem::path folder =
+      std::filesystem::absolute(referring_file).parent_path().lexically_normal();
+  return std::filesystem::absolute(path).lexically_normal().lexically_relative(folder).string();
+}
+
 }  // namespace flash::data

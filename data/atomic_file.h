@@ -14,4 +14,7 @@ std::string read_file(const std::string& path);
 /// `path` itself if absolute, else relative to the folder of `referring_file`, the file that names it.
 std::string resolve_path(const std::string& path, const std::string& referring_file);
 
+/// The inverse: how `referring_file` names `path`, relative where both have a common root.
+std::string relative_path(const std::string& path, const std::string& referring_file);
+
 }  // namespace flash::data
