@@ -38,11 +38,12 @@ void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t
   const std::string flat = value.dump();
   if (!nested || indent + used + flat.size() + flat.size() / 10 < kLine) {
     // One line, with a blank after each comma and colon outside of strings.
-    bool quoted = false;
-    for (std::size_t i = 0; i < flat.size(); ++i) {
-      text += flat[i];
-      if (flat[i] == '"' && (i == 0 || flat[i - 1] != '\\')) quoted = !quoted;
-      if (!quoted && (flat[i] == ',' || flat[i] == ':')) text += ' ';
+    bool quoted = false, escaped = false;
+    for (const char c : flat) {
+      text += c;
+      if (c == '"' && !escaped) quoted = !quoted;
+      escaped = c == '\\' && !escaped;
+      if (!quoted && (c == ',' || c == ':')) text += ' ';
     }
     return;
   }

@@ -1,0 +1,333 @@
+#include "data/asset.h"
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
+#include "data/text.h"
+
+namespace flash::data {
+namespace {
+
+constexpr std::array kConstitutiveNames = {std::pair{Constitutive::tri_arap, "TRI_ARAP"},
+                                           std::pair{Constitutive::tri_corotated, "TRI_COROTATED"},
+                                           std::pair{Constitutive::tri_stvk, "TRI_STVK"},
+                                           std::pair{Constitutive::tri_neohookean, "TRI_NEOHOOKEAN"},
+                                           std::pair{Constitutive::tet_arap, "TET_ARAP"},
+                                           std::pair{Constitutive::tet_corotated, "TET_COROTATED"},
+                                           std::pair{Constitutive::tet_neohookean, "TET_NEOHOOKEAN"}};
+
+constexpr std::array kBendingModelNames = {std::pair{BendingModel::plate, "plate"},
+                                           std::pair{BendingModel::isometric, "isometric"},
+                                           std::pair{BendingModel::hinge, "hinge"}};
+
+template <class Names, class Value>
+const char* name_in(const Names& names, Value value) {
+  for (const auto& [candidate, name] : names)
+    if (candidate == value) return name;
+  return "";
+}
+
+template <class Names>
+auto value_in(const Names& names, const std::string& name, const std::string& source,
+              const std::string& field) {
+  std::string expected;
+  for (const auto& [value, known] : names) {
+    if (name == known) return value;
+    expected += (expected.empty() ? "" : ", ") + std::string(known);
+  }
+  throw input_error(source, field, "found \"" + name + "\", expected one of " + expected);
+}
+
+bool is_solid(Constitutive constitutive) {
+  return constitutive == Constitutive::tet_arap || constitutive == Constitutive::tet_corotated ||
+         constitutive == Constitutive::tet_neohookean;
+}
+
+double plate_rigidity(double youngs_modulus, double poissons_ratio, double thickness) {
+  return youngs_modulus * thickness * thickness * thickness / (12 * (1 - poissons_ratio * poissons_ratio));
+}
+
+void read_mass(const JsonObject& props, Asset& asset) {
+  const std::array<std::pair<const char*, std::optional<double>*>, 4> masses = {
+      {{"density", &asset.density},
+       {"areal_density", &asset.areal_density},
+       {"mass", &asset.mass},
+       {"obj_mass", &asset.object_mass}}};
+  std::string found;
+  int count = 0;
+  for (const auto& [key, value] : masses) {
+    if (!props.has(key)) continue;
+    *value = props.positive(key);
+    found += (count++ == 0 ? "" : ", ") + std::string(key);
+  }
+  if (count != 1)
+    throw input_error(asset.source, "mechanical_props",
+                      "found " + (count == 0 ? "no mass" : found) +
+                          ", expected exactly one of density, areal_density, mass, obj_mass");
+}
+
+void read_properties(const JsonObject& props, Asset& asset) {
+  const bool published = asset.format == AssetFormat::published;
+  // The published coefficient is not D: under the wrong schema it would be off by a factor of 3 unnoticed.
+  if (!published && props.has("bending"))
+    throw props.error("bending", "bending_rigidity [N m] in flash-asset/1 (D = 3 bending)");
+  if (published && props.has("bending_rigidity"))
+    throw props.error("bending_rigidity", "bending, or \"schema\": \"flash-asset/1\"");
+  props.expect_fields({"obj_mass", "mass", "density", "areal_density", "young", "poisson", "constitutive",
+                       "thickness", published ? "bending" : "bending_rigidity", "bending_model", "friction",
+                       "air_drag", "stiffness_damping"});
+  asset.constitutive =
+      parse_constitutive(props.string("constitutive"), asset.source, props.name_of("constitutive"));
+  const bool solid = asset.element_type == ElementType::tetrahedron;
+  if (solid != is_solid(asset.constitutive))
+    throw props.error("constitutive",
+                      solid ? "TET_... for element_type TETRAHEDRON" : "TRI_... for element_type TRIANGLE");
+  asset.young = props.positive("young");
+  asset.poisson = props.number("poisson");
+  if (!(asset.poisson > -1 && (asset.poisson < 0.5 || (!solid && asset.poisson == 0.5))))
+    throw props.error("poisson", solid ? "above -1 and below 0.5" : "above -1 and at most 0.5");
+  if (props.has("thickness")) asset.thickness = props.positive("thickness");
+  if (props.has("bending")) asset.published_bending = props.not_negative("bending");
+  if (props.has("bending_rigidity")) asset.bending_rigidity = props.not_negative("bending_rigidity");
+  if (props.has("bending_model"))
+    asset.bending_model =
+        parse_bending_model(props.string("bending_model"), asset.source, props.name_of("bending_model"));
+  read_mass(props, asset);
+  if (asset.density && !asset.thickness && !solid)
+    throw props.error("thickness", "a thickness beside density, or areal_density");
+  if (asset.areal_density && solid)
+    throw props.error("areal_density", "density, mass or obj_mass for a solid");
+  if (!published && !solid && !asset.thickness && !asset.bending_rigidity)
+    throw props.error("bending_rigidity", "D [N m], or a thickness for the plate formula");
+  asset.friction = props.not_negative("friction", asset.friction);
+  asset.air_drag = props.not_negative("air_drag", 0);
+  asset.stiffness_damping = props.not_negative("stiffness_damping", 0);
+}
+
+nlohmann::ordered_json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+double areal_density_of(const Asset& asset, double rest_area) {
+  if (asset.areal_density) return *asset.areal_density;
+  if (asset.density) return *asset.density * asset.thickness.value_or(1);
+  return (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_area;
+}
+
+}  // namespace
+
+const char* to_string(Constitutive constitutive) { return name_in(kConstitutiveNames, constitutive); }
+const char* to_string(BendingModel model) { return name_in(kBendingModelNames, model); }
+
+Constitutive parse_constitutive(const std::string& name, const std::string& source,
+                                const std::string& field) {
+  return value_in(kConstitutiveNames, name, source, field);
+}
+
+BendingModel parse_bending_model(const std::string& name, const std::string& source,
+                                 const std::string& field) {
+  return value_in(kBendingModelNames, name, source, field);
+}
+
+Eigen::Matrix3d rotation_from_degrees(const Eigen::Vector3d& degrees) {
+  const Eigen::Vector3d r = degrees * std::numbers::pi / 180;
+  return (Eigen::AngleAxisd(r.z(), Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(r.y(), Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(r.x(), Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+Asset load_asset(const std::string& path) {
+  const nlohmann::json json = load_json(path);
+  const JsonObject file(json, path);
+  Asset asset;
+  asset.source = path;
+  asset.format = file.has("schema") ? AssetFormat::flash_1 : AssetFormat::published;
+  if (file.has("schema") && file.string("schema") != "flash-asset/1")
+    throw file.error("schema", "\"flash-asset/1\", or no schema for the published format");
+  file.expect_fields(
+      {"schema", "name", "mesh", "element_type", "transformation", "mechanical_props", "identification"});
+
+  const std::string mesh = file.string("mesh");
+  asset.mesh = is_mesh_spec(mesh) ? mesh : resolve_path(mesh, path);
+  const std::string element_type = file.string("element_type", "TRIANGLE");
+  if (element_type != "TRIANGLE" && element_type != "TETRAHEDRON")
+    throw file.error("element_type", "TRIANGLE or TETRAHEDRON");
+  if (element_type == "TETRAHEDRON") asset.element_type = ElementType::tetrahedron;
+  if (file.has("transformation")) {
+    const JsonObject transformation = file.object("transformation");
+    transformation.expect_fields({"trans", "rotation"});
+    asset.translation = transformation.vector3("trans", asset.translation);
+    asset.rotation_degrees = transformation.vector3("rotation", asset.rotation_degrees);
+  }
+  read_properties(file.object("mechanical_props"), asset);
+  if (file.has("identification")) asset.identification = file.object("identification").value().dump();
+  return asset;
+}
+
+void save_asset(const Asset& asset, const std::string& path) {
+  nlohmann::ordered_json file, props;
+  const bool published = asset.format == AssetFormat::published;
+  if (!published) file["schema"] = "flash-asset/1";
+  file["mesh"] = is_mesh_spec(asset.mesh) ? asset.mesh : relative_path(asset.mesh, path);
+  file["element_type"] = asset.element_type == ElementType::triangle ? "TRIANGLE" : "TETRAHEDRON";
+  file["transformation"] = {{"trans", vector_json(asset.translation)},
+                            {"rotation", vector_json(asset.rotation_degrees)}};
+  const auto put = [&](const char* key, const std::optional<double>& value) {
+    if (value) props[key] = *value;
+  };
+  put("obj_mass", asset.object_mass);
+  put("mass", asset.mass);
+  put("density", asset.density);
+  put("areal_density", asset.areal_density);
+  props["young"] = asset.young;
+  props["poisson"] = asset.poisson;
+  props["constitutive"] = to_string(asset.constitutive);
+  put("thickness", asset.thickness);
+  put(published ? "bending" : "bending_rigidity",
+      published ? asset.published_bending : asset.bending_rigidity);
+  if (!published) {
+    if (asset.bending_model) props["bending_model"] = to_string(*asset.bending_model);
+    props["friction"] = asset.friction;
+    if (asset.air_drag != 0) props["air_drag"] = asset.air_drag;
+    if (asset.stiffness_damping != 0) props["stiffness_damping"] = asset.stiffness_damping;
+  }
+  file["mechanical_props"] = props;
+  if (!published && !asset.identification.empty())
+    file["identification"] = nlohmann::ordered_json::parse(asset.identification);
+  write_atomically(path, format_json(file));
+}
+
+ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
+  if (asset.element_type != ElementType::triangle)
+    throw input_error(asset.source, "element_type", "found TETRAHEDRON, expected TRIANGLE: a sheet");
+  ResolvedSheet sheet;
+  SheetMaterial& m = sheet.material;
+  m.constitutive = asset.constitutive;
+  m.poissons_ratio = asset.poisson;
+  m.membrane_stiffness = asset.young * asset.thickness.value_or(1);
+  m.areal_density = areal_density_of(asset, rest_area);
+  m.friction = asset.friction;
+  m.air_drag = asset.air_drag;
+  m.stiffness_damping = asset.stiffness_damping;
+  sheet.total_mass = m.areal_density * rest_area;
+  sheet.uniform_vertex_mass = asset.object_mass.has_value();
+
+  std::string origin_of_bending = "bending_rigidity";
+  if (asset.bending_rigidity) {
+    m.bending_rigidity = *asset.bending_rigidity;
+  } else if (asset.published_bending) {
+    m.bending_rigidity = 3 * *asset.published_bending;
+    m.bending_model = BendingModel::isometric;
+    origin_of_bending =
+        "3 x bending " + format_short(*asset.published_bending) + ", as the published coefficient means it";
+  } else if (asset.thickness) {
+    m.bending_rigidity = plate_rigidity(asset.young, asset.poisson, *asset.thickness);
+    origin_of_bending = "plate formula E t^3 / (12 (1 - nu^2))";
+  } else {
+    m.bending_rigidity = 0;
+    origin_of_bending = "no bending in the file";
+  }
+  if (asset.bending_model) m.bending_model = *asset.bending_model;
+
+  const std::string source = asset.source.empty() ? "asset" : asset.source;
+  sheet.notices.push_back(source + ": E t = " + format_short(m.membrane_stiffness) + " N/m (" +
+                          (asset.thickness ? "young " + format_short(asset.young) + " Pa x thickness " +
+                                                 format_short(*asset.thickness) + " m"
+                                           : "young without a thickness") +
+                          "), nu = " + format_short(m.poissons_ratio));
+  sheet.notices.push_back(source + ": D = " + format_short(m.bending_rigidity) + " N m (" +
+                          origin_of_bending + "), bending_model " + to_string(m.bending_model));
+  sheet.notices.push_back(source + ": mass = " + format_short(sheet.total_mass) + " kg, " +
+                          format_short(m.areal_density) + " kg/m^2" +
+                          (asset.object_mass ? " (obj_mass, the total, spread evenly over vertices)" : ""));
+  return sheet;
+}
+
+ResolvedSolid resolve_solid(const Asset& asset, double rest_volume) {
+  if (asset.element_type != ElementType::tetrahedron)
+    throw input_error(asset.source, "element_type", "found TRIANGLE, expected TETRAHEDRON: a solid");
+  ResolvedSolid solid;
+  solid.youngs_modulus = asset.young;
+  solid.poissons_ratio = asset.poisson;
+  solid.density = asset.density ? *asset.density
+                                : (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_volume;
+  solid.notices.push_back(asset.source + ": E = " + format_short(solid.youngs_modulus) + " Pa, nu = " +
+                          format_short(solid.poissons_ratio) + ", density = " + format_short(solid.density) +
+                          " kg/m^3, mass = " + format_short(solid.density * rest_volume) + " kg");
+  return solid;
+}
+
+Asset express_as(const Asset& asset, AssetFormat format, double rest_area,
+                 std::vector<std::string>& notices) {
+  Asset result = asset;
+  result.format = format;
+  if (asset.format == format) return result;
+  if (format == AssetFormat::flash_1) {
+    if (asset.element_type == ElementType::triangle) {
+      const SheetMaterial material = resolve_sheet(asset, rest_area).material;
+      result.bending_rigidity = material.bending_rigidity;
+      result.bending_model = material.bending_model;
+    }
+    result.published_bending.reset();
+    return result;
+  }
+  const auto lose = [&](const std::string& what) {
+    notices.push_back("the published format cannot express " + what);
+  };
+  if (asset.element_type == ElementType::triangle) {
+    const ResolvedSheet sheet = resolve_sheet(asset, rest_area);
+    result.young = sheet.material.membrane_stiffness;
+    result.published_bending = sheet.material.bending_rigidity / 3;
+    result.object_mass = sheet.total_mass;
+    if (asset.thickness) lose("thickness " + format_short(*asset.thickness) + " m: young is E t [N/m]");
+    if (sheet.material.bending_model != BendingModel::isometric)
+      lose(std::string("bending_model ") + to_string(sheet.material.bending_model) +
+           ": bending is D / 3, which its isometric model bends as D only on suitable meshes");
+    result.thickness.reset();
+    result.mass.reset();
+    result.density.reset();
+    result.areal_density.reset();
+    result.bending_rigidity.reset();
+    result.bending_model.reset();
+    if (!sheet.uniform_vertex_mass) lose("mass by area: obj_mass is spread evenly over vertices");
+  }
+  lose("friction " + format_short(asset.friction));
+  if (asset.air_drag != 0) lose("air_drag " + format_short(asset.air_drag));
+  if (asset.stiffness_damping != 0) lose("stiffness_damping " + format_short(asset.stiffness_damping));
+  if (!asset.identification.empty()) lose("identification: intervals and randomization ranges");
+  return result;
+}
+
+Asset asset_from_sheet(const SheetMaterial& material, std::optional<double> thickness,
+                       const std::string& mesh) {
+  Asset asset;
+  asset.mesh = mesh;
+  asset.constitutive = material.constitutive;
+  asset.young = material.membrane_stiffness / thickness.value_or(1);
+  asset.poisson = material.poissons_ratio;
+  asset.thickness = thickness;
+  asset.bending_rigidity = material.bending_rigidity;
+  asset.bending_model = material.bending_model;
+  asset.areal_density = material.areal_density;
+  asset.friction = material.friction;
+  asset.air_drag = material.air_drag;
+  asset.stiffness_damping = material.stiffness_damping;
+  return asset;
+}
+
+TriangleMesh load_asset_mesh(const Asset& asset) {
+  TriangleMesh mesh = is_mesh_spec(asset.mesh) ? parse_mesh_spec(asset.mesh, asset.source, "mesh")
+                                               : load_triangle_mesh(asset.mesh);
+  mesh.vertices *= rotation_from_degrees(asset.rotation_degrees).transpose();
+  mesh.vertices.rowwise() += asset.translation.transpose();
+  return mesh;
+}
+
+}  // namespace flash::data
