@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <string>
 #include <vector>
 
@@ -8,28 +9,29 @@ namespace flash::sysid {
 
 /// How one keyframe of one recording was met.
 struct KeyframeScore {
-  double t = 0;      ///< of the recording [s]
-  double score = 0;  ///< [m]; meaningless when points == 0
-  int points = 0;    ///< observed points inside the crop
+  double t = 0;       ///< of the recording [s]
+  double score = 0;   ///< [m]; meaningless when points == 0
+  int points = 0;     ///< observed points inside the crop
+  double weight = 1;  ///< in the recording's score
 };
 
-/// One candidate on one recording.
+/// One candidate on one recording; the convention of offset, yaw and time_offset is that of Registration.
 struct RecordingScore {
-  double score = 0;              ///< mean over the keyframes that carry points [m]
-  double offset[3] = {0, 0, 0};  ///< nuisance: simulation to observation [m]
-  double yaw = 0;                ///< nuisance: about gravity [rad]
-  double time_offset = 0;        ///< nuisance: simulated time minus recorded time [s]
-  std::string bounds_hit;        ///< names of nuisance parameters at a bound, separated by spaces
+  double score = 0;  ///< weighted mean over the keyframes that carry points [m]
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< [m]
+  double yaw = 0;                                    ///< [rad]
+  double time_offset = 0;                            ///< [s]
+  std::vector<std::string> bounds_hit;  ///< nuisance parameters at a bound: "offset_x", "yaw", ...
   std::vector<KeyframeScore> keyframes;
 };
 
 enum class CandidateStatus {
   ok,
-  unconverged,  ///< some step missed the tolerance; the score stands but is not to be trusted alone
-  diverged      ///< positions left the numbers; no score
+  unconverged,  ///< some step missed the tolerance: the score stands, with doubt
+  diverged      ///< positions left the numbers: no score
 };
 
-const char* name_of(CandidateStatus status);  ///< "ok", "unconverged", "diverged"
+const char* to_string(CandidateStatus status);  ///< "ok", "unconverged", "diverged"
 
 struct CandidateResult {
   int id = 0;                  ///< of the candidate in the grid
@@ -49,25 +51,29 @@ struct GridResults {
   std::vector<CandidateResult> candidates;
 };
 
-/// results.csv (one line a candidate) and keyframes.csv (one line a candidate, recording and keyframe) are
-/// only ever appended to; a line is flushed as its candidate is known, keyframes first. `grid.json` beside
-/// them holds the fingerprint of inputs and settings, so that a run is never continued with others. Throws
-/// data::InputError when the folder holds results of another fingerprint.
+/// A folder of results that only ever grows: results.csv (one line a candidate; with several recordings its
+/// offsets are those of the first), registrations.csv (one line a candidate and recording) and keyframes.csv
+/// (one line a candidate, recording and keyframe). The line in results.csv is written last and flushed: a
+/// candidate is there as a whole or not at all. grid.json holds axes, recordings and the fingerprint of
+/// inputs and settings.
 class ResultsStore {
  public:
-  /// Opens or creates the files in `folder`; what is already there is read when `resume`, an error otherwise
-  /// unless the folder holds no results.
+  /// Creates `folder`, or with `resume` goes on with what it holds. Throws data::InputError where it holds
+  /// results and `resume` is not asked for, or results of another fingerprint.
   ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
                const std::vector<std::string>& recordings, const std::string& fingerprint, bool resume);
+
   void append(const CandidateResult& result);
   const GridResults& results() const { return results_; }
+  bool contains(int id) const;
 
  private:
   std::string folder_;
   GridResults results_;
 };
 
-/// Reads a folder written by ResultsStore. Throws data::InputError naming file and line.
+/// Reads a folder written by ResultsStore; a last line cut off by a crash is left out. Throws
+/// data::InputError naming file and line.
 GridResults load_grid_results(const std::string& folder);
 
 }  // namespace flash::sysid

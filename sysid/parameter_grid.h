@@ -1,8 +1,10 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "data/material.h"
+#include "sysid/replay.h"
 
 namespace flash::sysid {
 
@@ -26,18 +28,31 @@ struct ParameterInfo {
 /// grasp_depth, grasp_direction, grasp_pitch.
 const std::vector<ParameterInfo>& known_parameters();
 
-/// "low:high:count:log", "low:high:count" (linear), "a,b,c" or one value.
-/// Throws data::InputError naming the flag: unknown name (with the nearest known), malformed or out of range.
+/// "low:high:count:log", "low:high:count" (evenly), "a,b,c" or one value.
+/// Throws data::InputError naming the option: unknown parameter (with the nearest known), malformed, out of
+/// range.
 Axis parse_axis(const std::string& name, const std::string& specification);
 
-/// "friction=0.3" of `--fix`.
+/// "friction=0.3" of `--fix`, an axis of one value.
 Axis parse_fixed(const std::string& assignment);
 
-/// Cartesian product of the axes; the candidate's index is its id, the last axis runs fastest.
+/// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes);
 
-/// Refuses what no experiment can answer: the same parameter twice; young and poisson together under
-/// TRI_ARAP, whose motion depends on them only through E / (1 + nu). Throws data::InputError with the reason.
+/// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
+/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only. Throws data::InputError with the reason.
 void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive);
+
+/// What candidates are built on: the asset's material and how `young` and `bending` are understood.
+struct MaterialBase {
+  data::SheetMaterial material;
+  std::optional<double> thickness;  ///< given: young is E [Pa]; absent: young is E t [N/m]
+  bool bending_from_thickness =
+      false;  ///< D = E t^3 / (12 (1 - nu^2)) follows young unless bending is an axis
+};
+
+/// The base with the named values in place of its own. Fixed parameters are axes of one value.
+ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,
+                               const std::vector<double>& values);
 
 }  // namespace flash::sysid

@@ -1,0 +1,292 @@
+#include "sysid/grid_results.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::sysid {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr const char* kSchema = "flash-sysid-grid/1";
+
+std::string path_of(const std::string& folder, const char* file) {
+  return (fs::path(folder) / file).string();
+}
+
+/// A CSV field: quoted where it holds a comma or a quote.
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::vector<std::string> fields_of(std::string_view line) {
+  std::vector<std::string> fields(1);
+  bool quoted = false;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    const char c = line[i];
+    if (c == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"') {
+      fields.back() += line[++i];
+    } else if (c == '"') {
+      quoted = !quoted;
+    } else if (c == ',' && !quoted) {
+      fields.emplace_back();
+    } else {
+      fields.back() += c;
+    }
+  }
+  return fields;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  return text;
+}
+
+std::vector<std::string> words_of(const std::string& text) {
+  std::vector<std::string> words;
+  for (const std::string_view word : data::split(text)) {
+    if (!word.empty()) words.emplace_back(word);
+  }
+  return words;
+}
+
+std::string results_header(const std::vector<Axis>& axes) {
+  std::string header = "id";
+  for (const Axis& axis : axes) header += "," + axis.name;
+  return header +
+         ",score_m,converged,residual_max,penetration_max_m,offset_x,offset_y,offset_z,time_offset_s,status,"
+         "yaw_rad,"
+         "bounds_hit\n";
+}
+constexpr const char* kRegistrationsHeader =
+    "id,recording,score_m,offset_x,offset_y,offset_z,yaw_rad,time_offset_s,bounds_hit\n";
+constexpr const char* kKeyframesHeader = "id,recording,t,score_m,points,weight\n";
+
+/// One row by the names of its columns.
+class Row {
+ public:
+  Row(const std::vector<std::string>& names, std::vector<std::string> fields, std::string place)
+      : names_(names), fields_(std::move(fields)), place_(std::move(place)) {}
+
+  const std::string& text(const std::string& name) const {
+    const auto found = std::find(names_.begin(), names_.end(), name);
+    const auto index = static_cast<std::size_t>(found - names_.begin());
+    if (index >= fields_.size()) throw data::InputError(place_ + ": " + name + ": the column is missing");
+    return fields_[index];
+  }
+  double number(const std::string& name) const {
+    const std::optional<double> value = data::parse_number(text(name));
+    if (!value) throw data::InputError(place_ + ": " + name + ": \"" + text(name) + "\" is not a number");
+    return *value;
+  }
+
+ private:
+  const std::vector<std::string>& names_;
+  std::vector<std::string> fields_;
+  std::string place_;
+};
+
+/// Calls `use` for each whole line after the header.
+template <class Use>
+void for_each_row(const std::string& path, const Use& use) {
+  const std::string text = data::read_file(path);
+  const std::string whole = text.substr(0, text.rfind('\n') + 1);
+  data::LineReader lines(whole);
+  std::string_view line;
+  if (!lines.next(line)) return;
+  const std::vector<std::string> names = fields_of(line);
+  while (lines.next(line)) {
+    if (!line.empty()) use(Row(names, fields_of(line), path + ":" + std::to_string(lines.number())));
+  }
+}
+
+void append_text(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::app | std::ios::binary);
+  file << text << std::flush;
+  if (!file) throw std::runtime_error(path + ": cannot be written");
+}
+
+std::string results_line(const CandidateResult& result) {
+  const RecordingScore first = result.recordings.empty() ? RecordingScore{} : result.recordings.front();
+  std::string line = std::to_string(result.id);
+  for (const double value : result.values) line += "," + data::format_number(value);
+  for (const std::string& text :
+       {data::format_number(result.score), std::string(result.converged ? "true" : "false"),
+        data::format_number(result.residual_max), data::format_number(result.penetration_max),
+        data::format_number(first.offset.x()), data::format_number(first.offset.y()),
+        data::format_number(first.offset.z()), data::format_number(first.time_offset),
+        std::string(to_string(result.status)), data::format_number(first.yaw), joined(first.bounds_hit)}) {
+    line += "," + text;
+  }
+  return line + "\n";
+}
+
+CandidateStatus parse_status(const std::string& text) {
+  for (const auto status : {CandidateStatus::ok, CandidateStatus::unconverged, CandidateStatus::diverged}) {
+    if (text == to_string(status)) return status;
+  }
+  throw data::InputError("status \"" + text + "\": expected ok, unconverged or diverged");
+}
+
+nlohmann::json load_grid(const std::string& folder) {
+  const std::string path = path_of(folder, "grid.json");
+  const nlohmann::json grid = nlohmann::json::parse(data::read_file(path), nullptr, false);
+  if (!grid.is_object() || grid.value("schema", "") != kSchema || !grid.contains("axes") ||
+      !grid.contains("recordings")) {
+    throw data::InputError(path + ": schema: expected \"" + kSchema + "\" with axes and recordings");
+  }
+  return grid;
+}
+
+}  // namespace
+
+const char* to_string(CandidateStatus status) {
+  switch (status) {
+    case CandidateStatus::ok:
+      return "ok";
+    case CandidateStatus::unconverged:
+      return "unconverged";
+    case CandidateStatus::diverged:
+      return "diverged";
+  }
+  return "";
+}
+
+GridResults load_grid_results(const std::string& folder) {
+  GridResults results;
+  const nlohmann::json grid = load_grid(folder);
+  try {
+    for (const nlohmann::json& axis : grid.at("axes")) {
+      results.axes.push_back({axis.at("name"), axis.at("values").get<std::vector<double>>(), axis.at("log")});
+    }
+    results.recordings = grid.at("recordings").get<std::vector<std::string>>();
+  } catch (const nlohmann::json::exception& error) {
+    throw data::InputError(path_of(folder, "grid.json") + ": " + error.what());
+  }
+
+  std::map<int, CandidateResult> found;
+  for_each_row(path_of(folder, "results.csv"), [&](const Row& row) {
+    CandidateResult result;
+    result.id = static_cast<int>(row.number("id"));
+    for (const Axis& axis : results.axes) result.values.push_back(row.number(axis.name));
+    result.score = row.number("score_m");
+    result.converged = row.text("converged") == "true";
+    result.residual_max = row.number("residual_max");
+    result.penetration_max = row.number("penetration_max_m");
+    result.status = parse_status(row.text("status"));
+    result.recordings.resize(results.recordings.size());
+    found[result.id] = std::move(result);
+  });
+  const auto recording_of = [&](const Row& row) -> RecordingScore* {
+    const auto candidate = found.find(static_cast<int>(row.number("id")));
+    const auto name = std::find(results.recordings.begin(), results.recordings.end(), row.text("recording"));
+    if (candidate == found.end() || name == results.recordings.end()) return nullptr;
+    return &candidate->second.recordings[name - results.recordings.begin()];
+  };
+  for_each_row(path_of(folder, "registrations.csv"), [&](const Row& row) {
+    RecordingScore* recording = recording_of(row);
+    if (recording == nullptr) return;
+    recording->score = row.number("score_m");
+    recording->offset = {row.number("offset_x"), row.number("offset_y"), row.number("offset_z")};
+    recording->yaw = row.number("yaw_rad");
+    recording->time_offset = row.number("time_offset_s");
+    recording->bounds_hit = words_of(row.text("bounds_hit"));
+    recording->keyframes.clear();
+  });
+  for_each_row(path_of(folder, "keyframes.csv"), [&](const Row& row) {
+    RecordingScore* recording = recording_of(row);
+    if (recording == nullptr) return;
+    const KeyframeScore score{row.number("t"), row.number("score_m"), static_cast<int>(row.number("points")),
+                              row.number("weight")};
+    // A candidate interrupted between its keyframes and its result is computed again: the later line counts.
+    const auto same = std::find_if(recording->keyframes.begin(), recording->keyframes.end(),
+                                   [&](const KeyframeScore& k) { return k.t == score.t; });
+    if (same != recording->keyframes.end()) {
+      *same = score;
+    } else {
+      recording->keyframes.push_back(score);
+    }
+  });
+  for (auto& [id, result] : found) results.candidates.push_back(std::move(result));
+  return results;
+}
+
+ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
+                           const std::vector<std::string>& recordings, const std::string& fingerprint,
+                           bool resume)
+    : folder_(folder) {
+  const std::string results = path_of(folder, "results.csv");
+  if (fs::exists(path_of(folder, "grid.json")) && fs::exists(results)) {
+    if (!resume) {
+      throw data::InputError(folder + ": holds results already; go on with --resume, or name another folder");
+    }
+    const nlohmann::json grid = load_grid(folder);
+    if (grid.value("fingerprint", "") != fingerprint) {
+      throw data::InputError(folder +
+                             ": --resume: its results come from other inputs or settings than these; name "
+                             "another folder, or repeat the first command");
+    }
+    results_ = load_grid_results(folder);
+    for (const char* file : {"results.csv", "registrations.csv", "keyframes.csv"}) {
+      const std::string path = path_of(folder, file);
+      const std::string text = data::read_file(path);
+      const std::size_t whole = text.rfind('\n') + 1;
+      if (whole != text.size()) fs::resize_file(path, whole);
+    }
+    return;
+  }
+  results_.axes = axes;
+  results_.recordings = recordings;
+  nlohmann::json grid = {{"schema", kSchema}, {"fingerprint", fingerprint}, {"recordings", recordings}};
+  grid["axes"] = nlohmann::json::array();
+  for (const Axis& axis : axes) {
+    grid["axes"].push_back({{"name", axis.name}, {"values", axis.values}, {"log", axis.logarithmic}});
+  }
+  fs::create_directories(folder);
+  data::write_atomically(path_of(folder, "registrations.csv"), kRegistrationsHeader);
+  data::write_atomically(path_of(folder, "keyframes.csv"), kKeyframesHeader);
+  data::write_atomically(results, results_header(axes));
+  data::write_atomically(path_of(folder, "grid.json"), grid.dump(1) + "\n");
+}
+
+void ResultsStore::append(const CandidateResult& result) {
+  std::string registrations, keyframes;
+  for (std::size_t r = 0; r < result.recordings.size(); ++r) {
+    const RecordingScore& recording = result.recordings[r];
+    const std::string head = std::to_string(result.id) + "," + field(results_.recordings[r]);
+    registrations += head;
+    for (const double value : {recording.score, recording.offset.x(), recording.offset.y(),
+                               recording.offset.z(), recording.yaw, recording.time_offset}) {
+      registrations += "," + data::format_number(value);
+    }
+    registrations += "," + joined(recording.bounds_hit) + "\n";
+    for (const KeyframeScore& keyframe : recording.keyframes) {
+      keyframes += head + "," + data::format_number(keyframe.t) + "," + data::format_number(keyframe.score) +
+                   "," + std::to_string(keyframe.points) + "," + data::format_number(keyframe.weight) + "\n";
+    }
+  }
+  append_text(path_of(folder_, "keyframes.csv"), keyframes);
+  append_text(path_of(folder_, "registrations.csv"), registrations);
+  append_text(path_of(folder_, "results.csv"), results_line(result));
+  const auto place = std::lower_bound(results_.candidates.begin(), results_.candidates.end(), result.id,
+                                      [](const CandidateResult& a, int id) { return a.id < id; });
+  results_.candidates.insert(place, result);
+}
+
+bool ResultsStore::contains(int id) const {
+  return std::any_of(results_.candidates.begin(), results_.candidates.end(),
+                     [&](const CandidateResult& result) { return result.id == id; });
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,52 @@
+#pragma once
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "sysid/grid_results.h"
+#include "sysid/parameter_grid.h"
+#include "sysid/registration.h"
+#include "sysid/replay.h"
+
+namespace flash::sysid {
+
+struct ScoreSettings {
+  Robust robust;
+  RegistrationSettings registration;
+  SharedRegistration shared;  ///< between the recordings of one search
+};
+
+struct GridSettings {
+  MaterialBase base;
+  std::vector<Axis> axes;   ///< searched; the last runs fastest
+  std::vector<Axis> fixed;  ///< one value each
+  ScoreSettings score;
+  int envs = 64;    ///< candidates in work at the same time, at most
+  int threads = 1;  ///< each takes one candidate at a time
+};
+
+struct Progress {
+  int done = 0;  ///< candidates with a result, those of an earlier run included
+  int total = 0;
+  double candidates_per_second = 0;  ///< of this run
+  double seconds_left = 0;
+  double best_score = 0;  ///< [m]; infinity before the first
+};
+
+/// Registers and scores simulated motions, one a replay.
+CandidateResult score_motions(const std::vector<Replay>& replays, const std::vector<ReplayResult>& results,
+                              const ScoreSettings& settings);
+
+/// Hash of everything that decides the results: recordings as read, sheet, settings, axes. Hexadecimal.
+std::string fingerprint(const std::vector<Replay>& replays, const GridSettings& settings);
+
+/// Simulates and scores every candidate of the grid that `store` does not hold yet and appends it there. Each
+/// thread takes one candidate at a time, through all recordings. Candidates that diverge or miss the
+/// tolerance are marked, never a reason to stop. `progress` is called after each candidate, one thread at a
+/// time; `stop`, when set, ends the search after the candidates in work. True when the grid is complete.
+bool grid_search(const std::vector<Replay>& replays, const GridSettings& settings, ResultsStore& store,
+                 const std::function<void(const Progress&)>& progress = {},
+                 const std::atomic<bool>* stop = nullptr);
+
+}  // namespace flash::sysid

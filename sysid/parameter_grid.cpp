@@ -1,0 +1,195 @@
+#include "sysid/parameter_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kTiny = std::numeric_limits<double>::min();
+
+std::size_t edit_distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    std::size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const std::size_t substituted = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, substituted});
+    }
+  }
+  return row.back();
+}
+
+const ParameterInfo& info_of(const std::string& name) {
+  const std::vector<ParameterInfo>& known = known_parameters();
+  const auto found = std::find_if(known.begin(), known.end(), [&](const auto& p) { return p.name == name; });
+  if (found != known.end()) return *found;
+  const auto nearest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
+    return edit_distance(name, a.name) < edit_distance(name, b.name);
+  });
+  throw data::InputError("--" + name + ": unknown parameter (did you mean \"" + nearest->name + "\"?)");
+}
+
+double number(const std::string& option, std::string_view word) {
+  const std::optional<double> value = data::parse_number(word);
+  if (!value || !std::isfinite(*value)) {
+    throw data::InputError(option + ": \"" + std::string(word) +
+                           "\" is not a number; expected low:high:count[:log], a,b,c or one value");
+  }
+  return *value;
+}
+
+void check_range(const std::string& option, const ParameterInfo& info, double value) {
+  if (value >= info.low && value <= info.high) return;
+  throw data::InputError(option + ": " + data::format_short(value) + " " + info.unit + " is outside " +
+                         data::format_short(info.low) + " to " + data::format_short(info.high));
+}
+
+}  // namespace
+
+const std::vector<ParameterInfo>& known_parameters() {
+  static const std::vector<ParameterInfo> parameters = {
+      {"young", "Pa or N/m", true, kTiny, 1e13, "Young's modulus, or E t where the asset has no thickness"},
+      {"poisson", "", true, -0.99, 0.5, "Poisson's ratio"},
+      {"bending", "N m", true, 0, 1e6, "flexural rigidity D"},
+      {"friction", "", true, 0, 10, "Coulomb coefficient against the table"},
+      {"areal_density", "kg/m^2", true, kTiny, 1e4, "mass per area"},
+      {"air_drag", "1/s", true, 0, 1e4, "mass-proportional damping"},
+      {"stiffness_damping", "s", true, 0, 1e3, "stiffness-proportional damping"},
+      {"start_yaw", "rad", false, -kPi, kPi, "turn of the sheet on the table about the gripper"},
+      {"table_height", "m", false, -0.5, 0.5, "of table and sheet against the gripper's path"},
+      {"grasp_depth", "m", false, kTiny, 0.5, "pinch: size of the folded patch"},
+      {"grasp_direction", "rad", false, -kPi, kPi, "pinch: angle of the ridge from the sheet's diagonal"},
+      {"grasp_pitch", "rad", false, -kPi, kPi, "pinch: tilt of the ridge"},
+  };
+  return parameters;
+}
+
+Axis parse_axis(const std::string& name, const std::string& specification) {
+  const ParameterInfo& info = info_of(name);
+  const std::string option = "--" + name;
+  Axis axis{name, {}, false};
+  if (specification.find(':') == std::string::npos) {
+    for (const std::string_view word : data::split(specification, ","))
+      axis.values.push_back(number(option, word));
+    std::sort(axis.values.begin(), axis.values.end());
+    axis.values.erase(std::unique(axis.values.begin(), axis.values.end()), axis.values.end());
+  } else {
+    const std::vector<std::string_view> parts = data::split(specification, ":");
+    axis.logarithmic = parts.size() == 4 && parts[3] == "log";
+    if (parts.size() != 3 && !axis.logarithmic && !(parts.size() == 4 && parts[3] == "linear")) {
+      throw data::InputError(option + ": \"" + specification +
+                             "\": expected low:high:count, with :log at its end or not");
+    }
+    const double low = number(option, parts[0]), high = number(option, parts[1]),
+                 count = number(option, parts[2]);
+    if (count < 1 || count > 1e6 || count != std::floor(count)) {
+      throw data::InputError(option + ": count " + std::string(parts[2]) +
+                             " is not a whole number of at least 1");
+    }
+    if (!(low < high) && !(low == high && count == 1)) {
+      throw data::InputError(option + ": low " + std::string(parts[0]) + " is not below high " +
+                             std::string(parts[1]));
+    }
+    if (axis.logarithmic && low <= 0) {
+      throw data::InputError(option + ": a logarithmic axis cannot start at " + std::string(parts[0]));
+    }
+    const int n = static_cast<int>(count);
+    for (int i = 0; i < n; ++i) {
+      const double s = n > 1 ? i / static_cast<double>(n - 1) : 0;
+      axis.values.push_back(axis.logarithmic ? low * std::pow(high / low, s) : low + s * (high - low));
+    }
+    if (n > 1) axis.values.back() = high;
+  }
+  if (axis.values.empty()) throw data::InputError(option + ": no value given");
+  for (const double value : axis.values) check_range(option, info, value);
+  return axis;
+}
+
+Axis parse_fixed(const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos) {
+    throw data::InputError("--fix: \"" + assignment + "\": expected name=value, as friction=0.3");
+  }
+  const std::string name = assignment.substr(0, equals);
+  const ParameterInfo& info = info_of(name);
+  const double value = number("--fix " + name, std::string_view(assignment).substr(equals + 1));
+  check_range("--fix " + name, info, value);
+  return {name, {value}, false};
+}
+
+std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes) {
+  std::vector<std::vector<double>> candidates = {{}};
+  for (const Axis& axis : axes) {
+    std::vector<std::vector<double>> longer;
+    longer.reserve(candidates.size() * axis.values.size());
+    for (const std::vector<double>& candidate : candidates) {
+      for (const double value : axis.values) {
+        longer.push_back(candidate);
+        longer.back().push_back(value);
+      }
+    }
+    candidates = std::move(longer);
+  }
+  return candidates;
+}
+
+void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) {
+  bool young = false, poisson = false;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (axes[i].name == axes[j].name) throw data::InputError("--" + axes[i].name + ": given twice");
+    }
+    young = young || (axes[i].name == "young" && axes[i].values.size() > 1);
+    poisson = poisson || (axes[i].name == "poisson" && axes[i].values.size() > 1);
+  }
+  if (constitutive == data::Constitutive::tri_arap && young && poisson) {
+    throw data::InputError(
+        "--young, --poisson: under TRI_ARAP the motion depends on them only through E / (1 + nu), so that no "
+        "recording "
+        "can tell them apart; fix one (--fix poisson=0.3), or use TRI_COROTATED");
+  }
+}
+
+ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,
+                               const std::vector<double>& values) {
+  ReplayCandidate candidate{base.material, {}};
+  data::SheetMaterial& material = candidate.material;
+  const double thickness = base.thickness.value_or(1.0);
+  bool bending_given = !base.bending_from_thickness;
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const std::string& name = axes[i].name;
+    const double value = values[i];
+    if (name == "young") material.membrane_stiffness = value * thickness;
+    if (name == "poisson") material.poissons_ratio = value;
+    if (name == "bending") {
+      material.bending_rigidity = value;
+      bending_given = true;
+    }
+    if (name == "friction") material.friction = value;
+    if (name == "areal_density") material.areal_density = value;
+    if (name == "air_drag") material.air_drag = value;
+    if (name == "stiffness_damping") material.stiffness_damping = value;
+    if (name == "start_yaw") candidate.nuisance.start_yaw = value;
+    if (name == "table_height") candidate.nuisance.table_height = value;
+    if (name == "grasp_depth") candidate.nuisance.grasp_depth = value;
+    if (name == "grasp_direction") candidate.nuisance.grasp_direction = value;
+    if (name == "grasp_pitch") candidate.nuisance.grasp_pitch = value;
+  }
+  if (!bending_given) {
+    const double nu = material.poissons_ratio;
+    material.bending_rigidity = material.membrane_stiffness * thickness * thickness / (12 * (1 - nu * nu));
+  }
+  return candidate;
+}
+
+}  // namespace flash::sysid

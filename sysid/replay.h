@@ -1,0 +1,88 @@
+#pragma once
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/recording.h"
+#include "sim/solver.h"
+#include "sysid/objective.h"
+#include "sysid/registration.h"
+
+namespace flash::sysid {
+
+/// What every candidate of a replay has in common.
+struct ReplaySettings {
+  sim::SolverSettings solver;
+  std::string mesh;  ///< mesh specification or file in place of the recording's; empty: the recording's
+  std::optional<double> pre_roll;  ///< simulated before the recording starts, gripper at its first pose;
+                                   ///< absent: 0.4 where a grasp needs time to close, else 0 [s]
+  double closing_time = 0.25;                                    ///< the fingers', within the pre-roll [s]
+  std::optional<data::GraspShape> grasp_shape;                   ///< in place of the recording's
+  std::optional<double> grasp_within;                            ///< in place of the recording's [m]
+  double score_from = -std::numeric_limits<double>::infinity();  ///< keyframes before carry no weight [s]
+  double score_to = std::numeric_limits<double>::infinity();     ///< keyframes after carry no weight [s]
+  int min_points = 20;  ///< keyframes of fewer points carry no weight
+  int threads = 1;
+};
+
+/// How the sheet lay and how it was grasped: what the recording leaves open and what changes the motion.
+struct ReplayNuisance {
+  double start_yaw = 0;     ///< turn of the sheet on the table about the gripper's first position [rad]
+  double table_height = 0;  ///< of table and sheet, against the gripper's path [m]
+  std::optional<double> grasp_depth;      ///< pinch: size of the folded patch; absent: the recording's [m]
+  std::optional<double> grasp_direction;  ///< pinch: angle of the ridge from the sheet's diagonal; absent:
+                                          ///< the recording's [rad]
+  std::optional<double> grasp_pitch;      ///< pinch: tilt of the ridge; absent: the recording's [rad]
+};
+
+struct ReplayCandidate {
+  data::SheetMaterial material;
+  ReplayNuisance nuisance;
+};
+
+/// One candidate's simulated motion and how the solver fared.
+struct ReplayResult {
+  Motion motion;
+  bool converged = false;        ///< every step
+  bool finite = false;           ///< all positions are numbers
+  double residual_max = 0;       ///< |r| / |M g|
+  double penetration_max = 0;    ///< [m]
+  double unconverged_share = 0;  ///< of the steps
+};
+
+/// A recording made ready for simulation: its mesh, the start, the steps to take.
+struct Replay {
+  data::Recording recording;
+  sim::Sheet sheet;
+  ReplaySettings settings;
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity; the table normal without gravity
+  Eigen::Vector3d pivot =
+      Eigen::Vector3d::Zero();  ///< the first grasp's gripper at its start, or the sheet's centre
+  double start = 0;             ///< time of the first state: the recording's start less the pre-roll [s]
+  double beginning = 0;         ///< of the recording: its first grasp or keyframe [s]
+  int steps = 0;
+  std::vector<Observation> observations;
+  std::vector<std::string> notices;
+};
+
+/// Throws data::InputError where mesh, grasps or clouds cannot be used.
+Replay make_replay(const data::Recording& recording, const ReplaySettings& settings);
+
+/// The simulated world of one candidate, before its first step.
+sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate);
+
+std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates);
+
+/// Nuisance bounds and pivot of the recording, for register_motions.
+RegistrationProblem registration_problem(const Replay& replay, const Motion& motion);
+
+/// Where the vertices of a grasp are held, base frame, gripper at its pose of the grasp's start.
+/// clamp: where the sheet lies. point: the vertex nearest the corner alone. pinch: the patch folded about the
+/// line through its centre along `ridge` and standing on the table, so that a vertex at (a, b) along and
+/// across the ridge is held at m + a ridge + (max|b| - |b|) up, the whole then tilted by `pitch` about the
+/// axis across the ridge through m.
+data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridge, const Eigen::Vector3d& up,
+                           double pitch);
+
+}  // namespace flash::sysid
