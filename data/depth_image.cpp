@@ -1,0 +1,168 @@
+#include "data/depth_image.h"
+
+#include <png.h>
+
+#include <csetjmp>
+#include <cstring>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+
+namespace flash::data {
+namespace {
+
+/// Sixteen bits a sample, big endian, as PNG stores them.
+struct RawPng {
+  int width = 0, height = 0, channels = 0, bit_depth = 0;
+  std::vector<std::uint8_t> bytes;  ///< rows without padding
+};
+
+struct ReadState {
+  std::string_view rest;
+  std::string message;
+};
+
+void read_bytes(png_structp png, png_bytep out, std::size_t size) {
+  auto& state = *static_cast<ReadState*>(png_get_io_ptr(png));
+  if (state.rest.size() < size) png_error(png, "ends within its data");
+  std::memcpy(out, state.rest.data(), size);
+  state.rest.remove_prefix(size);
+}
+
+void keep_message(png_structp png, png_const_charp message) {
+  static_cast<ReadState*>(png_get_error_ptr(png))->message = message;
+  png_longjmp(png, 1);
+}
+
+void ignore_warning(png_structp, png_const_charp) {}
+
+/// Everything that libpng may jump out of; no object with a destructor is made after setjmp.
+bool decode(png_structp png, png_infop info, bool expand, RawPng& image, std::vector<png_bytep>& rows) {
+  if (setjmp(png_jmpbuf(png))) return false;
+  png_read_info(png, info);
+  if (expand) {
+    png_set_expand(png);
+    png_set_strip_16(png);
+    png_set_strip_alpha(png);
+  }
+  png_read_update_info(png, info);
+  image.width = static_cast<int>(png_get_image_width(png, info));
+  image.height = static_cast<int>(png_get_image_height(png, info));
+  image.channels = png_get_channels(png, info);
+  image.bit_depth = png_get_bit_depth(png, info);
+  const std::size_t stride = png_get_rowbytes(png, info);
+  image.bytes.resize(stride * static_cast<std::size_t>(image.height));
+  rows.resize(static_cast<std::size_t>(image.height));
+  for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = image.bytes.data() + y * stride;
+  png_read_image(png, rows.data());
+  return true;
+}
+
+RawPng load_png(const std::string& path, bool expand) {
+  const std::string file = read_file(path);
+  if (file.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(file.data()), 0, 8) != 0)
+    throw InputError(path + ": not a PNG file");
+  ReadState state{file, ""};
+  png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &state, keep_message, ignore_warning);
+  png_infop info = png_create_info_struct(png);
+  png_set_read_fn(png, &state, read_bytes);
+  RawPng image;
+  std::vector<png_bytep> rows;
+  const bool done = decode(png, info, expand, image, rows);
+  png_destroy_read_struct(&png, &info, nullptr);
+  if (!done) throw InputError(path + ": PNG cannot be decoded: " + state.message);
+  return image;
+}
+
+void append_bytes(png_structp png, png_bytep bytes, std::size_t size) {
+  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(bytes), size);
+}
+
+void flush_nothing(png_structp) {}
+
+bool encode(png_structp png, png_infop info, int width, int height, int bit_depth,
+            std::vector<png_bytep>& rows) {
+  if (setjmp(png_jmpbuf(png))) return false;
+  png_set_IHDR(png, info, static_cast<png_uint_32>(width), static_cast<png_uint_32>(height), bit_depth,
+               PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
+  png_write_info(png, info);
+  png_write_image(png, rows.data());
+  png_write_end(png, nullptr);
+  return true;
+}
+
+void save_png(int width, int height, int bit_depth, std::vector<std::uint8_t> bytes,
+              const std::string& path) {
+  ReadState state;
+  std::string file;
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &state, keep_message, ignore_warning);
+  png_infop info = png_create_info_struct(png);
+  png_set_write_fn(png, &file, append_bytes, flush_nothing);
+  std::vector<png_bytep> rows(static_cast<std::size_t>(height));
+  const std::size_t stride = static_cast<std::size_t>(width) * static_cast<std::size_t>(bit_depth / 8);
+  for (std::size_t y = 0; y < rows.size(); ++y) rows[y] = bytes.data() + y * stride;
+  const bool done = encode(png, info, width, height, bit_depth, rows);
+  png_destroy_write_struct(&png, &info);
+  if (!done) throw InputError(path + ": PNG cannot be encoded: " + state.message);
+  write_atomically(path, file);
+}
+
+}  // namespace
+
+DepthImage load_depth_image(const std::string& path) {
+  const RawPng raw = load_png(path, false);
+  if (raw.bit_depth != 16 || raw.channels != 1)
+    throw InputError(path + ": found " + std::to_string(raw.bit_depth) + " bits in " +
+                     std::to_string(raw.channels) + " channels, expected 16-bit grey depth");
+  DepthImage image{raw.width, raw.height, std::vector<std::uint16_t>(raw.bytes.size() / 2)};
+  for (std::size_t i = 0; i < image.pixels.size(); ++i)
+    image.pixels[i] = static_cast<std::uint16_t>(raw.bytes[2 * i] << 8 | raw.bytes[2 * i + 1]);
+  return image;
+}
+
+void save_depth_image(const DepthImage& image, const std::string& path) {
+  std::vector<std::uint8_t> bytes;
+  bytes.reserve(2 * image.pixels.size());
+  for (const std::uint16_t pixel : image.pixels) {
+    bytes.push_back(static_cast<std::uint8_t>(pixel >> 8));
+    bytes.push_back(static_cast<std::uint8_t>(pixel & 0xff));
+  }
+  save_png(image.width, image.height, 16, std::move(bytes), path);
+}
+
+MaskImage load_mask(const std::string& path) {
+  const RawPng raw = load_png(path, true);
+  const std::size_t channels = static_cast<std::size_t>(raw.channels);
+  MaskImage image{raw.width, raw.height, std::vector<std::uint8_t>(raw.bytes.size() / channels)};
+  for (std::size_t i = 0; i < raw.bytes.size(); ++i)
+    if (raw.bytes[i] > 0) image.pixels[i / channels] = 255;
+  return image;
+}
+
+void save_mask(const MaskImage& image, const std::string& path) {
+  save_png(image.width, image.height, 8, image.pixels, path);
+}
+
+Points points_from_depth(const DepthImage& depth, const MaskImage& mask, const CameraIntrinsics& camera,
+                         double depth_scale, const std::string& source) {
+  const auto size = [](int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+  };
+  if (depth.width != camera.width || depth.height != camera.height)
+    throw InputError(source + ": found " + size(depth.width, depth.height) +
+                     " pixels, expected the camera's " + size(camera.width, camera.height));
+  if (!mask.pixels.empty() && (mask.width != depth.width || mask.height != depth.height))
+    throw InputError(source + ": its mask has " + size(mask.width, mask.height) + " pixels, expected " +
+                     size(depth.width, depth.height));
+  std::vector<double> coordinates;
+  for (int y = 0; y < depth.height; ++y)
+    for (int x = 0; x < depth.width; ++x) {
+      if (depth.at(x, y) == 0 || (!mask.pixels.empty() && mask.at(x, y) == 0)) continue;
+      const Eigen::Vector3d point = unproject(camera, {x, y}, depth_scale * depth.at(x, y));
+      coordinates.insert(coordinates.end(), point.data(), point.data() + 3);
+    }
+  return Eigen::Map<Points>(coordinates.data(), static_cast<Eigen::Index>(coordinates.size() / 3), 3);
+}
+
+}  // namespace flash::data
