@@ -11,8 +11,8 @@ namespace {
 
 constexpr double near_plane = 1e-3;  // [m]
 
-void rasterize(const Eigen::Matrix3d& corners, int surface, const data::CameraIntrinsics& camera,
-               DepthView& view) {
+void rasterize(const Eigen::Matrix3d& corners, int surface, int triangle,
+               const data::CameraIntrinsics& camera, DepthView& view) {
   // One corner a row: pixel and inverse depth.
   Eigen::Matrix<double, 3, 2> pixel;
   Eigen::Vector3d inverse_depth;
@@ -42,6 +42,7 @@ void rasterize(const Eigen::Matrix3d& corners, int surface, const data::CameraIn
       if (depth >= view.depth(v, u)) continue;
       view.depth(v, u) = depth;
       view.surface(v, u) = surface;
+      view.triangle(v, u) = triangle;
     }
 }
 
@@ -57,6 +58,7 @@ DepthView render_depth(const data::CameraIntrinsics& camera, const Eigen::Isomet
   view.depth =
       Eigen::ArrayXXd::Constant(camera.height, camera.width, std::numeric_limits<double>::infinity());
   view.surface = Eigen::ArrayXXi::Constant(camera.height, camera.width, -1);
+  view.triangle = view.surface;
   const Eigen::Isometry3d camera_from_base = base_from_camera.inverse();
   for (std::size_t s = 0; s < surfaces.size(); ++s) {
     const data::Points seen = (surfaces[s].vertices * camera_from_base.linear().transpose()).rowwise() +
@@ -64,7 +66,7 @@ DepthView render_depth(const data::CameraIntrinsics& camera, const Eigen::Isomet
     for (Eigen::Index t = 0; t < surfaces[s].triangles.rows(); ++t) {
       Eigen::Matrix3d corners;
       for (int k = 0; k < 3; ++k) corners.row(k) = seen.row(surfaces[s].triangles(t, k));
-      rasterize(corners, static_cast<int>(s), camera, view);
+      rasterize(corners, static_cast<int>(s), static_cast<int>(t), camera, view);
     }
   }
   return view;

@@ -11,8 +11,9 @@ namespace flash::sysid {
 
 /// What a pinhole camera sees through the centre of each pixel; row v, column u.
 struct DepthView {
-  Eigen::ArrayXXd depth;    ///< along the optical axis [m]; infinity where there is nothing
-  Eigen::ArrayXXi surface;  ///< index of the surface seen; -1 where there is nothing
+  Eigen::ArrayXXd depth;     ///< along the optical axis [m]; infinity where there is nothing
+  Eigen::ArrayXXi surface;   ///< index of the surface seen; -1 where there is nothing
+  Eigen::ArrayXXi triangle;  ///< index of the triangle seen in its surface; -1 where there is nothing
 };
 
 /// Renders triangle meshes (base frame) into one z-buffer, so that each hides what lies behind it, itself

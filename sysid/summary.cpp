@@ -5,6 +5,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 
 namespace flash::sysid {
 namespace {
@@ -65,124 +66,88 @@ Json to_json(const Eigen::MatrixXd& matrix) {
   return rows;
 }
 
-/// One JSON object of the file, read field by field; messages name the file and the path to the field.
-class Fields {
- public:
-  Fields(const Json& json, std::string source, std::string path)
-      : json_(json), source_(std::move(source)), path_(std::move(path)) {
-    if (!json_.is_object()) fail("", "expected an object");
-  }
+// A number that was not finite is written as null.
+double finite_or_infinite(const nlohmann::json& value) {
+  return value.is_number() ? value.get<double>() : INFINITY;
+}
+double score_of(const data::JsonObject& json, const char* key) {
+  return json.optional_number(key).value_or(INFINITY);
+}
 
-  Fields object(const char* name) const { return {at(name), source_, path(name) + "."}; }
+std::vector<double> list_of(const data::JsonObject& json, const char* key) {
+  if (!json.raw(key).is_array()) throw json.error(key, "a list");
+  std::vector<double> values;
+  for (const nlohmann::json& value : json.raw(key)) values.push_back(finite_or_infinite(value));
+  return values;
+}
 
-  template <class Read>
-  void each(const char* name, const Read& read) const {
-    const Json& list = at(name);
-    if (!list.is_array() && !list.is_object()) fail(name, "expected a list or an object");
-    for (auto item = list.begin(); item != list.end(); ++item) {
-      const std::string key = list.is_object() ? item.key() : "";
-      const std::string step = list.is_object() ? "." + key : "[" + std::to_string(item - list.begin()) + "]";
-      read(key, Fields(item.value(), source_, path(name) + step + "."));
-    }
+template <class T>
+T typed(const data::JsonObject& json, const char* key, const char* expected) {
+  try {
+    return json.raw(key).get<T>();
+  } catch (const nlohmann::json::exception&) {
+    throw json.error(key, expected);
   }
+}
 
-  template <class T>
-  void read(const char* name, T& value) const {
-    try {
-      read_value(at(name), value);
-    } catch (const nlohmann::json::exception&) {
-      fail(name, "found " + at(name).dump().substr(0, 40) + ", expected another type");
-    }
-  }
-
-  [[noreturn]] void fail(const std::string& name, const std::string& what) const {
-    throw data::input_error(source_, path(name), what);
-  }
-
- private:
-  const Json& at(const char* name) const {
-    if (!json_.contains(name)) fail(name, "missing");
-    return json_.at(name);
-  }
-  std::string path(const std::string& name) const { return path_ + name; }
-
-  // A number that was not finite is written as null.
-  static void read_value(const Json& json, double& value) {
-    value = json.is_null() ? INFINITY : json.get<double>();
-  }
-  static void read_value(const Json& json, std::vector<double>& values) {
-    values.clear();
-    for (const Json& item : json) read_value(item, values.emplace_back());
-  }
-  static void read_value(const Json& json, Eigen::Vector3d& value) {
-    const auto numbers = json.get<std::array<double, 3>>();
-    value = Eigen::Vector3d(numbers[0], numbers[1], numbers[2]);
-  }
-  static void read_value(const Json& json, Eigen::MatrixXd& matrix) {
-    matrix.resize(static_cast<Eigen::Index>(json.size()), static_cast<Eigen::Index>(json.size()));
-    for (Eigen::Index i = 0; i < matrix.rows(); ++i)
-      for (Eigen::Index j = 0; j < matrix.cols(); ++j)
-        read_value(json.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(j)), matrix(i, j));
-  }
-  template <class T>
-  static void read_value(const Json& json, std::optional<T>& value) {
-    value.reset();
-    if (!json.is_null()) value = json.get<T>();
-  }
-  template <class T>
-  static void read_value(const Json& json, T& value) {
-    value = json.get<T>();
-  }
-
-  const Json& json_;
-  std::string source_, path_;
-};
-
-Identifiable identifiable_of(const Fields& fields) {
-  std::string name;
-  fields.read("identifiable", name);
+Identifiable identifiable_of(const data::JsonObject& json) {
+  const std::string name = json.string("identifiable");
   for (Identifiable value :
        {Identifiable::yes, Identifiable::no, Identifiable::lower_bound, Identifiable::upper_bound})
     if (name == to_string(value)) return value;
-  fields.fail("identifiable", "found \"" + name + "\", expected yes, no, lower_bound or upper_bound");
+  throw json.error("identifiable", "yes, no, lower_bound or upper_bound");
 }
 
-ParameterFinding read_finding(const std::string& name, const Fields& fields) {
+ParameterFinding read_finding(const std::string& name, const data::JsonObject& json) {
+  json.expect_fields({"estimate", "interval95", "identifiable", "edge", "note", "logarithmic", "profile"});
   ParameterFinding finding;
   finding.name = name;
-  fields.read("estimate", finding.estimate);
-  fields.read("interval95", finding.interval95);
-  finding.identifiable = identifiable_of(fields);
-  std::optional<std::string> edge;
-  fields.read("edge", edge);
-  finding.edge = !edge ? RangeEdge::none : *edge == "low" ? RangeEdge::low : RangeEdge::high;
-  fields.read("note", finding.note);
-  fields.read("logarithmic", finding.logarithmic);
-  const Fields profile = fields.object("profile");
-  profile.read("values", finding.values);
-  profile.read("scores", finding.scores);
+  finding.estimate = json.optional_number("estimate");
+  if (json.has("interval95")) {
+    const Eigen::VectorXd interval = json.vector("interval95", 2);
+    finding.interval95 = {interval[0], interval[1]};
+  }
+  finding.identifiable = identifiable_of(json);
+  const std::string edge = json.string("edge", "");
+  finding.edge = edge == "low" ? RangeEdge::low : edge == "high" ? RangeEdge::high : RangeEdge::none;
+  finding.note = json.string("note");
+  finding.logarithmic = json.boolean("logarithmic", false);
+  const data::JsonObject profile = json.object("profile");
+  finding.values = list_of(profile, "values");
+  finding.scores = list_of(profile, "scores");
   return finding;
 }
 
-SummaryRecording read_recording(const Fields& fields) {
+SummaryRecording read_recording(const data::JsonObject& json) {
+  json.expect_fields({"name", "sha256", "offset", "yaw", "time_offset", "nuisance", "score", "sigma_m",
+                      "sigma_source", "horizon_s", "frames"});
   SummaryRecording recording;
-  fields.read("name", recording.name);
-  fields.read("sha256", recording.sha256);
-  fields.read("offset", recording.offset);
-  fields.read("yaw", recording.yaw);
-  fields.read("time_offset", recording.time_offset);
-  fields.read("nuisance", recording.nuisance);
-  fields.read("score", recording.score);
-  fields.read("sigma_m", recording.sigma_m);
-  fields.read("sigma_source", recording.sigma_source);
-  fields.read("horizon_s", recording.horizon_s);
-  fields.each("frames", [&](const std::string&, const Fields& frame) {
-    SummaryFrame& read = recording.frames.emplace_back();
-    frame.read("t", read.t);
-    frame.read("score", read.score);
-    frame.read("weight", read.weight);
-  });
+  recording.name = json.string("name");
+  recording.sha256 = json.string("sha256");
+  recording.offset = json.vector("offset", 3);
+  recording.yaw = json.number("yaw");
+  recording.time_offset = json.number("time_offset");
+  recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
+  recording.score = score_of(json, "score");
+  recording.sigma_m = score_of(json, "sigma_m");
+  recording.sigma_source = json.string("sigma_source");
+  recording.horizon_s = json.optional_number("horizon_s");
+  for (const data::JsonObject& frame : json.objects("frames"))
+    recording.frames.push_back({frame.number("t"), score_of(frame, "score"), frame.number("weight")});
   return recording;
+}
+
+Eigen::MatrixXd read_matrix(const data::JsonObject& json, const char* key) {
+  const nlohmann::json& rows = json.raw(key);
+  const auto size = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd matrix(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const nlohmann::json& row = rows[static_cast<std::size_t>(i)];
+    if (row.size() != rows.size()) throw json.error(key, "a square matrix");
+    for (Eigen::Index j = 0; j < size; ++j)
+      matrix(i, j) = finite_or_infinite(row[static_cast<std::size_t>(j)]);
+  }
+  return matrix;
 }
 
 }  // namespace
@@ -213,9 +178,12 @@ std::string summary_text(const Summary& summary) {
                   {"membrane_stiffness", number(summary.membrane_stiffness)},
                   {"score", number(summary.best_score)}};
   json["level95"] = number(summary.level95);
+  json["axes"] = Json::array();
   json["parameters"] = Json::object();
-  for (const ParameterFinding& finding : summary.parameters)
+  for (const ParameterFinding& finding : summary.parameters) {
+    json["axes"].push_back(finding.name);
     json["parameters"][finding.name] = to_json(finding);
+  }
   json["fixed"] = Json::object();
   for (const auto& [name, fixed] : summary.fixed)
     json["fixed"][name] = {{"value", fixed.value}, {"source", fixed.source}};
@@ -223,10 +191,11 @@ std::string summary_text(const Summary& summary) {
   json["recordings"] = Json::array();
   for (const SummaryRecording& recording : summary.recordings)
     json["recordings"].push_back(to_json(recording));
-  json["solver_check"] = Json::object();
+  json["solver_check"] = Json::array();
   for (const SolverCheck& check : summary.solver_check)
-    json["solver_check"][check.what] = {{"score", number(check.score)},
-                                        {"surface_change_m", number(check.surface_change_m)}};
+    json["solver_check"].push_back({{"what", check.what},
+                                    {"score", number(check.score)},
+                                    {"surface_change_m", number(check.surface_change_m)}});
   json["settings"] = summary.settings;
   json["asset"] = summary.asset;
   json["candidates"] = summary.candidates;
@@ -235,7 +204,7 @@ std::string summary_text(const Summary& summary) {
   json["wall_seconds"] = summary.wall_seconds;
   json["warnings"] = summary.warnings;
   json["exit_code"] = summary.exit_code;
-  return json.dump(2) + "\n";
+  return data::format_json(json);
 }
 
 void save_summary(const Summary& summary, const std::string& path) {
@@ -243,45 +212,38 @@ void save_summary(const Summary& summary, const std::string& path) {
 }
 
 Summary load_summary(const std::string& path) {
-  const Json json = Json::parse(data::read_file(path), nullptr, false);
-  if (json.is_discarded()) throw data::InputError(path + ": not a JSON file");
-  const Fields fields(json, path, "");
-  std::string found;
-  fields.read("schema", found);
-  if (found != schema) fields.fail("schema", "found \"" + found + "\", expected \"" + schema + "\"");
-
+  const nlohmann::json file = data::load_json(path);
+  const data::JsonObject json(file, path);
+  if (json.string("schema") != schema) throw json.error("schema", schema);
+  json.expect_fields({"schema", "tool_version", "best", "level95", "axes", "parameters", "fixed",
+                      "covariance_log", "recordings", "solver_check", "settings", "asset", "candidates",
+                      "unconverged", "device", "wall_seconds", "warnings", "exit_code"});
   Summary summary;
-  fields.read("tool_version", summary.tool_version);
-  const Fields best = fields.object("best");
-  best.read("parameters", summary.best);
-  best.read("membrane_stiffness", summary.membrane_stiffness);
-  best.read("score", summary.best_score);
-  fields.read("level95", summary.level95);
-  fields.each("parameters", [&](const std::string& name, const Fields& finding) {
-    summary.parameters.push_back(read_finding(name, finding));
-  });
-  fields.each("fixed", [&](const std::string& name, const Fields& fixed) {
-    fixed.read("value", summary.fixed[name].value);
-    fixed.read("source", summary.fixed[name].source);
-  });
-  fields.read("covariance_log", summary.covariance_log);
-  fields.each("recordings", [&](const std::string&, const Fields& recording) {
+  summary.tool_version = json.string("tool_version");
+  const data::JsonObject best = json.object("best");
+  summary.best = typed<std::map<std::string, double>>(best, "parameters", "numbers by name");
+  summary.membrane_stiffness = score_of(best, "membrane_stiffness");
+  summary.best_score = score_of(best, "score");
+  summary.level95 = score_of(json, "level95");
+  const data::JsonObject parameters = json.object("parameters");
+  for (const std::string& name : typed<std::vector<std::string>>(json, "axes", "a list of names"))
+    summary.parameters.push_back(read_finding(name, parameters.object(name.c_str())));
+  for (const auto& [name, fixed] : json.members("fixed"))
+    summary.fixed[name] = {fixed.number("value"), fixed.string("source")};
+  summary.covariance_log = read_matrix(json, "covariance_log");
+  for (const data::JsonObject& recording : json.objects("recordings"))
     summary.recordings.push_back(read_recording(recording));
-  });
-  fields.each("solver_check", [&](const std::string& what, const Fields& check) {
-    SolverCheck& read = summary.solver_check.emplace_back();
-    read.what = what;
-    check.read("score", read.score);
-    check.read("surface_change_m", read.surface_change_m);
-  });
-  fields.read("settings", summary.settings);
-  fields.read("asset", summary.asset);
-  fields.read("candidates", summary.candidates);
-  fields.read("unconverged", summary.unconverged);
-  fields.read("device", summary.device);
-  fields.read("wall_seconds", summary.wall_seconds);
-  fields.read("warnings", summary.warnings);
-  fields.read("exit_code", summary.exit_code);
+  for (const data::JsonObject& check : json.objects("solver_check"))
+    summary.solver_check.push_back(
+        {check.string("what"), score_of(check, "score"), score_of(check, "surface_change_m")});
+  summary.settings = typed<std::map<std::string, std::string>>(json, "settings", "texts by name");
+  summary.asset = json.string("asset");
+  summary.candidates = json.integer("candidates");
+  summary.unconverged = json.integer("unconverged");
+  summary.device = json.string("device");
+  summary.wall_seconds = json.number("wall_seconds");
+  summary.warnings = typed<std::vector<std::string>>(json, "warnings", "a list of texts");
+  summary.exit_code = json.integer("exit_code");
   return summary;
 }
 
