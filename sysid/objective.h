@@ -18,9 +18,9 @@ struct Robust {
 
 /// What was seen at one time.
 struct Observation {
-  double t = 0;         ///< [s]
-  data::Points points;  ///< inside the crop, base frame [m]
-  double weight = 1;    ///< in the mean over keyframes; 0 leaves the keyframe out of score and fit
+  double t = 0;           ///< [s]
+  data::Points points{};  ///< inside the crop, base frame [m]
+  double weight = 1;      ///< in the mean over keyframes; 0 leaves the keyframe out of score and fit
 };
 
 /// Positions of a sheet at equal steps.
