@@ -6,6 +6,7 @@ namespace flash::sim {
 
 namespace {
 
+using data::Points;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
@@ -28,6 +29,22 @@ void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& bloc
   Eigen::Map<Matrix3d> target(values.data() + 9L * slot.block);
   if (slot.transpose) target += block.transpose();
   else target += block;
+}
+
+/// y += scale * S x by differences: rows of S sum to zero, so that rigid translations are exactly free of force.
+void add_product(const Eigen::SparseMatrix<double, Eigen::RowMajor>& S, double scale, const data::Points& x, data::Points& y) {
+  for (int i = 0; i < S.outerSize(); ++i) {
+    const double* xi = x.data() + 3L * i;
+    double sum0 = 0, sum1 = 0, sum2 = 0;
+    for (int k = S.outerIndexPtr()[i]; k < S.outerIndexPtr()[i + 1]; ++k) {
+      const double* xj = x.data() + 3L * S.innerIndexPtr()[k];
+      const double s = S.valuePtr()[k];
+      sum0 += s * (xj[0] - xi[0]);
+      sum1 += s * (xj[1] - xi[1]);
+      sum2 += s * (xj[2] - xi[2]);
+    }
+    y.row(i) += scale * Eigen::RowVector3d(sum0, sum1, sum2);
+  }
 }
 
 }  // namespace
@@ -58,22 +75,10 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
     }
     return energy;
   }
-  const auto& S = bending.stiffness;
-  for (int i = 0; i < S.outerSize(); ++i) {
-    // Rows of S sum to zero: differences keep rigid translations exactly free of force.
-    const double* xi = positions.data() + 3L * i;
-    double sum0 = 0, sum1 = 0, sum2 = 0;
-    for (int k = S.outerIndexPtr()[i]; k < S.outerIndexPtr()[i + 1]; ++k) {
-      const double* xj = positions.data() + 3L * S.innerIndexPtr()[k];
-      const double s = S.valuePtr()[k];
-      sum0 += s * (xj[0] - xi[0]);
-      sum1 += s * (xj[1] - xi[1]);
-      sum2 += s * (xj[2] - xi[2]);
-    }
-    const Eigen::RowVector3d force = D * Eigen::RowVector3d(sum0, sum1, sum2);
-    gradient.row(i) += force;
-    energy.bending += 0.5 * force.dot(positions.row(i));
-  }
+  Points bent = Points::Zero(positions.rows(), 3);
+  add_product(bending.stiffness, D, positions, bent);
+  gradient += bent;
+  energy.bending += 0.5 * bent.cwiseProduct(positions).sum();
   return energy;
 }
 
@@ -118,6 +123,10 @@ void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, 
   }
   for (size_t block = 0; block < bending.stand_in.size(); ++block)
     for (int c = 0; c < 3; ++c) values[9 * block + 4 * c] += D * bending.stand_in[block];
+}
+
+void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const Points& x, Points& y) {
+  add_product(bending.correction, bending_rigidity, x, y);
 }
 
 void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale, const data::Points& x,

@@ -22,4 +22,7 @@ void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, 
 void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale, const data::Points& x,
                        data::Points& y);
 
+/// y += D (stiffness - stand-in) x: what the Newton matrix lacks against the bending operator.
+void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const data::Points& x, data::Points& y);
+
 }  // namespace flash::sim

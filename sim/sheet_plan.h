@@ -33,6 +33,7 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
 struct BendingOperator {
   data::BendingModel model;
   Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness;  ///< exact; empty for the hinge model
+  Eigen::SparseMatrix<double, Eigen::RowMajor> correction;  ///< stiffness less the stand-in; for the plate only
   std::vector<double> stand_in;  ///< one number a block of the pattern: a sparser stiffness for the Newton matrix
 };
 

@@ -48,6 +48,11 @@ struct Solver::Workspace {
       : plan(std::move(plan_in)), settings(settings_in), factor(plan->symbolic) {}
 
   const BendingOperator& bending_of(const data::SheetMaterial& material);
+
+  /// Conjugate gradients on the free directions, preconditioned by the factor: the matrix has the bending operator
+  /// itself where the factor has its stand-in. Returns the number of iterations.
+  int solve(const BendingOperator& operator_, double bending_rigidity, const std::vector<VertexConstraint>& constraints,
+            const Points& right_hand_side, double tolerance, Points& solution) const;
 };
 
 const BendingOperator& Solver::Workspace::bending_of(const data::SheetMaterial& material) {
@@ -113,49 +118,58 @@ class StepProblem {
   Points target_, loads_;
 };
 
-/// Turns the matrix into that of the free directions: P B P + (I - P), after moving what the constraints' corrections do
-/// to the right-hand side.
-void constrain(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints, const Points& right_hand_side,
-               BlockValues<double>& values, Points& projected) {
-  projected = right_hand_side;
+/// Turns the matrix into that of the free directions, P (B + friction) P + (I - P) scaled to its neighbours.
+void constrain(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints, BlockValues<double>& values) {
   const auto block = [&](size_t k) { return Map<Matrix3d>(values.data() + 9 * k); };
-  const auto is_free = [&](int i) { return constraints[i].hold == Hold::free; };
   for (int i = 0; i < pattern.size; ++i) {
-    if (is_free(i)) continue;
-    block(i) += constraints[i].stiffness;
-    projected.row(i) -= (block(i) * constraints[i].correction).transpose();
+    const VertexConstraint& c = constraints[i];
+    if (c.hold == Hold::free) continue;
+    const Matrix3d friction = c.slip_stiffness * (Matrix3d::Identity() - c.slip_direction * c.slip_direction.transpose());
+    const double scale = block(i).trace() / 3;
+    block(i) = c.free * (block(i) + friction) * c.free + scale * (Matrix3d::Identity() - c.free);
   }
   for (size_t k = 0; k < pattern.pairs.size(); ++k) {
     const auto [row, column] = pattern.pairs[k];
-    if (is_free(row) && is_free(column)) continue;
+    if (constraints[row].hold == Hold::free && constraints[column].hold == Hold::free) continue;
     auto b = block(pattern.size + k);
-    projected.row(row) -= (b * constraints[column].correction).transpose();
-    projected.row(column) -= (b.transpose() * constraints[row].correction).transpose();
     b = constraints[row].free * b * constraints[column].free;
-  }
-  for (int i = 0; i < pattern.size; ++i) {
-    if (is_free(i)) continue;
-    const Matrix3d& P = constraints[i].free;
-    const double scale = block(i).trace();
-    block(i) = P * block(i) * P + scale * (Matrix3d::Identity() - P);
-    projected.row(i) = projected.row(i) * P;
   }
 }
 
-/// Friction work that a slipping vertex still has to do, as a potential at a frozen normal force.
-double friction_potential(const std::vector<VertexConstraint>& constraints, const Environment& environment, double time_step,
-                          const Points& positions) {
-  double potential = 0;
-  for (size_t i = 0; i < constraints.size(); ++i) {
-    const VertexConstraint& c = constraints[i];
-    if (c.hold != Hold::slip) continue;
-    potential += c.friction_bound * (c.free * (positions.row(i) - environment.state.positions.row(i)).transpose()).norm();
-  }
-  (void)time_step;
-  return potential;
+void restrict_to_free(const std::vector<VertexConstraint>& constraints, Points& vectors) {
+  for (size_t i = 0; i < constraints.size(); ++i)
+    if (constraints[i].hold != Hold::free) vectors.row(i) *= constraints[i].free;
 }
 
 }  // namespace
+
+int Solver::Workspace::solve(const BendingOperator& operator_, double bending_rigidity,
+                             const std::vector<VertexConstraint>& constraints, const Points& right_hand_side, double tolerance,
+                             Points& solution) const {
+  Points residual = right_hand_side, product(residual.rows(), 3), preconditioned, search;
+  restrict_to_free(constraints, residual);
+  solution.setZero(residual.rows(), 3);
+  const double target = std::max(0.05 * residual.norm(), tolerance);
+  double previous = 0;
+  for (int iteration = 1;; ++iteration) {
+    preconditioned = residual;
+    factor.solve_in_place(preconditioned.data());
+    restrict_to_free(constraints, preconditioned);
+    const double along = residual.cwiseProduct(preconditioned).sum();
+    search = iteration == 1 ? preconditioned : Points(preconditioned + along / previous * search);
+    previous = along;
+    product.setZero();
+    add_block_product(plan->pattern, values, 1.0, search, product);
+    if (operator_.model == data::BendingModel::plate) {
+      add_bending_correction(operator_, bending_rigidity, search, product);
+      restrict_to_free(constraints, product);
+    }
+    const double step = along / search.cwiseProduct(product).sum();
+    solution += step * search;
+    residual -= step * product;
+    if (residual.norm() <= target || iteration == 30) return iteration;
+  }
+}
 
 Solver::Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings)
     : workspace_(std::make_unique<Workspace>(std::move(plan), settings)) {}
@@ -182,7 +196,7 @@ StepReport Solver::step(Environment& environment) {
 
   Points x = start.positions + h * start.velocities;
   std::vector<VertexConstraint> constraints = begin_step(environment, time, x);
-  Points force(x.rows(), 3), residual(x.rows(), 3), projected(x.rows(), 3), trial, trial_force(x.rows(), 3);
+  Points force(x.rows(), 3), residual(x.rows(), 3), direction(x.rows(), 3), trial, trial_force(x.rows(), 3);
   ElasticEnergy elastic, trial_elastic;
   double potential = problem.evaluate(x, force, elastic);
   StepReport report;
@@ -196,30 +210,26 @@ StepReport Solver::step(Environment& environment) {
       if (constraints[i].hold != Hold::free) report.complementarity = std::max(report.complementarity, std::abs(constraints[i].gap));
     }
     report.residual = residual.norm() / force_scale;
-    report.converged = report.residual <= w.settings.tolerance && report.complementarity <= w.settings.gap_tolerance &&
-                       report.penetration_max <= w.settings.gap_tolerance;
+    report.converged = report.residual <= w.settings.tolerance;
   };
   judge();
   while (!report.converged && report.iterations < w.settings.max_iterations) {
     ++report.iterations;
     problem.assemble(x, w.values);
-    constrain(w.plan->pattern, constraints, -residual, w.values, projected);
+    constrain(w.plan->pattern, constraints, w.values);
     if (!w.factor.factorize(w.values)) break;
-    w.factor.solve_in_place(projected.data());
-    bool corrected = false;
-    for (int i = 0; i < x.rows(); ++i) {
-      corrected |= constraints[i].correction.squaredNorm() > 0;
-      projected.row(i) += constraints[i].correction.transpose();
-    }
-    // The potential guides the step, unless a constraint has to be met first.
-    const double before = potential + friction_potential(constraints, environment, h, x);
-    const double slope = residual.cwiseProduct(projected).sum();
+    report.solves += w.solve(bending, environment.material.bending_rigidity, constraints, -residual,
+                             0.3 * w.settings.tolerance * force_scale, direction);
+
+    const double before = potential + friction_potential(environment, time, h, constraints, x);
+    const double slope = residual.cwiseProduct(direction).sum();
     double length = 1.0;
     for (int cut = 0;; ++cut) {
-      trial = x + length * projected;
+      trial = x + length * direction;
+      project_to_feasible(environment, time, h, constraints, trial);
       const double trial_potential = problem.evaluate(trial, trial_force, trial_elastic);
-      const double after = trial_potential + friction_potential(constraints, environment, h, trial);
-      if (corrected || cut == 8 || after <= before + 1e-4 * length * slope + 1e-12 * std::abs(before)) {
+      const double after = trial_potential + friction_potential(environment, time, h, constraints, trial);
+      if (cut == 8 || after <= before + 1e-4 * length * slope + 1e-13 * std::abs(before)) {
         x.swap(trial);
         force.swap(trial_force);
         elastic = trial_elastic;

@@ -12,13 +12,13 @@ struct SolverSettings {
   double time_step = 0.01;      ///< h [s]
   int max_iterations = 60;      ///< Newton iterations a step
   double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
-  double gap_tolerance = 1e-7;  ///< on penetration and on the gap of a touching vertex [m]
 };
 
 /// How one step of one environment went.
 struct StepReport {
   double residual = 0;            ///< |r| / |M g|; without gravity as if it were 9.81 m/s^2
-  int iterations = 0;
+  int iterations = 0;             ///< of Newton's method
+  int solves = 0;                 ///< with a factor: iterations of the linear solver
   bool converged = false;
   double penetration_max = 0;     ///< deepest vertex below a surface [m]
   double complementarity = 0;     ///< max |min(gap, lambda / stiffness)| [m]

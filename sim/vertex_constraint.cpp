@@ -1,6 +1,7 @@
 #include "sim/vertex_constraint.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "sim/contact_geometry.h"
 
@@ -9,12 +10,10 @@ namespace flash::sim {
 namespace {
 
 using Eigen::Matrix3d;
-using Eigen::RowVector3d;
 using Eigen::Vector3d;
 
-constexpr double touching = 1e-9;       ///< gap below which a vertex starts a step in contact [m]
-constexpr double resting = 1e-12;       ///< slip below which a vertex has no direction of slip [m]
-constexpr int changes_allowed = 12;     ///< of one contact in a step; beyond, it keeps its last hold
+constexpr double touching = 1e-10;  ///< gap up to which a vertex is on a surface: rounding of a projected position [m]
+constexpr double resting = 1e-13;   ///< slip up to which a vertex has not moved: rounding of a position [m]
 
 Gap nearest_gap(const Environment& environment, const Vector3d& point, double time, int& obstacle) {
   Gap nearest{std::numeric_limits<double>::infinity(), Vector3d::Zero(), Vector3d::Zero()};
@@ -28,10 +27,10 @@ Gap nearest_gap(const Environment& environment, const Vector3d& point, double ti
   return nearest;
 }
 
-void set_hold(VertexConstraint& constraint, Hold hold) {
-  if (constraint.hold == hold) return;
-  constraint.hold = hold;
-  ++constraint.changes;
+/// Tangential displacement since the start of the step against the surface [m].
+Vector3d slip_of(const Environment& environment, const Gap& gap, double time_step, const data::Points& positions, int i) {
+  const Vector3d moved = (positions.row(i) - environment.state.positions.row(i)).transpose() - time_step * gap.surface_velocity;
+  return moved - gap.normal * gap.normal.dot(moved);
 }
 
 }  // namespace
@@ -49,12 +48,13 @@ std::vector<VertexConstraint> begin_step(const Environment& environment, double 
   }
   for (size_t k = 0; k < environment.grasps.size(); ++k) {
     const Grasp& grasp = environment.grasps[k];
-    if (environment.state.grasp_offsets.size() <= k || environment.state.grasp_offsets[k].rows() == 0) continue;
+    const data::Points& offsets = environment.state.grasp_offsets[k];
+    if (offsets.rows() == 0) continue;
     const Eigen::Isometry3d pose = data::pose_at(grasp.gripper, time);
     const double closed = grasp.closing_time > 0 ? std::clamp((time - grasp.from) / grasp.closing_time, 0.0, 1.0) : 1.0;
     const double blend = closed * closed * (3 - 2 * closed);
     for (size_t v = 0; v < grasp.vertices.size(); ++v) {
-      Vector3d offset = environment.state.grasp_offsets[k].row(v);
+      Vector3d offset = offsets.row(v);
       if (grasp.targets.rows() > 0) offset += blend * (grasp.targets.row(v).transpose() - offset);
       VertexConstraint& constraint = constraints[grasp.vertices[v]];
       constraint.hold = Hold::fixed;
@@ -63,15 +63,7 @@ std::vector<VertexConstraint> begin_step(const Environment& environment, double 
       positions.row(grasp.vertices[v]) = pose * offset;
     }
   }
-  for (size_t i = 0; i < constraints.size(); ++i) {
-    VertexConstraint& constraint = constraints[i];
-    if (constraint.hold == Hold::fixed) continue;
-    const Gap gap = nearest_gap(environment, environment.state.positions.row(i), environment.state.time, constraint.obstacle);
-    if (gap.distance > touching) continue;
-    const Vector3d velocity = environment.state.velocities.row(i).transpose() - gap.surface_velocity;
-    const Vector3d sliding = velocity - gap.normal * gap.normal.dot(velocity);
-    constraint.hold = sliding.norm() > resting ? Hold::slip : Hold::stick;
-  }
+  project_to_feasible(environment, time, 0, constraints, positions);
   return constraints;
 }
 
@@ -79,59 +71,66 @@ void update_contacts(const Environment& environment, double time, double time_st
                      const data::Points& force, std::vector<VertexConstraint>& constraints) {
   for (size_t i = 0; i < constraints.size(); ++i) {
     VertexConstraint& constraint = constraints[i];
+    const Vector3d needed = force.row(i);
     if (constraint.hold == Hold::fixed) {
-      constraint.reaction = force.row(i).transpose() - constraint.free * force.row(i).transpose();
+      constraint.reaction = needed - constraint.free * needed;
       continue;
     }
+    constraint = VertexConstraint{};
     const Gap gap = nearest_gap(environment, positions.row(i), time, constraint.obstacle);
-    const Vector3d needed = force.row(i);
-    const double needed_normal = gap.normal.dot(needed);
+    const double normal_force = gap.normal.dot(needed);
     constraint.gap = gap.distance;
-    constraint.normal = gap.normal;
-    const bool settled = constraint.changes >= changes_allowed;
-    const bool held = constraint.hold != Hold::free;
-    if (!held && gap.distance < 0 && !settled) set_hold(constraint, Hold::stick);
-    if (held && needed_normal < 0 && gap.distance > -touching && !settled) set_hold(constraint, Hold::free);
-    constraint.correction.setZero();
-    constraint.reaction.setZero();
-    constraint.stiffness.setZero();
-    constraint.friction_bound = 0;
-    constraint.free.setIdentity();
-    if (constraint.hold == Hold::free) continue;
+    if (gap.distance > touching || normal_force <= 0) continue;
 
-    const Matrix3d tangent = Matrix3d::Identity() - gap.normal * gap.normal.transpose();
     const Obstacle& obstacle = environment.obstacles[constraint.obstacle];
     const double friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
-    const double normal_force = std::max(needed_normal, 0.0), bound = friction * normal_force;
-    const Vector3d needed_tangential = tangent * needed;
-    const Vector3d slip =
-        tangent * (positions.row(i) - environment.state.positions.row(i)).transpose() - time_step * (tangent * gap.surface_velocity);
-    const double slip_length = slip.norm();
-
-    if (!settled && constraint.hold == Hold::stick && needed_tangential.norm() > bound) {
-      set_hold(constraint, Hold::slip);
-      constraint.slip_direction = -needed_tangential.normalized();
-    } else if (!settled && constraint.hold == Hold::slip) {
-      const bool reversed = slip.dot(constraint.slip_direction) < 0;
-      if (slip_length < resting || reversed) set_hold(constraint, Hold::stick);
-    }
-
-    constraint.correction = -gap.distance * gap.normal;
+    const double bound = friction * normal_force;
+    const Vector3d needed_tangential = needed - normal_force * gap.normal;
+    const Vector3d slip = slip_of(environment, gap, time_step, positions, static_cast<int>(i));
+    const double slip_length = slip.norm(), needed_length = needed_tangential.norm();
+    constraint.friction_bound = bound;
     constraint.reaction = normal_force * gap.normal;
-    if (constraint.hold == Hold::stick) {
+    if (slip_length <= resting && needed_length <= bound) {
+      constraint.hold = Hold::stick;
       constraint.free.setZero();
-      constraint.correction -= slip;
-      const double excess = needed_tangential.norm();
-      constraint.reaction += excess > bound ? Vector3d(needed_tangential * (bound / excess)) : needed_tangential;
-    } else {
-      if (slip_length > resting) constraint.slip_direction = slip / slip_length;
-      const Vector3d& direction = constraint.slip_direction;
-      constraint.free = tangent;
-      constraint.friction_bound = bound;
-      constraint.reaction -= bound * direction;
-      if (slip_length > resting) constraint.stiffness = bound / slip_length * (tangent - direction * direction.transpose());
+      constraint.reaction += needed_tangential;
+      continue;
+    }
+    constraint.hold = Hold::slip;
+    constraint.free = Matrix3d::Identity() - gap.normal * gap.normal.transpose();
+    constraint.slip_direction = slip_length > resting ? Vector3d(slip / slip_length) : Vector3d(-needed_tangential / needed_length);
+    constraint.reaction -= bound * constraint.slip_direction;
+    if (slip_length > resting) constraint.slip_stiffness = bound / slip_length;
+  }
+}
+
+void project_to_feasible(const Environment& environment, double time, double time_step,
+                         const std::vector<VertexConstraint>& constraints, data::Points& positions) {
+  if (environment.obstacles.empty()) return;
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    const VertexConstraint& constraint = constraints[i];
+    if (constraint.hold == Hold::fixed) continue;
+    int obstacle = -1;
+    const Gap gap = nearest_gap(environment, positions.row(i), time, obstacle);
+    const bool held = constraint.hold != Hold::free && obstacle == constraint.obstacle;
+    if (gap.distance < 0 || held) positions.row(i) -= gap.distance * gap.normal.transpose();
+    if (held && constraint.hold == Hold::slip) {
+      const Vector3d slip = slip_of(environment, gap, time_step, positions, static_cast<int>(i));
+      if (slip.dot(constraint.slip_direction) < 0) positions.row(i) -= slip.transpose();
     }
   }
+}
+
+double friction_potential(const Environment& environment, double time, double time_step,
+                          const std::vector<VertexConstraint>& constraints, const data::Points& positions) {
+  double potential = 0;
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    const VertexConstraint& constraint = constraints[i];
+    if (constraint.friction_bound == 0) continue;
+    const Gap gap = gap_to(environment.obstacles[constraint.obstacle], positions.row(i), time);
+    potential += constraint.friction_bound * slip_of(environment, gap, time_step, positions, static_cast<int>(i)).norm();
+  }
+  return potential;
 }
 
 }  // namespace flash::sim
