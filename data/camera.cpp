@@ -167,7 +167,7 @@ Eigen::Vector3d unproject(const CameraIntrinsics& camera, const Eigen::Vector2d&
       p -= jacobian.inverse() * residual;
     }
   }
-  return depth * p.homogeneous();
+  return {depth * p.x(), depth * p.y(), depth};
 }
 
 }  // namespace flash::data

@@ -11,7 +11,7 @@
 namespace flash::data {
 namespace {
 
-/// Sixteen bits a sample, big endian, as PNG stores them.
+/// Samples as PNG stores them: sixteen bits are big endian.
 struct RawPng {
   int width = 0, height = 0, channels = 0, bit_depth = 0;
   std::vector<std::uint8_t> bytes;  ///< rows without padding
@@ -45,6 +45,7 @@ bool decode(png_structp png, png_infop info, bool expand, RawPng& image, std::ve
     png_set_strip_16(png);
     png_set_strip_alpha(png);
   }
+  png_set_interlace_handling(png);
   png_read_update_info(png, info);
   image.width = static_cast<int>(png_get_image_width(png, info));
   image.height = static_cast<int>(png_get_image_height(png, info));

@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <cmath>
+
+#include "data/atomic_file.h"
+#include "data/depth_image.h"
+#include "data/error.h"
+#include "data/mesh_io.h"
+#include "data/recording.h"
+#include "data/text.h"
+
+namespace flash::data {
+namespace {
+
+double diagonal(const Points& points) {
+  return points.rows() == 0 ? 0 : (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
+}
+
+Points transformed(Points points, const Eigen::Isometry3d& pose) {
+  points *= pose.linear().transpose();
+  points.rowwise() += pose.translation().transpose();
+  return points;
+}
+
+Points inside(const CropBox& crop, const Points& points) {
+  Points kept(points.rows(), 3);
+  Eigen::Index count = 0;
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    if (crop.contains(points.row(i))) kept.row(count++) = points.row(i);
+  return kept.topRows(count);
+}
+
+/// How far the middle point of the cloud is from the middle of the sheet; the median is blind to stray
+/// clusters.
+double median_distance(const Points& points, const Eigen::Vector3d& from) {
+  std::vector<double> distances;
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    distances.push_back((points.row(i).transpose() - from).norm());
+  const auto middle = distances.begin() + static_cast<long>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+/// A cloud is expected about the size of the sheet and as near to it as the gripper takes it.
+void check_scale(const Recording& recording, const Points& cloud, const std::string& path) {
+  if (cloud.rows() == 0) return;
+  const Eigen::Vector3d centre = recording.start.colwise().mean();
+  const double size = diagonal(recording.start);
+  double reach = size + recording.nuisance.offset.norm();
+  for (const auto& [name, trajectory] : recording.trajectories)
+    for (const Eigen::Isometry3d& pose : trajectory.poses)
+      reach = std::max(reach, (pose.translation() - centre).norm() + size);
+  const double distance = median_distance(cloud, centre);
+  if (distance > 20 * reach)
+    throw InputError(path + ": its points lie " + format_short(distance) + " m from a sheet " +
+                     format_short(size) +
+                     " m across, expected metres in the base frame (millimetres read as metres?)");
+}
+
+void load_markers(const std::string& path, Eigen::Index vertices, Keyframe& keyframe) {
+  const std::string text = read_file(path);
+  LineReader lines(text);
+  std::string_view line;
+  if (!lines.next(line) || line != "vertex,x,y,z")
+    throw input_error(path, "line 1", "expected the header vertex,x,y,z");
+  std::vector<double> coordinates;
+  while (lines.next(line)) {
+    if (line.empty()) continue;
+    const std::vector<std::string_view> cells = split(line, ",");
+    const std::optional<long> vertex = cells.size() == 4 ? parse_integer(cells[0]) : std::nullopt;
+    if (!vertex || *vertex < 0 || *vertex >= vertices)
+      throw input_error(path, "line " + std::to_string(lines.number()),
+                        "found \"" + std::string(line) + "\", expected vertex,x,y,z with a vertex below " +
+                            std::to_string(vertices));
+    keyframe.marker_vertices.push_back(static_cast<int>(*vertex));
+    for (std::size_t k = 1; k < 4; ++k) {
+      const std::optional<double> value = parse_number(cells[k]);
+      if (!value || !std::isfinite(*value))
+        throw input_error(path, "line " + std::to_string(lines.number()),
+                          "found \"" + std::string(cells[k]) + "\", expected a finite number");
+      coordinates.push_back(*value);
+    }
+  }
+  keyframe.markers =
+      Eigen::Map<Points>(coordinates.data(), static_cast<Eigen::Index>(coordinates.size() / 3), 3);
+}
+
+Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recorded) {
+  Keyframe keyframe;
+  keyframe.time = recorded.time;
+  keyframe.force = recorded.force;
+  Points cloud;
+  if (!recorded.cloud.empty()) {
+    cloud = load_point_cloud(recorded.cloud);
+    check_scale(recording, cloud, recorded.cloud);
+  } else if (!recorded.depth.empty()) {
+    const MaskImage mask = recorded.mask.empty() ? MaskImage{} : load_mask(recorded.mask);
+    cloud =
+        transformed(points_from_depth(load_depth_image(recorded.depth), mask, recording.camera->intrinsics,
+                                      recording.camera->depth_scale, recorded.depth),
+                    recording.camera->base_from_camera);
+    check_scale(recording, cloud, recorded.depth);
+  }
+  keyframe.cloud = inside(recording.crop, cloud);
+  if (!recorded.contour.empty()) {
+    const Points contour = load_point_cloud(recorded.contour);
+    check_scale(recording, contour, recorded.contour);
+    keyframe.contour = inside(recording.crop, contour);
+  }
+  if (!recorded.markers.empty()) load_markers(recorded.markers, recording.mesh.vertices.rows(), keyframe);
+  return keyframe;
+}
+
+}  // namespace
+
+std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std::string>& notices) {
+  std::vector<Keyframe> keyframes;
+  std::string empty;
+  std::size_t empty_count = 0;
+  double largest = 0;
+  for (const RecordedKeyframe& recorded : recording.keyframes) {
+    keyframes.push_back(load_keyframe(recording, recorded));
+    const Keyframe& keyframe = keyframes.back();
+    largest = std::max(largest, diagonal(keyframe.cloud));
+    if (keyframe.cloud.rows() == 0 && keyframe.contour.rows() == 0 && keyframe.markers.rows() == 0 &&
+        !keyframe.force) {
+      empty += (empty.empty() ? "" : ", ") + format_short(recorded.time);
+      ++empty_count;
+    }
+  }
+  const std::string of_all =
+      std::to_string(empty_count) + " of " + std::to_string(keyframes.size()) + " keyframes";
+  if (empty_count == keyframes.size())
+    throw input_error(
+        recording.source, "keyframes",
+        "no keyframe has a point inside the crop box, expected points in metres in the base frame");
+  if (largest > 0 && largest < 0.005 * diagonal(recording.mesh.vertices))
+    throw input_error(recording.source, "keyframes",
+                      "the largest cloud is " + format_short(largest) + " m across, the sheet " +
+                          format_short(diagonal(recording.mesh.vertices)) +
+                          " m: expected the same unit, metres");
+  if (empty_count > 0)
+    notices.push_back(recording.source + ": " + of_all + " have no point inside the crop box (t = " + empty +
+                      " s)");
+  return keyframes;
+}
+
+}  // namespace flash::data

@@ -1,0 +1,351 @@
+#include "data/recording.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
+#include "data/text.h"
+
+namespace flash::data {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Nothing that a robot arm handles is larger: above it, lengths are taken for millimetres [m].
+constexpr double kLargestSize = 20.0;
+
+Eigen::Isometry3d read_pose(const JsonObject& object, const char* key) {
+  const Eigen::VectorXd pose = object.vector(key, 7);
+  if (std::abs(pose.tail<4>().norm() - 1) > 1e-3)
+    throw object.error(key, "[x, y, z, qx, qy, qz, qw] with a unit quaternion");
+  return from_vector(pose);
+}
+
+double diagonal(const Points& points) {
+  return points.rows() == 0 ? 0 : (points.colwise().maxCoeff() - points.colwise().minCoeff()).norm();
+}
+
+std::string existing_file(const JsonObject& object, const char* key, const std::string& source) {
+  const std::string path = resolve_path(object.string(key), source);
+  if (!std::filesystem::exists(path))
+    throw input_error(source, object.name_of(key), "file " + path + " does not exist");
+  return path;
+}
+
+void read_object(const JsonObject& file, Recording& recording) {
+  const JsonObject object = file.object("object");
+  object.expect_fields({"mesh", "asset", "start", "note"});
+  const std::string mesh = object.string("mesh");
+  recording.mesh_spec = is_mesh_spec(mesh) ? mesh : existing_file(object, "mesh", recording.source);
+  recording.mesh = is_mesh_spec(mesh) ? parse_mesh_spec(mesh, recording.source, object.name_of("mesh"))
+                                      : load_triangle_mesh(recording.mesh_spec);
+  const double size = diagonal(recording.mesh.vertices);
+  if (size > kLargestSize)
+    throw object.error(
+        "mesh", "metres: the mesh is " + format_short(size) + " m across (millimetres read as metres?)");
+  if (object.has("asset")) recording.asset = existing_file(object, "asset", recording.source);
+
+  recording.start = recording.mesh.vertices;
+  if (!object.has("start")) return;
+  if (object.raw("start").is_string()) {
+    recording.start_mesh = existing_file(object, "start", recording.source);
+  } else {
+    const JsonObject start = object.object("start");
+    start.expect_fields({"T_base_object", "mesh", "note"});
+    if (start.has("T_base_object") == start.has("mesh"))
+      throw input_error(recording.source, "object.start", "expected either T_base_object or mesh");
+    if (start.has("mesh")) recording.start_mesh = existing_file(start, "mesh", recording.source);
+    if (start.has("T_base_object")) recording.base_from_object = read_pose(start, "T_base_object");
+  }
+  if (!recording.start_mesh.empty()) {
+    recording.start = load_geometry(recording.start_mesh).points;
+    if (recording.start.rows() != recording.mesh.vertices.rows())
+      throw input_error(recording.source, "object.start",
+                        "found " + format_count(static_cast<std::size_t>(recording.start.rows())) +
+                            " vertices in " + recording.start_mesh + ", expected " +
+                            format_count(static_cast<std::size_t>(recording.mesh.vertices.rows())) +
+                            " as in object.mesh");
+    return;
+  }
+  recording.start *= recording.base_from_object.linear().transpose();
+  recording.start.rowwise() += recording.base_from_object.translation().transpose();
+}
+
+void read_table(const JsonObject& file, Recording& recording) {
+  recording.has_table = file.has("table");
+  if (!recording.has_table) return;
+  const JsonObject table = file.object("table");
+  table.expect_fields({"point", "normal"});
+  recording.table_point = table.vector("point", 3);
+  recording.table_normal = table.direction("normal", Eigen::Vector3d::UnitZ());
+}
+
+void read_trajectories(const JsonObject& file, Recording& recording) {
+  if (!file.has("trajectories")) return;
+  const JsonObject trajectories = file.object("trajectories");
+  for (const auto& [name, value] : trajectories.value().items()) {
+    const std::string path = existing_file(trajectories, name.c_str(), recording.source);
+    const Trajectory trajectory = load_trajectory(path);
+    for (const Eigen::Isometry3d& pose : trajectory.poses)
+      if (pose.translation().norm() > kLargestSize)
+        throw InputError(
+            path + ": reaches " + format_short(pose.translation().norm()) +
+            " m from the origin, expected metres in the robot's base frame (millimetres read as metres?)");
+    recording.trajectories[name] = trajectory;
+    recording.trajectory_paths[name] = path;
+  }
+}
+
+GraspShape read_shape(const JsonObject& grasp) {
+  const std::string shape = grasp.string("shape", "clamp");
+  for (const GraspShape candidate : {GraspShape::clamp, GraspShape::point, GraspShape::pinch})
+    if (shape == to_string(candidate)) return candidate;
+  throw grasp.error("shape", "clamp, point or pinch");
+}
+
+GraspSelection read_selection(const JsonObject& grasp, Eigen::Index vertices) {
+  const JsonObject select = grasp.object("select");
+  select.expect_fields({"corner", "vertices", "position", "within"});
+  if (select.has("corner") + select.has("vertices") + select.has("position") != 1)
+    throw input_error(select.source(), grasp.name_of("select"),
+                      "expected exactly one of corner, vertices and position");
+  GraspSelection selection;
+  selection.within = select.positive("within", selection.within);
+  if (select.has("position")) selection.position = select.vector("position", 3);
+  if (select.has("corner")) {
+    const std::vector<int> corner = select.indices("corner");
+    if (corner.size() != 2 || corner[0] > 1 || corner[1] > 1)
+      throw select.error("corner", "[i, j], each 0 or 1");
+    selection.corner = {corner[0], corner[1]};
+  }
+  if (select.has("vertices")) {
+    selection.vertices = select.indices("vertices");
+    if (selection.vertices.empty()) throw select.error("vertices", "at least one index");
+    for (const int vertex : selection.vertices)
+      if (vertex >= vertices)
+        throw select.error("vertices",
+                           "indices below " + std::to_string(vertices) + ", the vertices of the mesh");
+  }
+  return selection;
+}
+
+void read_grasps(const JsonObject& file, Recording& recording) {
+  for (const JsonObject& object : file.objects("grasps")) {
+    object.expect_fields({"gripper", "from", "to", "select", "shape", "depth", "direction", "pitch", "note"});
+    RecordedGrasp grasp;
+    grasp.gripper = object.string("gripper");
+    if (!recording.trajectories.contains(grasp.gripper)) {
+      std::string known;
+      for (const auto& [name, trajectory] : recording.trajectories)
+        known += (known.empty() ? "" : ", ") + name;
+      throw object.error("gripper", "a name of trajectories: " + (known.empty() ? "there are none" : known));
+    }
+    grasp.from = object.number("from", 0.0);
+    grasp.to = object.number("to", kInfinity);
+    if (!(grasp.to > grasp.from)) throw object.error("to", "a time after from, or null");
+    grasp.select = read_selection(object, recording.mesh.vertices.rows());
+    grasp.shape = read_shape(object);
+    grasp.depth = object.positive("depth", grasp.depth);
+    if (object.has("direction")) grasp.direction = object.direction("direction", grasp.direction);
+    grasp.pitch = object.number("pitch", 0.0);
+    recording.grasps.push_back(grasp);
+  }
+}
+
+void read_camera(const JsonObject& file, Recording& recording) {
+  if (!file.has("camera")) return;
+  const JsonObject object = file.object("camera");
+  object.expect_fields({"intrinsics", "T_base_camera", "depth_scale"});
+  RecordedCamera camera;
+  camera.intrinsics_path = existing_file(object, "intrinsics", recording.source);
+  camera.intrinsics = load_camera_intrinsics(camera.intrinsics_path);
+  camera.base_from_camera = read_pose(object, "T_base_camera");
+  camera.depth_scale = object.positive("depth_scale", camera.depth_scale);
+  recording.camera = camera;
+}
+
+Eigen::Vector3d read_bound(const JsonObject& crop, const char* key, double open) {
+  Eigen::Vector3d bound = Eigen::Vector3d::Constant(open);
+  if (!crop.has(key)) return bound;
+  const nlohmann::json& list = crop.raw(key);
+  if (!list.is_array() || list.size() != 3) throw crop.error(key, "three numbers, null where open");
+  for (int axis = 0; axis < 3; ++axis) {
+    const nlohmann::json& value = list[static_cast<std::size_t>(axis)];
+    if (value.is_null()) continue;
+    if (!value.is_number()) throw crop.error(key, "three numbers, null where open");
+    bound[axis] = value.get<double>();
+  }
+  return bound;
+}
+
+void read_crop(const JsonObject& file, Recording& recording) {
+  if (!file.has("crop")) return;
+  const JsonObject crop = file.object("crop");
+  crop.expect_fields({"min", "max"});
+  recording.crop.min = read_bound(crop, "min", -kInfinity);
+  recording.crop.max = read_bound(crop, "max", kInfinity);
+  if (!(recording.crop.min.array() < recording.crop.max.array()).all())
+    throw crop.error("min", "below max on every axis");
+}
+
+void read_keyframes(const JsonObject& file, Recording& recording) {
+  for (const JsonObject& object : file.objects("keyframes")) {
+    object.expect_fields({"t", "cloud", "depth", "mask", "markers", "contour", "force", "note"});
+    RecordedKeyframe keyframe;
+    keyframe.time = object.number("t");
+    if (!recording.keyframes.empty() && keyframe.time <= recording.keyframes.back().time)
+      throw object.error(
+          "t", "a time after " + format_number(recording.keyframes.back().time) + " s, the keyframe before");
+    const auto read = [&](const char* key, std::string& path) {
+      if (object.has(key)) path = existing_file(object, key, recording.source);
+    };
+    read("cloud", keyframe.cloud);
+    read("depth", keyframe.depth);
+    read("mask", keyframe.mask);
+    read("markers", keyframe.markers);
+    read("contour", keyframe.contour);
+    if (object.has("force")) keyframe.force = object.vector("force", 3);
+    if (!keyframe.depth.empty() && !recording.camera)
+      throw object.error("depth", "a camera in the recording");
+    if (!keyframe.mask.empty() && keyframe.depth.empty()) throw object.error("mask", "depth beside it");
+    if (keyframe.cloud.empty() && keyframe.depth.empty() && keyframe.markers.empty() &&
+        keyframe.contour.empty() && !keyframe.force)
+      throw object.error("cloud", "cloud, depth, markers, contour or force");
+    recording.keyframes.push_back(keyframe);
+  }
+  if (recording.keyframes.empty()) throw file.error("keyframes", "at least one keyframe");
+}
+
+void read_nuisance(const JsonObject& file, Recording& recording) {
+  if (!file.has("nuisance")) return;
+  const JsonObject object = file.object("nuisance");
+  object.expect_fields({"offset_m", "yaw_rad", "time_s", "table_height_m", "start_yaw_rad"});
+  NuisanceBounds& bounds = recording.nuisance;
+  if (object.has("offset_m")) {
+    bounds.offset = object.raw("offset_m").is_number()
+                        ? Eigen::Vector3d(Eigen::Vector3d::Constant(object.number("offset_m")))
+                        : Eigen::Vector3d(object.vector("offset_m", 3));
+    if (!(bounds.offset.array() >= 0).all()) throw object.error("offset_m", "bounds of 0 or above");
+  }
+  bounds.yaw = object.not_negative("yaw_rad", 0);
+  bounds.time = object.not_negative("time_s", 0);
+  bounds.table_height = object.not_negative("table_height_m", 0);
+  bounds.start_yaw = object.not_negative("start_yaw_rad", 0);
+}
+
+void check_times(Recording& recording) {
+  const double first = recording.keyframes.front().time, last = recording.keyframes.back().time;
+  for (const auto& [name, trajectory] : recording.trajectories) {
+    const double begin = trajectory.times.front(), end = trajectory.times.back();
+    const std::string spans = "keyframes span " + format_short(first) + " to " + format_short(last) +
+                              " s, trajectory " + name + ' ' + format_short(begin) + " to " +
+                              format_short(end) + " s";
+    const double slack = recording.nuisance.time;
+    if (first > end + slack || last < begin - slack)
+      throw input_error(recording.source, "keyframes", spans + ": expected clocks that overlap");
+    // Times that differ by the rounding of their files are the same time.
+    if (first < begin - slack - 1e-6 || last > end + slack + 1e-6)
+      recording.notices.push_back(recording.source + ": " + spans +
+                                  ": the gripper stands still outside its trajectory");
+  }
+}
+
+/// Only grasps that act on the start shape can be checked before anything has moved.
+void check_grasps(const Recording& recording) {
+  double earliest = kInfinity;
+  for (const RecordedGrasp& grasp : recording.grasps) earliest = std::min(earliest, grasp.from);
+  for (std::size_t g = 0; g < recording.grasps.size(); ++g) {
+    const RecordedGrasp& grasp = recording.grasps[g];
+    if (grasp.from > earliest) continue;
+    const Eigen::Isometry3d pose = pose_at(recording.trajectories.at(grasp.gripper), grasp.from);
+    const Eigen::Vector3d at = pose * grasp.select.position.value_or(Eigen::Vector3d::Zero());
+    double nearest = kInfinity;
+    for (const int vertex : select_vertices(recording, grasp))
+      nearest = std::min(nearest, (recording.start.row(vertex).transpose() - at).norm());
+    const double offset = recording.nuisance.offset.norm();
+    if (nearest > grasp.select.within + offset)
+      throw input_error(
+          recording.source, "grasps[" + std::to_string(g) + "]",
+          "at t = " + format_short(grasp.from) + " s gripper " + grasp.gripper + " is " +
+              format_short(nearest) + " m from the nearest vertex it should hold, expected at most within " +
+              format_short(grasp.select.within) + " m plus nuisance.offset_m " + format_short(offset) +
+              " m: check object.start, select and the frame of the trajectory");
+  }
+}
+
+}  // namespace
+
+const char* to_string(GraspShape shape) {
+  switch (shape) {
+    case GraspShape::clamp:
+      return "clamp";
+    case GraspShape::point:
+      return "point";
+    case GraspShape::pinch:
+      return "pinch";
+  }
+  return "";
+}
+
+Recording load_recording(const std::string& path) {
+  Recording recording;
+  recording.source =
+      std::filesystem::is_directory(path) ? (std::filesystem::path(path) / "recording.json").string() : path;
+  const nlohmann::json json = load_json(recording.source);
+  const JsonObject file(json, recording.source);
+  if (file.string("schema", "") != "flash-recording/1") throw file.error("schema", "\"flash-recording/1\"");
+  file.expect_fields({"schema", "name", "kind", "note", "gravity", "object", "table", "trajectories",
+                      "grasps", "camera", "crop", "keyframes", "nuisance"});
+  recording.name = file.string("name");
+  recording.kind = file.string("kind", recording.kind);
+  const std::vector<std::string> kinds = {"corner_lift", "hang",       "bar_pull", "bias_pull",
+                                          "drag",        "cantilever", "free"};
+  if (std::find(kinds.begin(), kinds.end(), recording.kind) == kinds.end())
+    throw file.error("kind", "corner_lift, hang, bar_pull, bias_pull, drag, cantilever or free");
+  recording.gravity = file.vector3("gravity", recording.gravity);
+  read_object(file, recording);
+  read_table(file, recording);
+  read_trajectories(file, recording);
+  read_grasps(file, recording);
+  read_camera(file, recording);
+  read_crop(file, recording);
+  read_keyframes(file, recording);
+  read_nuisance(file, recording);
+  check_times(recording);
+  check_grasps(recording);
+  return recording;
+}
+
+std::vector<int> select_vertices(const Recording& recording, const RecordedGrasp& grasp) {
+  const GraspSelection& select = grasp.select;
+  if (!select.vertices.empty()) return select.vertices;
+  std::vector<int> selected;
+  const Points& rest = recording.mesh.vertices;
+  // A cell edge that equals `within` but for rounding counts as inside.
+  const double within = select.within * (1 + 1e-9);
+  if (select.corner) {
+    Eigen::Vector2d corner;
+    for (int axis = 0; axis < 2; ++axis)
+      corner[axis] = (*select.corner)[static_cast<std::size_t>(axis)] == 0 ? rest.col(axis).minCoeff()
+                                                                           : rest.col(axis).maxCoeff();
+    for (int v = 0; v < rest.rows(); ++v)
+      if ((rest.row(v).head<2>().transpose() - corner).cwiseAbs().maxCoeff() <= within) selected.push_back(v);
+  } else {
+    const Eigen::Vector3d at = pose_at(recording.trajectories.at(grasp.gripper), grasp.from) *
+                               select.position.value_or(Eigen::Vector3d::Zero());
+    for (int v = 0; v < rest.rows(); ++v)
+      if ((recording.start.row(v).transpose() - at).norm() <= within) selected.push_back(v);
+  }
+  if (selected.empty())
+    throw input_error(recording.source, "grasps",
+                      "no vertex lies within " + format_short(select.within) +
+                          " m of the place that gripper " + grasp.gripper + " grasps");
+  return selected;
+}
+
+}  // namespace flash::data

@@ -1,0 +1,88 @@
+#include <cmath>
+
+#include "data/atomic_file.h"
+#include "data/json_reader.h"
+#include "data/procedural_mesh.h"
+#include "data/recording.h"
+
+namespace flash::data {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json numbers(const Eigen::VectorXd& values) {
+  Json list = Json::array();
+  for (const double value : values) list.push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
+  return list;
+}
+
+Json grasp_json(const RecordedGrasp& grasp) {
+  Json select = Json::object();
+  if (grasp.select.corner) select["corner"] = *grasp.select.corner;
+  if (!grasp.select.vertices.empty()) select["vertices"] = grasp.select.vertices;
+  if (grasp.select.position) select["position"] = numbers(*grasp.select.position);
+  select["within"] = grasp.select.within;
+  Json json = {{"gripper", grasp.gripper}, {"from", grasp.from}};
+  json["to"] = std::isfinite(grasp.to) ? Json(grasp.to) : Json(nullptr);
+  json["select"] = select;
+  json["shape"] = to_string(grasp.shape);
+  if (grasp.shape == GraspShape::pinch) {
+    json["depth"] = grasp.depth;
+    if (!grasp.direction.isZero()) json["direction"] = numbers(grasp.direction);
+    json["pitch"] = grasp.pitch;
+  }
+  return json;
+}
+
+}  // namespace
+
+void save_recording(const Recording& recording, const std::string& path) {
+  const auto named = [&](const std::string& file) { return relative_path(file, path); };
+  Json json = {{"schema", "flash-recording/1"}, {"name", recording.name}, {"kind", recording.kind}};
+  json["gravity"] = numbers(recording.gravity);
+
+  Json object;
+  object["mesh"] = is_mesh_spec(recording.mesh_spec) ? recording.mesh_spec : named(recording.mesh_spec);
+  object["asset"] = recording.asset.empty() ? Json(nullptr) : Json(named(recording.asset));
+  if (recording.start_mesh.empty())
+    object["start"] = {{"T_base_object", numbers(to_vector(recording.base_from_object))}};
+  else
+    object["start"] = {{"mesh", named(recording.start_mesh)}};
+  json["object"] = object;
+
+  if (recording.has_table)
+    json["table"] = {{"point", numbers(recording.table_point)}, {"normal", numbers(recording.table_normal)}};
+  json["trajectories"] = Json::object();
+  for (const auto& [name, file] : recording.trajectory_paths) json["trajectories"][name] = named(file);
+  json["grasps"] = Json::array();
+  for (const RecordedGrasp& grasp : recording.grasps) json["grasps"].push_back(grasp_json(grasp));
+  if (recording.camera)
+    json["camera"] = {{"intrinsics", named(recording.camera->intrinsics_path)},
+                      {"T_base_camera", numbers(to_vector(recording.camera->base_from_camera))},
+                      {"depth_scale", recording.camera->depth_scale}};
+  json["crop"] = {{"min", numbers(recording.crop.min)}, {"max", numbers(recording.crop.max)}};
+
+  json["keyframes"] = Json::array();
+  for (const RecordedKeyframe& keyframe : recording.keyframes) {
+    Json entry = {{"t", keyframe.time}};
+    const auto put = [&](const char* key, const std::string& file) {
+      if (!file.empty()) entry[key] = named(file);
+    };
+    put("cloud", keyframe.cloud);
+    put("depth", keyframe.depth);
+    put("mask", keyframe.mask);
+    put("markers", keyframe.markers);
+    put("contour", keyframe.contour);
+    if (keyframe.force) entry["force"] = numbers(*keyframe.force);
+    json["keyframes"].push_back(entry);
+  }
+  const NuisanceBounds& bounds = recording.nuisance;
+  json["nuisance"] = {{"offset_m", numbers(bounds.offset)},
+                      {"yaw_rad", bounds.yaw},
+                      {"time_s", bounds.time},
+                      {"table_height_m", bounds.table_height},
+                      {"start_yaw_rad", bounds.start_yaw}};
+  write_atomically(path, format_json(json));
+}
+
+}  // namespace flash::data
