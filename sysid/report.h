@@ -3,26 +3,11 @@
 #include <string>
 #include <vector>
 
-#include "data/mesh.h"
 #include "sysid/grid_results.h"
+#include "sysid/overlay.h"
 #include "sysid/summary.h"
 
 namespace flash::sysid {
-
-/// One keyframe of the best candidate, simulation and observation in the same frame.
-struct OverlayFrame {
-  double t = 0;           ///< [s]
-  data::Points vertices;  ///< simulated [m]
-  data::Points cloud;     ///< observed, moved by the fitted offset into the frame of the simulation [m]
-  double score = 0;       ///< [m]
-};
-
-/// A recording replayed with one set of parameters.
-struct Overlay {
-  std::string name;
-  data::Triangles triangles;
-  std::vector<OverlayFrame> frames;
-};
 
 struct ReportSettings {
   std::array<std::string, 2> map_axes;  ///< parameters across and up in the score map; empty: the first two
