@@ -1,0 +1,24 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "sysid/grid_search.h"
+#include "sysid/summary.h"
+
+namespace flash::sysid {
+
+/// The candidate solved again at half the time step, on a mesh of half the cell (sheets given by a
+/// specification only) and with four times the iterations at a tenth of the tolerance. `surface_change_m`:
+/// mean over the weighing keyframes of the mean distance from the vertices of the finer run to the surface of
+/// the run under the search's own settings, before any registration. `score`: with the registration fitted
+/// anew.
+std::vector<SolverCheck> check_solver(const std::vector<Replay>& replays, const ReplayCandidate& candidate,
+                                      const ScoreSettings& score);
+
+/// Time until which the motion of a candidate can be predicted [s]: the first weighing keyframe at which the
+/// surfaces of two runs, one with every stiffness and the friction larger by `perturbation`, lie more than
+/// `limit` [m] apart in the mean. Empty: to the end.
+std::optional<double> predictability_horizon(const Replay& replay, const ReplayCandidate& candidate,
+                                             double limit, double perturbation = 1e-3);
+
+}  // namespace flash::sysid

@@ -1,0 +1,201 @@
+#include "sysid/summarize.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/asset.h"
+#include "data/atomic_file.h"
+#include "data/procedural_mesh.h"
+#include "data/sha256.h"
+#include "data/text.h"
+
+namespace flash::sysid {
+namespace {
+
+bool is_material(const std::string& name) {
+  for (const ParameterInfo& info : known_parameters())
+    if (info.name == name) return info.material;
+  return false;
+}
+
+const Axis* axis_named(const std::vector<Axis>& axes, const std::string& name) {
+  const auto found =
+      std::find_if(axes.begin(), axes.end(), [&](const Axis& axis) { return axis.name == name; });
+  return found == axes.end() ? nullptr : &*found;
+}
+
+std::map<std::string, double> parameters_of(const data::SheetMaterial& material,
+                                            std::optional<double> thickness) {
+  return {{"young", material.membrane_stiffness / thickness.value_or(1.0)},
+          {"poisson", material.poissons_ratio},
+          {"bending", material.bending_rigidity},
+          {"friction", material.friction},
+          {"areal_density", material.areal_density},
+          {"air_drag", material.air_drag},
+          {"stiffness_damping", material.stiffness_damping}};
+}
+
+// What was held, and on whose word: `--fix` is a measurement, the asset an assumption.
+std::map<std::string, FixedParameter> fixed_of(const Summary& summary, const GridSettings& settings) {
+  std::map<std::string, FixedParameter> fixed;
+  for (const Axis& axis : settings.fixed) fixed[axis.name] = {axis.values.front(), "measured"};
+  for (const char* name : {"young", "poisson", "bending", "friction", "areal_density"}) {
+    const Axis* axis = axis_named(settings.axes, name);
+    const bool follows_young = std::string(name) == "bending" && settings.base.bending_from_thickness;
+    if (fixed.count(name) || follows_young || (axis && axis->values.size() > 1)) continue;
+    fixed[name] = {summary.best.at(name), "assumed"};
+  }
+  return fixed;
+}
+
+SummaryRecording summarize_recording(const Replay& replay, const RecordingScore& score,
+                                     const GridVerdict& verdict,
+                                     const std::map<std::string, double>& nuisance) {
+  SummaryRecording recording;
+  recording.name = replay.recording.name;
+  recording.sha256 = recording_sha256(replay.recording);
+  recording.offset = score.offset;
+  recording.yaw = score.yaw;
+  recording.time_offset = score.time_offset;
+  recording.nuisance = nuisance;
+  recording.score = score.score;
+  recording.sigma_m = verdict.sigma;
+  recording.sigma_source = verdict.sigma_source;
+  for (const KeyframeScore& frame : score.keyframes)
+    if (frame.points > 0) recording.frames.push_back({frame.t, frame.score, frame.weight});
+  return recording;
+}
+
+std::vector<std::string> warnings_of(const Summary& summary, const CandidateResult& best,
+                                     const GridSettings& settings, std::size_t wanted) {
+  std::vector<std::string> warnings;
+  const std::size_t found = static_cast<std::size_t>(summary.candidates);
+  if (found < wanted)
+    warnings.push_back("stopped after " + data::format_count(found) + " of " + data::format_count(wanted) +
+                       " candidates; --resume goes on");
+  for (const ParameterFinding& finding : summary.parameters) {
+    if (finding.identifiable == Identifiable::no)
+      warnings.push_back(finding.name + " is not identifiable from " +
+                         (summary.recordings.size() > 1 ? "these recordings" : "this recording"));
+    if (finding.edge != RangeEdge::none && finding.identifiable == Identifiable::yes)
+      warnings.push_back(finding.name + ": the best value is at the edge of the searched range");
+  }
+  for (std::size_t r = 0; r < best.recordings.size(); ++r)
+    for (const std::string& bound : best.recordings[r].bounds_hit)
+      warnings.push_back(summary.recordings[r].name + ": " + bound +
+                         " is at its bound; widen `nuisance` in recording.json");
+  if (summary.unconverged > 0)
+    warnings.push_back(data::format_count(static_cast<std::size_t>(summary.unconverged)) + " of " +
+                       data::format_count(found) + " candidates did not converge in every step");
+  if (settings.base.material.constitutive == data::Constitutive::tri_arap &&
+      axis_named(settings.axes, "young"))
+    warnings.push_back("under TRI_ARAP young is known through young / (1 + poisson) only");
+  return warnings;
+}
+
+// Empty where the answer can be used.
+std::string reason_unusable(const Summary& summary, const CandidateResult& best) {
+  if (best.status != CandidateStatus::ok)
+    return "the best candidate did not converge (residual " + data::format_short(best.residual_max) +
+           "): raise --iterations or lower --time-step";
+  const auto is_searched_material = [](const ParameterFinding& finding) { return is_material(finding.name); };
+  const auto is_known = [&](const ParameterFinding& finding) {
+    return is_searched_material(finding) && finding.identifiable != Identifiable::no;
+  };
+  const auto& findings = summary.parameters;
+  if (std::any_of(findings.begin(), findings.end(), is_searched_material) &&
+      std::none_of(findings.begin(), findings.end(), is_known))
+    return "none of the searched parameters is identifiable from the recordings";
+  return "";
+}
+
+void add_settings(Summary& summary, const std::vector<Replay>& replays, const GridSettings& settings) {
+  const Replay& replay = replays.front();
+  auto& texts = summary.settings;
+  texts["mesh"] = replay.recording.mesh_spec + " (" +
+                  data::format_count(static_cast<std::size_t>(replay.sheet.rest.vertices.rows())) +
+                  " vertices)";
+  texts["constitutive"] = data::to_string(settings.base.material.constitutive);
+  texts["bending_model"] = data::to_string(settings.base.material.bending_model);
+  texts["time_step_s"] = data::format_number(replay.settings.solver.time_step);
+  texts["max_iterations"] = std::to_string(replay.settings.solver.max_iterations);
+  texts["tolerance"] = data::format_number(replay.settings.solver.tolerance);
+  if (settings.base.thickness) texts["thickness_m"] = data::format_number(*settings.base.thickness);
+  const Robust& robust = settings.score.robust;
+  texts["distance"] =
+      robust.kind == RobustKind::trimmed
+          ? "mean without the largest " + data::format_short(100 * robust.trim_fraction) + " %"
+      : robust.kind == RobustKind::huber ? "Huber, " + data::format_short(1000 * robust.huber_delta) + " mm"
+                                         : "mean";
+}
+
+}  // namespace
+
+ReplayCandidate candidate_of(const CandidateResult& result, const GridSettings& settings) {
+  std::vector<Axis> axes = settings.axes;
+  axes.insert(axes.end(), settings.fixed.begin(), settings.fixed.end());
+  std::vector<double> values = result.values;
+  for (const Axis& axis : settings.fixed) values.push_back(axis.values.front());
+  return make_candidate(settings.base, axes, values);
+}
+
+Summary summarize(const GridResults& results, const GridVerdict& verdict, const std::vector<Replay>& replays,
+                  const GridSettings& settings) {
+  Summary summary;
+  summary.tool_version = FLASH_VERSION;
+  summary.candidates = static_cast<int>(results.candidates.size());
+  for (const CandidateResult& candidate : results.candidates)
+    summary.unconverged += candidate.status != CandidateStatus::ok;
+  add_settings(summary, replays, settings);
+  if (verdict.best < 0) {
+    summary.exit_code = 3;
+    summary.best_score = INFINITY;
+    summary.warnings = {summary.candidates == 0 ? "no candidate was simulated"
+                                                : "every candidate diverged: none has a score"};
+    return summary;
+  }
+  const CandidateResult& best = results.candidates[static_cast<std::size_t>(verdict.best)];
+  const ReplayCandidate candidate = candidate_of(best, settings);
+  summary.best = parameters_of(candidate.material, settings.base.thickness);
+  summary.membrane_stiffness = candidate.material.membrane_stiffness;
+  summary.best_score = verdict.score;
+  summary.level95 = verdict.level95;
+  std::map<std::string, double> nuisance;
+  for (const std::vector<Axis>* axes : {&settings.axes, &settings.fixed})
+    for (std::size_t k = 0; k < axes->size(); ++k)
+      if (!is_material((*axes)[k].name)) {
+        const double value = axes == &settings.fixed ? (*axes)[k].values.front() : best.values[k];
+        nuisance[(*axes)[k].name] = summary.best[(*axes)[k].name] = value;
+      }
+  for (const ParameterFinding& finding : verdict.parameters)
+    if (finding.values.size() > 1) summary.parameters.push_back(finding);
+  if (summary.parameters.size() == verdict.parameters.size()) summary.covariance_log = verdict.covariance_log;
+  summary.fixed = fixed_of(summary, settings);
+  for (std::size_t r = 0; r < replays.size(); ++r)
+    summary.recordings.push_back(summarize_recording(replays[r], best.recordings[r], verdict, nuisance));
+  summary.warnings = warnings_of(summary, best, settings, cartesian_product(settings.axes).size());
+  if (const std::string reason = reason_unusable(summary, best); !reason.empty()) {
+    summary.exit_code = 3;
+    summary.warnings.insert(summary.warnings.begin(), reason);
+  }
+  return summary;
+}
+
+std::string recording_sha256(const data::Recording& recording) {
+  std::vector<std::string> paths = {recording.source};
+  for (const auto& [name, path] : recording.trajectory_paths) paths.push_back(path);
+  if (!recording.mesh_spec.empty() && !data::is_mesh_spec(recording.mesh_spec))
+    paths.push_back(recording.mesh_spec);
+  if (!recording.start_mesh.empty()) paths.push_back(recording.start_mesh);
+  if (recording.camera && !recording.camera->intrinsics_path.empty())
+    paths.push_back(recording.camera->intrinsics_path);
+  for (const data::RecordedKeyframe& keyframe : recording.keyframes)
+    for (const std::string& path :
+         {keyframe.cloud, keyframe.depth, keyframe.mask, keyframe.markers, keyframe.contour})
+      if (!path.empty()) paths.push_back(path);
+  std::string digests;
+  for (const std::string& path : paths) digests += data::sha256(data::read_file(path));
+  return data::sha256(digests);
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,26 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sysid/grid_search.h"
+#include "sysid/profile.h"
+#include "sysid/replay.h"
+#include "sysid/summary.h"
+
+namespace flash::sysid {
+
+/// What a grid search found, said for people and for later tools: estimates, intervals, nuisance values, what
+/// was fixed, warnings, and whether the answer can be used. exit_code is 3 when no candidate has a score,
+/// when the best did not converge, or when none of the searched material parameters is identifiable;
+/// `warnings` then begins with the reason. Solver check, device and times are left to the caller.
+Summary summarize(const GridResults& results, const GridVerdict& verdict, const std::vector<Replay>& replays,
+                  const GridSettings& settings);
+
+/// Values of the fixed and the searched parameters of a candidate, in the order axes, fixed.
+ReplayCandidate candidate_of(const CandidateResult& result, const GridSettings& settings);
+
+/// SHA-256 over recording.json and every file it names, in the order they are named, each as its own digest.
+std::string recording_sha256(const data::Recording& recording);
+
+}  // namespace flash::sysid
