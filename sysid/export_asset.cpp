@@ -1,0 +1,100 @@
+#include "sysid/export_asset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "data/error.h"
+#include "data/json_reader.h"
+
+namespace flash::sysid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+// Names and matrix together: the order of the rows must not depend on another field.
+Json covariance(const Summary& summary) {
+  if (summary.covariance_log.size() == 0) return nullptr;
+  Json json = {{"parameters", Json::array()}, {"matrix", Json::array()}};
+  for (const ParameterFinding& finding : summary.parameters) json["parameters"].push_back(finding.name);
+  for (Eigen::Index i = 0; i < summary.covariance_log.rows(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < summary.covariance_log.cols(); ++j)
+      row.push_back(number(summary.covariance_log(i, j)));
+    json["matrix"].push_back(row);
+  }
+  return json;
+}
+
+std::string identification(const Summary& summary) {
+  Json json;
+  json["recordings"] = Json::array();
+  std::optional<double> horizon;
+  for (const SummaryRecording& recording : summary.recordings) {
+    json["recordings"].push_back({{"name", recording.name}, {"sha256", recording.sha256}});
+    if (recording.horizon_s) horizon = std::min(horizon.value_or(*recording.horizon_s), *recording.horizon_s);
+  }
+  for (const char* part : {"estimate", "interval95", "identifiable", "fixed"}) json[part] = Json::object();
+  for (const ParameterFinding& finding : summary.parameters) {
+    json["estimate"][finding.name] = finding.estimate ? Json(*finding.estimate) : Json(nullptr);
+    json["interval95"][finding.name] = finding.interval95 ? Json(*finding.interval95) : Json(nullptr);
+    json["identifiable"][finding.name] = to_string(finding.identifiable);
+  }
+  for (const auto& [name, fixed] : summary.fixed)
+    json["fixed"][name] = {{"value", fixed.value}, {"source", fixed.source}};
+  json["covariance_log"] = covariance(summary);
+  json["score_m"] = number(summary.best_score);
+  json["horizon_s"] = horizon ? Json(*horizon) : Json(nullptr);
+  json["solver"] = summary.settings;
+  json["tool_version"] = summary.tool_version;
+  json["randomization"] = randomization_ranges(summary);
+  return data::format_json(json);
+}
+
+}  // namespace
+
+std::map<std::string, std::array<double, 2>> randomization_ranges(const Summary& summary) {
+  std::map<std::string, std::array<double, 2>> ranges;
+  for (const ParameterFinding& finding : summary.parameters) {
+    if (finding.values.empty()) continue;
+    const std::array<double, 2> searched = {finding.values.front(), finding.values.back()};
+    ranges[finding.name] =
+        finding.identifiable == Identifiable::no ? searched : finding.interval95.value_or(searched);
+  }
+  return ranges;
+}
+
+data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
+  if (summary.best.empty())
+    throw data::InputError("summary.json: best: the search found no candidate to export");
+  std::map<std::string, double> values = summary.best;
+  for (const ParameterFinding& finding : summary.parameters)
+    if (finding.identifiable == Identifiable::yes && finding.estimate)
+      values[finding.name] = *finding.estimate;
+
+  data::Asset asset = base;
+  asset.format = data::AssetFormat::flash_1;
+  asset.young = values.at("young");
+  asset.poisson = values.at("poisson");
+  asset.friction = values.at("friction");
+  asset.air_drag = values.at("air_drag");
+  asset.stiffness_damping = values.at("stiffness_damping");
+  asset.published_bending.reset();
+  const bool follows_young = base.thickness && !base.bending_rigidity && !base.published_bending;
+  const bool searched_bending =
+      std::any_of(summary.parameters.begin(), summary.parameters.end(),
+                  [](const ParameterFinding& finding) { return finding.name == "bending"; });
+  if (!follows_young || searched_bending || summary.fixed.count("bending"))
+    asset.bending_rigidity = values.at("bending");
+  asset.density.reset();
+  asset.mass.reset();
+  asset.object_mass.reset();
+  asset.areal_density = values.at("areal_density");
+  asset.identification = identification(summary);
+  return asset;
+}
+
+}  // namespace flash::sysid
