@@ -16,11 +16,13 @@ Gap gap_of(const Cylinder& cylinder, const Vector3d& point, double) {
   Vector3d radial = point - cylinder.point;
   radial -= cylinder.axis * cylinder.axis.dot(radial);
   const double length = radial.norm();
-  return {length - cylinder.radius, length > 0 ? Vector3d(radial / length) : cylinder.axis.unitOrthogonal(), Vector3d::Zero()};
+  return {length - cylinder.radius, length > 0 ? Vector3d(radial / length) : cylinder.axis.unitOrthogonal(),
+          Vector3d::Zero()};
 }
 
 Gap gap_of(const Box& box, const Vector3d& point, double time) {
-  const Eigen::Isometry3d pose = box.trajectory.times.empty() ? box.pose : data::pose_at(box.trajectory, time);
+  const Eigen::Isometry3d pose =
+      box.trajectory.times.empty() ? box.pose : data::pose_at(box.trajectory, time);
   const Vector3d local = pose.inverse() * point;
   const Vector3d excess = local.cwiseAbs() - box.half_extents;
   Gap gap;

@@ -12,7 +12,8 @@ struct Gap {
   Eigen::Vector3d surface_velocity;  ///< of the obstacle's material at the contact [m/s]
 };
 
-/// Signed distance of `point` [m] to the obstacle at `time` [s]. Exact outside; inside a box the nearest face decides.
+/// Signed distance of `point` [m] to the obstacle at `time` [s]. Exact outside; inside a box the nearest face
+/// decides.
 Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time);
 
 }  // namespace flash::sim

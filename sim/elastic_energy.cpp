@@ -10,7 +10,8 @@ using data::Points;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Derivatives of the deformation gradient: F = x_0 w_0^T + x_1 w_1^T + x_2 w_2^T, row k of the result is w_k.
+/// Derivatives of the deformation gradient: F = x_0 w_0^T + x_1 w_1^T + x_2 w_2^T, row k of the result is
+/// w_k.
 Eigen::Matrix<double, 3, 2> shape_gradients(const RestTriangle& triangle) {
   Eigen::Matrix<double, 3, 2> w;
   w.bottomRows<2>() = triangle.inverse_edges;
@@ -18,7 +19,8 @@ Eigen::Matrix<double, 3, 2> shape_gradients(const RestTriangle& triangle) {
   return w;
 }
 
-Matrix32 deformation_gradient(const RestTriangle& triangle, const Eigen::Matrix<double, 3, 2>& w, const data::Points& x) {
+Matrix32 deformation_gradient(const RestTriangle& triangle, const Eigen::Matrix<double, 3, 2>& w,
+                              const data::Points& x) {
   Matrix32 F = x.row(triangle.vertices[0]).transpose() * w.row(0);
   F += x.row(triangle.vertices[1]).transpose() * w.row(1);
   F += x.row(triangle.vertices[2]).transpose() * w.row(2);
@@ -27,12 +29,16 @@ Matrix32 deformation_gradient(const RestTriangle& triangle, const Eigen::Matrix<
 
 void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& block) {
   Eigen::Map<Matrix3d> target(values.data() + 9L * slot.block);
-  if (slot.transpose) target += block.transpose();
-  else target += block;
+  if (slot.transpose)
+    target += block.transpose();
+  else
+    target += block;
 }
 
-/// y += scale * S x by differences: rows of S sum to zero, so that rigid translations are exactly free of force.
-void add_product(const Eigen::SparseMatrix<double, Eigen::RowMajor>& S, double scale, const data::Points& x, data::Points& y) {
+/// y += scale * S x by differences: rows of S sum to zero, so that rigid translations are exactly free of
+/// force.
+void add_product(const Eigen::SparseMatrix<double, Eigen::RowMajor>& S, double scale, const data::Points& x,
+                 data::Points& y) {
   for (int i = 0; i < S.outerSize(); ++i) {
     const double* xi = x.data() + 3L * i;
     double sum0 = 0, sum1 = 0, sum2 = 0;
@@ -49,15 +55,17 @@ void add_product(const Eigen::SparseMatrix<double, Eigen::RowMajor>& S, double s
 
 }  // namespace
 
-ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator& bending, const data::SheetMaterial& material,
-                                   const data::Points& positions, data::Points& gradient) {
+ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator& bending,
+                                   const data::SheetMaterial& material, const data::Points& positions,
+                                   data::Points& gradient) {
   ElasticEnergy energy;
   const SheetLame lame = sheet_lame(material.membrane_stiffness, material.poissons_ratio);
   for (const RestTriangle& triangle : plan.sheet.triangles) {
     const auto w = shape_gradients(triangle);
     double density;
     Matrix32 stress;
-    membrane_response(material.constitutive, deformation_gradient(triangle, w, positions), lame, density, stress, nullptr);
+    membrane_response(material.constitutive, deformation_gradient(triangle, w, positions), lame, density,
+                      stress, nullptr);
     energy.membrane += triangle.area * density;
     for (int k = 0; k < 3; ++k)
       gradient.row(triangle.vertices[k]) += triangle.area * (stress * w.row(k).transpose()).transpose();
@@ -82,8 +90,9 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
   return energy;
 }
 
-void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, const data::SheetMaterial& material,
-                         const data::Points& positions, double scale, BlockValues<double>& values) {
+void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
+                         const data::SheetMaterial& material, const data::Points& positions, double scale,
+                         BlockValues<double>& values) {
   const SheetLame lame = sheet_lame(material.membrane_stiffness, material.poissons_ratio);
   for (size_t t = 0; t < plan.sheet.triangles.size(); ++t) {
     const RestTriangle& triangle = plan.sheet.triangles[t];
@@ -91,9 +100,11 @@ void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, 
     double density;
     Matrix32 stress;
     Matrix66 hessian;
-    membrane_response(material.constitutive, deformation_gradient(triangle, w, positions), lame, density, stress, &hessian);
+    membrane_response(material.constitutive, deformation_gradient(triangle, w, positions), lame, density,
+                      stress, &hessian);
     const double factor = scale * triangle.area;
-    const Matrix3d h00 = factor * hessian.topLeftCorner<3, 3>(), h01 = factor * hessian.topRightCorner<3, 3>(),
+    const Matrix3d h00 = factor * hessian.topLeftCorner<3, 3>(),
+                   h01 = factor * hessian.topRightCorner<3, 3>(),
                    h11 = factor * hessian.bottomRightCorner<3, 3>();
     const auto block = [&](int i, int j) -> Matrix3d {
       return (w(i, 0) * w(j, 0)) * h00 + (w(i, 0) * w(j, 1)) * h01 + (w(i, 1) * w(j, 0)) * h01.transpose() +
@@ -114,10 +125,13 @@ void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, 
       double hinge_energy;
       Matrix12 hessian;
       hinge_response(hinge, x, hinge_energy, hinge_gradient, &hessian);
-      for (int k = 0; k < 4; ++k) add_block(values, {hinge.vertices[k], false}, D * hessian.block<3, 3>(3 * k, 3 * k));
-      constexpr std::array<std::pair<int, int>, 6> blocks = {{{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}}};
+      for (int k = 0; k < 4; ++k)
+        add_block(values, {hinge.vertices[k], false}, D * hessian.block<3, 3>(3 * k, 3 * k));
+      constexpr std::array<std::pair<int, int>, 6> blocks = {
+          {{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}}};
       for (int b = 0; b < 6; ++b)
-        add_block(values, plan.hinge_slots[e][b], D * hessian.block<3, 3>(3 * blocks[b].first, 3 * blocks[b].second));
+        add_block(values, plan.hinge_slots[e][b],
+                  D * hessian.block<3, 3>(3 * blocks[b].first, 3 * blocks[b].second));
     }
     return;
   }
@@ -125,12 +139,13 @@ void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, 
     for (int c = 0; c < 3; ++c) values[9 * block + 4 * c] += D * bending.stand_in[block];
 }
 
-void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const Points& x, Points& y) {
+void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const Points& x,
+                            Points& y) {
   add_product(bending.correction, bending_rigidity, x, y);
 }
 
-void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale, const data::Points& x,
-                       data::Points& y) {
+void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale,
+                       const data::Points& x, data::Points& y) {
   const auto block = [&](size_t k) { return Eigen::Map<const Matrix3d>(values.data() + 9 * k); };
   for (int i = 0; i < pattern.size; ++i) y.row(i) += scale * (block(i) * x.row(i).transpose()).transpose();
   for (size_t k = 0; k < pattern.pairs.size(); ++k) {

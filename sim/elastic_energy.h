@@ -10,19 +10,22 @@ struct ElasticEnergy {
 };
 
 /// Elastic energy of the sheet at `positions`; adds its gradient to `gradient` (vertices x 3) [N].
-ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator& bending, const data::SheetMaterial& material,
-                                   const data::Points& positions, data::Points& gradient);
+ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator& bending,
+                                   const data::SheetMaterial& material, const data::Points& positions,
+                                   data::Points& gradient);
 
-/// Adds `scale` times the elastic Hessian, with its negative eigenvalues element by element set to zero and with the
-/// stand-in for the plate's bending.
-void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending, const data::SheetMaterial& material,
-                         const data::Points& positions, double scale, BlockValues<double>& values);
+/// Adds `scale` times the elastic Hessian, with its negative eigenvalues element by element set to zero and
+/// with the stand-in for the plate's bending.
+void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
+                         const data::SheetMaterial& material, const data::Points& positions, double scale,
+                         BlockValues<double>& values);
 
 /// y += scale * values * x, vertex by vertex.
-void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale, const data::Points& x,
-                       data::Points& y);
+void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale,
+                       const data::Points& x, data::Points& y);
 
 /// y += D (stiffness - stand-in) x: what the Newton matrix lacks against the bending operator.
-void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const data::Points& x, data::Points& y);
+void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const data::Points& x,
+                            data::Points& y);
 
 }  // namespace flash::sim

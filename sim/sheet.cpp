@@ -30,7 +30,8 @@ Sheet make_sheet(const data::TriangleMesh& rest) {
     const Eigen::Vector3d edge2 = rest.vertices.row(v[2]) - rest.vertices.row(v[0]);
     const Eigen::Vector3d normal = edge1.cross(edge2);
     const double area = 0.5 * normal.norm();
-    if (!(area > 1e-14 * extent * extent)) throw data::input_error("mesh", where, "degenerate, its area is zero");
+    if (!(area > 1e-14 * extent * extent))
+      throw data::input_error("mesh", where, "degenerate, its area is zero");
     const Eigen::Vector3d axis1 = edge1.normalized(), axis2 = normal.normalized().cross(axis1);
     Eigen::Matrix2d edges;
     edges << edge1.dot(axis1), edge2.dot(axis1), edge1.dot(axis2), edge2.dot(axis2);
@@ -38,7 +39,8 @@ Sheet make_sheet(const data::TriangleMesh& rest) {
     for (int corner : {v[0], v[1], v[2]}) sheet.vertex_area[corner] += area / 3;
   }
   for (int i = 0; i < rest.vertices.rows(); ++i)
-    if (sheet.vertex_area[i] == 0) throw data::input_error("mesh", "vertex " + std::to_string(i), "belongs to no triangle");
+    if (sheet.vertex_area[i] == 0)
+      throw data::input_error("mesh", "vertex " + std::to_string(i), "belongs to no triangle");
   return sheet;
 }
 

@@ -48,14 +48,16 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   bending->model = model;
   if (model == data::BendingModel::hinge) return bending;
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
-  bending->stiffness = model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio) : isometric;
+  bending->stiffness =
+      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio) : isometric;
   bending->stiffness.makeCompressed();
   if (model == data::BendingModel::plate) {
     bending->correction = bending->stiffness - Eigen::SparseMatrix<double, Eigen::RowMajor>(isometric);
     bending->correction.makeCompressed();
   }
   for (int i = 0; i < plan.pattern.size; ++i) bending->stand_in.push_back(isometric.coeff(i, i));
-  for (const auto& [row, column] : plan.pattern.pairs) bending->stand_in.push_back(isometric.coeff(row, column));
+  for (const auto& [row, column] : plan.pattern.pairs)
+    bending->stand_in.push_back(isometric.coeff(row, column));
   return bending;
 }
 

@@ -24,7 +24,8 @@ struct SheetPlan {
   BlockPattern pattern;  ///< neighbours over an edge and across a hinge
   std::shared_ptr<const SymbolicFactor> symbolic;
   std::vector<std::array<BlockSlot, 3>> triangle_slots;  ///< blocks (1, 0), (2, 0), (2, 1) of a triangle
-  std::vector<std::array<BlockSlot, 6>> hinge_slots;     ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
+  std::vector<std::array<BlockSlot, 6>>
+      hinge_slots;  ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
 };
 
 std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
@@ -33,8 +34,10 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
 struct BendingOperator {
   data::BendingModel model;
   Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness;  ///< exact; empty for the hinge model
-  Eigen::SparseMatrix<double, Eigen::RowMajor> correction;  ///< stiffness less the stand-in; for the plate only
-  std::vector<double> stand_in;  ///< one number a block of the pattern: a sparser stiffness for the Newton matrix
+  Eigen::SparseMatrix<double, Eigen::RowMajor>
+      correction;  ///< stiffness less the stand-in; for the plate only
+  std::vector<double>
+      stand_in;  ///< one number a block of the pattern: a sparser stiffness for the Newton matrix
 };
 
 /// Throws data::InputError where the model needs a flat rest shape and the sheet has none.

@@ -49,10 +49,11 @@ struct Solver::Workspace {
 
   const BendingOperator& bending_of(const data::SheetMaterial& material);
 
-  /// Conjugate gradients on the free directions, preconditioned by the factor: the matrix has the bending operator
-  /// itself where the factor has its stand-in. Returns the number of iterations.
-  int solve(const BendingOperator& operator_, double bending_rigidity, const std::vector<VertexConstraint>& constraints,
-            const Points& right_hand_side, double tolerance, Points& solution) const;
+  /// Conjugate gradients on the free directions, preconditioned by the factor: the matrix has the bending
+  /// operator itself where the factor has its stand-in. Returns the number of iterations.
+  int solve(const BendingOperator& operator_, double bending_rigidity,
+            const std::vector<VertexConstraint>& constraints, const Points& right_hand_side, double tolerance,
+            Points& solution) const;
 };
 
 const BendingOperator& Solver::Workspace::bending_of(const data::SheetMaterial& material) {
@@ -67,8 +68,8 @@ namespace {
 /// The incremental potential of one implicit Euler step and what it is made of.
 class StepProblem {
  public:
-  StepProblem(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment, double time_step,
-              const BlockValues<double>& damping)
+  StepProblem(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment,
+              double time_step, const BlockValues<double>& damping)
       : plan_(plan), bending_(bending), environment_(environment), h_(time_step), damping_(damping) {
     const State& start = environment.state;
     mass_ = environment.material.areal_density * plan.sheet.vertex_area;
@@ -119,12 +120,14 @@ class StepProblem {
 };
 
 /// Turns the matrix into that of the free directions, P (B + friction) P + (I - P) scaled to its neighbours.
-void constrain(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints, BlockValues<double>& values) {
+void constrain(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints,
+               BlockValues<double>& values) {
   const auto block = [&](size_t k) { return Map<Matrix3d>(values.data() + 9 * k); };
   for (int i = 0; i < pattern.size; ++i) {
     const VertexConstraint& c = constraints[i];
     if (c.hold == Hold::free) continue;
-    const Matrix3d friction = c.slip_stiffness * (Matrix3d::Identity() - c.slip_direction * c.slip_direction.transpose());
+    const Matrix3d friction =
+        c.slip_stiffness * (Matrix3d::Identity() - c.slip_direction * c.slip_direction.transpose());
     const double scale = block(i).trace() / 3;
     block(i) = c.free * (block(i) + friction) * c.free + scale * (Matrix3d::Identity() - c.free);
   }
@@ -144,8 +147,8 @@ void restrict_to_free(const std::vector<VertexConstraint>& constraints, Points& 
 }  // namespace
 
 int Solver::Workspace::solve(const BendingOperator& operator_, double bending_rigidity,
-                             const std::vector<VertexConstraint>& constraints, const Points& right_hand_side, double tolerance,
-                             Points& solution) const {
+                             const std::vector<VertexConstraint>& constraints, const Points& right_hand_side,
+                             double tolerance, Points& solution) const {
   Points residual = right_hand_side, product(residual.rows(), 3), preconditioned, search;
   restrict_to_free(constraints, residual);
   solution.setZero(residual.rows(), 3);
@@ -173,7 +176,8 @@ int Solver::Workspace::solve(const BendingOperator& operator_, double bending_ri
 
 Solver::Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings)
     : workspace_(std::make_unique<Workspace>(std::move(plan), settings)) {}
-Solver::Solver(const Sheet& sheet, const SolverSettings& settings) : Solver(make_sheet_plan(sheet), settings) {}
+Solver::Solver(const Sheet& sheet, const SolverSettings& settings)
+    : Solver(make_sheet_plan(sheet), settings) {}
 Solver::~Solver() = default;
 Solver::Solver(Solver&&) noexcept = default;
 
@@ -188,7 +192,8 @@ StepReport Solver::step(Environment& environment) {
   w.damping.clear();
   if (environment.material.stiffness_damping > 0) {
     w.damping.assign(9 * (w.plan->pattern.size + w.plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*w.plan, bending, environment.material, start.positions, environment.material.stiffness_damping / h, w.damping);
+    add_elastic_hessian(*w.plan, bending, environment.material, start.positions,
+                        environment.material.stiffness_damping / h, w.damping);
   }
   const StepProblem problem(*w.plan, bending, environment, h, w.damping);
   const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
@@ -207,7 +212,8 @@ StepReport Solver::step(Environment& environment) {
       residual.row(i) = force.row(i) - constraints[i].reaction.transpose();
       if (constraints[i].hold == Hold::fixed) continue;
       report.penetration_max = std::max(report.penetration_max, -constraints[i].gap);
-      if (constraints[i].hold != Hold::free) report.complementarity = std::max(report.complementarity, std::abs(constraints[i].gap));
+      if (constraints[i].hold != Hold::free)
+        report.complementarity = std::max(report.complementarity, std::abs(constraints[i].gap));
     }
     report.residual = residual.norm() / force_scale;
     report.converged = report.residual <= w.settings.tolerance;
@@ -247,14 +253,18 @@ StepReport Solver::step(Environment& environment) {
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& c = constraints[i];
-    if (c.hold == Hold::fixed) (c.grasp >= 0 ? report.grasp_forces[c.grasp] : report.fixed_force) += c.reaction;
-    else if (c.hold != Hold::free) report.obstacle_forces[c.obstacle] += c.reaction;
+    if (c.hold == Hold::fixed)
+      (c.grasp >= 0 ? report.grasp_forces[c.grasp] : report.fixed_force) += c.reaction;
+    else if (c.hold != Hold::free)
+      report.obstacle_forces[c.obstacle] += c.reaction;
   }
   environment.state.velocities = (x - start.positions) / h;
   environment.state.positions = x;
   environment.state.time = time;
   const Eigen::VectorXd& mass = problem.mass();
-  report.kinetic = 0.5 * (mass.asDiagonal() * environment.state.velocities).cwiseProduct(environment.state.velocities).sum();
+  report.kinetic =
+      0.5 *
+      (mass.asDiagonal() * environment.state.velocities).cwiseProduct(environment.state.velocities).sum();
   report.potential = -(mass.transpose() * x * environment.gravity)(0);
   return report;
 }

@@ -9,24 +9,24 @@
 namespace flash::sim {
 
 struct SolverSettings {
-  double time_step = 0.01;      ///< h [s]
-  int max_iterations = 60;      ///< Newton iterations a step
-  double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
+  double time_step = 0.01;  ///< h [s]
+  int max_iterations = 60;  ///< Newton iterations a step
+  double tolerance = 1e-3;  ///< on the relative residual |r| / |M g|
 };
 
 /// How one step of one environment went.
 struct StepReport {
-  double residual = 0;            ///< |r| / |M g|; without gravity as if it were 9.81 m/s^2
-  int iterations = 0;             ///< of Newton's method
-  int solves = 0;                 ///< with a factor: iterations of the linear solver
+  double residual = 0;  ///< |r| / |M g|; without gravity as if it were 9.81 m/s^2
+  int iterations = 0;   ///< of Newton's method
+  int solves = 0;       ///< with a factor: iterations of the linear solver
   bool converged = false;
-  double penetration_max = 0;     ///< deepest vertex below a surface [m]
-  double complementarity = 0;     ///< max |min(gap, lambda / stiffness)| [m]
-  double cone_violation = 0;      ///< max(|lambda_t| - mu lambda_n) [N]
+  double penetration_max = 0;                                    ///< deepest vertex below a surface [m]
+  double complementarity = 0;                                    ///< max |min(gap, lambda / stiffness)| [m]
+  double cone_violation = 0;                                     ///< max(|lambda_t| - mu lambda_n) [N]
   double kinetic = 0, membrane = 0, bending = 0, potential = 0;  ///< energies [J]
-  std::vector<Eigen::Vector3d> grasp_forces;     ///< gripper on sheet, one a grasp [N]
-  std::vector<Eigen::Vector3d> obstacle_forces;  ///< obstacle on sheet, one an obstacle [N]
-  Eigen::Vector3d fixed_force = Eigen::Vector3d::Zero();  ///< supports on sheet [N]
+  std::vector<Eigen::Vector3d> grasp_forces;                     ///< gripper on sheet, one a grasp [N]
+  std::vector<Eigen::Vector3d> obstacle_forces;                  ///< obstacle on sheet, one an obstacle [N]
+  Eigen::Vector3d fixed_force = Eigen::Vector3d::Zero();         ///< supports on sheet [N]
 };
 
 /// Steps environments of one Sheet by implicit Euler. Holds only what depends on the sheet and on the last
@@ -52,8 +52,8 @@ struct Rollout {
   std::vector<StepReport> reports;
 };
 
-/// Runs `steps` steps of each environment, environments spread over `threads`. Result i equals environment i alone,
-/// bitwise.
+/// Runs `steps` steps of each environment, environments spread over `threads`. Result i equals environment i
+/// alone, bitwise.
 std::vector<Rollout> simulate(const Sheet& sheet, std::vector<Environment> environments, int steps,
                               const SolverSettings& settings, int threads);
 

@@ -12,8 +12,11 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double touching = 1e-10;  ///< gap up to which a vertex is on a surface: rounding of a projected position [m]
-constexpr double resting = 1e-13;   ///< slip up to which a vertex has not moved: rounding of a position [m]
+constexpr double touching =
+    1e-10;  ///< gap up to which a vertex is on a surface: rounding of a projected position [m]
+constexpr double resting = 1e-13;  ///< slip up to which a vertex has not moved: rounding of a position [m]
+constexpr double smoothing =
+    1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
 
 Gap nearest_gap(const Environment& environment, const Vector3d& point, double time, int& obstacle) {
   Gap nearest{std::numeric_limits<double>::infinity(), Vector3d::Zero(), Vector3d::Zero()};
@@ -28,14 +31,17 @@ Gap nearest_gap(const Environment& environment, const Vector3d& point, double ti
 }
 
 /// Tangential displacement since the start of the step against the surface [m].
-Vector3d slip_of(const Environment& environment, const Gap& gap, double time_step, const data::Points& positions, int i) {
-  const Vector3d moved = (positions.row(i) - environment.state.positions.row(i)).transpose() - time_step * gap.surface_velocity;
+Vector3d slip_of(const Environment& environment, const Gap& gap, double time_step,
+                 const data::Points& positions, int i) {
+  const Vector3d moved =
+      (positions.row(i) - environment.state.positions.row(i)).transpose() - time_step * gap.surface_velocity;
   return moved - gap.normal * gap.normal.dot(moved);
 }
 
 }  // namespace
 
-std::vector<VertexConstraint> begin_step(const Environment& environment, double time, data::Points& positions) {
+std::vector<VertexConstraint> begin_step(const Environment& environment, double time,
+                                         data::Points& positions) {
   std::vector<VertexConstraint> constraints(environment.state.positions.rows());
   for (const FixedVertex& support : environment.fixed) {
     VertexConstraint& constraint = constraints[support.vertex];
@@ -51,7 +57,8 @@ std::vector<VertexConstraint> begin_step(const Environment& environment, double 
     const data::Points& offsets = environment.state.grasp_offsets[k];
     if (offsets.rows() == 0) continue;
     const Eigen::Isometry3d pose = data::pose_at(grasp.gripper, time);
-    const double closed = grasp.closing_time > 0 ? std::clamp((time - grasp.from) / grasp.closing_time, 0.0, 1.0) : 1.0;
+    const double closed =
+        grasp.closing_time > 0 ? std::clamp((time - grasp.from) / grasp.closing_time, 0.0, 1.0) : 1.0;
     const double blend = closed * closed * (3 - 2 * closed);
     for (size_t v = 0; v < grasp.vertices.size(); ++v) {
       Vector3d offset = offsets.row(v);
@@ -67,8 +74,9 @@ std::vector<VertexConstraint> begin_step(const Environment& environment, double 
   return constraints;
 }
 
-void update_contacts(const Environment& environment, double time, double time_step, const data::Points& positions,
-                     const data::Points& force, std::vector<VertexConstraint>& constraints) {
+void update_contacts(const Environment& environment, double time, double time_step,
+                     const data::Points& positions, const data::Points& force,
+                     std::vector<VertexConstraint>& constraints) {
   for (size_t i = 0; i < constraints.size(); ++i) {
     VertexConstraint& constraint = constraints[i];
     const Vector3d needed = force.row(i);
@@ -98,9 +106,14 @@ void update_contacts(const Environment& environment, double time, double time_st
     }
     constraint.hold = Hold::slip;
     constraint.free = Matrix3d::Identity() - gap.normal * gap.normal.transpose();
-    constraint.slip_direction = slip_length > resting ? Vector3d(slip / slip_length) : Vector3d(-needed_tangential / needed_length);
+    if (slip_length > resting) {
+      const double smooth_length = std::hypot(slip_length, smoothing);
+      constraint.slip_direction = slip / smooth_length;
+      constraint.slip_stiffness = bound / smooth_length;
+    } else {
+      constraint.slip_direction = -needed_tangential / needed_length;
+    }
     constraint.reaction -= bound * constraint.slip_direction;
-    if (slip_length > resting) constraint.slip_stiffness = bound / slip_length;
   }
 }
 
@@ -128,7 +141,9 @@ double friction_potential(const Environment& environment, double time, double ti
     const VertexConstraint& constraint = constraints[i];
     if (constraint.friction_bound == 0) continue;
     const Gap gap = gap_to(environment.obstacles[constraint.obstacle], positions.row(i), time);
-    potential += constraint.friction_bound * slip_of(environment, gap, time_step, positions, static_cast<int>(i)).norm();
+    const Vector3d slip = slip_of(environment, gap, time_step, positions, static_cast<int>(i));
+    potential += constraint.friction_bound *
+                 (constraint.slip_stiffness > 0 ? std::hypot(slip.norm(), smoothing) : slip.norm());
   }
   return potential;
 }
