@@ -5,37 +5,10 @@
 
 #include "data/procedural_mesh.h"
 #include "data/text.h"
-#include "sysid/surface_distance.h"
+#include "sysid/surface_change.h"
 
 namespace flash::sysid {
 namespace {
-
-double mean_distance(const data::Points& points, const SurfaceDistance& surface) {
-  double sum = 0;
-  int hint = -1;
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    const SurfacePoint nearest = surface.nearest(points.row(i).transpose(), hint);
-    hint = nearest.triangle;
-    sum += nearest.distance;
-  }
-  return sum / static_cast<double>(std::max<Eigen::Index>(1, points.rows()));
-}
-
-// Mean distance of b's vertices to a's surface at each keyframe that weighs.
-std::vector<std::pair<double, double>> distances_over_time(const Replay& replay, const Motion& a,
-                                                           const Motion& b) {
-  SurfaceDistance surface(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
-  std::vector<std::pair<double, double>> distances;
-  data::Points positions;
-  for (const Observation& observation : replay.observations) {
-    if (observation.weight <= 0) continue;
-    surface_at(a, observation.t, positions);
-    surface.move(positions);
-    surface_at(b, observation.t, positions);
-    distances.emplace_back(observation.t, mean_distance(positions, surface));
-  }
-  return distances;
-}
 
 // "sheet:0.4x0.4:0.02[:pattern]" with half the cell; empty for anything else.
 std::string finer_mesh(const std::string& specification) {
@@ -66,8 +39,7 @@ std::optional<SolverCheck> check(const std::string& what, const Change& change,
     finer.push_back(make_replay(replays[r].recording, settings));
     finer.back().observations = replays[r].observations;
     results.push_back(std::move(run(finer.back(), {candidate}).front()));
-    for (const auto& [t, distance] :
-         distances_over_time(replays[r], reference[r].motion, results[r].motion)) {
+    for (const auto& [t, distance] : surface_change(replays[r], reference[r].motion, results[r].motion)) {
       sum += distance;
       ++count;
     }
@@ -106,18 +78,6 @@ std::vector<SolverCheck> check_solver(const std::vector<Replay>& replays, const 
     if (const auto found = check(what, change, replays, reference, candidate, score))
       checks.push_back(*found);
   return checks;
-}
-
-std::optional<double> predictability_horizon(const Replay& replay, const ReplayCandidate& candidate,
-                                             double limit, double perturbation) {
-  ReplayCandidate twin = candidate;
-  twin.material.membrane_stiffness *= 1 + perturbation;
-  twin.material.bending_rigidity *= 1 + perturbation;
-  twin.material.friction *= 1 + perturbation;
-  const std::vector<ReplayResult> results = run(replay, {candidate, twin});
-  for (const auto& [t, distance] : distances_over_time(replay, results[0].motion, results[1].motion))
-    if (!(distance <= limit)) return t;
-  return std::nullopt;
 }
 
 }  // namespace flash::sysid

@@ -1,5 +1,4 @@
 #pragma once
-#include <optional>
 #include <vector>
 
 #include "sysid/grid_search.h"
@@ -14,11 +13,5 @@ namespace flash::sysid {
 /// anew.
 std::vector<SolverCheck> check_solver(const std::vector<Replay>& replays, const ReplayCandidate& candidate,
                                       const ScoreSettings& score);
-
-/// Time until which the motion of a candidate can be predicted [s]: the first weighing keyframe at which the
-/// surfaces of two runs, one with every stiffness and the friction larger by `perturbation`, lie more than
-/// `limit` [m] apart in the mean. Empty: to the end.
-std::optional<double> predictability_horizon(const Replay& replay, const ReplayCandidate& candidate,
-                                             double limit, double perturbation = 1e-3);
 
 }  // namespace flash::sysid
