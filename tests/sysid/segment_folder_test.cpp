@@ -1,0 +1,157 @@
+#include "sysid/segment_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+
+#include "data/depth_image.h"
+#include "data/error.h"
+#include "data/mesh_io.h"
+
+namespace flash::sysid {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SegmentFolder : public testing::Test {
+ protected:
+  SegmentFolder()
+      : root_(fs::temp_directory_path() / ("segment_folder_" + std::to_string(std::random_device()()) +
+                                           testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::create_directories(root_);
+  }
+  ~SegmentFolder() override { fs::remove_all(root_); }
+
+  std::string folder(const std::string& name) const { return (root_ / name).string(); }
+
+  fs::path root_;
+};
+
+// A camera 1 m above the table z = 0.07 looks straight down: x right, y towards the robot, z down.
+const Eigen::Vector3d camera_position(0.5, 0.1, 1.07);
+
+data::CameraIntrinsics small_camera() {
+  data::CameraIntrinsics camera;
+  camera.width = 160;
+  camera.height = 120;
+  camera.fx = camera.fy = 160;
+  camera.cx = 79.5;
+  camera.cy = 59.5;
+  return camera;
+}
+
+// A depth image of a table with a flat square patch 0.2 m wide, `height` above it, under the camera's axis.
+data::DepthImage patch_above_table(double height) {
+  const data::CameraIntrinsics camera = small_camera();
+  data::DepthImage image{camera.width, camera.height,
+                         std::vector<std::uint16_t>(camera.width * camera.height)};
+  for (int v = 0; v < camera.height; ++v)
+    for (int u = 0; u < camera.width; ++u) {
+      const double z = 1.0 - height;
+      const bool patch =
+          std::abs((u - camera.cx) / camera.fx * z) < 0.1 && std::abs((v - camera.cy) / camera.fy * z) < 0.1;
+      image.at(u, v) = static_cast<std::uint16_t>(std::lround(1000 * (patch ? z : 1.0)));
+    }
+  image.at(0, 0) = 0;  // nothing measured
+  return image;
+}
+
+void write_depth_view(const std::string& folder, const std::vector<double>& heights) {
+  fs::create_directories(folder + "/depth");
+  data::save_camera_info(small_camera(), folder + "/camera_info.yaml");
+  for (std::size_t k = 0; k < heights.size(); ++k)
+    data::save_depth_image(patch_above_table(heights[k]), folder + "/depth/" + std::to_string(k) + ".png");
+  // Half a turn about x: the optical axis points down.
+  std::ofstream(folder + "/extrinsics.json")
+      << R"({"schema": "flash-extrinsics/1", "transform": {"parent": "base", "child": "camera",
+             "translation": [0.5, 0.1, 1.07], "rotation_xyzw": [1, 0, 0, 0]}})";
+}
+
+TEST_F(SegmentFolder, DepthImagesBecomeTheLiftedPatchInTheBaseFrame) {
+  write_depth_view(folder("raw"), {0.1, 0.2});
+  SegmentFolderSettings settings;
+  const SegmentedFolder result =
+      segment_folder({open_raw_view(folder("raw"))}, {0.0, 0.1}, settings, folder("out"));
+  ASSERT_TRUE(result.table);
+  EXPECT_NEAR(result.table->point.z(), 0.07, 1e-6);
+  for (int k : {0, 1}) {
+    const data::Points cloth = data::load_point_cloud(folder("out") + "/" + result.clouds[k]);
+    ASSERT_GT(cloth.rows(), 300);
+    const double height = 0.07 + 0.1 * (k + 1);
+    EXPECT_LT((cloth.col(2).array() - height).abs().maxCoeff(), 1e-6);
+    // The patch ends at 0.1 m from the axis, less up to one pixel and what the outlier filter takes from its
+    // rim.
+    EXPECT_NEAR(cloth.col(0).maxCoeff(), camera_position.x() + 0.1, 0.012);
+    EXPECT_NEAR(cloth.col(0).minCoeff(), camera_position.x() - 0.1, 0.012);
+    EXPECT_NEAR(cloth.col(1).mean(), camera_position.y(), 0.002);
+  }
+  EXPECT_TRUE(fs::exists(folder("out") + "/segment.png"));
+}
+
+TEST_F(SegmentFolder, ViewsAreMergedFrameByFrame) {
+  write_depth_view(folder("a"), {0.1});
+  fs::create_directories(folder("b"));
+  data::Points side(400, 3);  // a second patch 0.1 m beside the first, close enough to be one cluster with it
+  for (int i = 0; i < side.rows(); ++i)
+    side.row(i) << camera_position.x() + 0.1 + 0.005 * (i % 20), 0.05 + 0.005 * (i / 20), 0.17;
+  data::save_point_cloud(side, folder("b") + "/000.ply");
+  const SegmentedFolder result =
+      segment_folder({open_raw_view(folder("a")), open_raw_view(folder("b"))}, {0.0}, {}, folder("out"));
+  EXPECT_GT(result.frames[0].cloth.col(0).maxCoeff(), camera_position.x() + 0.19);
+}
+
+TEST_F(SegmentFolder, TheArmAboveTheGripperIsCutAway) {
+  write_depth_view(folder("raw"), {0.1});
+  fs::create_directories(folder("arm"));
+  data::Points arm(500, 3);
+  for (int i = 0; i < arm.rows(); ++i)
+    arm.row(i) << 0.55 + 0.02 * std::cos(0.5 * i), 0.1 + 0.02 * std::sin(0.5 * i), 0.175 + 0.0005 * i;
+  data::save_point_cloud(arm, folder("arm") + "/000.ply");
+  SegmentFolderSettings settings;
+  data::Trajectory gripper;
+  gripper.times = {0.0};
+  gripper.poses = {Eigen::Isometry3d(Eigen::Translation3d(0.55, 0.1, 0.171))};
+  settings.gripper = gripper;
+  const std::vector<RawView> views = {open_raw_view(folder("raw")), open_raw_view(folder("arm"))};
+  EXPECT_LT(segment_folder(views, {0.0}, settings, folder("out")).frames[0].cloth.col(2).maxCoeff(), 0.172);
+  settings.gripper.reset();
+  EXPECT_GT(segment_folder(views, {0.0}, settings, folder("out2")).frames[0].cloth.col(2).maxCoeff(), 0.3);
+}
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const data::InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST_F(SegmentFolder, WhatIsMissingIsNamed) {
+  EXPECT_NE(message_of([&] { open_raw_view(folder("nowhere")); }).find("does not exist"), std::string::npos);
+  fs::create_directories(folder("empty"));
+  EXPECT_NE(message_of([&] { open_raw_view(folder("empty")); }).find("found neither clouds"),
+            std::string::npos);
+  write_depth_view(folder("raw"), {0.1, 0.2});
+  const RawView view = open_raw_view(folder("raw"));
+  EXPECT_NE(message_of([&] { segment_folder({view}, {0.0}, {}, folder("out")); }).find("found 2, expected 1"),
+            std::string::npos);
+  fs::remove(folder("raw") + "/extrinsics.json");
+  EXPECT_NE(message_of([&] { open_raw_view(folder("raw")); }).find("need the pose of their camera"),
+            std::string::npos);
+}
+
+TEST_F(SegmentFolder, ATableWithoutClothSaysSo) {
+  write_depth_view(folder("raw"), {0.0});
+  const RawView view = open_raw_view(folder("raw"));
+  EXPECT_NE(
+      message_of([&] { segment_folder({view}, {0.0}, {}, folder("out")); }).find("no frame holds a cluster"),
+      std::string::npos);
+}
+
+}  // namespace
+}  // namespace flash::sysid
