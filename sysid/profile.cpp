@@ -47,8 +47,9 @@ double refined_estimate(const Axis& axis, const std::vector<double>& scores, std
 double crossing(const Axis& axis, const std::vector<double>& chi2, std::size_t inside, std::size_t outside,
                 double limit) {
   const double a = coordinate(axis, axis.values[inside]), b = coordinate(axis, axis.values[outside]);
-  const double s =
-      std::isfinite(chi2[outside]) ? (limit - chi2[inside]) / (chi2[outside] - chi2[inside]) : 0.5;
+  // The root of chi^2 is straight where chi^2 is a parabola.
+  const double from = std::sqrt(chi2[inside]), to = std::sqrt(chi2[outside]);
+  const double s = std::isfinite(to) ? (std::sqrt(limit) - from) / (to - from) : 0.5;
   return value_at(axis, a + s * (b - a));
 }
 

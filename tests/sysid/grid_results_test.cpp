@@ -1,0 +1,113 @@
+#include "sysid/grid_results.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <limits>
+
+#include "data/error.h"
+
+namespace flash::sysid {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<Axis> kAxes = {{"young", {10, 100}, true}, {"friction", {0.1, 0.3}, false}};
+
+CandidateResult result_of(int id, double score) {
+  CandidateResult result;
+  result.id = id;
+  result.values = {id < 2 ? 10.0 : 100.0, id % 2 ? 0.3 : 0.1};
+  result.score = score;
+  result.converged = true;
+  result.residual_max = 1e-4;
+  RecordingScore recording;
+  recording.score = score;
+  recording.offset = {0.01, -0.02, 0.1 / 3};
+  recording.yaw = 0.05;
+  recording.time_offset = -0.04;
+  recording.bounds_hit = {"offset_x", "time"};
+  recording.keyframes = {{0.1, score, 120, 1}, {0.2, 0, 0, 0}};
+  result.recordings = {recording, recording};
+  result.recordings[1].score = 2 * score;
+  return result;
+}
+
+class Results : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder = (fs::temp_directory_path() / ("flash_grid_results_" + std::to_string(::getpid()))).string();
+    fs::remove_all(folder);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+  std::string folder;
+};
+
+TEST_F(Results, ComeBackAsTheyWereWritten) {
+  {
+    ResultsStore store(folder, kAxes, {"lift, one", "lift two"}, "abc", false);
+    store.append(result_of(3, 0.005));
+    CandidateResult lost = result_of(0, std::numeric_limits<double>::infinity());
+    lost.status = CandidateStatus::diverged;
+    lost.converged = false;
+    store.append(lost);
+    EXPECT_EQ(store.results().candidates.front().id, 0);
+  }
+  const GridResults results = load_grid_results(folder);
+  EXPECT_EQ(results.recordings, (std::vector<std::string>{"lift, one", "lift two"}));
+  EXPECT_EQ(results.axes[0].name, "young");
+  EXPECT_TRUE(results.axes[0].logarithmic);
+  ASSERT_EQ(results.candidates.size(), 2u);
+  EXPECT_EQ(results.candidates[0].status, CandidateStatus::diverged);
+  EXPECT_EQ(results.candidates[0].score, std::numeric_limits<double>::infinity());
+  const CandidateResult& result = results.candidates[1];
+  EXPECT_EQ(result.values, (std::vector<double>{100, 0.3}));
+  EXPECT_TRUE(result.converged);
+  EXPECT_EQ(result.recordings[1].score, 0.01);
+  EXPECT_EQ(result.recordings[0].offset, Eigen::Vector3d(0.01, -0.02, 0.1 / 3));
+  EXPECT_EQ(result.recordings[0].bounds_hit, (std::vector<std::string>{"offset_x", "time"}));
+  ASSERT_EQ(result.recordings[0].keyframes.size(), 2u);
+  EXPECT_EQ(result.recordings[0].keyframes[0].points, 120);
+  EXPECT_EQ(result.recordings[0].keyframes[1].weight, 0);
+}
+
+TEST_F(Results, GoOnWhereTheyStoppedAfterACutLine) {
+  {
+    ResultsStore store(folder, kAxes, {"a", "b"}, "abc", false);
+    store.append(result_of(0, 0.005));
+    store.append(result_of(1, 0.006));
+  }
+  std::ofstream(folder + "/results.csv", std::ios::app) << "2,100,0.1,0.00";
+  {
+    ResultsStore store(folder, kAxes, {"a", "b"}, "abc", true);
+    EXPECT_TRUE(store.contains(1));
+    EXPECT_FALSE(store.contains(2));
+    store.append(result_of(2, 0.007));
+  }
+  const GridResults results = load_grid_results(folder);
+  ASSERT_EQ(results.candidates.size(), 3u);
+  EXPECT_EQ(results.candidates[2].score, 0.007);
+}
+
+TEST_F(Results, AreNeverMixedWithOthers) {
+  { ResultsStore(folder, kAxes, {"a"}, "abc", false); }
+  EXPECT_THROW(ResultsStore(folder, kAxes, {"a"}, "abc", false), data::InputError);
+  EXPECT_THROW(ResultsStore(folder, kAxes, {"a"}, "abd", true), data::InputError);
+  EXPECT_NO_THROW(ResultsStore(folder, kAxes, {"a"}, "abc", true));
+}
+
+TEST_F(Results, HeaderNamesTheColumnsOfTheContract) {
+  { ResultsStore(folder, kAxes, {"a"}, "abc", false); }
+  std::ifstream file(folder + "/results.csv");
+  std::string header;
+  std::getline(file, header);
+  EXPECT_EQ(
+      header.find("id,young,friction,score_m,converged,residual_max,penetration_max_m,offset_x,offset_y,"
+                  "offset_z,time_offset_s,status"),
+      0u);
+}
+
+}  // namespace
+}  // namespace flash::sysid
