@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/SparseCholesky>
+#include <algorithm>
 #include <cmath>
-#include <map>
 #include <string>
 #include <utility>
 
@@ -48,16 +48,78 @@ Eigen::Matrix2Xd plane_coordinates(const Sheet& sheet) {
   return plane;
 }
 
-Sparse without_small_entries(const Sparse& matrix, double drop_tolerance) {
-  const Eigen::VectorXd diagonal = matrix.diagonal();
-  Triplets entries;
-  entries.reserve(matrix.nonZeros());
-  for (int j = 0; j < matrix.outerSize(); ++j)
-    for (Sparse::InnerIterator it(matrix, j); it; ++it) {
-      const bool small = std::abs(it.value()) < drop_tolerance * std::sqrt(diagonal[it.row()] * diagonal[j]);
-      entries.emplace_back(small ? j : int(it.row()), j, it.value());
+// x <- -matrix^-1 x for many right-hand sides at once: a row of x is contiguous, so the loops run over
+// vectors.
+using Block = Eigen::Matrix<double, Eigen::Dynamic, 32, Eigen::RowMajor>;
+
+void solve_negative(const Eigen::SimplicialLDLT<Sparse>& factor, Block& x) {
+  const Sparse& L = factor.matrixL().nestedExpression();
+  Block y = factor.permutationP() * x;
+  for (int j = 0; j < L.cols(); ++j)
+    for (Sparse::InnerIterator it(L, j); it; ++it)
+      if (it.row() > j) y.row(it.row()).noalias() -= it.value() * y.row(j);
+  y.array().colwise() /= -factor.vectorD().array();
+  for (int j = int(L.cols()) - 1; j >= 0; --j)
+    for (Sparse::InnerIterator it(L, j); it; ++it)
+      if (it.row() > j) y.row(j).noalias() -= it.value() * y.row(it.row());
+  x = factor.permutationP().transpose() * y;
+}
+
+// Rows of T = -ee^-1 ex, the normal derivative of the free edges in terms of the positions, without their
+// small entries: what is left of a row is moved by the least change that keeps its values for affine
+// positions.
+Sparse slope_weights(const Sheet& sheet, const std::vector<Edge>& edges, const Eigen::Matrix2Xd& plane,
+                     const Eigen::SimplicialLDLT<Sparse>& factor, const Sparse& ex, double drop_tolerance) {
+  struct Weight {
+    int vertex;
+    double value;
+  };
+  std::vector<std::vector<Weight>> rows(edges.size());
+  Eigen::Matrix3Xd affine = Eigen::Matrix3Xd::Zero(3, Eigen::Index(edges.size()));  // T (1, x, y)
+  std::vector<double> smallest(edges.size());
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    const Edge& e = edges[i];
+    const double area = sheet.triangles[e.left].area + (e.right >= 0 ? sheet.triangles[e.right].area : 0.0);
+    smallest[i] = drop_tolerance * (plane.col(e.a) - plane.col(e.b)).norm() / area;
+  }
+  const auto from_midpoint = [&](const Edge& e, int vertex) -> Eigen::Vector3d {
+    const Eigen::Vector2d length = plane.col(e.b) - plane.col(e.a);
+    const Eigen::Vector2d d = (plane.col(vertex) - 0.5 * (plane.col(e.a) + plane.col(e.b))) / length.norm();
+    return {1.0, d.x(), d.y()};
+  };
+  Block block(ex.rows(), Block::ColsAtCompileTime);
+  for (int first = 0; first < ex.cols(); first += int(block.cols())) {
+    const int count = std::min<int>(int(block.cols()), int(ex.cols()) - first);
+    block.setZero();
+    for (int j = 0; j < count; ++j)
+      for (Sparse::InnerIterator it(ex, first + j); it; ++it) block(it.row(), j) = it.value();
+    solve_negative(factor, block);
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      const Edge& e = edges[i];
+      for (int j = 0; j < count; ++j) {
+        const int vertex = first + j;
+        const double value = block(Eigen::Index(i), j);
+        if (std::abs(value) > 1e-12 * smallest[i])
+          affine.col(Eigen::Index(i)) += value * from_midpoint(e, vertex);
+        if (std::abs(value) >= smallest[i] || vertex == e.a || vertex == e.b || vertex == e.opposite_left)
+          rows[i].push_back({vertex, value});
+      }
     }
-  return sparse(matrix.rows(), matrix.cols(), entries);
+  }
+  Triplets entries;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d missing = affine.col(Eigen::Index(i));
+    for (const Weight& w : rows[i]) {
+      const Eigen::Vector3d d = from_midpoint(edges[i], w.vertex);
+      moments += d * d.transpose();
+      missing -= w.value * d;
+    }
+    const Eigen::Vector3d change = moments.ldlt().solve(missing);
+    for (const Weight& w : rows[i])
+      entries.emplace_back(int(i), w.vertex, w.value + change.dot(from_midpoint(edges[i], w.vertex)));
+  }
+  return sparse(ex.rows(), ex.cols(), entries);
 }
 
 }  // namespace
@@ -124,42 +186,43 @@ CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
   const auto vertices = plate.xx.rows(), edges = plate.ee.rows();
 
   data::Points slopes = data::Points::Zero(edges, 3);
-  std::vector<int> column(edges, 0);  // of the free edges; -1 where clamped
+  std::vector<bool> is_clamped(edges, false);
   for (const ClampedEdge& clamp : clamped) {
-    int found = -1;
-    for (int i = 0; i < int(edges); ++i)
-      if (std::minmax(plate.edges[i].a, plate.edges[i].b) == std::minmax(clamp.vertex_a, clamp.vertex_b))
-        found = i;
-    if (found < 0)
+    const auto same = [&](const Edge& e) {
+      return std::minmax(e.a, e.b) == std::minmax(clamp.vertex_a, clamp.vertex_b);
+    };
+    const auto found = std::find_if(plate.edges.begin(), plate.edges.end(), same) - plate.edges.begin();
+    if (found == edges)
       throw data::input_error("clamped edge",
                               std::to_string(clamp.vertex_a) + "-" + std::to_string(clamp.vertex_b),
                               "not an edge of the mesh");
     slopes.row(found) = clamp.slope;
-    column[found] = -1;
+    is_clamped[found] = true;
   }
-  Triplets select_free;
-  int free = 0;
+  std::vector<Edge> free;
+  Triplets select;
   for (int i = 0; i < int(edges); ++i)
-    if (column[i] == 0) {
-      column[i] = free;
-      select_free.emplace_back(i, free++, 1.0);
+    if (!is_clamped[i]) {
+      select.emplace_back(i, int(free.size()), 1.0);
+      free.push_back(plate.edges[i]);
     }
-  const Sparse P = sparse(edges, free, select_free);
-  const Sparse xe = plate.xe * P, ee = P.transpose() * plate.ee * P;
-
-  Eigen::SimplicialLDLT<Sparse> factor(ee);
+  const Sparse P = sparse(edges, Eigen::Index(free.size()), select);
+  const Sparse xe = plate.xe * P, ex = xe.transpose(), ee = P.transpose() * plate.ee * P;
+  const Eigen::SimplicialLDLT<Sparse> factor(ee);
   if (factor.info() != Eigen::Success) throw data::input_error("mesh", "bending_model", "singular plate");
-  // theta = -ee^-1 (ex x + fixed)
+
+  // The energy at theta = T x + response: for the exact T the minimum over theta, for a truncated one above
+  // it by the square of what was dropped.
+  const Sparse T = slope_weights(sheet, free, plane_coordinates(sheet), factor, ex, drop_tolerance);
+  const Sparse mixed = xe * T, quadratic = T.transpose() * Sparse(ee * T);
   CondensedPlate result;
-  const Sparse ex = xe.transpose();
-  result.stiffness = without_small_entries(Sparse(plate.xx - xe * Sparse(factor.solve(ex))), drop_tolerance);
+  result.stiffness = plate.xx + mixed + Sparse(mixed.transpose()) + quadratic;
   result.force = data::Points::Zero(vertices, 3);
   if (!clamped.empty()) {
-    const data::Points fixed = P.transpose() * (plate.ee * slopes);
-    const Eigen::MatrixXd response = factor.solve(Eigen::MatrixXd(fixed));
-    result.force = xe * response - plate.xe * slopes;
+    const Eigen::MatrixXd fixed = P.transpose() * (plate.ee * slopes), response = -factor.solve(fixed);
+    result.force = -(xe * response + plate.xe * slopes);
     result.constant =
-        0.5 * (slopes.cwiseProduct(plate.ee * slopes).sum() - fixed.cwiseProduct(response).sum());
+        0.5 * (slopes.cwiseProduct(plate.ee * slopes).sum() + fixed.cwiseProduct(response).sum());
   }
   return result;
 }
