@@ -1,0 +1,67 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command_line.h"
+#include "apps/sysid_options.h"
+#include "apps/sysid_verbs.h"
+#include "data/error.h"
+#include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
+#include "sim/sheet.h"
+#include "sysid/export_asset.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ExportOptions {
+  CommonOptions common;
+  std::string run;
+  std::string asset;
+  std::string format = "flash";
+  std::string out;
+};
+
+int run_export(const ExportOptions& options) {
+  const sysid::Summary summary = sysid::load_summary((fs::path(options.run) / "summary.json").string());
+  const data::Asset base = data::load_asset(options.asset.empty() ? summary.asset : options.asset);
+  check_output(options.out, options.common);
+  const data::Asset tuned = sysid::tuned_asset(base, summary);
+  std::vector<std::string> notices;
+  const data::TriangleMesh mesh = data::load_asset_mesh(tuned);
+  const double area = sim::make_sheet(mesh).vertex_area.sum();
+  const auto format =
+      options.format == "published" ? data::AssetFormat::published : data::AssetFormat::flash_1;
+  data::save_asset(data::express_as(tuned, format, area, notices), options.out);
+
+  for (const std::string& notice : notices) warn(notice);
+  if (summary.exit_code != 0) warn("the search behind this asset ended with: " + summary.warnings.front());
+  if (options.common.json) {
+    std::cout << nlohmann::ordered_json{{"asset", options.out}, {"not_expressed", notices}}.dump(2) << '\n';
+  } else {
+    std::printf("%s\n", options.out.c_str());
+  }
+  return summary.exit_code == 0 ? exit_done : exit_unusable;
+}
+
+}  // namespace
+
+void add_export_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<ExportOptions>();
+  CLI::App* verb = app.add_subcommand("export", "Write the tuned asset of a search, with its intervals");
+  verb->add_option("run", options->run, "Folder of the search")->required();
+  verb->add_option("--asset", options->asset, "In place of the asset the search started from");
+  verb->add_option("--as", options->format, "flash: all of it; published: what the published format can say")
+      ->check(CLI::IsMember({"flash", "published"}))
+      ->capture_default_str();
+  verb->add_option("-o,--out", options->out, "The asset file")->required();
+  add_common_options(*verb, options->common);
+  verb->footer("Example:\n  flash-sysid export run -o tuned.json");
+  verb->callback([options, &action] { action = [options] { return run_export(*options); }; });
+}
+
+}  // namespace flash

@@ -1,0 +1,200 @@
+#include "apps/sysid_options.h"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <thread>
+
+#include "data/error.h"
+#include "data/text.h"
+#include "sim/sheet.h"
+
+namespace flash {
+namespace {
+
+std::atomic<bool> interrupted = false;  // a signal handler reaches nothing else
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+void on_interrupt(int signal) {
+  interrupted = true;
+  std::signal(signal, SIG_DFL);
+}
+
+std::string duration_text(double seconds) {
+  char text[32];
+  if (seconds < 90) {
+    std::snprintf(text, sizeof text, "%.0f s", seconds);
+  } else if (seconds < 5400) {
+    std::snprintf(text, sizeof text, "%.0f min", seconds / 60);
+  } else {
+    std::snprintf(text, sizeof text, "%.1f h", seconds / 3600);
+  }
+  return text;
+}
+
+}  // namespace
+
+void add_common_options(CLI::App& verb, CommonOptions& options) {
+  CLI::App& group = *verb.add_option_group("Common");
+  group.add_flag("--json", options.json, "Print the result as JSON on stdout");
+  CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
+  group.add_flag("--verbose", options.verbose, "Print every notice")->excludes(quiet);
+  group.add_flag("--force", options.force, "Overwrite what is there");
+  group.add_option("--seed", options.seed, "Of everything random")->capture_default_str();
+  group.add_option("--threads", options.threads, "0: one a processor")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  group.add_option("--device", options.device, "Where the simulation runs")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->capture_default_str();
+}
+
+void add_replay_options(CLI::App& verb, ReplayOptions& options) {
+  CLI::App& group = *verb.add_option_group("Replay and score");
+  group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
+  group.add_option("--time-step", options.time_step, "[s]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group.add_option("--iterations", options.iterations, "Of the solver, a step at most")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group.add_option("--tolerance", options.tolerance, "On the residual |r| / |M g|")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group.add_option("--grasp-shape", options.grasp_shape, "In place of the recording's")
+      ->check(CLI::IsMember({"clamp", "point", "pinch"}));
+  group
+      .add_option("--grasp-within", options.grasp_within,
+                  "Size of the grasped patch in place of the recording's [m]")
+      ->check(CLI::PositiveNumber);
+  group.add_option("--from", options.from, "Keyframes before do not count [s]");
+  group.add_option("--to", options.to, "Keyframes after do not count [s]");
+  group.add_option("--distance", options.distance, "How point distances become one number")
+      ->check(CLI::IsMember({"mean", "trimmed", "huber"}))
+      ->capture_default_str();
+  group.add_option("--trim", options.trim, "trimmed: share of the largest distances left out")
+      ->check(CLI::Range(0.0, 0.5))
+      ->capture_default_str();
+  group.add_option("--huber", options.huber, "huber: where the distance stops counting in full [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group.add_option("--share", options.shared, "Nuisance values that all recordings have in common")
+      ->check(CLI::IsMember({"offset", "yaw", "time"}))
+      ->delimiter(',');
+}
+
+sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions& options, int threads) {
+  sysid::ReplaySettings settings;
+  settings.solver.time_step = options.time_step;
+  settings.solver.max_iterations = options.iterations;
+  settings.solver.tolerance = options.tolerance;
+  settings.mesh = options.mesh;
+  settings.threads = threads;
+  if (options.grasp_within > 0) settings.grasp_within = options.grasp_within;
+  if (options.grasp_shape == "clamp") settings.grasp_shape = data::GraspShape::clamp;
+  if (options.grasp_shape == "point") settings.grasp_shape = data::GraspShape::point;
+  if (options.grasp_shape == "pinch") settings.grasp_shape = data::GraspShape::pinch;
+  if (verb.count("--from") > 0) settings.score_from = options.from;
+  if (verb.count("--to") > 0) settings.score_to = options.to;
+  return settings;
+}
+
+sysid::ScoreSettings score_settings(const ReplayOptions& options) {
+  sysid::ScoreSettings settings;
+  settings.robust.kind = options.distance == "mean"    ? sysid::RobustKind::plain
+                         : options.distance == "huber" ? sysid::RobustKind::huber
+                                                       : sysid::RobustKind::trimmed;
+  settings.robust.trim_fraction = options.trim;
+  settings.robust.huber_delta = options.huber;
+  const auto shares = [&](const char* name) {
+    return std::find(options.shared.begin(), options.shared.end(), name) != options.shared.end();
+  };
+  settings.shared = {shares("offset"), shares("yaw"), shares("time")};
+  return settings;
+}
+
+void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values) {
+  CLI::App& group =
+      *verb.add_option_group("Searched parameters", "low:high:count[:log], a list a,b,c, or one value");
+  for (const sysid::ParameterInfo& info : sysid::known_parameters()) {
+    std::string dashed = info.name;
+    std::replace(dashed.begin(), dashed.end(), '_', '-');
+    const std::string flags = dashed == info.name ? "--" + info.name : "--" + dashed + ",--" + info.name;
+    const std::string unit = info.unit.empty() ? "" : " [" + info.unit + "]";
+    group.add_option_function<std::string>(
+        flags, [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
+        info.meaning + unit);
+  }
+}
+
+void say(const CommonOptions& options, const std::string& line) {
+  if (!options.quiet) std::cerr << line << '\n';
+}
+
+void warn(const std::string& line) { std::cerr << "flash-sysid: warning: " << line << '\n'; }
+
+int thread_count(const CommonOptions& options) {
+  return options.threads > 0 ? options.threads
+                             : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+std::string choose_device(const CommonOptions& options) {
+  if (options.device == "cuda")
+    throw data::InputError("--device cuda: this program has no CUDA backend; use --device cpu or auto");
+  return "cpu";
+}
+
+void check_output(const std::string& path, const CommonOptions& options) {
+  if (options.force || !std::filesystem::exists(path)) return;
+  if (std::filesystem::is_directory(path) && std::filesystem::is_empty(path)) return;
+  throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
+}
+
+data::Asset load_asset_for(const std::string& path, const data::Recording& recording) {
+  if (!path.empty()) return data::load_asset(path);
+  if (recording.asset.empty())
+    throw data::InputError("--asset: none given, and " + recording.source + " names none in object.asset");
+  return data::load_asset(recording.asset);
+}
+
+sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
+                                  const CommonOptions& options) {
+  const double area = sim::make_sheet(mesh).vertex_area.sum();
+  const data::ResolvedSheet resolved = data::resolve_sheet(asset, area);
+  for (const std::string& notice : resolved.notices) say(options, notice);
+  sysid::MaterialBase base;
+  base.material = resolved.material;
+  base.thickness = asset.thickness;
+  base.bending_from_thickness = asset.thickness && !asset.bending_rigidity && !asset.published_bending;
+  return base;
+}
+
+ProgressLine::ProgressLine(const CommonOptions& options)
+    : visible_(!options.quiet && isatty(STDERR_FILENO) != 0) {}
+
+ProgressLine::~ProgressLine() {
+  if (drawn_) std::cerr << '\n';
+}
+
+void ProgressLine::show(const sysid::Progress& progress) {
+  if (!visible_) return;
+  drawn_ = true;
+  char line[160];
+  std::snprintf(line, sizeof line, "\r%d of %d candidates, %.2f/s, %s left, best %.2f mm\033[K",
+                progress.done, progress.total, progress.candidates_per_second,
+                duration_text(progress.seconds_left).c_str(), 1000 * progress.best_score);
+  std::cerr << line << std::flush;
+}
+
+const std::atomic<bool>& stop_on_interrupt() {
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  return interrupted;
+}
+
+}  // namespace flash

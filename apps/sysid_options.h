@@ -1,0 +1,79 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "data/asset.h"
+#include "sysid/grid_search.h"
+#include "sysid/replay.h"
+
+namespace flash {
+
+/// Options that every verb has.
+struct CommonOptions {
+  bool json = false;
+  bool quiet = false;
+  bool verbose = false;
+  bool force = false;
+  unsigned seed = 1;
+  std::string device = "auto";
+  int threads = 0;  ///< 0: one a processor
+};
+void add_common_options(CLI::App& verb, CommonOptions& options);
+
+/// How a recording is replayed and scored.
+struct ReplayOptions {
+  std::string mesh;
+  double time_step = 0.01;
+  int iterations = 60;
+  double tolerance = 1e-3;
+  std::string grasp_shape;
+  double grasp_within = 0;  ///< 0: the recording's
+  double from = 0, to = 0;
+  std::string distance = "trimmed";
+  double trim = 0.05, huber = 0.02;
+  std::vector<std::string> shared;
+};
+void add_replay_options(CLI::App& verb, ReplayOptions& options);
+sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions& options, int threads);
+sysid::ScoreSettings score_settings(const ReplayOptions& options);
+
+/// Adds --young, --poisson, ...: one option a known parameter, its text kept by name.
+void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values);
+
+/// What a verb says to people, on stderr, unless --quiet.
+void say(const CommonOptions& options, const std::string& line);
+void warn(const std::string& line);
+
+int thread_count(const CommonOptions& options);
+
+/// The device a search runs on. Throws data::InputError for cuda where the program has none; auto takes the
+/// CPU.
+std::string choose_device(const CommonOptions& options);
+
+/// Throws data::InputError where the folder or file exists already (a folder: with something in it) and
+/// --force is not given.
+void check_output(const std::string& path, const CommonOptions& options);
+
+/// The asset named on the command line or, without one, by the recording.
+data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
+sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
+                                  const CommonOptions& options);
+
+/// A line of progress with rate and time left, drawn over itself; silent when stderr is no terminal.
+class ProgressLine {
+ public:
+  explicit ProgressLine(const CommonOptions& options);
+  ~ProgressLine();
+  void show(const sysid::Progress& progress);
+
+ private:
+  bool visible_;
+  bool drawn_ = false;
+};
+
+/// Set by Ctrl-C from now on; a second Ctrl-C ends the program at once.
+const std::atomic<bool>& stop_on_interrupt();
+
+}  // namespace flash

@@ -1,0 +1,170 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command_line.h"
+#include "apps/sysid_options.h"
+#include "apps/sysid_verbs.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/mesh_io.h"
+#include "data/text.h"
+#include "sysid/overlay.h"
+#include "sysid/overlay_image.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReplayVerbOptions {
+  CommonOptions common;
+  ReplayOptions replay;
+  std::string recording;
+  std::string asset;
+  std::vector<std::string> set;
+  std::vector<int> frames;
+  bool every_step = false;
+  std::string out;
+};
+
+// Six frames, evenly spread over those that carry points.
+std::vector<int> some_frames(const sysid::Overlay& overlay) {
+  std::vector<int> seen;
+  for (std::size_t k = 0; k < overlay.frames.size(); ++k)
+    if (overlay.frames[k].cloud.rows() > 0) seen.push_back(static_cast<int>(k));
+  std::vector<int> frames;
+  for (std::size_t i = 1; i <= 6 && !seen.empty(); ++i) {
+    const int frame = seen[(seen.size() - 1) * i / 6];
+    if (frames.empty() || frames.back() != frame) frames.push_back(frame);
+  }
+  return frames;
+}
+
+Eigen::AlignedBox3d bounds_of(const sysid::Overlay& overlay, const std::vector<int>& frames) {
+  Eigen::AlignedBox3d bounds;
+  for (const int k : frames)
+    for (const data::Points* points : {&overlay.frames[static_cast<std::size_t>(k)].vertices,
+                                       &overlay.frames[static_cast<std::size_t>(k)].cloud})
+      for (Eigen::Index i = 0; i < points->rows(); ++i) bounds.extend(points->row(i).transpose());
+  return bounds;
+}
+
+std::string numbered(const std::string& folder, const char* format, int k) {
+  char name[32];
+  std::snprintf(name, sizeof name, format, k);
+  return (fs::path(folder) / name).string();
+}
+
+void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, const std::string& folder) {
+  const Eigen::AlignedBox3d bounds = bounds_of(overlay, frames);
+  for (const int k : frames) {
+    const sysid::OverlayFrame& frame = overlay.frames[static_cast<std::size_t>(k)];
+    data::save_png(sysid::draw_overlay({frame.vertices, overlay.triangles}, frame.cloud, bounds),
+                   numbered(folder, "%03d.png", k));
+  }
+}
+
+nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const sysid::ReplayResult& motion) {
+  const sysid::RecordingScore& recording = result.recordings.front();
+  nlohmann::ordered_json json;
+  json["score"] = result.score;
+  json["converged"] = result.converged;
+  json["unconverged_share"] = motion.unconverged_share;
+  json["residual_max"] = result.residual_max;
+  json["penetration_max_m"] = result.penetration_max;
+  json["offset"] = {recording.offset.x(), recording.offset.y(), recording.offset.z()};
+  json["yaw"] = recording.yaw;
+  json["time_offset"] = recording.time_offset;
+  json["bounds_hit"] = recording.bounds_hit;
+  json["frames"] = nlohmann::ordered_json::array();
+  for (const sysid::KeyframeScore& frame : recording.keyframes)
+    if (frame.points > 0)
+      json["frames"].push_back({{"t", frame.t}, {"score", frame.score}, {"weight", frame.weight}});
+  return json;
+}
+
+int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
+  choose_device(options.common);
+  const data::Recording recording = data::load_recording(options.recording);
+  const data::Asset asset = load_asset_for(options.asset, recording);
+  const sysid::Replay replay =
+      sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common)));
+  if (options.common.verbose)
+    for (const std::string& notice : replay.notices) say(options.common, notice);
+  const sysid::MaterialBase base = material_base(asset, replay.sheet.rest, options.common);
+  std::vector<sysid::Axis> axes;
+  std::vector<double> values;
+  for (const std::string& assignment : options.set) {
+    axes.push_back(sysid::parse_fixed(assignment));
+    values.push_back(axes.back().values.front());
+  }
+  check_output(options.out, options.common);
+
+  const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
+  const sysid::ReplayResult motion = std::move(sysid::run(replay, {candidate}).front());
+  const sysid::CandidateResult result =
+      sysid::score_motions({replay}, {motion}, score_settings(options.replay));
+  if (result.status == sysid::CandidateStatus::diverged)
+    throw std::runtime_error(recording.name + ": the simulation diverged; lower --time-step");
+
+  const sysid::Overlay overlay = sysid::make_overlay(replay, motion.motion, result.recordings.front());
+  sysid::save_overlay(overlay, options.out);
+  if (options.every_step)
+    for (std::size_t k = 0; k < motion.motion.positions.size(); ++k)
+      data::save_triangle_mesh(
+          {motion.motion.positions[k], overlay.triangles},
+          numbered((fs::path(options.out) / "steps").string(), "%06d.ply", static_cast<int>(k)));
+  const std::vector<int> frames = options.frames.empty() ? some_frames(overlay) : options.frames;
+  for (const int k : frames)
+    if (k < 0 || k >= static_cast<int>(overlay.frames.size()))
+      throw data::InputError("--frames: " + std::to_string(k) + " is not a keyframe; expected 0 to " +
+                             std::to_string(overlay.frames.size() - 1));
+  draw_frames(overlay, frames, options.out);
+
+  if (!result.converged)
+    warn("not converged in " + data::format_short(100 * motion.unconverged_share) +
+         " % of the steps (residual " + data::format_short(result.residual_max) + ")");
+  if (options.common.json) {
+    std::cout << result_json(result, motion).dump(2) << '\n';
+  } else {
+    const sysid::RecordingScore& fit = result.recordings.front();
+    for (const sysid::KeyframeScore& frame : fit.keyframes)
+      if (frame.points > 0)
+        std::printf("%8.3f s  %6.2f mm  %6d points%s\n", frame.t, 1000 * frame.score, frame.points,
+                    frame.weight > 0 ? "" : "  not counted");
+    std::printf("score %.2f mm, offset %.1f %.1f %.1f mm, yaw %.3f rad, clock %.0f ms\n%s\n",
+                1000 * result.score, 1000 * fit.offset.x(), 1000 * fit.offset.y(), 1000 * fit.offset.z(),
+                fit.yaw, 1000 * fit.time_offset, options.out.c_str());
+  }
+  return exit_done;
+}
+
+}  // namespace
+
+void add_replay_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<ReplayVerbOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "replay", "Replay one set of parameters: meshes, scores and pictures over the observation");
+  verb->add_option("recording", options->recording, "Folder with recording.json")->required();
+  verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
+  verb->add_option("--set", options->set, "A parameter in place of the asset's, as bending=1e-4")
+      ->expected(1)
+      ->allow_extra_args(false);
+  verb->add_option("--frames", options->frames, "Keyframes to draw, counted from 0; without it six")
+      ->delimiter(',');
+  verb->add_flag("--every-step", options->every_step, "Write the mesh of every step too");
+  verb->add_option("-o,--out", options->out, "Folder for meshes, clouds, overlay.csv and pictures")
+      ->required();
+  add_replay_options(*verb, options->replay);
+  add_common_options(*verb, options->common);
+  verb->footer(
+      "Example:\n  flash-sysid replay lift_a --asset towel.json --set bending=1e-4 --frames 12,16,20,24 -o "
+      "overlay");
+  verb->callback(
+      [verb, options, &action] { action = [verb, options] { return run_replay(*verb, *options); }; });
+}
+
+}  // namespace flash

@@ -1,0 +1,68 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command_line.h"
+#include "apps/sysid_options.h"
+#include "apps/sysid_verbs.h"
+#include "sysid/report.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReportOptions {
+  CommonOptions common;
+  std::string run;
+  std::vector<std::string> map;
+  int points = 3000;
+  std::string out;
+};
+
+int run_report(const ReportOptions& options) {
+  const sysid::Summary summary = sysid::load_summary((fs::path(options.run) / "summary.json").string());
+  const sysid::GridResults results = sysid::load_grid_results(options.run);
+  std::vector<sysid::Overlay> overlays;
+  for (const sysid::SummaryRecording& recording : summary.recordings) {
+    const fs::path folder = fs::path(options.run) / "best" / recording.name;
+    if (fs::exists(folder)) overlays.push_back(sysid::load_overlay(folder.string()));
+  }
+  sysid::ReportSettings settings;
+  settings.max_cloud_points = options.points;
+  for (std::size_t k = 0; k < options.map.size() && k < 2; ++k) settings.map_axes[k] = options.map[k];
+  // Its own report.html is the run's to replace; any other file is not.
+  const std::string out =
+      options.out.empty() ? (fs::path(options.run) / "report.html").string() : options.out;
+  if (!options.out.empty()) check_output(out, options.common);
+  sysid::write_report(summary, results, overlays, settings, out);
+  if (options.common.json) {
+    std::cout << nlohmann::ordered_json{{"report", out}}.dump(2) << '\n';
+  } else {
+    std::printf("%s\n", out.c_str());
+  }
+  return exit_done;
+}
+
+}  // namespace
+
+void add_report_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<ReportOptions>();
+  CLI::App* verb =
+      app.add_subcommand("report", "Write the report of a search again: one HTML file that opens anywhere");
+  verb->add_option("run", options->run, "Folder of the search")->required();
+  verb->add_option("--map", options->map, "The two parameters of the score map, as bending,friction")
+      ->delimiter(',')
+      ->expected(2);
+  verb->add_option("--points", options->points, "Observed points shown a keyframe at most")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("-o,--out", options->out, "The file; without it report.html in the folder of the search");
+  add_common_options(*verb, options->common);
+  verb->footer("Example:\n  flash-sysid report run --map bending,friction -o report.html");
+  verb->callback([options, &action] { action = [options] { return run_report(*options); }; });
+}
+
+}  // namespace flash

@@ -1,0 +1,198 @@
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command_line.h"
+#include "apps/sysid_options.h"
+#include "apps/sysid_verbs.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
+#include "data/text.h"
+#include "sysid/depth_camera.h"
+#include "sysid/synth.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SynthOptions {
+  CommonOptions common;
+  sysid::SynthSettings synth;
+  sim::SolverSettings solver;
+  std::string asset;
+  std::string mesh;
+  std::vector<std::string> set;
+  std::vector<std::string> cameras;
+  std::string resolution = "160x120";
+  double field_of_view = 60;
+  std::vector<double> displacement, offset;
+  bool no_gripper = false;
+  std::string truth;
+  std::string out;
+};
+
+Eigen::Vector3d parse_position(const std::string& text) {
+  const std::vector<std::string_view> words = data::split(text, ",");
+  Eigen::Vector3d position;
+  for (int k = 0; k < 3; ++k) {
+    const auto number =
+        words.size() == 3 ? data::parse_number(words[static_cast<std::size_t>(k)]) : std::nullopt;
+    if (!number)
+      throw data::InputError("--camera: found \"" + text + "\", expected x,y,z in metres, as 0.2,-0.7,0.75");
+    position[k] = *number;
+  }
+  return position;
+}
+
+data::CameraIntrinsics make_intrinsics(const SynthOptions& options) {
+  const std::vector<std::string_view> words = data::split(options.resolution, "x");
+  const auto width = words.size() == 2 ? data::parse_integer(words[0]) : std::nullopt;
+  const auto height = words.size() == 2 ? data::parse_integer(words[1]) : std::nullopt;
+  if (!width || !height || *width < 8 || *height < 8 || *width > 4096 || *height > 4096)
+    throw data::InputError("--resolution: found \"" + options.resolution + "\", expected pixels, as 160x120");
+  data::CameraIntrinsics camera;
+  camera.width = static_cast<int>(*width);
+  camera.height = static_cast<int>(*height);
+  camera.fx = camera.fy = 0.5 * camera.width / std::tan(0.5 * options.field_of_view * M_PI / 180);
+  camera.cx = 0.5 * (camera.width - 1);
+  camera.cy = 0.5 * (camera.height - 1);
+  return camera;
+}
+
+// Aimed a little above the middle of the sheet, where it hangs. Without --camera: from the front, above.
+std::vector<sysid::SynthCamera> make_cameras(const SynthOptions& options, const data::TriangleMesh& mesh) {
+  const Eigen::Vector3d low = mesh.vertices.colwise().minCoeff(), high = mesh.vertices.colwise().maxCoeff();
+  const double size = (high - low).maxCoeff();
+  const Eigen::Vector3d target = 0.5 * (low + high) + 0.3 * size * Eigen::Vector3d::UnitZ();
+  std::vector<Eigen::Vector3d> positions;
+  for (const std::string& text : options.cameras) positions.push_back(parse_position(text));
+  if (positions.empty()) positions.push_back(target + size * Eigen::Vector3d(0, -2.25, 1.6));
+  std::vector<sysid::SynthCamera> cameras;
+  for (const Eigen::Vector3d& position : positions)
+    cameras.push_back({make_intrinsics(options), sysid::look_at(position, target, Eigen::Vector3d::UnitZ())});
+  return cameras;
+}
+
+Eigen::Vector3d vector_of(const std::vector<double>& numbers) {
+  return Eigen::Map<const Eigen::Vector3d>(numbers.data());
+}
+
+int run_synth(SynthOptions options) {
+  choose_device(options.common);
+  const data::Asset asset = data::load_asset(options.asset);
+  const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
+  const data::TriangleMesh mesh = data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
+                                                                : data::load_triangle_mesh(mesh_spec);
+  const sysid::MaterialBase base = material_base(asset, mesh, options.common);
+  std::vector<sysid::Axis> axes;
+  std::vector<double> values;
+  for (const std::string& assignment : options.set) {
+    axes.push_back(sysid::parse_fixed(assignment));
+    values.push_back(axes.back().values.front());
+  }
+  check_output(options.out, options.common);
+
+  sysid::SynthSettings& settings = options.synth;
+  settings.name = fs::path(options.out).lexically_normal().filename().string();
+  if (settings.name.empty())
+    settings.name = fs::path(options.out).lexically_normal().parent_path().filename().string();
+  settings.seed = options.common.seed;
+  settings.cameras = make_cameras(options, mesh);
+  if (!options.displacement.empty()) settings.displacement = vector_of(options.displacement);
+  if (!options.offset.empty()) settings.cloud_offset = vector_of(options.offset);
+  if (options.no_gripper) settings.gripper_half_extents.setZero();
+
+  const data::SheetMaterial material = sysid::make_candidate(base, axes, values).material;
+  sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
+  if (options.common.force) fs::remove_all(fs::path(options.out) / "frames");
+  sysid::save_synthetic(synthetic, options.out);
+  const std::string truth =
+      options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
+  data::write_atomically(truth, sysid::truth_text(material, settings));
+
+  if (synthetic.unconverged_share > 0)
+    warn("the simulation did not converge in " + data::format_short(100 * synthetic.unconverged_share) +
+         " % of the steps");
+  Eigen::Index points = 0;
+  for (const data::Points& cloud : synthetic.clouds) points += cloud.rows();
+  if (options.common.json) {
+    std::cout << nlohmann::ordered_json{{"recording", options.out},
+                                        {"truth", truth},
+                                        {"keyframes", synthetic.clouds.size()},
+                                        {"points", points},
+                                        {"unconverged_share", synthetic.unconverged_share}}
+                     .dump(2)
+              << '\n';
+  } else {
+    std::printf("%s: %zu keyframes, %s points\n%s\n", options.out.c_str(), synthetic.clouds.size(),
+                data::format_count(static_cast<std::size_t>(points)).c_str(), truth.c_str());
+  }
+  return exit_done;
+}
+
+}  // namespace
+
+void add_synth_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<SynthOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "synth", "Make a recording from an asset: simulate it and look at it with depth cameras");
+  sysid::SynthSettings& synth = options->synth;
+  verb->add_option("--asset", options->asset, "The object")->required();
+  verb->add_option("--kind", synth.kind, "What is done to the sheet")
+      ->check(CLI::IsMember({"corner_lift", "hang", "drag", "bar_pull", "bias_pull"}))
+      ->capture_default_str();
+  verb->add_option("--mesh", options->mesh, "Mesh in place of the asset's, as sheet:0.4x0.4:0.02");
+  verb->add_option("--set", options->set, "A parameter in place of the asset's, as bending=1e-4")
+      ->expected(1)
+      ->allow_extra_args(false);
+  verb->add_option("--displacement", options->displacement, "Of the gripper x,y,z in place of the kind's [m]")
+      ->delimiter(',')
+      ->expected(3);
+  verb->add_option("--duration", synth.duration, "Of the motion [s]")->capture_default_str();
+  verb->add_option("--rest", synth.rest, "Recorded after it [s]")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb->add_option("--rate", synth.keyframe_rate, "Keyframes a second")->capture_default_str();
+  verb->add_option("--grasp-within", synth.grasp_within, "Size of the grasped patch [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--camera", options->cameras,
+                   "Position x,y,z of a camera [m], aimed at the sheet; repeat for more")
+      ->expected(1)
+      ->allow_extra_args(false);
+  verb->add_option("--resolution", options->resolution, "Of the cameras [px]")->capture_default_str();
+  verb->add_option("--fov", options->field_of_view, "Horizontal field of view [deg]")
+      ->check(CLI::Range(5.0, 150.0))
+      ->capture_default_str();
+  verb->add_option("--noise", synth.depth_noise, "Standard deviation along the ray [m]")
+      ->capture_default_str();
+  verb->add_option("--dropped", synth.dropped, "Share of keyframes lost")->capture_default_str();
+  verb->add_option("--offset", options->offset, "Error of the camera registration x,y,z [m]")
+      ->delimiter(',')
+      ->expected(3);
+  verb->add_option("--time-offset", synth.time_offset, "Error of the camera's clock [s]")
+      ->capture_default_str();
+  verb->add_flag("--forces", synth.forces, "Record the gripper's force too");
+  verb->add_flag("--no-gripper", options->no_gripper, "The gripper hides nothing");
+  verb->add_option("--time-step", options->solver.time_step, "[s]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--truth-out", options->truth,
+                   "Where the truth goes; without it truth.json in the recording");
+  verb->add_option("-o,--out", options->out, "Folder of the recording")->required();
+  add_common_options(*verb, options->common);
+  verb->footer(
+      "Example:\n"
+      "  flash-sysid synth --asset towel.json --kind corner_lift --mesh sheet:0.4x0.4:0.02 --camera "
+      "0.2,-0.7,0.75 \\\n"
+      "    --noise 0.001 --seed 1 -o lift");
+  verb->callback([options, &action] { action = [options] { return run_synth(*options); }; });
+}
+
+}  // namespace flash
