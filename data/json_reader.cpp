@@ -84,7 +84,8 @@ std::string nearest_name(const std::string& name, const std::vector<std::string>
   std::string nearest;
   std::size_t least = std::max<std::size_t>(2, name.size() / 2) + 1;
   for (const std::string& candidate : known) {
-    const std::size_t distance = edit_distance(name, candidate);
+    // A forgotten unit or qualifier ("yaw" for "yaw_rad") is nearer than any misspelling.
+    const std::size_t distance = candidate.starts_with(name + '_') ? 1 : edit_distance(name, candidate);
     if (distance < least) {
       least = distance;
       nearest = candidate;

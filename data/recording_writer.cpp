@@ -10,7 +10,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json numbers(const Eigen::VectorXd& values) {
+template <int size>
+Json numbers(const Eigen::Matrix<double, size, 1>& values) {
   Json list = Json::array();
   for (const double value : values) list.push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
   return list;

@@ -100,19 +100,23 @@ TEST(ProceduralMesh, JitterKeepsTheBorderAndTheSeed) {
 }
 
 TEST(ProceduralMesh, CircumcirclesOfTheDelaunayMeshAreEmpty) {
-  const TriangleMesh mesh = delaunay_rectangle(0.2, 0.2, 0.02, 7);
-  for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t) {
-    const Eigen::Vector2d a = mesh.vertices.row(mesh.triangles(t, 0)).head<2>(),
-                          b = mesh.vertices.row(mesh.triangles(t, 1)).head<2>(),
-                          c = mesh.vertices.row(mesh.triangles(t, 2)).head<2>();
-    Eigen::Matrix2d edges;
-    edges << (b - a).transpose(), (c - a).transpose();
-    const Eigen::Vector2d centre =
-        a + edges.inverse() * Eigen::Vector2d((b - a).squaredNorm() / 2, (c - a).squaredNorm() / 2);
-    const double radius = (a - centre).norm();
-    for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v)
-      // 1e-9 m: rounding of circumcentres; border points may lie exactly on a circle.
-      ASSERT_GE((mesh.vertices.row(v).head<2>().transpose() - centre).norm(), radius - 1e-9);
+  for (const unsigned seed : {1u, 7u, 11u, 42u}) {
+    const TriangleMesh mesh = delaunay_rectangle(0.2, 0.2, 0.02, seed);
+    for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t) {
+      const Eigen::Vector2d a = mesh.vertices.row(mesh.triangles(t, 0)).head<2>(),
+                            b = mesh.vertices.row(mesh.triangles(t, 1)).head<2>(),
+                            c = mesh.vertices.row(mesh.triangles(t, 2)).head<2>();
+      Eigen::Matrix2d edges;
+      edges << (b - a).transpose(), (c - a).transpose();
+      const Eigen::Vector2d centre =
+          a + edges.inverse() * Eigen::Vector2d((b - a).squaredNorm() / 2, (c - a).squaredNorm() / 2);
+      const double radius = (a - centre).norm();
+      for (Eigen::Index v = 0; v < mesh.vertices.rows(); ++v)
+        // 1e-9 m: rounding of circumcentres; border points may lie exactly on a circle.
+        ASSERT_GE((mesh.vertices.row(v).head<2>().transpose() - centre).norm(), radius - 1e-9);
+    }
+    expect_disc_topology(mesh);
+    EXPECT_NEAR(area(mesh), 0.04, 1e-15);
   }
 }
 

@@ -1,0 +1,226 @@
+#include "data/asset.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <nlohmann/json.hpp>
+
+#include "data/procedural_mesh.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::data {
+namespace {
+
+using nlohmann::json;
+
+const char* const kPublished = R"({"mesh": "sheet:0.5x0.4:0.1", "element_type": "TRIANGLE",
+  "transformation": {"trans": [0, 1, 0], "rotation": [90, 0, 0]},
+  "mechanical_props": {"obj_mass": 1000, "young": 3E+4, "poisson": 0.4, "constitutive": "TRI_ARAP", "bending": 0.2}})";
+
+const char* const kFlash = R"({"schema": "flash-asset/1", "mesh": "sheet:0.5x0.4:0.1",
+  "mechanical_props": {"areal_density": 0.2, "young": 3e4, "poisson": 0.25, "constitutive": "TRI_COROTATED",
+  "thickness": 1e-3, "friction": 0.4, "air_drag": 0.1, "stiffness_damping": 0.001},
+  "identification": {"score_m": 0.005, "recordings": [{"name": "lift", "sha256": "00"}]}})";
+
+TEST(Asset, PublishedUnitsAreMembraneStiffnessTotalMassAndAThirdOfD) {
+  const TemporaryFolder folder;
+  const Asset asset = load_asset(folder.write("cloth.json", kPublished));
+  EXPECT_EQ(asset.format, AssetFormat::published);
+  const ResolvedSheet sheet = resolve_sheet(asset, 0.2);
+  EXPECT_DOUBLE_EQ(sheet.material.membrane_stiffness, 3e4);
+  EXPECT_DOUBLE_EQ(sheet.material.poissons_ratio, 0.4);
+  EXPECT_DOUBLE_EQ(sheet.material.bending_rigidity, 0.6);
+  EXPECT_EQ(sheet.material.bending_model, BendingModel::isometric);
+  EXPECT_EQ(sheet.material.constitutive, Constitutive::tri_arap);
+  EXPECT_DOUBLE_EQ(sheet.material.areal_density, 5000);
+  EXPECT_DOUBLE_EQ(sheet.total_mass, 1000);
+  EXPECT_TRUE(sheet.uniform_vertex_mass);
+  const std::string said = sheet.notices[0] + '\n' + sheet.notices[1] + '\n' + sheet.notices[2];
+  EXPECT_NE(said.find("E t = 3e+04 N/m (young without a thickness)"), std::string::npos) << said;
+  EXPECT_NE(said.find("D = 0.6 N m (3 x bending 0.2"), std::string::npos) << said;
+  EXPECT_NE(said.find("mass = 1000 kg"), std::string::npos) << said;
+}
+
+TEST(Asset, TransformationTurnsAboutFixedAxesThenMoves) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = load_asset_mesh(load_asset(folder.write("cloth.json", kPublished)));
+  // The far corner (0.5, 0.4, 0): turned by 90 degrees about x, y becomes z.
+  EXPECT_TRUE(mesh.vertices.row(mesh.vertices.rows() - 1).isApprox(Eigen::RowVector3d(0.5, 1, 0.4), 1e-15));
+  // x first, then y: (0, 1, 0) -> (0, 0, 1) -> (1, 0, 0).
+  EXPECT_TRUE((rotation_from_degrees({90, 90, 0}) * Eigen::Vector3d::UnitY())
+                  .isApprox(Eigen::Vector3d::UnitX(), 1e-15));
+}
+
+TEST(Asset, ThicknessGivesThePlateFormula) {
+  const TemporaryFolder folder;
+  const ResolvedSheet sheet = resolve_sheet(load_asset(folder.write("towel.json", kFlash)), 0.2);
+  EXPECT_DOUBLE_EQ(sheet.material.membrane_stiffness, 30);
+  EXPECT_NEAR(sheet.material.bending_rigidity, 3e4 * 1e-9 / (12 * (1 - 0.0625)), 1e-20);
+  EXPECT_EQ(sheet.material.bending_model, BendingModel::plate);
+  EXPECT_DOUBLE_EQ(sheet.material.areal_density, 0.2);
+  EXPECT_FALSE(sheet.uniform_vertex_mass);
+  EXPECT_DOUBLE_EQ(sheet.material.friction, 0.4);
+  EXPECT_DOUBLE_EQ(sheet.material.air_drag, 0.1);
+  EXPECT_DOUBLE_EQ(sheet.material.stiffness_damping, 0.001);
+}
+
+TEST(Asset, EveryMassMeansTheSameSheet) {
+  const TemporaryFolder folder;
+  for (const auto& [key, value] :
+       {std::pair{"areal_density", 0.2}, {"density", 200.0}, {"mass", 0.04}, {"obj_mass", 0.04}}) {
+    json file = json::parse(kFlash);
+    file["mechanical_props"].erase("areal_density");
+    file["mechanical_props"][key] = value;
+    const ResolvedSheet sheet = resolve_sheet(load_asset(folder.write("towel.json", file.dump())), 0.2);
+    EXPECT_NEAR(sheet.material.areal_density, 0.2, 1e-15) << key;
+    EXPECT_NEAR(sheet.total_mass, 0.04, 1e-15) << key;
+  }
+}
+
+TEST(Asset, SurvivesSaveAndLoad) {
+  const TemporaryFolder folder;
+  const Asset written = load_asset(folder.write("towel.json", kFlash));
+  save_asset(written, folder / "copy/towel.json");
+  const Asset read = load_asset(folder / "copy/towel.json");
+  EXPECT_EQ(read.mesh, written.mesh);
+  EXPECT_EQ(read.young, written.young);
+  EXPECT_EQ(read.poisson, written.poisson);
+  EXPECT_EQ(read.thickness, written.thickness);
+  EXPECT_EQ(read.areal_density, written.areal_density);
+  EXPECT_EQ(read.friction, written.friction);
+  EXPECT_EQ(json::parse(read.identification), json::parse(written.identification));
+}
+
+TEST(Asset, MeshFilesStayReachableFromElsewhere) {
+  const TemporaryFolder folder;
+  json file = json::parse(kFlash);
+  file["mesh"] = "meshes/towel.obj";
+  const Asset asset = load_asset(folder.write("a/towel.json", file.dump()));
+  EXPECT_EQ(asset.mesh, folder / "a/meshes/towel.obj");
+  save_asset(asset, folder / "b/c/towel.json");
+  EXPECT_EQ(load_asset(folder / "b/c/towel.json").mesh, asset.mesh);
+}
+
+TEST(Asset, PublishedExportKeepsTheMotionAndSaysWhatIsLost) {
+  const TemporaryFolder folder;
+  const Asset asset = load_asset(folder.write("towel.json", kFlash));
+  std::vector<std::string> notices;
+  const Asset published = express_as(asset, AssetFormat::published, 0.2, notices);
+  save_asset(published, folder / "published.json");
+  const ResolvedSheet a = resolve_sheet(asset, 0.2),
+                      b = resolve_sheet(load_asset(folder / "published.json"), 0.2);
+  EXPECT_DOUBLE_EQ(b.material.membrane_stiffness, a.material.membrane_stiffness);
+  EXPECT_DOUBLE_EQ(b.material.bending_rigidity, a.material.bending_rigidity);
+  EXPECT_DOUBLE_EQ(b.total_mass, a.total_mass);
+  std::string said;
+  for (const std::string& notice : notices) said += notice + '\n';
+  for (const char* lost : {"thickness 0.001 m", "friction 0.4", "air_drag", "stiffness_damping",
+                           "identification", "bending_model plate"})
+    EXPECT_NE(said.find(lost), std::string::npos) << lost << " in\n" << said;
+
+  std::ifstream stream(folder / "published.json");
+  const json file = json::parse(stream);
+  EXPECT_FALSE(file.contains("schema"));
+  EXPECT_DOUBLE_EQ(file["mechanical_props"]["young"], 30);
+  EXPECT_DOUBLE_EQ(file["mechanical_props"]["obj_mass"], 0.04);
+}
+
+TEST(Asset, PublishedBecomesFlashWithItsRigidity) {
+  const TemporaryFolder folder;
+  std::vector<std::string> notices;
+  const Asset flash =
+      express_as(load_asset(folder.write("cloth.json", kPublished)), AssetFormat::flash_1, 0.2, notices);
+  save_asset(flash, folder / "flash.json");
+  const ResolvedSheet sheet = resolve_sheet(load_asset(folder / "flash.json"), 0.2);
+  EXPECT_DOUBLE_EQ(sheet.material.bending_rigidity, 0.6);
+  EXPECT_DOUBLE_EQ(sheet.material.membrane_stiffness, 3e4);
+  EXPECT_EQ(sheet.material.bending_model, BendingModel::isometric);
+  EXPECT_TRUE(notices.empty());
+}
+
+TEST(Asset, MaterialsSurviveTheAsset) {
+  const TemporaryFolder folder;
+  SheetMaterial material;
+  material.membrane_stiffness = 55;
+  material.bending_rigidity = 2e-5;
+  material.friction = 0.7;
+  for (const std::optional<double> thickness : {std::optional<double>(), std::optional<double>(2e-3)}) {
+    save_asset(asset_from_sheet(material, thickness, "sheet:0.4x0.4:0.1"), folder / "a.json");
+    const SheetMaterial read = resolve_sheet(load_asset(folder / "a.json"), 0.16).material;
+    EXPECT_DOUBLE_EQ(read.membrane_stiffness, 55);
+    EXPECT_DOUBLE_EQ(read.bending_rigidity, 2e-5);
+    EXPECT_DOUBLE_EQ(read.areal_density, material.areal_density);
+    EXPECT_DOUBLE_EQ(read.friction, 0.7);
+    EXPECT_EQ(read.bending_model, BendingModel::plate);
+  }
+}
+
+TEST(Asset, SolidsHaveADensity) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("part.json", R"({"mesh": "part.vtk", "element_type": "TETRAHEDRON",
+    "mechanical_props": {"obj_mass": 2, "young": 2e5, "poisson": 0.45, "constitutive": "TET_NEOHOOKEAN"}})");
+  EXPECT_DOUBLE_EQ(resolve_solid(load_asset(path), 0.002).density, 1000);
+  EXPECT_NE(
+      input_error_of([&] { resolve_sheet(load_asset(path), 1); }).find("element_type: found TETRAHEDRON"),
+      std::string::npos);
+}
+
+TEST(Asset, WrongFieldsAreNamed) {
+  const TemporaryFolder folder;
+  const auto changed = [&](const char* text, const char* pointer, const json& value) {
+    json file = json::parse(text);
+    if (value.is_null())
+      file = file.patch({{{"op", "remove"}, {"path", pointer}}});
+    else
+      file[json::json_pointer(pointer)] = value;
+    const std::string path = folder.write("towel.json", file.dump());
+    std::string message = input_error_of([&] { load_asset(path); });
+    return message.starts_with(path) ? message.substr(path.size() + 2) : message;
+  };
+  json misspelt = json::parse(kPublished);
+  misspelt["mechanical_props"].erase("poisson");
+  misspelt["mechanical_props"]["poison"] = 0.4;
+  EXPECT_EQ(input_error_of([&] { load_asset(folder.write("towel.json", misspelt.dump())); }),
+            folder / "towel.json" + ": mechanical_props.poison: unknown field (did you mean \"poisson\"?)");
+  EXPECT_EQ(
+      changed(kFlash, "/schema", "flash-asset/9"),
+      "schema: found \"flash-asset/9\", expected \"flash-asset/1\", or no schema for the published format");
+  EXPECT_EQ(changed(kFlash, "/mechanical_props/young", "soft"),
+            "mechanical_props.young: found \"soft\", expected a number");
+  EXPECT_EQ(changed(kFlash, "/mechanical_props/young", -1),
+            "mechanical_props.young: found -1, expected a number above 0");
+  EXPECT_EQ(changed(kFlash, "/mechanical_props/young", nullptr),
+            "mechanical_props.young: missing, expected a number");
+  EXPECT_EQ(changed(kFlash, "/mechanical_props/poisson", 0.6),
+            "mechanical_props.poisson: found 0.6, expected above -1 and at most 0.5");
+  EXPECT_EQ(changed(kFlash, "/mechanical_props/mass", 1),
+            "mechanical_props: found areal_density, mass, expected exactly one of density, areal_density, "
+            "mass, obj_mass");
+  EXPECT_EQ(
+      changed(kFlash, "/mechanical_props/areal_density", nullptr),
+      "mechanical_props: found no mass, expected exactly one of density, areal_density, mass, obj_mass");
+  EXPECT_EQ(
+      changed(kFlash, "/mechanical_props/thickness", nullptr),
+      "mechanical_props.bending_rigidity: missing, expected D [N m], or a thickness for the plate formula");
+  EXPECT_EQ(changed(kFlash, "/mechanical_props/bending", 0.1),
+            "mechanical_props.bending: found 0.1, expected bending_rigidity [N m] in flash-asset/1 (D = 3 "
+            "bending)");
+  EXPECT_EQ(changed(kFlash, "/mechanical_props/constitutive", "TRI_HOOKE"),
+            "mechanical_props.constitutive: found \"TRI_HOOKE\", expected one of TRI_ARAP, TRI_COROTATED, "
+            "TRI_STVK, "
+            "TRI_NEOHOOKEAN, TET_ARAP, TET_COROTATED, TET_NEOHOOKEAN");
+  EXPECT_EQ(
+      changed(kPublished, "/element_type", "TETRAHEDRON"),
+      "mechanical_props.constitutive: found \"TRI_ARAP\", expected TET_... for element_type TETRAHEDRON");
+  EXPECT_EQ(changed(kPublished, "/element_type", "QUAD"),
+            "element_type: found \"QUAD\", expected TRIANGLE or TETRAHEDRON");
+  EXPECT_EQ(changed(kPublished, "/transformation/trans", {1, 2}),
+            "transformation.trans: found [1,2], expected a list of 3 numbers");
+  EXPECT_NE(input_error_of([&] {
+              load_asset(folder.write("towel.json", "{\n\"mesh\": ,\n}"));
+            }).find("not valid JSON: line 2, column 9"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace flash::data
