@@ -80,7 +80,7 @@ Sparse slope_weights(const Sheet& sheet, const std::vector<Edge>& edges, const E
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const Edge& e = edges[i];
     const double area = sheet.triangles[e.left].area + (e.right >= 0 ? sheet.triangles[e.right].area : 0.0);
-    smallest[i] = drop_tolerance * (plane.col(e.a) - plane.col(e.b)).norm() / area;
+    smallest[i] = std::sqrt(drop_tolerance) * (plane.col(e.a) - plane.col(e.b)).norm() / area;
   }
   const auto from_midpoint = [&](const Edge& e, int vertex) -> Eigen::Vector3d {
     const Eigen::Vector2d length = plane.col(e.b) - plane.col(e.a);

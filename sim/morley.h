@@ -38,16 +38,16 @@ struct CondensedPlate {
 };
 
 /// The edge unknowns at their minimum theta = T x + (clamps), T = -ee^-1 ex, free edges natural. T decays by
-/// about a factor of three a cell: entries below drop_tolerance |e| / (A_left + A_right) are dropped and the
-/// rest moved so that affine positions keep their slopes. The stiffness stays positive semi-definite, zero on
-/// affine positions, and above the exact one by the square of what was dropped: at the
-/// default by at most 0.2 % on any mode up to nu = 0.3 and 0.8 % at nu = 0.45, with about 100 entries a row.
-/// drop_tolerance = 0 is exact.
+/// about a factor of three a cell: entries below sqrt(drop_tolerance) |e| / (A_left + A_right) are dropped
+/// and the rest moved so that affine positions keep their slopes. The stiffness stays positive semi-definite,
+/// zero on affine positions, and above the exact one by the square of what was dropped: at the default by at
+/// most 0.2 % on any mode up to nu = 0.3 and 0.8 % at nu = 0.45, with about 100 entries a row. drop_tolerance
+/// = 0 is exact.
 CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
-                               const std::vector<ClampedEdge>& clamped, double drop_tolerance = 1e-3);
+                               const std::vector<ClampedEdge>& clamped, double drop_tolerance = 1e-6);
 
 /// The stiffness without clamped edges, D = 1 [1/m^2].
 Eigen::SparseMatrix<double> plate_bending_stiffness(const Sheet& sheet, double poissons_ratio,
-                                                    double drop_tolerance = 1e-3);
+                                                    double drop_tolerance = 1e-6);
 
 }  // namespace flash::sim
