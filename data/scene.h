@@ -18,8 +18,9 @@ namespace flash::data {
 /// Solver settings under the names of the file.
 struct SceneSolver {
   std::string linear_solver = "SPARSE_CHOLESKY";  ///< linearsolver.type, e.g. SPARSE_INVERSE_CUDA
-  std::string constraint_solver =
-      "NonSmoothNewton";  ///< constraintsolver.type; "Lite..." is the inertia metric
+  /// constraintsolver.type: automatic, NonSmoothNewton (full metric) or LiteNonSmoothNewton (inertia), maybe
+  /// with _CUDA
+  std::string constraint_solver = "automatic";
   std::string constraint_linear_solver = "DENSE_CHOLESKY_EIGEN";  ///< constraintsolver.linearsolver
   double max_force = 1e10;                                        ///< constraintsolver.maxforce [N]
   int constraint_iterations = 10;                                 ///< constraintsolver.iterations
@@ -56,6 +57,7 @@ struct SceneObstacle {
 /// Vertices held in some axes, all for the whole run.
 struct SceneFixed {
   std::vector<int> vertices;
+  bool all = false;                               ///< every vertex of the object; `vertices` is empty then
   std::array<bool, 3> axes = {true, true, true};  ///< "x", "xy", ...: a roller fixes one axis
   Points positions;                               ///< one row a vertex [m]; empty: where they start
 };
@@ -131,7 +133,11 @@ struct Scene {
 };
 
 /// Throws InputError naming file, field, found and expected; unknown fields name the nearest known one.
+/// Vertex indices are not compared with the meshes, which are not loaded.
 Scene load_scene(const std::string& path);
+
+/// Whether a solver of the file is named ..._CUDA.
+bool asks_for_cuda(const SceneSolver& solver);
 
 /// The coefficient of `object` on `other`: the pair's, else the other body's, else empty (the material's).
 std::optional<double> friction_between(const Scene& scene, const std::string& object,

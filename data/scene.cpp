@@ -1,0 +1,348 @@
+#include "data/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "data/asset.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/text.h"
+
+namespace flash::data {
+namespace {
+
+std::string existing_file(const JsonObject& object, const char* key) {
+  const std::string path = resolve_path(object.string(key), object.source());
+  if (!std::filesystem::exists(path))
+    throw input_error(object.source(), object.name_of(key), "file " + path + " does not exist");
+  return path;
+}
+
+Eigen::Isometry3d read_pose(const JsonObject& object, const char* key) {
+  const Eigen::Matrix<double, 7, 1> pose = object.vector(key, 7);
+  if (std::abs(pose.tail<4>().norm() - 1) > 1e-3)
+    throw object.error(key, "[x, y, z, qx, qy, qz, qw] with a unit quaternion");
+  return from_vector(pose);
+}
+
+std::string read_choice(const JsonObject& object, const char* key, const std::string& fallback,
+                        const std::vector<std::string>& known) {
+  const std::string value = object.string(key, fallback);
+  if (std::find(known.begin(), known.end(), value) != known.end()) return value;
+  std::string expected;
+  for (const std::string& name : known) expected += (expected.empty() ? "" : ", ") + name;
+  throw object.error(key, "one of " + expected);
+}
+
+void read_solver(const JsonObject& file, SceneSolver& solver) {
+  if (file.has("linearsolver")) {
+    const JsonObject object = file.object("linearsolver");
+    object.expect_fields({"type"});
+    solver.linear_solver =
+        read_choice(object, "type", solver.linear_solver,
+                    {"SPARSE_CHOLESKY", "SPARSE_INVERSE", "SPARSE_CHOLESKY_CUDA", "SPARSE_INVERSE_CUDA"});
+  }
+  if (file.has("constraintsolver")) {
+    const JsonObject object = file.object("constraintsolver");
+    object.expect_fields({"type", "linearsolver", "maxforce", "iterations", "tolerance"});
+    solver.constraint_solver = read_choice(object, "type", solver.constraint_solver,
+                                           {"automatic", "NonSmoothNewton", "LiteNonSmoothNewton",
+                                            "NonSmoothNewton_CUDA", "LiteNonSmoothNewton_CUDA"});
+    solver.constraint_linear_solver = read_choice(object, "linearsolver", solver.constraint_linear_solver,
+                                                  {"DENSE_CHOLESKY_EIGEN", "DENSE_CG", "DENSE_PCG_JACOBI",
+                                                   "DENSE_CR", "DENSE_PCR_JACOBI", "MATRIX_FREE"});
+    solver.max_force = object.positive("maxforce", solver.max_force);
+    solver.constraint_iterations = object.integer("iterations", solver.constraint_iterations);
+    if (solver.constraint_iterations < 1) throw object.error("iterations", "a whole number from 1");
+    solver.constraint_tolerance = object.positive("tolerance", solver.constraint_tolerance);
+  }
+  if (file.has("solver")) {
+    const JsonObject object = file.object("solver");
+    object.expect_fields({"type", "iterations", "tolerance"});
+    solver.integrator = read_choice(object, "type", solver.integrator, {"newton", "projective"});
+    solver.max_iterations = object.integer("iterations", solver.max_iterations);
+    if (solver.max_iterations < 1) throw object.error("iterations", "a whole number from 1");
+    solver.tolerance = object.positive("tolerance", solver.tolerance);
+  }
+}
+
+std::optional<double> read_friction(const JsonObject& object) {
+  return object.has("friction") ? std::optional<double>(object.not_negative("friction")) : std::nullopt;
+}
+
+ScenePlane read_plane(const JsonObject& object) {
+  return {object.vector3("point", Eigen::Vector3d::Zero()),
+          object.direction("normal", Eigen::Vector3d::UnitZ())};
+}
+
+/// One plane, a list of planes, or planes by name.
+void read_plane_collisions(const JsonObject& file, Scene& scene) {
+  const auto append = [&](const std::string& name, const JsonObject& object) {
+    object.expect_fields({"point", "normal", "friction"});
+    if (!object.has("normal")) throw object.error("normal", "a direction, out of the solid");
+    scene.obstacles.push_back({name, read_plane(object), read_friction(object)});
+  };
+  if (!file.has("planecollisions")) return;
+  if (file.raw("planecollisions").is_array()) {
+    const std::vector<JsonObject> planes = file.objects("planecollisions");
+    for (std::size_t i = 0; i < planes.size(); ++i) append("plane" + std::to_string(i), planes[i]);
+    return;
+  }
+  const JsonObject object = file.object("planecollisions");
+  if (object.has("point") || object.has("normal")) return append("plane", object);
+  for (const auto& [name, plane] : file.members("planecollisions")) append(name, plane);
+}
+
+/// "trajectory": a file, or "keyframes": [{t, translation, rotation_xyzw}]; empty where there is neither.
+Trajectory read_trajectory(const JsonObject& object) {
+  if (object.has("trajectory") && object.has("keyframes"))
+    throw object.error("keyframes", "either trajectory or keyframes");
+  if (object.has("trajectory")) return load_trajectory(existing_file(object, "trajectory"));
+  Trajectory trajectory;
+  for (const JsonObject& keyframe : object.objects("keyframes")) {
+    keyframe.expect_fields({"t", "translation", "rotation_xyzw"});
+    const double time = keyframe.number("t");
+    if (!trajectory.times.empty() && time <= trajectory.times.back())
+      throw keyframe.error(
+          "t", "a time after " + format_number(trajectory.times.back()) + " s, the keyframe before");
+    Eigen::Matrix<double, 7, 1> pose;
+    pose.head<3>() = keyframe.vector3("translation", Eigen::Vector3d::Zero());
+    pose.tail<4>() = Eigen::Vector4d::UnitW();
+    if (keyframe.has("rotation_xyzw")) pose.tail<4>() = Eigen::Vector4d(keyframe.vector("rotation_xyzw", 4));
+    if (std::abs(pose.tail<4>().norm() - 1) > 1e-3)
+      throw keyframe.error("rotation_xyzw", "a unit quaternion");
+    trajectory.times.push_back(time);
+    trajectory.poses.push_back(from_vector(pose));
+  }
+  return trajectory;
+}
+
+void read_obstacles(const JsonObject& file, Scene& scene) {
+  for (const auto& [name, object] : file.members("obstacles")) {
+    SceneObstacle obstacle;
+    obstacle.name = name;
+    const std::string shape = read_choice(object, "shape", "", {"plane", "box", "cylinder"});
+    if (shape == "plane") {
+      object.expect_fields({"shape", "point", "normal", "friction"});
+      obstacle.shape = read_plane(object);
+    } else if (shape == "cylinder") {
+      object.expect_fields({"shape", "point", "axis", "radius", "friction"});
+      obstacle.shape =
+          SceneCylinder{object.vector("point", 3), object.direction("axis", Eigen::Vector3d::UnitX()),
+                        object.positive("radius")};
+    } else {
+      object.expect_fields({"shape", "size", "pose", "trajectory", "keyframes", "friction"});
+      SceneBox box;
+      box.size = object.vector("size", 3);
+      if (!(box.size.array() > 0).all()) throw object.error("size", "three lengths above 0");
+      if (object.has("pose")) box.pose = read_pose(object, "pose");
+      box.trajectory = read_trajectory(object);
+      obstacle.shape = box;
+    }
+    obstacle.friction = read_friction(object);
+    scene.obstacles.push_back(obstacle);
+  }
+}
+
+std::vector<int> read_vertices(const JsonObject& object) {
+  std::vector<int> vertices = object.indices("vertices");
+  if (vertices.empty()) throw object.error("vertices", "at least one index");
+  return vertices;
+}
+
+SceneFixed read_fixed(const JsonObject& object) {
+  object.expect_fields({"vertices", "axes", "positions"});
+  SceneFixed fixed;
+  fixed.all = object.raw("vertices") == "all";
+  if (!fixed.all) fixed.vertices = read_vertices(object);
+  const std::string axes = object.string("axes", "xyz");
+  for (std::size_t axis = 0; axis < 3; ++axis) fixed.axes[axis] = axes.find("xyz"[axis]) != std::string::npos;
+  if (axes.empty() || axes.find_first_not_of("xyz") != std::string::npos)
+    throw object.error("axes", "letters of xyz, such as \"z\" for a roller");
+  if (!object.has("positions")) return fixed;
+  const nlohmann::json& rows = object.raw("positions");
+  if (fixed.all || !rows.is_array() || rows.size() != fixed.vertices.size())
+    throw object.error("positions", "one [x, y, z] for each of vertices");
+  fixed.positions.resize(static_cast<Eigen::Index>(rows.size()), 3);
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (!rows[i].is_array() || rows[i].size() != 3 || !rows[i][axis].is_number())
+        throw object.error("positions", "one [x, y, z] for each of vertices");
+      fixed.positions(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(axis)) =
+          rows[i][axis].get<double>();
+    }
+  return fixed;
+}
+
+ScenePrescribed read_prescribed(const JsonObject& object) {
+  object.expect_fields({"vertices", "trajectory", "keyframes", "from", "to"});
+  ScenePrescribed prescribed;
+  prescribed.vertices = read_vertices(object);
+  prescribed.trajectory = read_trajectory(object);
+  if (prescribed.trajectory.times.empty()) throw object.error("trajectory", "a trajectory, or keyframes");
+  prescribed.from = object.number("from", prescribed.from);
+  prescribed.to = object.number("to", prescribed.to);
+  if (!(prescribed.to > prescribed.from)) throw object.error("to", "a time after from, or null");
+  return prescribed;
+}
+
+SceneLoad read_load(const JsonObject& object, const Eigen::Vector3d& gravity) {
+  object.expect_fields({"vertices", "force", "hung_mass"});
+  SceneLoad load;
+  load.vertices = read_vertices(object);
+  if (object.has("force") == object.has("hung_mass"))
+    throw object.error("force", "either force [N] on each vertex, or hung_mass [kg] shared by them");
+  load.force = object.has("force") ? Eigen::Vector3d(object.vector("force", 3))
+                                   : Eigen::Vector3d(object.positive("hung_mass") /
+                                                     static_cast<double>(load.vertices.size()) * gravity);
+  return load;
+}
+
+SceneObject read_object(const std::string& name, const JsonObject& object, const Eigen::Vector3d& gravity) {
+  object.expect_fields({"asset", "start", "velocity", "fixed", "prescribed", "loads"});
+  SceneObject result;
+  result.name = name;
+  result.asset = existing_file(object, "asset");
+  result.start_velocity = object.vector3("velocity", result.start_velocity);
+  if (object.raw("start").is_string()) {
+    result.start_mesh = existing_file(object, "start");
+  } else if (object.has("start")) {
+    const JsonObject start = object.object("start");
+    start.expect_fields({"T_base_object", "mesh"});
+    if (start.has("T_base_object")) result.base_from_object = read_pose(start, "T_base_object");
+    if (start.has("mesh")) result.start_mesh = existing_file(start, "mesh");
+  }
+  for (const JsonObject& fixed : object.objects("fixed")) result.fixed.push_back(read_fixed(fixed));
+  for (const JsonObject& prescribed : object.objects("prescribed"))
+    result.prescribed.push_back(read_prescribed(prescribed));
+  for (const JsonObject& load : object.objects("loads")) result.loads.push_back(read_load(load, gravity));
+  return result;
+}
+
+void read_objects(const JsonObject& file, Scene& scene) {
+  const JsonObject objects = file.object("objects");
+  for (const auto& [name, value] : objects.value().items()) {
+    if (value.is_string()) {
+      SceneObject object;
+      object.name = name;
+      object.asset = existing_file(objects, name.c_str());
+      scene.objects.push_back(object);
+    } else {
+      scene.objects.push_back(read_object(name, objects.object(name.c_str()), scene.gravity));
+    }
+  }
+  if (scene.objects.empty()) throw file.error("objects", "at least one object");
+}
+
+void read_end_effectors(const JsonObject& file, Scene& scene) {
+  for (const auto& [name, object] : file.members("end_effectors")) {
+    object.expect_fields({"size", "trajectory", "keyframes", "collides", "friction", "grasps"});
+    SceneEndEffector effector;
+    effector.name = name;
+    effector.size = object.vector3("size", effector.size);
+    if (!(effector.size.array() > 0).all()) throw object.error("size", "three lengths above 0");
+    effector.trajectory = read_trajectory(object);
+    if (effector.trajectory.times.empty()) throw object.error("trajectory", "a trajectory, or keyframes");
+    effector.collides = object.boolean("collides", false);
+    effector.friction = read_friction(object);
+    for (const JsonObject& entry : object.objects("grasps")) {
+      entry.expect_fields({"object", "from", "to", "threshold", "zero_length", "closing_time"});
+      SceneGrasp grasp;
+      const auto is_object = [&](const SceneObject& candidate) { return candidate.name == grasp.object; };
+      grasp.object =
+          scene.objects.size() == 1 ? entry.string("object", scene.objects[0].name) : entry.string("object");
+      if (std::none_of(scene.objects.begin(), scene.objects.end(), is_object))
+        throw entry.error("object", "a name of objects");
+      grasp.from = entry.number("from", grasp.from);
+      grasp.to = entry.number("to", grasp.to);
+      if (!(grasp.to > grasp.from)) throw entry.error("to", "a time after from, or null");
+      grasp.threshold = entry.not_negative("threshold", grasp.threshold);
+      grasp.zero_length = entry.boolean("zero_length", false);
+      grasp.closing_time = entry.not_negative("closing_time", 0);
+      effector.grasps.push_back(grasp);
+    }
+    scene.end_effectors.push_back(effector);
+  }
+}
+
+void read_pair_friction(const JsonObject& file, Scene& scene) {
+  std::vector<std::string> names;
+  for (const SceneObject& object : scene.objects) names.push_back(object.name);
+  for (const SceneObstacle& obstacle : scene.obstacles) names.push_back(obstacle.name);
+  for (const SceneEndEffector& effector : scene.end_effectors) names.push_back(effector.name);
+  for (const JsonObject& object : file.objects("friction")) {
+    object.expect_fields({"a", "b", "friction"});
+    for (const char* key : {"a", "b"}) read_choice(object, key, "", names);
+    scene.pair_friction.push_back({object.string("a"), object.string("b"), object.not_negative("friction")});
+  }
+}
+
+void read_duration(const JsonObject& file, Scene& scene) {
+  if (file.has("steps") && file.has("duration")) throw file.error("steps", "either steps or duration");
+  if (file.has("steps")) {
+    scene.steps = file.integer("steps");
+    if (scene.steps < 0) throw file.error("steps", "a whole number from 0");
+  }
+  if (!file.has("duration")) return;
+  const double steps = file.not_negative("duration") / scene.time_step;
+  if (!(steps < 1e9))
+    throw file.error("duration", "fewer than 1e9 steps of " + format_short(scene.time_step) + " s");
+  scene.steps = static_cast<int>(std::lround(steps));
+}
+
+}  // namespace
+
+Scene load_scene(const std::string& path) {
+  const nlohmann::json json = load_json(path);
+  const JsonObject file(json, path);
+  Scene scene;
+  scene.source = path;
+  if (file.has("schema")) {
+    if (file.string("schema") != "flash-scene/1")
+      throw file.error("schema", "\"flash-scene/1\", or no schema for the published format");
+    file.expect_fields({"schema", "name", "note", "timestep", "steps", "duration", "gravity", "linearsolver",
+                        "constraintsolver", "solver", "bending_model", "planecollisions", "obstacles",
+                        "objects", "end_effectors", "friction", "keyframes"});
+  } else {
+    file.expect_fields(
+        {"timestep", "gravity", "linearsolver", "constraintsolver", "planecollisions", "objects"});
+  }
+  scene.name = file.string("name", std::filesystem::path(path).stem().string());
+  scene.time_step = file.positive("timestep");
+  scene.gravity = file.vector("gravity", 3);
+  read_duration(file, scene);
+  read_solver(file, scene.solver);
+  if (file.has("bending_model"))
+    scene.bending_model = parse_bending_model(file.string("bending_model"), path, "bending_model");
+  read_plane_collisions(file, scene);
+  read_obstacles(file, scene);
+  read_objects(file, scene);
+  read_end_effectors(file, scene);
+  read_pair_friction(file, scene);
+  if (file.has("keyframes")) {
+    const Eigen::VectorXd times = file.vector("keyframes", -1);
+    scene.keyframe_times.assign(times.begin(), times.end());
+    if (!std::is_sorted(times.begin(), times.end()))
+      throw file.error("keyframes", "times in increasing order");
+  }
+  return scene;
+}
+
+bool asks_for_cuda(const SceneSolver& solver) {
+  return solver.linear_solver.ends_with("_CUDA") || solver.constraint_solver.ends_with("_CUDA");
+}
+
+std::optional<double> friction_between(const Scene& scene, const std::string& object,
+                                       const std::string& other) {
+  for (const ScenePairFriction& pair : scene.pair_friction)
+    if ((pair.a == object && pair.b == other) || (pair.a == other && pair.b == object)) return pair.friction;
+  for (const SceneObstacle& obstacle : scene.obstacles)
+    if (obstacle.name == other) return obstacle.friction;
+  for (const SceneEndEffector& effector : scene.end_effectors)
+    if (effector.name == other) return effector.friction;
+  return std::nullopt;
+}
+
+}  // namespace flash::data
