@@ -48,8 +48,9 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   bending->model = model;
   if (model == data::BendingModel::hinge) return bending;
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
-  bending->stiffness =
-      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio) : isometric;
+  bending->stiffness = model == data::BendingModel::plate
+                           ? plate_bending_stiffness(plan.sheet, poissons_ratio, 1e-6)
+                           : isometric;
   bending->stiffness.makeCompressed();
   if (model == data::BendingModel::plate) {
     bending->correction = bending->stiffness - Eigen::SparseMatrix<double, Eigen::RowMajor>(isometric);

@@ -11,8 +11,8 @@ std::vector<Rollout> simulate(const Sheet& sheet, std::vector<Environment> envir
   std::vector<Rollout> rollouts(environments.size());
   std::atomic<size_t> next = 0;
   const auto work = [&] {
-    Solver solver(plan, settings);
     for (size_t e = next++; e < environments.size(); e = next++) {
+      Solver solver(plan, settings);
       Rollout& rollout = rollouts[e];
       rollout.positions.push_back(environments[e].state.positions);
       for (int k = 0; k < steps; ++k) {

@@ -43,17 +43,19 @@ struct Solver::Workspace {
   std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> bending;
   BlockCholesky<double> factor;
   BlockValues<double> values, damping;
+  bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
 
   Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
       : plan(std::move(plan_in)), settings(settings_in), factor(plan->symbolic) {}
 
   const BendingOperator& bending_of(const data::SheetMaterial& material);
 
-  /// Conjugate gradients on the free directions, preconditioned by the factor: the matrix has the bending
-  /// operator itself where the factor has its stand-in. Returns the number of iterations.
+  /// Conjugate gradients on the free directions. The matrix has the bending operator itself and the
+  /// constraints of this iterate; the factor that preconditions it has the operator's stand-in, and may be of
+  /// an earlier iterate. Returns the number of iterations, 0 where the matrix could not be factorized.
   int solve(const BendingOperator& operator_, double bending_rigidity,
             const std::vector<VertexConstraint>& constraints, const Points& right_hand_side, double tolerance,
-            Points& solution) const;
+            Points& solution);
 };
 
 const BendingOperator& Solver::Workspace::bending_of(const data::SheetMaterial& material) {
@@ -148,7 +150,8 @@ void restrict_to_free(const std::vector<VertexConstraint>& constraints, Points& 
 
 int Solver::Workspace::solve(const BendingOperator& operator_, double bending_rigidity,
                              const std::vector<VertexConstraint>& constraints, const Points& right_hand_side,
-                             double tolerance, Points& solution) const {
+                             double tolerance, Points& solution) {
+  if (refactor && !factor.factorize(values)) return 0;
   Points residual = right_hand_side, product(residual.rows(), 3), preconditioned, search;
   restrict_to_free(constraints, residual);
   solution.setZero(residual.rows(), 3);
@@ -223,9 +226,12 @@ StepReport Solver::step(Environment& environment) {
     ++report.iterations;
     problem.assemble(x, w.values);
     constrain(w.plan->pattern, constraints, w.values);
-    if (!w.factor.factorize(w.values)) break;
-    report.solves += w.solve(bending, environment.material.bending_rigidity, constraints, -residual,
-                             0.3 * w.settings.tolerance * force_scale, direction);
+    const int solves = w.solve(bending, environment.material.bending_rigidity, constraints, -residual,
+                               0.3 * w.settings.tolerance * force_scale, direction);
+    if (solves == 0) break;
+    report.solves += solves;
+    report.factorizations += w.refactor;
+    w.refactor = solves > w.settings.stale_factor_solves;
 
     const double before = potential + friction_potential(environment, time, h, constraints, x);
     const double slope = residual.cwiseProduct(direction).sum();

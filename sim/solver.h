@@ -9,9 +9,10 @@
 namespace flash::sim {
 
 struct SolverSettings {
-  double time_step = 0.01;  ///< h [s]
-  int max_iterations = 60;  ///< Newton iterations a step
-  double tolerance = 1e-3;  ///< on the relative residual |r| / |M g|
+  double time_step = 0.01;      ///< h [s]
+  int max_iterations = 60;      ///< Newton iterations a step
+  double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
+  int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
 };
 
 /// How one step of one environment went.
@@ -19,6 +20,7 @@ struct StepReport {
   double residual = 0;  ///< |r| / |M g|; without gravity as if it were 9.81 m/s^2
   int iterations = 0;   ///< of Newton's method
   int solves = 0;       ///< with a factor: iterations of the linear solver
+  int factorizations = 0;
   bool converged = false;
   double penetration_max = 0;                                    ///< deepest vertex below a surface [m]
   double complementarity = 0;                                    ///< max |min(gap, lambda / stiffness)| [m]
@@ -29,8 +31,9 @@ struct StepReport {
   Eigen::Vector3d fixed_force = Eigen::Vector3d::Zero();         ///< supports on sheet [N]
 };
 
-/// Steps environments of one Sheet by implicit Euler. Holds only what depends on the sheet and on the last
-/// factorization; one Solver a thread.
+/// Steps an environment by implicit Euler: semi-smooth Newton on the potential of the step, feasible at every
+/// iterate. Holds what depends on the sheet and the last factorization, which later steps start from: one
+/// Solver an environment.
 class Solver {
  public:
   Solver(const Sheet& sheet, const SolverSettings& settings);
