@@ -40,25 +40,83 @@ double violations(const ContactProblem& problem, const VectorXd& diagonal, const
   return sum;
 }
 
-std::vector<ConstraintRow> rows_at(const ContactProblem& problem, Complementarity complementarity,
-                                   const VectorXd& diagonal, const VectorXd& gap,
-                                   const VectorXd& multiplier) {
+/// The rows of all contacts, tangential ones in the frame (cosine, sine) of their contact.
+struct Linearisation {
+  std::vector<ConstraintRow> rows;
+  VectorXd cosine, sine;
+  std::vector<bool> slides;
+};
+
+Linearisation linearise(const ContactProblem& problem, const ConstraintSettings& settings,
+                        const VectorXd& diagonal, const VectorXd& gap, const VectorXd& multiplier) {
   const double h = problem.time_step;
-  const auto normal_row = complementarity == Complementarity::fischer_burmeister
+  const auto normal_row = settings.complementarity == Complementarity::fischer_burmeister
                               ? normal_row_fischer_burmeister
                               : normal_row_minimum_map;
-  std::vector<ConstraintRow> rows;
-  rows.reserve(gap.size());
-  for (Index k = 0; k < problem.friction.size(); ++k) {
+  const Index contacts = problem.friction.size();
+  Linearisation at{{}, VectorXd::Ones(contacts), VectorXd::Zero(contacts), std::vector<bool>(contacts)};
+  at.rows.reserve(gap.size());
+  for (Index k = 0; k < contacts; ++k) {
     const double* c = &gap[3 * k];
     const double* l = &multiplier[3 * k];
-    const double r_t = 0.5 * h * (diagonal[3 * k + 1] + diagonal[3 * k + 2]);
-    rows.push_back(normal_row(c[0], c[0], l[0], h * h * diagonal[3 * k], h));
-    const FrictionRows t = friction_rows(c + 1, c + 1, l + 1, l[0], problem.friction[k], r_t, h);
-    rows.push_back({t.omega, t.compliance, t.rhs[0]});
-    rows.push_back({t.omega, t.compliance, t.rhs[1]});
+    const double tangential = 0.5 * (diagonal[3 * k + 1] + diagonal[3 * k + 2]);
+    at.rows.push_back(normal_row(c[0], c[0], l[0], h * h * diagonal[3 * k], h));
+    if (settings.friction == FrictionRow::newton) {
+      const SlipRows t = slip_rows(c + 1, c + 1, l + 1, l[0], problem.friction[k], h * h * tangential, h);
+      at.rows.push_back(t.along);
+      at.rows.push_back(t.across);
+      at.cosine[k] = t.direction[0];
+      at.sine[k] = t.direction[1];
+      at.slides[k] = t.along.omega == 0;
+    } else {
+      const FrictionRows t = friction_rows(c + 1, c + 1, l + 1, l[0], problem.friction[k], h * tangential, h);
+      at.rows.push_back({t.omega, t.compliance, t.rhs[0]});
+      at.rows.push_back({t.omega, t.compliance, t.rhs[1]});
+    }
   }
-  return rows;
+  return at;
+}
+
+/// Tangential rows of x from the contacts' bases into the frames of their rows (direction 1) or back (-1).
+template <typename Matrix>
+void turn(const Linearisation& at, int direction, Matrix&& x) {
+  for (Index k = 0; k < at.cosine.size(); ++k) {
+    if (at.sine[k] == 0 && at.cosine[k] == 1) continue;
+    const double c = at.cosine[k], s = direction * at.sine[k];
+    const auto first = x.row(3 * k + 1).eval(), second = x.row(3 * k + 2).eval();
+    x.row(3 * k + 1) = c * first + s * second;
+    x.row(3 * k + 2) = c * second - s * first;
+  }
+}
+
+DualSolution newton_step(const ContactProblem& problem, const Linearisation& at, const VectorXd& diagonal,
+                         const DualSolverSettings& settings) {
+  DualSolution step;
+  if (problem.W.size() > 0) {
+    Eigen::MatrixXd W = problem.W;
+    turn(at, 1, W);
+    turn(at, 1, W.transpose());
+    step = solve_dual(W, at.rows, problem.time_step, settings);
+  } else {
+    const Operator turned = [&](const VectorXd& l, VectorXd& w) {
+      VectorXd own = l;
+      turn(at, -1, own);
+      problem.apply_W(own, w);
+      turn(at, 1, w);
+    };
+    step = solve_dual(turned, diagonal, at.rows, problem.time_step, settings);
+  }
+  turn(at, -1, step.x);
+  return step;
+}
+
+/// Sliding contacts follow their normal force to the new rim of the disc, which the frozen one has missed.
+void follow_rim(const ContactProblem& problem, const Linearisation& at, VectorXd& multiplier) {
+  for (Index k = 0; k < problem.friction.size(); ++k) {
+    const double limit = problem.friction[k] * std::max(multiplier[3 * k], 0.0);
+    const double size = multiplier.segment<2>(3 * k + 1).norm();
+    if (at.slides[k] && size > 0) multiplier.segment<2>(3 * k + 1) *= limit / size;
+  }
 }
 
 void project(const ContactProblem& problem, double max_force, VectorXd& multiplier) {
@@ -86,11 +144,8 @@ ConstraintReport solve_contacts(const ContactProblem& problem, const ConstraintS
   VectorXd best = multiplier;
   double best_violation = report.violation;
   while (report.violation > settings.tolerance && report.iterations < settings.iterations) {
-    const auto rows = rows_at(problem, settings.complementarity, diagonal, gap, multiplier);
-    const DualSolution step =
-        problem.W.size() > 0
-            ? solve_dual(problem.W, rows, problem.time_step, settings.linear)
-            : solve_dual(problem.apply_W, diagonal, rows, problem.time_step, settings.linear);
+    const Linearisation at = linearise(problem, settings, diagonal, gap, multiplier);
+    const DualSolution step = newton_step(problem, at, diagonal, settings.linear);
     ++report.iterations;
     report.linear_iterations += step.iterations;
     const VectorXd start = multiplier;
@@ -99,6 +154,7 @@ ConstraintReport solve_contacts(const ContactProblem& problem, const ConstraintS
     const double last = settings.damping > 0 ? settings.damping : 0.125;
     for (double length = first; length >= last; length *= 0.5) {
       VectorXd trial = start + length * step.x;
+      follow_rim(problem, at, trial);
       project(problem, settings.max_force, trial);
       const VectorXd trial_gap = gaps(problem, trial);
       double worst = 0;

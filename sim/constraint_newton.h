@@ -8,10 +8,17 @@ namespace flash::sim {
 /// How the normal rows of contact are written.
 enum class Complementarity { minimum_map, fischer_burmeister };
 
+/// How the friction rows are linearised. fixed_point: the published scalar compliance; linear convergence,
+/// slow where sliding contacts are coupled. newton: the exact derivative across the slip and the rim of the
+/// disc along it, both at frozen normal force.
+enum class FrictionRow { newton, fixed_point };
+
 struct ConstraintSettings {
   Complementarity complementarity = Complementarity::minimum_map;
-  int iterations = 10;      ///< Newton steps on the multipliers
-  double tolerance = 1e-9;  ///< on the worst violation of a row, |min(c, r lambda)| and its friction like [m]
+  FrictionRow friction = FrictionRow::newton;
+  int iterations = 50;  ///< Newton steps on the multipliers
+  double tolerance =
+      1e-12;                ///< on the worst violation of a row, |min(c, r lambda)| and its friction like [m]
   double max_force = 1e10;  ///< clamp on lambda_n [N]
   double damping = 0;  ///< fixed step length in (0, 1], 0.75 as published; 0: the best of 1, 1/2, 1/4, 1/8
   DualSolverSettings linear;

@@ -85,6 +85,36 @@ FLASH_HOST_DEVICE inline FrictionRows friction_rows(const double slip[2], const 
            -h * h * compliance * multiplier[1] - free_slip[1]}};
 }
 
+/// Friction rows in the frame of the slip: `along` the unit direction in which friction pushes, and `across`
+/// it.
+struct SlipRows {
+  double direction[2];
+  ConstraintRow along, across;
+};
+
+/// Coulomb friction by the exact derivative of lambda_t - P_{mu lambda_n}(lambda_t - c_t / r), P the
+/// projection on the disc, at frozen lambda_n (Alart and Curnier 1991). With q = lambda_t - c_t / r and a =
+/// mu lambda_n / |q|: inside the disc both rows stick, c_t = 0; outside, along q lambda_t = mu lambda_n, and
+/// across it c + r (1 - a) / a lambda = 0. r = h^2 W_tt [m/N]. As above where there is no normal force.
+FLASH_HOST_DEVICE inline SlipRows slip_rows(const double slip[2], const double free_slip[2],
+                                            const double multiplier[2], double normal_multiplier,
+                                            double friction, double r, double h) {
+  const double limit = friction * normal_multiplier;
+  if (!(limit > 0)) return {{1, 0}, {0, 1 / h, -h * multiplier[0]}, {0, 1 / h, -h * multiplier[1]}};
+  const double q[2] = {multiplier[0] - slip[0] / r, multiplier[1] - slip[1] / r};
+  const double size = std::sqrt(q[0] * q[0] + q[1] * q[1]);
+  if (size <= limit) return {{1, 0}, {1, 0, -free_slip[0]}, {1, 0, -free_slip[1]}};
+  const double e[2] = {q[0] / size, q[1] / size}, a = limit / size;
+  const double multiplier_along = e[0] * multiplier[0] + e[1] * multiplier[1];
+  const double multiplier_across = e[0] * multiplier[1] - e[1] * multiplier[0];
+  const double slip_across = e[0] * slip[1] - e[1] * slip[0];
+  const double free_across = e[0] * free_slip[1] - e[1] * free_slip[0];
+  // The across component of q is zero, so that the function is the multiplier itself there.
+  return {{e[0], e[1]},
+          {0, 1 / h, h * (limit - multiplier_along)},
+          {1, r * (1 - a) / (a * h * h), -r / a * multiplier_across + slip_across - free_across}};
+}
+
 /// Bilateral row c + h^2 E lambda = 0, never clamped: grasps and supports. compliance 0 [1/kg] is rigid. A
 /// moving anchor enters through free_gap, which is taken against the anchor at the end of the step.
 FLASH_HOST_DEVICE inline ConstraintRow bilateral_row(double free_gap, double multiplier, double compliance,

@@ -169,6 +169,76 @@ TEST(ConstraintRow, FrictionRowIsTheDerivativeOfItsLawAtFrozenCompliance) {
   }
 }
 
+// lambda_t - P(lambda_t - c_t / r) in the frame (e, e_perp), written independently.
+void natural_map(const double c[2], const double l[2], double limit, double r, double value[2]) {
+  const double q[2] = {l[0] - c[0] / r, l[1] - c[1] / r};
+  const double size = std::hypot(q[0], q[1]), scale = size > limit ? limit / size : 1;
+  for (int k : {0, 1}) value[k] = l[k] - scale * q[k];
+}
+
+TEST(ConstraintRow, SlipRowsAreTheDerivativeOfTheProjectionOnTheDisc) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  const double mu = 0.4, normal = 2, limit = mu * normal, r = 2e-4;
+  for (int i = 0; i < 500; ++i) {
+    const double c[2] = {3e-4 * unit(random), 3e-4 * unit(random)};
+    const double l[2] = {0.6 * unit(random), 0.6 * unit(random)};
+    const double q = std::hypot(l[0] - c[0] / r, l[1] - c[1] / r);
+    if (std::fabs(q - limit) < 0.05 * limit) continue;  // the kink
+    const SlipRows rows = slip_rows(c, c, l, normal, mu, r, h);
+    const double e[2] = {rows.direction[0], rows.direction[1]}, p[2] = {-e[1], e[0]};
+    EXPECT_EQ(rows.along.omega == 0, q > limit);
+    // Each row is its component of the map times a factor; the factor is read off one derivative, the rest
+    // follows.
+    const auto component = [&](const double* axis, double dc_e, double dc_p, double dl_e, double dl_p) {
+      double value[2];
+      const double c2[2] = {c[0] + dc_e * e[0] + dc_p * p[0], c[1] + dc_e * e[1] + dc_p * p[1]};
+      const double l2[2] = {l[0] + dl_e * e[0] + dl_p * p[0], l[1] + dl_e * e[1] + dl_p * p[1]};
+      natural_map(c2, l2, limit, r, value);
+      return axis[0] * value[0] + axis[1] * value[1];
+    };
+    const double dl = 1e-5, dc = r * dl;
+    const auto check = [&](const ConstraintRow& row, const double* axis, bool is_along) {
+      const double by_c = (component(axis, is_along * dc, !is_along * dc, 0, 0) -
+                           component(axis, -is_along * dc, -!is_along * dc, 0, 0)) /
+                          (2 * dl);
+      const double by_l = (component(axis, 0, 0, is_along * dl, !is_along * dl) -
+                           component(axis, 0, 0, -is_along * dl, -!is_along * dl)) /
+                          (2 * dl);
+      const double cross = (component(axis, !is_along * dc, is_along * dc, 0, 0) -
+                            component(axis, -!is_along * dc, -is_along * dc, 0, 0)) /
+                           (2 * dl);
+      const double value = component(axis, 0, 0, 0, 0);
+      const double factor = row.omega > 0 ? r * row.omega / by_c : h;  // [m/N]
+      EXPECT_NEAR(cross, 0, 1e-7);
+      EXPECT_NEAR(by_c * factor, r * row.omega, 1e-7 * r);
+      EXPECT_NEAR(by_l * factor, h * h * row.compliance, 1e-6 * (h * h * row.compliance + r));
+      EXPECT_NEAR(-value * factor, row.rhs, 1e-6 * std::fabs(row.rhs) + 1e-12);
+    };
+    check(rows.along, e, true);
+    check(rows.across, p, false);
+  }
+}
+
+TEST(ConstraintRow, SlipRowsVanishExactlyOnCoulomb) {
+  const double mu = 0.4, normal = 2, r = 2e-4;
+  for (double angle = 0; angle < 6.28; angle += 0.37) {
+    const double rim[2] = {mu * normal * std::cos(angle), mu * normal * std::sin(angle)};
+    const double slip[2] = {-1e-4 * std::cos(angle), -1e-4 * std::sin(angle)}, zero[2] = {0, 0};
+    const SlipRows sliding = slip_rows(slip, slip, rim, normal, mu, r, h);
+    EXPECT_NEAR(sliding.along.rhs, 0, 1e-17);
+    EXPECT_NEAR(sliding.across.rhs, 0, 1e-17);
+    EXPECT_NEAR(h * h * sliding.across.compliance, 1e-4 / (mu * normal), 1e-15);
+    const double inside[2] = {0.5 * rim[0], 0.5 * rim[1]};
+    const SlipRows sticking = slip_rows(zero, zero, inside, normal, mu, r, h);
+    EXPECT_EQ(sticking.along.rhs, 0);
+    EXPECT_EQ(sticking.across.rhs, 0);
+    const SlipRows lifted = slip_rows(slip, slip, rim, 0, mu, r, h);
+    EXPECT_EQ(lifted.along.omega, 0);
+    EXPECT_NEAR(lifted.along.rhs / (h * h * lifted.along.compliance), -rim[0], 1e-15);
+  }
+}
+
 TEST(ConstraintRow, FrictionAtItsKinksIsFinite) {
   const double zero[2] = {0, 0}, slip[2] = {1e-4, 0}, rim[2] = {0.8, 0}, over[2] = {3, 4};
   for (const auto* c : {zero, slip})

@@ -214,19 +214,21 @@ VectorXd gauss_seidel(const ContactProblem& problem) {
 TEST(ConstraintNewton, AgreesWithProjectedGaussSeidel) {
   for (const double friction : {0.0, 0.3, 1.0})
     for (const auto complementarity : {Complementarity::minimum_map, Complementarity::fischer_burmeister})
-      for (unsigned seed = 1; seed <= 6; ++seed) {
-        const ContactProblem problem = random_contacts(12, friction, seed);
-        const VectorXd expected = gauss_seidel(problem);
-        ConstraintSettings settings;
-        settings.complementarity = complementarity;
-        settings.iterations = 200;
-        settings.tolerance = 1e-12;
-        VectorXd lambda = VectorXd::Zero(expected.size());
-        const ConstraintReport report = solve_contacts(problem, settings, lambda);
-        EXPECT_TRUE(report.converged) << friction << " " << seed << " " << report.violation;
-        EXPECT_LE((lambda - expected).norm(), 1e-6 * expected.norm())
-            << friction << " seed " << seed << " after " << report.iterations;
-      }
+      for (const auto friction_row : {FrictionRow::newton, FrictionRow::fixed_point})
+        for (unsigned seed = 1; seed <= 6; ++seed) {
+          const ContactProblem problem = random_contacts(12, friction, seed);
+          const VectorXd expected = gauss_seidel(problem);
+          ConstraintSettings settings;
+          settings.complementarity = complementarity;
+          settings.friction = friction_row;
+          settings.iterations = 200;
+          settings.tolerance = 1e-12;
+          VectorXd lambda = VectorXd::Zero(expected.size());
+          const ConstraintReport report = solve_contacts(problem, settings, lambda);
+          EXPECT_TRUE(report.converged) << friction << " " << seed << " " << report.violation;
+          EXPECT_LE((lambda - expected).norm(), 1e-6 * expected.norm())
+              << friction << " seed " << seed << " after " << report.iterations;
+        }
 }
 
 }  // namespace

@@ -1,0 +1,309 @@
+#include "sim/projective.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "sim/anderson.h"
+#include "sim/elastic_energy.h"
+#include "sim/projective_contact.h"
+#include "sim/vertex_constraint.h"
+
+namespace flash::sim {
+namespace {
+
+using data::Points;
+using Eigen::Index;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+Eigen::Map<const VectorXd> flat(const Points& x) { return {x.data(), x.size()}; }
+
+}  // namespace
+
+struct ProjectiveSolver::Workspace {
+  using BendingKey = std::pair<data::BendingModel, double>;
+  using SystemKey = std::pair<std::array<double, 6>, std::pair<data::Constitutive, data::BendingModel>>;
+
+  std::shared_ptr<const SheetPlan> plan;
+  ProjectiveSettings settings;
+  std::map<BendingKey, std::shared_ptr<const BendingOperator>> bending;
+  std::map<SystemKey, ProjectiveSystem> systems;
+
+  const BendingOperator& bending_of(const data::SheetMaterial& m) {
+    auto& entry =
+        bending[{m.bending_model, m.bending_model == data::BendingModel::plate ? m.poissons_ratio : 0.0}];
+    if (!entry) entry = make_bending_operator(*plan, m.bending_model, m.poissons_ratio);
+    return *entry;
+  }
+
+  ProjectiveSystem& system_of(const data::SheetMaterial& m) {
+    const SystemKey key = {{m.membrane_stiffness, m.poissons_ratio, m.areal_density, m.bending_rigidity,
+                            m.air_drag, m.stiffness_damping},
+                           {m.constitutive, m.bending_model}};
+    const auto found = systems.find(key);
+    if (found != systems.end()) return found->second;
+    return systems.emplace(key, ProjectiveSystem(*plan, bending_of(m), m, settings.time_step)).first->second;
+  }
+};
+
+namespace {
+
+/// Forces of one implicit Euler step at an iterate.
+class StepForces {
+ public:
+  StepForces(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment,
+             const VectorXd& mass, double time_step)
+      : plan_(plan), bending_(bending), environment_(environment), mass_(mass), h_(time_step) {
+    const State& start = environment.state;
+    target_ = start.positions + h_ * start.velocities;
+    target_.rowwise() += h_ * h_ * environment.gravity.transpose();
+    loads_ = Points::Zero(start.positions.rows(), 3);
+    for (const Load& load : environment.loads) loads_.row(load.vertex) += load.force.transpose();
+    const double damping = environment.material.stiffness_damping;
+    if (damping > 0) {
+      damping_.assign(9 * (plan.pattern.size + plan.pattern.pairs.size()), 0.0);
+      add_elastic_hessian(plan, bending, environment.material, start.positions, damping / h_, damping_);
+    }
+  }
+
+  /// What every vertex needs from outside to obey its equation of motion at x [N].
+  Points needed(const Points& x, ElasticEnergy& energy) const {
+    const Points moved = x - environment_.state.positions;
+    Points force =
+        mass_.asDiagonal() * ((x - target_) / (h_ * h_) + environment_.material.air_drag / h_ * moved);
+    force -= loads_;
+    if (!damping_.empty()) add_block_product(plan_.pattern, damping_, 1.0, moved, force);
+    energy = add_elastic_gradient(plan_, bending_, environment_.material, x, force);
+    return force;
+  }
+
+ private:
+  const SheetPlan& plan_;
+  const BendingOperator& bending_;
+  const Environment& environment_;
+  const VectorXd& mass_;
+  double h_;
+  Points target_, loads_;
+  BlockValues<double> damping_;
+};
+
+/// Grasps close and open for the step that ends at `time`.
+void update_grasps(Environment& environment, double time) {
+  auto& offsets = environment.state.grasp_offsets;
+  offsets.resize(environment.grasps.size());
+  for (std::size_t k = 0; k < environment.grasps.size(); ++k) {
+    const Grasp& grasp = environment.grasps[k];
+    if (environment.state.time < grasp.from - 1e-9 || time > grasp.to + 1e-9) {
+      offsets[k].resize(0, 3);
+    } else if (offsets[k].rows() == 0) {
+      const Eigen::Isometry3d gripper = data::pose_at(grasp.gripper, environment.state.time).inverse();
+      offsets[k].resize(static_cast<Index>(grasp.vertices.size()), 3);
+      for (std::size_t v = 0; v < grasp.vertices.size(); ++v)
+        offsets[k].row(v) = gripper * environment.state.positions.row(grasp.vertices[v]).transpose();
+    }
+  }
+}
+
+/// The law of the contacts at an iterate, gaps linear in the multipliers: with dx = -h^2 A^-1 (force - H^T
+/// lambda) from the multipliers at hand, and W for a change of them.
+ContactProblem contact_problem(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system,
+                               const ProjectiveSettings& settings, ContactMetric metric, const Points& force,
+                               const VectorXd& multiplier) {
+  const double h = settings.time_step;
+  const Index n = force.rows();
+  ContactProblem problem;
+  problem.time_step = h;
+  if (metric == ContactMetric::inertia) {
+    const VectorXd inverse_mass = system.mass().cwiseInverse();
+    problem.diagonal.resize(3 * contacts.size());
+    for (std::size_t k = 0; k < contacts.size(); ++k)
+      problem.diagonal.segment<3>(3 * k).setConstant(inverse_mass[contacts[k].vertex]);
+    problem.apply_W = [&contacts, inverse_mass, n](const VectorXd& l, VectorXd& w) {
+      w = along_contacts(contacts, inverse_mass.asDiagonal() * contact_forces(contacts, l, n));
+    };
+  } else if (static_cast<int>(contacts.size()) <= settings.dense_contacts &&
+             settings.constraints.linear.solver != DualSolver::matrix_free) {
+    problem.W = full_metric(contacts, system);
+  } else {
+    problem.diagonal = full_metric_diagonal(contacts, system);
+    problem.apply_W = [&contacts, &system, n](const VectorXd& l, VectorXd& w) {
+      w = along_contacts(contacts, system.solve(contact_forces(contacts, l, n)));
+    };
+  }
+  problem.friction.resize(contacts.size());
+  problem.free_gap =
+      along_contacts(contacts, system.solve(-h * h * (force - contact_forces(contacts, multiplier, n))));
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    problem.friction[k] = contacts[k].friction;
+    problem.free_gap.segment<3>(3 * k) += contacts[k].gap;
+  }
+  VectorXd known(multiplier.size());
+  if (problem.W.size() > 0)
+    known = problem.W * multiplier;
+  else
+    problem.apply_W(multiplier, known);
+  problem.free_gap -= h * h * known;
+  return problem;
+}
+
+/// Penetration that the inertia metric leaves, N_s g h^2 / K [m], N_s the free vertices a loaded contact
+/// carries.
+double inertia_penetration(const Environment& environment, const ProjectiveSettings& settings,
+                           double carried) {
+  return carried * environment.gravity.norm() * settings.time_step * settings.time_step / settings.iterations;
+}
+
+std::string inertia_warning(double carried, double penetration, double creep) {
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "contact metric inertia: %.1f vertices carried per contact vertex leave about %.2g m of "
+                "penetration and "
+                "%.2g m/s of creep; use metric full",
+                carried, penetration, creep);
+  return text;
+}
+
+}  // namespace
+
+ProjectiveSolver::ProjectiveSolver(const Sheet& sheet, const ProjectiveSettings& settings)
+    : workspace_(std::make_unique<Workspace>()) {
+  workspace_->plan = make_sheet_plan(sheet);
+  workspace_->settings = settings;
+}
+ProjectiveSolver::~ProjectiveSolver() = default;
+ProjectiveSolver::ProjectiveSolver(ProjectiveSolver&&) noexcept = default;
+
+ProjectiveReport ProjectiveSolver::step(Environment& environment) {
+  Workspace& w = *workspace_;
+  const ProjectiveSettings& settings = w.settings;
+  const double h = settings.time_step, time = environment.state.time + h;
+  const BendingOperator& bending = w.bending_of(environment.material);
+  ProjectiveSystem& system = w.system_of(environment.material);
+  update_grasps(environment, time);
+  const StepForces forces(*w.plan, bending, environment, system.mass(), h);
+
+  Points x = environment.state.positions + h * environment.state.velocities;
+  const std::vector<VertexConstraint> holds = begin_step(environment, time, x);
+  const Index n = x.rows();
+  std::vector<Vector3d> free_axes(n);
+  std::array<std::vector<int>, 3> held;
+  for (Index i = 0; i < n; ++i) {
+    free_axes[i] = holds[i].free.diagonal();
+    for (int axis = 0; axis < 3; ++axis)
+      if (free_axes[i][axis] == 0) held[axis].push_back(static_cast<int>(i));
+  }
+  system.hold(held);
+  const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
+  const double force_scale = system.mass().norm() * gravity;
+
+  ProjectiveReport report;
+  report.metric = ContactMetric::inertia;
+  Anderson anderson(settings.acceleration);
+  std::map<std::pair<int, int>, Vector3d> known;  // multipliers of the last iteration, to start the next from
+  std::vector<VertexContact> contacts;
+  VectorXd multiplier;
+  Points force, residual, plain;
+  Points reaction = Points::Zero(n, 3);
+  double previous = std::numeric_limits<double>::infinity();
+  bool accelerated = false;
+  for (;; ++report.iterations) {
+    ElasticEnergy elastic;
+    force = forces.needed(x, elastic);
+    const Points free_motion = system.solve(-h * h * (force - reaction));
+    contacts =
+        find_contacts(environment, time, h, x, 2 * free_motion.rowwise().norm() + VectorXd::Constant(n, 1e-6),
+                      free_axes, settings.tangent_angle);
+    multiplier = VectorXd::Zero(3 * contacts.size());
+    for (std::size_t k = 0; k < contacts.size(); ++k) {
+      const auto found = known.find({contacts[k].vertex, contacts[k].obstacle});
+      if (found != known.end()) multiplier.segment<3>(3 * k) = contacts[k].directions * found->second;
+    }
+    const double carried = contacts.empty() ? 0.0 : double(n) / contacts.size();
+    if (settings.metric != ContactMetric::automatic)
+      report.metric = settings.metric;
+    else if (inertia_penetration(environment, settings, carried) > settings.allowed_penetration)
+      report.metric = ContactMetric::full;  // for the rest of the step
+    double violation = 0;
+    if (!contacts.empty()) {
+      const ContactProblem problem =
+          contact_problem(contacts, system, settings, report.metric, force, multiplier);
+      const ConstraintReport solved = solve_contacts(problem, settings.constraints, multiplier);
+      report.constraint_iterations += solved.iterations;
+      VectorXd gap(multiplier.size());
+      for (std::size_t k = 0; k < contacts.size(); ++k) gap.segment<3>(3 * k) = contacts[k].gap;
+      violation = contact_violation(problem, gap, multiplier);
+    }
+    reaction = contact_forces(contacts, multiplier, n);
+    known.clear();
+    for (std::size_t k = 0; k < contacts.size(); ++k)
+      known[{contacts[k].vertex, contacts[k].obstacle}] =
+          contacts[k].directions.transpose() * multiplier.segment<3>(3 * k);
+
+    residual = force - reaction;
+    for (Index i = 0; i < n; ++i) residual.row(i).array() *= free_axes[i].transpose().array();
+    const Points motion = system.solve(-h * h * residual);
+    report.residual = residual.norm() / force_scale;
+    report.membrane = elastic.membrane;
+    report.bending = elastic.bending;
+    report.converged = report.residual <= settings.tolerance && violation <= settings.contact_tolerance;
+    report.solves += 1;
+    if (report.converged || report.iterations == settings.iterations) break;
+
+    // |motion|_A^2: the plain iteration does not increase it, an accelerated one that does is taken back.
+    const double merit = -h * h * flat(motion).dot(flat(residual));
+    if (accelerated && !(merit < 2 * previous)) {
+      anderson.reset();
+      x = plain;
+      accelerated = false;
+      previous = std::numeric_limits<double>::infinity();
+      continue;
+    }
+    previous = merit;
+    plain = x + motion;
+    if (report.metric == ContactMetric::inertia && !contacts.empty()) {
+      x = plain;
+    } else {
+      x = Eigen::Map<const Points>(anderson.next(flat(x), flat(motion), -flat(residual)).data(), n, 3);
+      accelerated = settings.acceleration > 0;
+    }
+  }
+
+  report.contacts = static_cast<int>(contacts.size());
+  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
+  report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
+  for (Index i = 0; i < n; ++i) {
+    const Vector3d hold =
+        (Vector3d::Ones() - free_axes[i]).cwiseProduct((force - reaction).row(i).transpose());
+    (holds[i].grasp >= 0 ? report.grasp_forces[holds[i].grasp] : report.fixed_force) += hold;
+  }
+  int loaded = 0;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const Vector3d l = multiplier.segment<3>(3 * k);
+    report.obstacle_forces[contacts[k].obstacle] += contacts[k].directions.transpose() * l;
+    report.penetration_max = std::max(report.penetration_max, -contacts[k].gap[0]);
+    report.cone_violation = std::max(report.cone_violation, l.tail<2>().norm() - contacts[k].friction * l[0]);
+    if (l[0] > 0) {
+      ++loaded;
+      report.complementarity = std::max(report.complementarity, std::abs(contacts[k].gap[0]));
+    }
+  }
+  if (report.metric == ContactMetric::inertia && loaded > 0) {
+    const double carried = double(n) / loaded,
+                 penetration = inertia_penetration(environment, settings, carried);
+    if (penetration > settings.allowed_penetration)
+      report.warning = inertia_warning(carried, penetration, penetration / h);
+  }
+
+  environment.state.velocities = (x - environment.state.positions) / h;
+  environment.state.positions = x;
+  environment.state.time = time;
+  const Points& v = environment.state.velocities;
+  report.kinetic = 0.5 * (system.mass().asDiagonal() * v).cwiseProduct(v).sum();
+  report.potential = -(system.mass().transpose() * x * environment.gravity)(0);
+  return report;
+}
+
+}  // namespace flash::sim
