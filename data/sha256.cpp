@@ -52,7 +52,7 @@ std::string sha256(std::string_view bytes) {
     compress(hash, reinterpret_cast<const unsigned char*>(bytes.data()) + at);
   // 5.1.1: a bit, zeros, and the length in bits.
   std::array<unsigned char, 128> tail{};
-  const std::size_t rest = bytes.size() - at;
+  const std::size_t rest = bytes.size() % 64;
   for (std::size_t i = 0; i < rest; ++i) tail[i] = static_cast<unsigned char>(bytes[at + i]);
   tail[rest] = 0x80;
   const std::size_t blocks = rest < 56 ? 1 : 2;
