@@ -1,0 +1,19 @@
+#include <CLI/CLI.hpp>
+
+#include "apps/command_line.h"
+#include "apps/sim_verbs.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Simulates sheets by implicit Euler with contact, friction and grasps.", "flash-sim");
+  app.set_version_flag("--version", FLASH_VERSION);
+  app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  flash-sim run scene.json -o out\n"
+      "  flash-sim bench --vertices 1000 --envs 64 --steps 250 --threads 2\n"
+      "Exit codes: 0 done; 1 failed; 2 bad usage or input; 3 finished, but the steps did not converge.");
+  flash::Action action;
+  flash::add_run_verb(app, action);
+  flash::add_bench_verb(app, action);
+  return flash::run_tool(app, argc, argv, [&] { return action(); });
+}

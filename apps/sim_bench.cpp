@@ -1,0 +1,88 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "apps/command_line.h"
+#include "apps/sim_verbs.h"
+#include "sim/lift_benchmark.h"
+
+namespace flash {
+namespace {
+
+struct BenchOptions {
+  sim::LiftBenchmark benchmark;
+  bool json = false;
+};
+
+int bench(BenchOptions options) {
+  sim::LiftBenchmark& benchmark = options.benchmark;
+  if (benchmark.threads == 0) benchmark.threads = int(std::max(1u, std::thread::hardware_concurrency()));
+  const sim::LiftBenchmarkResult result = sim::run_lift_benchmark(benchmark);
+  double accounted = 0;
+  for (const sim::BenchmarkPhase& phase : result.phases)
+    accounted += phase.calls_per_step * phase.milliseconds_per_call;
+  if (options.json) {
+    nlohmann::ordered_json json = {{"schema", "flash-sim-bench/1"},
+                                   {"vertices", result.vertices},
+                                   {"environments", benchmark.environments},
+                                   {"steps", benchmark.steps},
+                                   {"threads", benchmark.threads},
+                                   {"wall_seconds", result.wall_seconds},
+                                   {"step_ms", result.step_milliseconds},
+                                   {"iterations", result.iterations},
+                                   {"converged_share", result.converged_share},
+                                   {"residual_max", result.residual_max},
+                                   {"phases", nlohmann::ordered_json::array()}};
+    for (const sim::BenchmarkPhase& phase : result.phases)
+      json["phases"].push_back(
+          {{"name", phase.name}, {"calls", phase.calls_per_step}, {"call_ms", phase.milliseconds_per_call}});
+    std::cout << json.dump(2) << '\n';
+    return exit_done;
+  }
+  std::printf("%d vertices, %d environments, %d steps, %d threads: %.1f s\n", result.vertices,
+              benchmark.environments, benchmark.steps, benchmark.threads, result.wall_seconds);
+  std::printf("converged %.2f %% of the steps, worst residual %.2g, %.2f Newton iterations a step\n",
+              100 * result.converged_share, result.residual_max, result.iterations);
+  std::printf("%-20s %10s %10s %10s\n", "thread time a step", "calls", "ms a call", "ms");
+  for (const sim::BenchmarkPhase& phase : result.phases)
+    std::printf("%-20s %10.2f %10.4f %10.3f\n", phase.name.c_str(), phase.calls_per_step,
+                phase.milliseconds_per_call, phase.calls_per_step * phase.milliseconds_per_call);
+  std::printf("%-20s %32.3f\n", "contact and the rest", result.step_milliseconds - accounted);
+  std::printf("%-20s %32.3f\n", "all", result.step_milliseconds);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_bench_verb(CLI::App& app, Action& action) {
+  CLI::App& verb = *app.add_subcommand("bench", "Time corner lifts of many materials, by phase of a step");
+  const auto options = std::make_shared<BenchOptions>();
+  sim::LiftBenchmark& benchmark = options->benchmark;
+  benchmark.threads = 0;
+  verb.footer("Example:\n  flash-sim bench --vertices 1000 --envs 64 --steps 250 --threads 2");
+  const auto count = [&](const char* name, int& value, const char* text) {
+    verb.add_option(name, value, text)->check(CLI::PositiveNumber)->capture_default_str();
+  };
+  const auto positive = [&](const char* name, double& value, const char* text) {
+    verb.add_option(name, value, text)->check(CLI::PositiveNumber)->capture_default_str();
+  };
+  count("--vertices", benchmark.vertices, "Of the towel, about");
+  count("--envs", benchmark.environments, "Materials");
+  count("--steps", benchmark.steps, "A material");
+  verb.add_option("--threads", benchmark.threads, "0: one a processor")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  positive("--time-step", benchmark.time_step, "[s]");
+  positive("--tolerance", benchmark.tolerance, "On the residual |r| / |M g|");
+  positive("--young-min", benchmark.membrane_stiffness_min, "E t from [N/m]");
+  positive("--young-max", benchmark.membrane_stiffness_max, "E t to [N/m]");
+  positive("--bending-min", benchmark.bending_rigidity_min, "D from [N m]");
+  positive("--bending-max", benchmark.bending_rigidity_max, "D to [N m]");
+  verb.add_flag("--json", options->json, "Print the result as JSON");
+  verb.callback([&action, options] { action = [options] { return bench(*options); }; });
+}
+
+}  // namespace flash

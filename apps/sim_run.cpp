@@ -1,0 +1,144 @@
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "apps/command_line.h"
+#include "apps/sim_verbs.h"
+#include "data/error.h"
+#include "data/scene.h"
+#include "data/text.h"
+#include "sim/scene.h"
+
+namespace flash {
+namespace {
+
+struct RunOptions {
+  std::string scene, out, device = "auto";
+  int threads = 0, steps = -1;
+  bool quiet = false, verbose = false, json = false, force = false;
+};
+
+std::atomic<bool> interrupted = false;  // a signal handler reaches nothing else
+
+void on_interrupt(int signal) {
+  interrupted = true;
+  std::signal(signal, SIG_DFL);
+}
+
+/// Rate and time left, drawn over itself, once a run has taken two seconds.
+class ProgressLine {
+ public:
+  explicit ProgressLine(bool visible) : visible_(visible && isatty(STDERR_FILENO) != 0) {}
+  ~ProgressLine() {
+    if (drawn_) std::cerr << '\n';
+  }
+  void show(int done, int steps) {
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    if (!visible_ || seconds < 2 || (now - last_ < std::chrono::milliseconds(100) && done < steps)) return;
+    last_ = now;
+    drawn_ = true;
+    const double rate = done / seconds;
+    std::fprintf(stderr, "\rstep %d of %d, %.0f/s, %.0f s left\033[K", done, steps, rate,
+                 (steps - done) / rate);
+  }
+
+ private:
+  bool visible_, drawn_ = false;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_{};
+};
+
+void print_json(const sim::SceneSummary& summary, const std::string& out, int exit_code) {
+  const nlohmann::ordered_json json = {{"schema", "flash-sim-summary/1"},
+                                       {"out", out},
+                                       {"steps", summary.steps},
+                                       {"unconverged_steps", summary.unconverged_steps},
+                                       {"residual_max", summary.residual_max},
+                                       {"penetration_max_m", summary.penetration_max},
+                                       {"iterations", summary.iterations},
+                                       {"frames", summary.frames},
+                                       {"wall_seconds", summary.wall_seconds},
+                                       {"interrupted", summary.interrupted},
+                                       {"warnings", summary.notices},
+                                       {"exit_code", exit_code}};
+  std::cout << json.dump(2) << '\n';
+}
+
+int run(const RunOptions& options) {
+  if (options.device == "cuda")
+    throw data::InputError("--device cuda: this program has no CUDA backend; use --device cpu or auto");
+  namespace fs = std::filesystem;
+  if (!options.force && fs::exists(options.out) &&
+      !(fs::is_directory(options.out) && fs::is_empty(options.out)))
+    throw data::InputError(options.out + ": exists already; choose another -o, or --force to overwrite");
+  const data::Scene scene = data::load_scene(options.scene);
+  if (options.force) fs::remove_all(fs::path(options.out) / "frames");
+
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+  ProgressLine progress(!options.quiet);
+  sim::SceneRun settings;
+  settings.steps = options.steps;
+  settings.threads =
+      options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+  settings.notice = [&](const std::string& notice) {
+    if (!options.quiet) std::cerr << notice << '\n';
+  };
+  settings.progress = [&](int done, int steps) {
+    progress.show(done, steps);
+    return !interrupted;
+  };
+  const sim::SceneSummary summary = sim::run_scene(scene, settings, options.out);
+
+  // One step in a hundred may stay above the tolerance without spoiling a motion.
+  const bool unusable = summary.interrupted ? false : 100 * summary.unconverged_steps > summary.steps;
+  const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
+  if (summary.unconverged_steps > 0)
+    std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps
+              << " steps did not converge; worst residual " << data::format_short(summary.residual_max)
+              << " (see " << (fs::path(options.out) / "log.csv").string() << ")\n";
+  if (options.json) {
+    print_json(summary, options.out, exit_code);
+  } else if (!options.quiet) {
+    std::printf(
+        "%d steps in %.1f s, %.1f Newton iterations a step, residual at most %s, penetration at most %s m\n",
+        summary.steps, summary.wall_seconds, double(summary.iterations) / std::max(1, summary.steps),
+        data::format_short(summary.residual_max).c_str(),
+        data::format_short(summary.penetration_max).c_str());
+    std::printf("%s: %d frames, log.csv, forces.csv\n", options.out.c_str(), summary.frames);
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+void add_run_verb(CLI::App& app, Action& action) {
+  CLI::App& verb = *app.add_subcommand("run", "Run a scene; write its frames, log.csv and forces.csv");
+  const auto options = std::make_shared<RunOptions>();
+  verb.footer("Example:\n  flash-sim run scene.json -o out");
+  verb.add_option("scene", options->scene, "Scene file (.json)")->required();
+  verb.add_option("-o,--out", options->out, "Folder to write")->required();
+  verb.add_option("--device", options->device, "Where the simulation runs")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->capture_default_str();
+  verb.add_option("--threads", options->threads, "Objects stepped at once; 0: one a processor")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb.add_option("--steps", options->steps, "In place of the scene's")->check(CLI::NonNegativeNumber);
+  verb.add_flag("--json", options->json, "Print the summary as JSON on stdout");
+  CLI::Option* quiet = verb.add_flag("--quiet", options->quiet, "Print nothing but errors and warnings");
+  verb.add_flag("--verbose", options->verbose, "Print every notice (the default)")->excludes(quiet);
+  verb.add_flag("--force", options->force, "Write over what is there");
+  verb.callback([&action, options] { action = [options] { return run(*options); }; });
+}
+
+}  // namespace flash

@@ -1,0 +1,168 @@
+#include "sim/lift_benchmark.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <thread>
+
+#include "data/procedural_mesh.h"
+#include "sim/elastic_energy.h"
+#include "sim/solver.h"
+
+namespace flash::sim {
+namespace {
+
+constexpr double side = 0.4;  // [m]
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Radical inverse: with i / n the points of a Hammersley set, which spreads any number of materials evenly.
+double radical_inverse(int i) {
+  double value = 0;
+  for (double digit = 0.5; i > 0; i /= 2, digit *= 0.5) value += digit * (i % 2);
+  return value;
+}
+
+double between(double low, double high, double share) { return low * std::pow(high / low, share); }
+
+// Up by 0.35 m and inwards by 0.1 m in 3 s, without jerks.
+data::Trajectory lift_of(const Eigen::Vector3d& corner) {
+  data::Trajectory trajectory;
+  for (int k = 0; k <= 300; ++k) {
+    const double t = k / 300.0, s = t * t * t * (10 - 15 * t + 6 * t * t);
+    trajectory.times.push_back(3.0 * t);
+    trajectory.poses.push_back(
+        Eigen::Isometry3d(Eigen::Translation3d(corner + s * Eigen::Vector3d(-0.1, -0.1, 0.35))));
+  }
+  return trajectory;
+}
+
+Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet, int index) {
+  Environment environment;
+  data::SheetMaterial& material = environment.material;
+  material.membrane_stiffness = between(benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max,
+                                        (index + 0.5) / benchmark.environments);
+  material.bending_rigidity =
+      between(benchmark.bending_rigidity_min, benchmark.bending_rigidity_max, radical_inverse(index));
+  material.poissons_ratio = benchmark.poissons_ratio;
+  material.areal_density = benchmark.areal_density;
+  material.friction = benchmark.friction;
+  environment.obstacles.push_back({Plane{}, -1.0});
+  environment.state.positions = sheet.rest.vertices;
+  environment.state.velocities = data::Points::Zero(sheet.rest.vertices.rows(), 3);
+  Grasp grasp;
+  for (int i = 0; i < int(sheet.rest.vertices.rows()); ++i)
+    if (sheet.rest.vertices.row(i).head<2>().minCoeff() > side - 0.02) grasp.vertices.push_back(i);
+  grasp.gripper = lift_of(Eigen::Vector3d(side, side, 0));
+  environment.grasps.push_back(grasp);
+  return environment;
+}
+
+double milliseconds_of(const std::function<void()>& work) {
+  work();
+  int count = 0;
+  const auto start = std::chrono::steady_clock::now();
+  do {
+    work();
+    ++count;
+  } while (seconds_since(start) < 0.1);
+  return 1e3 * seconds_since(start) / count;
+}
+
+}  // namespace
+
+LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
+  const int cells = std::max(1, int(std::lround(std::sqrt(double(benchmark.vertices)))) - 1);
+  data::RectangleMesh rectangle;
+  rectangle.width = rectangle.height = side;
+  rectangle.cells_x = rectangle.cells_y = cells;
+  const auto plan = make_sheet_plan(make_sheet(data::rectangle(rectangle)));
+  const SolverSettings settings = [&] {
+    SolverSettings chosen;
+    chosen.time_step = benchmark.time_step;
+    chosen.tolerance = benchmark.tolerance;
+    return chosen;
+  }();
+
+  struct Counts {
+    long iterations = 0, solves = 0, factorizations = 0, converged = 0;
+    double residual_max = 0;
+    data::Points middle;  // positions halfway
+  };
+  std::vector<Counts> counts(benchmark.environments);
+  std::atomic<int> next = 0;
+  const auto work = [&] {
+    for (int e = next++; e < benchmark.environments; e = next++) {
+      Environment environment = lift_environment(benchmark, plan->sheet, e);
+      Solver solver(plan, settings);
+      for (int k = 0; k < benchmark.steps; ++k) {
+        const StepReport report = solver.step(environment);
+        counts[e].iterations += report.iterations;
+        counts[e].solves += report.solves;
+        counts[e].factorizations += report.factorizations;
+        counts[e].converged += report.converged;
+        counts[e].residual_max = std::max(counts[e].residual_max, report.residual);
+        if (k == benchmark.steps / 2) counts[e].middle = environment.state.positions;
+      }
+    }
+  };
+  const auto start = std::chrono::steady_clock::now();
+  {
+    std::vector<std::jthread> workers;
+    for (int t = 1; t < benchmark.threads; ++t) workers.emplace_back(work);
+    work();
+  }
+  LiftBenchmarkResult result;
+  result.wall_seconds = seconds_since(start);
+  result.vertices = plan->pattern.size;
+  const double total = double(benchmark.environments) * benchmark.steps;
+  double solves = 0, factorizations = 0, converged = 0;
+  for (const Counts& c : counts) {
+    result.iterations += double(c.iterations) / total;
+    solves += double(c.solves) / total;
+    factorizations += double(c.factorizations) / total;
+    converged += double(c.converged);
+    result.residual_max = std::max(result.residual_max, c.residual_max);
+  }
+  result.converged_share = converged / total;
+  result.step_milliseconds =
+      1e3 * result.wall_seconds * std::min(benchmark.threads, benchmark.environments) / total;
+  if (total < 1) return result;
+
+  const data::SheetMaterial material =
+      lift_environment(benchmark, plan->sheet, benchmark.environments / 2).material;
+  const auto bending = make_bending_operator(*plan, material.bending_model, material.poissons_ratio);
+  const data::Points& x = counts[benchmark.environments / 2].middle;
+  data::Points y = data::Points::Zero(x.rows(), 3);
+  BlockValues<double> values;
+  const auto assemble = [&] {
+    values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
+    add_elastic_hessian(*plan, *bending, material, x, 1.0, values);
+    for (int i = 0; i < plan->pattern.size; ++i)
+      for (int c = 0; c < 3; ++c)
+        values[9L * i + 4 * c] +=
+            material.areal_density * plan->sheet.vertex_area[i] / (benchmark.time_step * benchmark.time_step);
+  };
+  BlockCholesky<double> factor(plan->symbolic);
+  const auto add = [&](const char* name, double calls, const std::function<void()>& phase) {
+    result.phases.push_back({name, calls, milliseconds_of(phase)});
+  };
+  add("energy and forces", result.iterations + 1,
+      [&] { add_elastic_gradient(*plan, *bending, material, x, y); });
+  add("matrix", result.iterations, assemble);
+  add("factorization", factorizations, [&] { factor.factorize(values); });
+  y = x;
+  add("triangular solves", solves, [&] { factor.solve_in_place(y.data()); });
+  y.setZero();
+  add("matrix products", solves, [&] {
+    add_block_product(plan->pattern, values, 1.0, x, y);
+    add_bending_correction(*bending, material.bending_rigidity, x, y);
+  });
+  return result;
+}
+
+}  // namespace flash::sim
