@@ -19,6 +19,7 @@ int main(int argc, char** argv) {
   flash::add_grid_verb(app, action);
   flash::add_replay_verb(app, action);
   flash::add_synth_verb(app, action);
+  flash::add_import_verb(app, action);
   flash::add_segment_verb(app, action);
   flash::add_export_verb(app, action);
   flash::add_report_verb(app, action);

@@ -14,6 +14,7 @@ using Action = std::function<int()>;
 void add_grid_verb(CLI::App& app, Action& action);
 void add_replay_verb(CLI::App& app, Action& action);
 void add_synth_verb(CLI::App& app, Action& action);
+void add_import_verb(CLI::App& app, Action& action);
 void add_segment_verb(CLI::App& app, Action& action);
 void add_export_verb(CLI::App& app, Action& action);
 void add_report_verb(CLI::App& app, Action& action);

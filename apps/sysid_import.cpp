@@ -1,0 +1,133 @@
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command_line.h"
+#include "apps/sysid_options.h"
+#include "apps/sysid_verbs.h"
+#include "data/error.h"
+#include "data/import.h"
+#include "data/text.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ImportVerbOptions {
+  CommonOptions common;
+  data::ImportOptions import;
+  std::vector<std::string> offset;
+  std::string shape = "clamp";
+  double within = 0, table_height = 0, heading_degrees = 0;
+};
+
+// One bound for all axes, or x,y,z.
+Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
+  Eigen::Vector3d bounds;
+  for (int k = 0; k < 3; ++k) {
+    const std::size_t word = words.size() == 1 ? 0 : static_cast<std::size_t>(k);
+    const auto number =
+        words.size() == 1 || words.size() == 3 ? data::parse_number(words[word]) : std::nullopt;
+    if (!number || *number < 0)
+      throw data::InputError("--offset: expected one bound or three, x,y,z, in metres, as 0.06");
+    bounds[k] = *number;
+  }
+  return bounds;
+}
+
+int run_import(const CLI::App& verb, ImportVerbOptions options) {
+  data::ImportOptions& import = options.import;
+  import.overwrite = options.common.force;
+  if (!options.offset.empty()) import.nuisance.offset = parse_bounds(options.offset);
+  if (options.shape == "point") import.shape = data::GraspShape::point;
+  if (options.shape == "pinch") import.shape = data::GraspShape::pinch;
+  if (verb.count("--within") > 0) import.within = options.within;
+  if (verb.count("--table-height") > 0) import.table_height = options.table_height;
+  if (verb.count("--heading") > 0) import.heading = options.heading_degrees * M_PI / 180;
+
+  const data::Recording recording = data::import_recording(import);
+  for (const std::string& notice : recording.notices) say(options.common, notice);
+  const std::string path = (fs::path(import.out) / "recording.json").string();
+  if (options.common.json) {
+    std::cout << nlohmann::ordered_json{{"recording", path},
+                                        {"keyframes", recording.keyframes.size()},
+                                        {"notices", recording.notices}}
+                     .dump(2)
+              << '\n';
+  } else {
+    std::printf("%s: %zu keyframes\n", path.c_str(), recording.keyframes.size());
+  }
+  return exit_done;
+}
+
+}  // namespace
+
+void add_import_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<ImportVerbOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "import", "Make a recording from a folder of clouds, or of depth images, and a trajectory");
+  data::ImportOptions& import = options->import;
+  CLI::Option* clouds =
+      verb->add_option("clouds", import.clouds, "Folder of .ply or .pcd, base frame [m], in order of name");
+  CLI::Option* depth =
+      verb->add_option("--depth", import.depth, "Folder of 16-bit depth PNG, in place of clouds")
+          ->excludes(clouds);
+  verb->add_option("--masks", import.masks, "Folder of masks of the same names")->needs(depth);
+  verb->add_option("--intrinsics", import.intrinsics, "camera_info or OpenCV YAML")->needs(depth);
+  verb->add_option("--extrinsics", import.extrinsics, "T_base_camera: flash-extrinsics/1, or a TUM file")
+      ->needs(depth);
+  verb->add_option("--depth-scale", import.depth_scale, "Metres a count")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--trajectory", import.trajectory, "T_base_gripper, TUM or CSV")->required();
+  verb->add_option("--times", import.times, "rate:HZ, rate:HZ:START, or a CSV with one time a frame")
+      ->capture_default_str();
+  CLI::Option* sheet = verb->add_option("--sheet", import.sheet, "WIDTHxHEIGHT [m], as 0.278x0.278");
+  verb->add_option("--mesh", import.mesh, "Mesh specification or file, in place of --sheet")->excludes(sheet);
+  verb->add_option("--cell", import.cell, "Of the sheet's mesh [m]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--grasp", import.grasp, "corner, corner:I,J, vertices:A,B,... or position")
+      ->capture_default_str();
+  verb->add_option("--within", options->within, "Size of the grasped patch [m]; without it 1.2 cells")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("--shape", options->shape, "How the patch sits in the fingers")
+      ->check(CLI::IsMember({"clamp", "point", "pinch"}))
+      ->capture_default_str();
+  verb->add_option("--crop-x", import.crop_x, "LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-y", import.crop_y, "LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-z", import.crop_z, "LOW:HIGH [m], either may be empty, as 0.075:");
+  verb->add_option("--table-height", options->table_height,
+                   "[m]; without it from the gripper's start and the crop");
+  verb->add_option("--heading", options->heading_degrees,
+                   "Of the diagonal from the grasped corner, from x [deg]; without it towards the clouds");
+  verb->add_option("--offset", options->offset, "Bound on the camera's offset, one or x,y,z [m]")
+      ->delimiter(',');
+  verb->add_option("--yaw", import.nuisance.yaw, "Bound on the camera's yaw [rad]")
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--clock", import.nuisance.time, "Bound on the camera's clock against the robot's [s]")
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--start-yaw", import.nuisance.start_yaw, "Bound on the sheet's turn on the table [rad]")
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--table-error", import.nuisance.table_height, "Bound on the table's height [m]")
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--asset", import.asset, "The object");
+  verb->add_option("--kind", import.kind, "corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free")
+      ->capture_default_str();
+  verb->add_option("--name", import.name, "Without it the folder's");
+  verb->add_option("-o,--out", import.out, "Folder of the recording")->required();
+  add_common_options(*verb, options->common);
+  verb->footer(
+      "Example:\n"
+      "  flash-sysid import clouds --trajectory tcp.tum --times rate:10 --sheet 0.278x0.278 --grasp corner "
+      "\\\n"
+      "    --crop-z 0.075: --offset 0.06 -o recording");
+  verb->callback(
+      [verb, options, &action] { action = [verb, options] { return run_import(*verb, *options); }; });
+}
+
+}  // namespace flash
