@@ -15,13 +15,13 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
-demo: build  ## Packages, build, then: synthesize a corner lift, search its material, export the tuned asset
-	rm -rf $(DEMO)
-	$(sysid) synth --asset examples/towel.json --kind corner_lift --seed 1 --truth-out $(DEMO)/truth.json -o $(DEMO)/recording
-	$(sysid) grid $(DEMO)/recording --asset examples/towel.json --bending 3e-6:3e-4:7:log --friction 0.1:0.5:3 -o $(DEMO)/run
-	$(sysid) export $(DEMO)/run -o $(DEMO)/tuned.json
-	@printf '\nTuned asset: %s\nReport:      %s   (open it in a browser)\nTruth:       %s\n' \
-	  $(abspath $(DEMO)/tuned.json) $(abspath $(DEMO)/run/report.html) $(abspath $(DEMO)/truth.json)
+demo: build  ## Packages, build, then the main job on a recording it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
+	$(sysid) synth --asset examples/towel.json --set bending=1.5e-4 --kind corner_lift --seed 1 --force -o $(DEMO)/recording
+	$(sysid) grid $(DEMO)/recording --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
+	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
+	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
+	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \
+	  'Truth:       $(abspath $(DEMO)/recording/truth.json)'
 
 build: packages-build  ## Packages, then the release build in $(BUILD)
 	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=OFF $(CMAKE_ARGS)
