@@ -175,6 +175,7 @@ void read_vertices(const Element& element, Body& body, const std::string& source
 }
 
 void read_faces(const Element& element, Body& body, const std::string& source, Triangles& triangles) {
+  if (element.properties.empty()) return;  // takes no bytes, however many it claims
   std::vector<int> corners, fans;
   for (long i = 0; i < element.count; ++i)
     for (const Property& property : element.properties) {

@@ -3,9 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <limits>
+#include <random>
 
 #include "data/procedural_mesh.h"
+#include "data/text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -173,6 +174,30 @@ TEST(MeshIo, TruncatedBinaryFilesAreErrorsNotCrashes) {
       try {
         load_triangle_mesh(path);  // a text file may be cut where it still makes sense
       } catch (const InputError&) {
+      }
+    }
+  }
+}
+
+TEST(MeshIo, DamagedFilesAreErrorsNotCrashes) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = parse_mesh_spec("sheet:0.1x0.1:0.05");
+  std::mt19937 generator(1);
+  for (const char* name : {"a.ply", "a.vtk", "a.obj", "a.pcd"}) {
+    if (lower_extension(name) == ".pcd")
+      save_point_cloud(mesh.vertices, folder / name);
+    else
+      save_triangle_mesh(mesh, folder / name);
+    std::ifstream stream(folder / name, std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
+    for (int trial = 0; trial < 300; ++trial) {
+      std::string damaged = bytes;
+      for (int k = 0; k < 3; ++k) damaged[generator() % damaged.size()] = static_cast<char>(generator());
+      const std::string path = folder.write(std::string("damaged_") + name, damaged);
+      try {
+        load_geometry(path);
+      } catch (const InputError& error) {
+        ASSERT_NE(std::string(error.what()).find(path), std::string::npos);
       }
     }
   }

@@ -1,0 +1,186 @@
+#include "data/import.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "data/atomic_file.h"
+#include "data/depth_image.h"
+#include "data/mesh_io.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::data {
+namespace {
+
+/// Clouds of a 0.2 m sheet on a table at z = 0.05 m, grasped at (0.5, 0.1), its diagonal along +y.
+class ImportFiles : public testing::Test {
+ protected:
+  ImportFiles() {
+    folder_.write("tcp.csv", "t,tx,ty,tz,qx,qy,qz,qw\n0,0.5,0.1,0.052,0,0,0,1\n0.2,0.5,0.15,0.15,0,0,0,1\n");
+    Points cloud(4, 3);
+    cloud << 0.5, 0.2, 0.06, 0.45, 0.24, 0.06, 0.55, 0.24, 0.06, 0.5, 0.28, 0.06;
+    for (const char* name : {"clouds/2.ply", "clouds/10.pcd", "clouds/11.ply"})
+      save_point_cloud(cloud, folder_ / name);
+    cloud(3, 0) += 1e-3;
+    save_point_cloud(cloud, folder_ / "clouds/11.ply");
+    folder_.write("clouds/notes.txt", "not a cloud");
+    options_.clouds = folder_ / "clouds";
+    options_.trajectory = folder_ / "tcp.csv";
+    options_.sheet = "0.2x0.2";
+    options_.cell = 0.02;
+    options_.crop_z = "0.055:";
+    options_.table_height = 0.05;
+    options_.out = folder_ / "lift";
+  }
+
+  TemporaryFolder folder_;
+  ImportOptions options_;
+};
+
+TEST_F(ImportFiles, CloudsAndATrajectoryBecomeARecording) {
+  options_.nuisance.offset.setConstant(0.06);
+  const Recording recording = import_recording(options_);
+  EXPECT_EQ(recording.name, "lift");
+  EXPECT_EQ(recording.keyframes.size(), 3u);
+  EXPECT_DOUBLE_EQ(recording.keyframes[2].time, 0.2);
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/000002.ply"));
+  // 2, 10, 11: the numbers count, not the letters.
+  std::vector<std::string> notices;
+  EXPECT_NEAR(load_keyframes(recording, notices)[2].cloud(3, 0), 0.501, 1e-6);
+  EXPECT_EQ(recording.crop.min.z(), 0.055);
+  EXPECT_EQ(recording.nuisance.offset, Eigen::Vector3d::Constant(0.06));
+  EXPECT_EQ(select_vertices(recording, recording.grasps[0]).size(), 4u);
+  // The guess: corner (0, 0) under the gripper, the opposite one 0.2 sqrt(2) further along +y.
+  EXPECT_TRUE(recording.start.row(0).isApprox(Eigen::RowVector3d(0.5, 0.1, 0.05), 1e-9));
+  EXPECT_TRUE(recording.start.row(recording.start.rows() - 1)
+                  .isApprox(Eigen::RowVector3d(0.5, 0.1 + 0.2 * std::numbers::sqrt2, 0.05), 1e-6));
+  bool told = false;
+  for (const std::string& notice : recording.notices)
+    told |= notice.find("diagonal points to 90 deg") != std::string::npos;
+  EXPECT_TRUE(told);
+}
+
+TEST_F(ImportFiles, EveryCornerCanBeTheGraspedOne) {
+  for (const char* corner : {"corner:0,0", "corner:0,1", "corner:1,0", "corner:1,1"}) {
+    options_.grasp = corner;
+    options_.overwrite = true;
+    const Recording recording = import_recording(options_);
+    const std::vector<int> held = select_vertices(recording, recording.grasps[0]);
+    double nearest = 1;
+    for (const int vertex : held)
+      nearest = std::min(nearest, (recording.start.row(vertex) - Eigen::RowVector3d(0.5, 0.1, 0.05)).norm());
+    EXPECT_LT(nearest, 1e-9) << corner;
+    EXPECT_NEAR(recording.start.col(0).mean(), 0.5, 1e-6) << corner;
+    EXPECT_NEAR(recording.start.col(1).mean(), 0.1 + 0.1 * std::numbers::sqrt2, 1e-6) << corner;
+  }
+}
+
+TEST_F(ImportFiles, TimesFromAFile) {
+  options_.times = folder_.write("times.csv", "frame,t_s\n0,0.01\n1,0.11\n2,0.19\n");
+  EXPECT_DOUBLE_EQ(import_recording(options_).keyframes[1].time, 0.11);
+  options_.overwrite = true;
+  options_.times = folder_.write("times.csv", "frame,t_s\n0,0.01\n1,0.11\n");
+  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
+            options_.times + ": found 2 times, expected 3, one a frame");
+  options_.times = "rate:ten";
+  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
+            "--times: found \"rate:ten\", expected rate:HZ, rate:HZ:START or a CSV file with a column t");
+}
+
+TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
+  CameraIntrinsics camera;
+  camera.width = 4;
+  camera.height = 4;
+  camera.fx = camera.fy = 10;
+  camera.cx = camera.cy = 1.5;
+  save_camera_info(camera, folder_ / "camera.yaml");
+  // 1 m above (0.5, 0.24), looking down: half a turn about x.
+  folder_.write("camera.tum", "0 0.5 0.24 1.06 1 0 0 0\n");
+  DepthImage depth{4, 4, std::vector<std::uint16_t>(16, 2000)};
+  MaskImage mask{4, 4, std::vector<std::uint8_t>(16, 0)};
+  mask.at(1, 2) = 255;
+  save_depth_image(depth, folder_ / "depth/a.png");
+  save_mask(mask, folder_ / "masks/a.png");
+  options_.clouds.clear();
+  options_.depth = folder_ / "depth";
+  options_.masks = folder_ / "masks";
+  options_.intrinsics = folder_ / "camera.yaml";
+  options_.extrinsics = folder_ / "camera.tum";
+  options_.depth_scale = 0.0005;
+  const Recording recording = import_recording(options_);
+  std::vector<std::string> notices;
+  const Points cloud = load_keyframes(recording, notices)[0].cloud;
+  ASSERT_EQ(cloud.rows(), 1);
+  // Pixel (1, 2): x -0.05, y 0.05 in the camera, which in the base are -0.05 and -0.05.
+  EXPECT_TRUE(cloud.row(0).isApprox(Eigen::RowVector3d(0.45, 0.19, 0.06), 1e-9)) << cloud;
+
+  folder_.write("camera.json",
+                R"({"schema": "flash-extrinsics/1", "setup": "eye-to-hand", "transform": {"parent": "base",
+    "child": "camera", "translation": [0.5, 0.24, 1.06], "rotation_xyzw": [1, 0, 0, 0]}})");
+  EXPECT_TRUE(load_extrinsics(folder_ / "camera.json").isApprox(load_extrinsics(folder_ / "camera.tum")));
+  options_.overwrite = true;
+  options_.extrinsics.clear();
+  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
+            "import: --depth needs --intrinsics and --extrinsics");
+}
+
+TEST_F(ImportFiles, WhatFailsItsCheckLeavesNoRecording) {
+  options_.grasp = "corner:0,2";
+  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("--grasp: found \"corner:0,2\""),
+            std::string::npos);
+  options_.grasp = "position";  // the sheet would lie at the origin, half a metre from the gripper
+  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("no vertex lies within"),
+            std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "lift/recording.json"));
+  options_.grasp = "corner";
+  options_.crop_z = "0.5:0.1";
+  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
+            "--crop-z: found \"0.5:0.1\", expected a low end below the high one");
+  options_.crop_z = "1:";
+  EXPECT_NE(
+      input_error_of([&] { import_recording(options_); }).find("no keyframe has a point inside the crop box"),
+      std::string::npos);
+  options_.crop_z.clear();
+  import_recording(options_);
+  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("exists already"), std::string::npos);
+}
+
+class ImportedClip : public testing::TestWithParam<const char*> {};
+
+/// The shared recordings were written by hand; the import has to find the same sheet within what is fitted
+/// afterwards.
+TEST_P(ImportedClip, StartsNearTheRecordingMadeByHand) {
+  const std::string clip = std::string(FLASH_SHARED_DIR) + "/data/" + GetParam();
+  if (!std::filesystem::exists(clip)) GTEST_SKIP() << clip << " is absent";
+  const Recording by_hand = load_recording(clip);
+  const TemporaryFolder folder;
+  ImportOptions options;
+  options.clouds = clip + "/frames";
+  options.trajectory = by_hand.trajectory_paths.at("gripper");
+  const bool twin = std::string(GetParam()).starts_with("twin");
+  options.sheet = twin ? "0.4x0.4" : "0.278x0.278";
+  options.grasp = twin ? "corner:1,1" : "corner";
+  if (!twin) {
+    options.crop_z = "0.075:";
+    options.crop_y = ":0.3";
+    options.nuisance.offset.setConstant(0.06);
+  }
+  options.out = folder / "recording";
+  const Recording imported = import_recording(options);
+  const Eigen::Matrix3d turn =
+      by_hand.base_from_object.linear().transpose() * imported.base_from_object.linear();
+  EXPECT_LT(std::acos(std::min(1.0, (turn.trace() - 1) / 2)), 0.35);  // the bound of start_yaw_rad
+  EXPECT_LT((by_hand.start - imported.start).rowwise().norm().maxCoeff(), 0.14);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ImportedClip,
+                         testing::Values("lift/lift_paper", "lift/lift_navy2", "twin/lift_a"),
+                         [](const auto& parameter) {
+                           std::string name = parameter.param;
+                           name[name.find('/')] = '_';
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace flash::data
