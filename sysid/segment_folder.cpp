@@ -6,7 +6,7 @@
 
 #include "data/depth_image.h"
 #include "data/error.h"
-#include "data/json_reader.h"
+#include "data/import.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
 #include "sysid/segment_picture.h"
@@ -75,19 +75,6 @@ std::string frame_name(int frame) {
 
 }  // namespace
 
-Eigen::Isometry3d load_base_from_camera(const std::string& path) {
-  const nlohmann::json json = data::load_json(path);
-  const data::JsonObject file(json, path);
-  if (file.string("schema") != "flash-extrinsics/1") throw file.error("schema", "\"flash-extrinsics/1\"");
-  const data::JsonObject transform = file.object("transform");
-  const Eigen::Vector4d xyzw = transform.vector("rotation_xyzw", 4);
-  if (std::abs(xyzw.norm() - 1) > 1e-3) throw transform.error("rotation_xyzw", "a unit quaternion x y z w");
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = Eigen::Quaterniond(xyzw[3], xyzw[0], xyzw[1], xyzw[2]).normalized().toRotationMatrix();
-  pose.translation() = transform.vector("translation", 3);
-  return pose;
-}
-
 RawView open_raw_view(const std::string& folder) {
   if (!fs::is_directory(folder)) throw data::input_error(folder, "folder", "does not exist");
   RawView view;
@@ -103,7 +90,7 @@ RawView open_raw_view(const std::string& folder) {
   }
   const fs::path extrinsics = fs::path(folder) / "extrinsics.json";
   if (fs::exists(extrinsics))
-    view.base_from_camera = load_base_from_camera(extrinsics.string());
+    view.base_from_camera = data::load_extrinsics(extrinsics.string());
   else if (!clouds)
     throw data::input_error(extrinsics.string(), "file",
                             "missing: depth images need the pose of their camera");

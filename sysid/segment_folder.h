@@ -24,9 +24,6 @@ struct RawView {
 /// clouds without one are taken as they stand, in the base frame. Throws InputError naming what is missing.
 RawView open_raw_view(const std::string& folder);
 
-/// transform of a "flash-extrinsics/1" file whose parent is the robot's base: T_base_camera.
-Eigen::Isometry3d load_base_from_camera(const std::string& path);
-
 /// One frame in the base frame [m]; depth pixels of zero are left out.
 data::Points load_raw_frame(const RawView& view, int frame);
 
