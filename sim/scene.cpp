@@ -61,10 +61,13 @@ void add_supports(const data::Scene& scene, const data::SceneObject& object, Sce
   const data::Points& start = environment.state.positions;
   for (const data::SceneFixed& fixed : object.fixed) {
     check_vertices(scene, object, "fixed", fixed.vertices, start.rows());
-    for (std::size_t i = 0; i < fixed.vertices.size(); ++i) {
+    std::vector<int> vertices = fixed.vertices;
+    if (fixed.all)
+      for (int i = 0; i < int(start.rows()); ++i) vertices.push_back(i);
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
       const bool given = fixed.positions.rows() > 0;
-      const Vector3d at = given ? fixed.positions.row(Eigen::Index(i)) : start.row(fixed.vertices[i]);
-      environment.fixed.push_back({fixed.vertices[i], fixed.axes, at});
+      const Vector3d at = given ? fixed.positions.row(Eigen::Index(i)) : start.row(vertices[i]);
+      environment.fixed.push_back({vertices[i], fixed.axes, at});
     }
   }
   for (const data::SceneLoad& load : object.loads) {
@@ -219,6 +222,7 @@ std::vector<SceneBody> scene_bodies(const data::Scene& scene, std::vector<std::s
   std::vector<SceneBody> bodies;
   for (const data::SceneObject& object : scene.objects) bodies.push_back(make_body(scene, object, notices));
   if (bodies.size() > 1) notices.push_back("the objects of this scene do not touch each other");
+  if (data::asks_for_cuda(scene.solver)) notices.push_back("no CUDA backend here: running on the CPU");
   return bodies;
 }
 
