@@ -8,6 +8,7 @@
 #include <future>
 #include <limits>
 #include <map>
+#include <memory>
 #include <set>
 #include <utility>
 
@@ -16,6 +17,7 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
+#include "sim/projective.h"
 
 namespace flash::sim {
 namespace {
@@ -141,6 +143,34 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object,
   return body;
 }
 
+/// Advances an environment by one step.
+using Stepper = std::function<StepReport(Environment&)>;
+
+Stepper make_stepper(const data::SceneSolver& solver, double time_step, const SceneBody& body) {
+  if (solver.integrator == "newton") {
+    SolverSettings settings;
+    settings.time_step = time_step;
+    settings.max_iterations = solver.max_iterations;
+    settings.tolerance = solver.tolerance;
+    return
+        [newton = std::make_shared<Solver>(body.sheet, settings)](Environment& e) { return newton->step(e); };
+  }
+  ProjectiveSettings settings;
+  settings.time_step = time_step;
+  settings.iterations = solver.max_iterations;
+  settings.tolerance = solver.tolerance;
+  settings.metric = solver.constraint_solver.starts_with("Lite")        ? ContactMetric::inertia
+                    : solver.constraint_solver.starts_with("NonSmooth") ? ContactMetric::full
+                                                                        : ContactMetric::automatic;
+  settings.constraints.iterations = solver.constraint_iterations;
+  settings.constraints.tolerance = solver.constraint_tolerance;
+  settings.constraints.max_force = solver.max_force;
+  settings.constraints.linear.solver = dual_solver_from_name(solver.constraint_linear_solver);
+  return [projective = std::make_shared<ProjectiveSolver>(body.sheet, settings)](Environment& e) {
+    return projective->step(e);
+  };
+}
+
 double distance_to_box(const Vector3d& half_extents, const Vector3d& point) {
   return (point.cwiseAbs() - half_extents).cwiseMax(0.0).norm();
 }
@@ -222,6 +252,9 @@ std::vector<SceneBody> scene_bodies(const data::Scene& scene, std::vector<std::s
   std::vector<SceneBody> bodies;
   for (const data::SceneObject& object : scene.objects) bodies.push_back(make_body(scene, object, notices));
   if (bodies.size() > 1) notices.push_back("the objects of this scene do not touch each other");
+  if (scene.solver.integrator == "newton" && scene.solver.constraint_solver.starts_with("Lite"))
+    notices.push_back(
+        "contacts are met exactly by the newton integrator; solver.type projective has the inertia metric");
   if (data::asks_for_cuda(scene.solver)) notices.push_back("no CUDA backend here: running on the CPU");
   return bodies;
 }
@@ -259,12 +292,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   if (run.notice)
     for (const std::string& notice : summary.notices) run.notice(notice);
 
-  SolverSettings settings;
-  settings.time_step = scene.time_step;
-  settings.max_iterations = scene.solver.max_iterations;
-  settings.tolerance = scene.solver.tolerance;
-  std::vector<Solver> solvers;
-  for (const SceneBody& body : bodies) solvers.emplace_back(body.sheet, settings);
+  std::vector<Stepper> steppers;
+  for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
 
   const int steps = run.steps >= 0 ? run.steps : scene.steps;
   const std::set<int> frames = frames_to_write(scene, steps);
@@ -290,7 +319,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     for (int step = 1; step <= steps && !summary.interrupted; ++step) {
       for (SceneBody& body : bodies) close_pending_grasps(body);
       std::vector<std::future<void>> pending;
-      const auto advance = [&](std::size_t b) { reports[b] = solvers[b].step(bodies[b].environment); };
+      const auto advance = [&](std::size_t b) { reports[b] = steppers[b](bodies[b].environment); };
       for (std::size_t b = 0; b < bodies.size(); ++b)
         if (run.threads > 1 && b + 1 < bodies.size())
           pending.push_back(std::async(std::launch::async, advance, b));

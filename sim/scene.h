@@ -1,13 +1,11 @@
 #pragma once
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
 #include "data/scene.h"
 #include "sim/environment.h"
 #include "sim/sheet.h"
-#include "sim/solver.h"
 
 namespace flash::sim {
 
