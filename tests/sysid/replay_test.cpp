@@ -1,0 +1,168 @@
+#include "sysid/replay.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "data/error.h"
+#include "data/procedural_mesh.h"
+#include "sysid/grid_search.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+TEST(Pinch, FoldsThePatchAboutItsRidgeWithoutStretchingIt) {
+  data::Points flat(5, 3);
+  flat << 0, 0, 0, 0.02, 0, 0, 0, 0.02, 0, 0.02, 0.02, 0, 0.01, 0.01, 0;
+  const Eigen::Vector3d ridge = Eigen::Vector3d(1, 1, 0).normalized();
+  const data::Points folded = pinch_targets(flat, ridge, Eigen::Vector3d::UnitZ(), 0);
+  const double half = 0.02 / std::sqrt(2.0);
+  // Both wings come down from the ridge and stand on the table together.
+  EXPECT_NEAR(folded(0, 2), half, 1e-15);
+  EXPECT_NEAR(folded(3, 2), half, 1e-15);
+  EXPECT_NEAR(folded(1, 2), 0, 1e-15);
+  EXPECT_NEAR((folded.row(1) - folded.row(2)).norm(), 0, 1e-15);
+  for (const auto& [i, j] : {std::pair{0, 1}, {0, 2}, {1, 3}, {0, 4}, {3, 4}}) {
+    EXPECT_NEAR((folded.row(i) - folded.row(j)).norm(), (flat.row(i) - flat.row(j)).norm(), 1e-15);
+  }
+  const data::Points tilted = pinch_targets(flat, ridge, Eigen::Vector3d::UnitZ(), 0.5);
+  EXPECT_NEAR((tilted.row(0) - tilted.row(3)).norm(), (flat.row(0) - flat.row(3)).norm(), 1e-15);
+  EXPECT_NEAR((tilted(0, 2) - tilted(3, 2)) / (tilted.row(0) - tilted.row(3)).norm(), std::sin(0.5), 1e-12);
+}
+
+class Lift : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    path = std::string(FLASH_SHARED_DIR) + "/data/twin/lift_a";
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "no recording at " << path;
+    recording = data::load_recording(path);
+    settings.mesh = "sheet:0.4x0.4:0.04";
+    settings.grasp_within = 0.041;
+  }
+  std::string path;
+  data::Recording recording;
+  ReplaySettings settings;
+};
+
+TEST_F(Lift, ClampHoldsThePatchAsItLies) {
+  const Replay replay = make_replay(recording, settings);
+  EXPECT_EQ(replay.start, 0);
+  EXPECT_NEAR(replay.pivot.x(), 0.39, 1e-12);
+  EXPECT_NEAR(replay.start + (replay.steps - 1) * 0.01, 2.5, 1e-9);
+  const sim::Environment environment = make_environment(replay, {});
+  EXPECT_EQ(environment.grasps.at(0).vertices.size(), 4u);
+  EXPECT_EQ(environment.grasps.at(0).targets.rows(), 0);
+  EXPECT_EQ(environment.obstacles.size(), 1u);
+}
+
+TEST_F(Lift, PointHoldsTheCornerAlone) {
+  settings.grasp_shape = data::GraspShape::point;
+  const Replay replay = make_replay(recording, settings);
+  const sim::Environment environment = make_environment(replay, {});
+  ASSERT_EQ(environment.grasps.at(0).vertices.size(), 1u);
+  const auto corner = replay.recording.mesh.vertices.row(environment.grasps[0].vertices[0]);
+  EXPECT_NEAR((corner - Eigen::RowVector3d(0.4, 0.4, 0)).norm(), 0, 1e-12);
+}
+
+TEST_F(Lift, PinchClosesBeforeTheRecordingStarts) {
+  settings.grasp_shape = data::GraspShape::pinch;
+  const Replay replay = make_replay(recording, settings);
+  EXPECT_NEAR(replay.start, -0.4, 1e-12);
+  ReplayCandidate candidate;
+  candidate.nuisance.grasp_depth = 0.041;
+  const sim::Environment environment = make_environment(replay, candidate);
+  const sim::Grasp& grasp = environment.grasps.at(0);
+  EXPECT_EQ(grasp.vertices.size(), 4u);
+  EXPECT_EQ(grasp.from, replay.start);
+  EXPECT_LE(grasp.from + grasp.closing_time, 0);
+  const Eigen::VectorXd heights = grasp.targets.col(2);  // the gripper starts at z = 0, unturned
+  EXPECT_NEAR(heights.minCoeff(), 0, 1e-12);
+  EXPECT_NEAR(heights.maxCoeff(), 0.04 / std::sqrt(2.0), 1e-12);
+}
+
+TEST_F(Lift, StartYawTurnsTheSheetAboutTheGripperAndTableHeightLeavesTheGripperWhereItIs) {
+  settings.pre_roll = 0.3;
+  const Replay replay = make_replay(recording, settings);
+  ReplayCandidate candidate;
+  candidate.nuisance.start_yaw = 0.2;
+  candidate.nuisance.table_height = -0.01;
+  const sim::Environment environment = make_environment(replay, candidate);
+  const data::Points& start = environment.state.positions;
+  const Eigen::RowVector3d was = replay.recording.start.row(0) - replay.pivot.transpose(),
+                           is = start.row(0) - replay.pivot.transpose();
+  EXPECT_NEAR(std::atan2(is.y(), is.x()) - std::atan2(was.y(), was.x()), 0.2, 1e-12);
+  EXPECT_NEAR(is.head<2>().norm(), was.head<2>().norm(), 1e-12);
+  EXPECT_NEAR(start.col(2).maxCoeff(), -0.01, 1e-12);
+  EXPECT_NEAR(std::get<sim::Plane>(environment.obstacles.at(0).shape).point.z(), -0.01, 1e-12);
+  EXPECT_NEAR(environment.grasps.at(0).targets.col(2).norm(), 0, 1e-12);
+
+  candidate.nuisance.table_height = 0.01;  // a table above the recorded grasp carries the patch
+  const sim::Environment raised = make_environment(replay, candidate);
+  EXPECT_NEAR(raised.grasps.at(0).targets.col(2).minCoeff(), 0.01, 1e-12);
+}
+
+TEST_F(Lift, RegistrationTakesBoundsAndPivotOfTheRecording) {
+  recording.nuisance.offset = {0.01, 0.02, 0.03};
+  recording.nuisance.yaw = kPi / 12;
+  const Replay replay = make_replay(recording, settings);
+  const Motion motion;
+  const RegistrationProblem problem = registration_problem(replay, motion);
+  EXPECT_EQ(problem.bounds.offset, recording.nuisance.offset);
+  EXPECT_EQ(problem.bounds.yaw, kPi / 12);
+  EXPECT_EQ(problem.start.pivot, replay.pivot);
+}
+
+TEST_F(Lift, GridSearchEqualsItselfWithMoreThreadsAndAfterAStop) {
+  settings.score_to = 0.3;
+  Replay replay = make_replay(recording, settings);
+  replay.steps = 30;
+  GridSettings grid;
+  grid.axes = {parse_axis("bending", "5e-5:2e-4:3:log"), parse_axis("friction", "0.2,0.4")};
+  const auto folder = [](const char* name) {
+    const auto place = std::filesystem::temp_directory_path() / name;
+    std::filesystem::remove_all(place);
+    return place.string();
+  };
+  const std::string key = fingerprint({replay}, grid);
+  const std::string at_once = folder("flash_grid_at_once"), stopped = folder("flash_grid_stopped");
+  ResultsStore one(at_once, grid.axes, {recording.name}, key, false);
+  EXPECT_TRUE(grid_search({replay}, grid, one));
+
+  std::atomic<bool> stop = false;
+  {
+    ResultsStore first(stopped, grid.axes, {recording.name}, key, false);
+    EXPECT_FALSE(grid_search(
+        {replay}, grid, first, [&](const Progress& p) { stop = p.done >= 2; }, &stop));
+    EXPECT_EQ(first.results().candidates.size(), 2u);
+  }
+  grid.threads = 2;
+  EXPECT_EQ(fingerprint({replay}, grid), key);  // threads decide nothing
+  ResultsStore rest(stopped, grid.axes, {recording.name}, key, true);
+  EXPECT_TRUE(grid_search({replay}, grid, rest));
+  ASSERT_EQ(rest.results().candidates.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(rest.results().candidates[i].score, one.results().candidates[i].score);
+    EXPECT_EQ(rest.results().candidates[i].values, one.results().candidates[i].values);
+  }
+  std::filesystem::remove_all(at_once);
+  std::filesystem::remove_all(stopped);
+}
+
+TEST_F(Lift, FingerprintFollowsSettingsAndInputs) {
+  const Replay replay = make_replay(recording, settings);
+  GridSettings grid;
+  grid.axes = {parse_axis("bending", "1e-4")};
+  const std::string key = fingerprint({replay}, grid);
+  GridSettings other = grid;
+  other.base.material.friction += 0.1;
+  EXPECT_NE(fingerprint({replay}, other), key);
+  Replay moved = replay;
+  moved.observations[3].points(0, 0) += 1e-6;
+  EXPECT_NE(fingerprint({moved}, grid), key);
+}
+
+}  // namespace
+}  // namespace flash::sysid
