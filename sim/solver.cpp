@@ -42,7 +42,7 @@ struct Solver::Workspace {
   SolverSettings settings;
   std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> bending;
   BlockCholesky<double> factor;
-  BlockValues<double> values, damping;
+  BlockValues<double> values, restricted, damping;
   bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
 
   Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
@@ -50,12 +50,12 @@ struct Solver::Workspace {
 
   const BendingOperator& bending_of(const data::SheetMaterial& material);
 
-  /// Conjugate gradients on the free directions. The matrix has the bending operator itself and the
-  /// constraints of this iterate; the factor that preconditions it has the operator's stand-in, and may be of
-  /// an earlier iterate. Returns the number of iterations, 0 where the matrix could not be factorized.
-  int solve(const BendingOperator& operator_, double bending_rigidity,
-            const std::vector<VertexConstraint>& constraints, const Points& right_hand_side, double tolerance,
-            Points& solution);
+  /// Newton direction by conjugate gradients on the free directions. The matrix has the bending operator
+  /// itself and the constraints of this iterate; the factor that preconditions it has the operator's
+  /// stand-in, and may be of an earlier iterate. Returns false where the matrix could not be factorized.
+  bool solve(const BendingOperator& bending_operator, double bending_rigidity,
+             const std::vector<VertexConstraint>& constraints, const Points& gradient, double tolerance,
+             Points& direction, Points& force, StepReport& report);
 };
 
 const BendingOperator& Solver::Workspace::bending_of(const data::SheetMaterial& material) {
@@ -90,7 +90,7 @@ class StepProblem {
     force = mass_.asDiagonal() * (inertial / (h_ * h_) + drag * moved) - loads_;
     double potential = 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() +
                        0.5 * drag * (mass_.asDiagonal() * moved).cwiseProduct(moved).sum() -
-                       loads_.cwiseProduct(positions).sum();
+                       loads_.cwiseProduct(moved).sum();
     if (!damping_.empty()) {
       Points damped = Points::Zero(moved.rows(), 3);
       add_block_product(plan_.pattern, damping_, 1.0, moved, damped);
@@ -121,60 +121,120 @@ class StepProblem {
   Points target_, loads_;
 };
 
-/// Turns the matrix into that of the free directions, P (B + friction) P + (I - P) scaled to its neighbours.
-void constrain(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints,
-               BlockValues<double>& values) {
-  const auto block = [&](size_t k) { return Map<Matrix3d>(values.data() + 9 * k); };
-  for (int i = 0; i < pattern.size; ++i) {
+/// A point on the way to the end of a step, always feasible.
+struct Iterate {
+  Points positions, force, residual;
+  std::vector<VertexConstraint> constraints;
+  ElasticEnergy elastic;
+  double potential = 0;
+};
+
+/// The friction force of a slipping vertex turns with its slip.
+void add_slip_stiffness(const std::vector<VertexConstraint>& constraints, BlockValues<double>& values) {
+  for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& c = constraints[i];
-    if (c.hold == Hold::free) continue;
-    const Matrix3d friction =
-        c.slip_stiffness * (Matrix3d::Identity() - c.slip_direction * c.slip_direction.transpose());
-    const double scale = block(i).trace() / 3;
-    block(i) = c.free * (block(i) + friction) * c.free + scale * (Matrix3d::Identity() - c.free);
+    if (c.slip_stiffness == 0) continue;
+    Map<Matrix3d> block(values.data() + 9 * i);
+    block += c.slip_stiffness * c.free *
+             (Matrix3d::Identity() - c.slip_direction * c.slip_direction.transpose()) * c.free;
+  }
+}
+
+/// P B P + (I - P) scaled to its neighbours: the matrix of the free directions.
+void restrict_matrix(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints,
+                     const BlockValues<double>& values, BlockValues<double>& restricted) {
+  restricted = values;
+  const auto block = [&](size_t k) { return Map<Matrix3d>(restricted.data() + 9 * k); };
+  const auto is_free = [&](int i) { return constraints[i].hold == Hold::free; };
+  for (int i = 0; i < pattern.size; ++i) {
+    if (is_free(i)) continue;
+    const Matrix3d& P = constraints[i].free;
+    block(i) = P * block(i) * P + block(i).trace() / 3 * (Matrix3d::Identity() - P);
   }
   for (size_t k = 0; k < pattern.pairs.size(); ++k) {
     const auto [row, column] = pattern.pairs[k];
-    if (constraints[row].hold == Hold::free && constraints[column].hold == Hold::free) continue;
+    if (is_free(row) && is_free(column)) continue;
     auto b = block(pattern.size + k);
     b = constraints[row].free * b * constraints[column].free;
   }
 }
 
-void restrict_to_free(const std::vector<VertexConstraint>& constraints, Points& vectors) {
+void restrict_vectors(const std::vector<VertexConstraint>& constraints, Points& vectors) {
   for (size_t i = 0; i < constraints.size(); ++i)
     if (constraints[i].hold != Hold::free) vectors.row(i) *= constraints[i].free;
 }
 
+/// One exchange of the active set of the linear problem: holds free vertices that `direction` drives into a
+/// surface and frees held ones that the surface would have to pull (`force`: what they would need at its
+/// end). Returns whether any.
+bool exchange_contacts(const Points& direction, const Points& force_before, const Points& force,
+                       Points& gradient, std::vector<VertexConstraint>& constraints) {
+  bool any = false;
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    VertexConstraint& c = constraints[i];
+    if (c.hold == Hold::fixed || c.obstacle < 0) continue;
+    if (c.hold == Hold::free && c.gap + c.normal.dot(direction.row(i)) < -1e-12) {
+      c.hold = Hold::slip;
+      c.free = Matrix3d::Identity() - c.normal * c.normal.transpose();
+      c.correction = -c.gap * c.normal;
+      any = true;
+    } else if (c.hold != Hold::free && c.normal.dot(force.row(i)) < 0) {
+      c.hold = Hold::free;
+      c.free.setIdentity();
+      c.correction.setZero();
+      gradient.row(i) = force_before.row(i);
+      any = true;
+    }
+  }
+  return any;
+}
+
 }  // namespace
 
-int Solver::Workspace::solve(const BendingOperator& operator_, double bending_rigidity,
-                             const std::vector<VertexConstraint>& constraints, const Points& right_hand_side,
-                             double tolerance, Points& solution) {
-  if (refactor && !factor.factorize(values)) return 0;
-  Points residual = right_hand_side, product(residual.rows(), 3), preconditioned, search;
-  restrict_to_free(constraints, residual);
-  solution.setZero(residual.rows(), 3);
+bool Solver::Workspace::solve(const BendingOperator& bending_operator, double bending_rigidity,
+                              const std::vector<VertexConstraint>& constraints, const Points& gradient,
+                              double tolerance, Points& direction, Points& force, StepReport& report) {
+  if (refactor) {
+    restrict_matrix(plan->pattern, constraints, values, restricted);
+    if (!factor.factorize(restricted)) return false;
+    ++report.factorizations;
+  }
+  const auto multiply = [&](const Points& x, Points& product) {
+    product.setZero(x.rows(), 3);
+    add_block_product(plan->pattern, values, 1.0, x, product);
+    if (bending_operator.model == data::BendingModel::plate)
+      add_bending_correction(bending_operator, bending_rigidity, x, product);
+  };
+  Points residual = -gradient, product, preconditioned, search;
+  direction.setZero(residual.rows(), 3);
+  for (size_t i = 0; i < constraints.size(); ++i) direction.row(i) = constraints[i].correction;
+  if (!direction.isZero(0)) {
+    multiply(direction, product);
+    residual -= product;
+  }
+  restrict_vectors(constraints, residual);
   const double target = std::max(0.05 * residual.norm(), tolerance);
   double previous = 0;
-  for (int iteration = 1;; ++iteration) {
+  int iteration = 0;
+  while (residual.norm() > target && iteration < 30) {
+    ++iteration;
     preconditioned = residual;
     factor.solve_in_place(preconditioned.data());
-    restrict_to_free(constraints, preconditioned);
+    restrict_vectors(constraints, preconditioned);
     const double along = residual.cwiseProduct(preconditioned).sum();
     search = iteration == 1 ? preconditioned : Points(preconditioned + along / previous * search);
     previous = along;
-    product.setZero();
-    add_block_product(plan->pattern, values, 1.0, search, product);
-    if (operator_.model == data::BendingModel::plate) {
-      add_bending_correction(operator_, bending_rigidity, search, product);
-      restrict_to_free(constraints, product);
-    }
+    multiply(search, product);
+    restrict_vectors(constraints, product);
     const double step = along / search.cwiseProduct(product).sum();
-    solution += step * search;
+    direction += step * search;
     residual -= step * product;
-    if (residual.norm() <= target || iteration == 30) return iteration;
   }
+  multiply(direction, product);
+  force += product;
+  report.solves += iteration;
+  refactor = iteration > settings.stale_factor_solves;
+  return true;
 }
 
 Solver::Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings)
@@ -202,76 +262,79 @@ StepReport Solver::step(Environment& environment) {
   const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
   const double force_scale = problem.mass().norm() * gravity;
 
-  Points x = start.positions + h * start.velocities;
-  std::vector<VertexConstraint> constraints = begin_step(environment, time, x);
-  Points force(x.rows(), 3), residual(x.rows(), 3), direction(x.rows(), 3), trial, trial_force(x.rows(), 3);
-  ElasticEnergy elastic, trial_elastic;
-  double potential = problem.evaluate(x, force, elastic);
   StepReport report;
-  const auto judge = [&] {
-    update_contacts(environment, time, h, x, force, constraints);
-    report.penetration_max = report.complementarity = 0;
-    for (int i = 0; i < x.rows(); ++i) {
-      residual.row(i) = force.row(i) - constraints[i].reaction.transpose();
-      if (constraints[i].hold == Hold::fixed) continue;
-      report.penetration_max = std::max(report.penetration_max, -constraints[i].gap);
-      if (constraints[i].hold != Hold::free)
-        report.complementarity = std::max(report.complementarity, std::abs(constraints[i].gap));
-    }
-    report.residual = residual.norm() / force_scale;
-    report.converged = report.residual <= w.settings.tolerance;
+  Iterate now, trial;
+  const auto evaluate = [&](Iterate& iterate) {
+    iterate.potential = problem.evaluate(iterate.positions, iterate.force, iterate.elastic);
+    update_contacts(environment, time, h, iterate.positions, iterate.force, iterate.constraints);
+    iterate.residual = iterate.force;
+    for (int i = 0; i < iterate.residual.rows(); ++i)
+      iterate.residual.row(i) -= iterate.constraints[i].reaction.transpose();
   };
-  judge();
-  while (!report.converged && report.iterations < w.settings.max_iterations) {
+  now.positions = start.positions + h * start.velocities;
+  now.constraints = begin_step(environment, time, now.positions);
+  evaluate(now);
+  trial.constraints = now.constraints;
+  Points direction;
+  while (report.iterations < w.settings.max_iterations &&
+         now.residual.norm() > w.settings.tolerance * force_scale) {
     ++report.iterations;
-    problem.assemble(x, w.values);
-    constrain(w.plan->pattern, constraints, w.values);
-    const int solves = w.solve(bending, environment.material.bending_rigidity, constraints, -residual,
-                               0.3 * w.settings.tolerance * force_scale, direction);
-    if (solves == 0) break;
-    report.solves += solves;
-    report.factorizations += w.refactor;
-    w.refactor = solves > w.settings.stale_factor_solves;
+    problem.assemble(now.positions, w.values);
+    add_slip_stiffness(now.constraints, w.values);
+    std::vector<VertexConstraint> linear = now.constraints;
+    Points gradient = now.residual, force;
+    for (int exchange = 0; exchange < 6; ++exchange) {
+      force = now.force;
+      if (!w.solve(bending, environment.material.bending_rigidity, linear, gradient,
+                   0.3 * w.settings.tolerance * force_scale, direction, force, report))
+        break;
+      if (!exchange_contacts(direction, now.force, force, gradient, linear)) break;
+    }
 
-    const double before = potential + friction_potential(environment, time, h, constraints, x);
-    const double slope = residual.cwiseProduct(direction).sum();
+    // The potential guides the step; where the surface is curved or the normal forces change it is not exact,
+    // and a smaller residual does as well. Near the solution the potential falls by less than its rounding.
+    const double before =
+        now.potential + friction_potential(environment, time, h, now.constraints, now.positions);
+    const double slope = now.residual.cwiseProduct(direction).sum();
     double length = 1.0;
     for (int cut = 0;; ++cut) {
-      trial = x + length * direction;
-      project_to_feasible(environment, time, h, constraints, trial);
-      const double trial_potential = problem.evaluate(trial, trial_force, trial_elastic);
-      const double after = trial_potential + friction_potential(environment, time, h, constraints, trial);
-      if (cut == 8 || after <= before + 1e-4 * length * slope + 1e-13 * std::abs(before)) {
-        x.swap(trial);
-        force.swap(trial_force);
-        elastic = trial_elastic;
-        potential = trial_potential;
+      trial.positions = now.positions + length * direction;
+      project_to_feasible(environment, time, h, linear, trial.positions);
+      evaluate(trial);
+      const double after =
+          trial.potential + friction_potential(environment, time, h, now.constraints, trial.positions);
+      if (cut == 8 || after <= before + 1e-4 * length * slope ||
+          trial.residual.norm() <= (1 - 0.1 * length) * now.residual.norm())
         break;
-      }
       length *= 0.5;
     }
-    judge();
+    std::swap(now, trial);
   }
+  report.residual = now.residual.norm() / force_scale;
+  report.converged = report.residual <= w.settings.tolerance;
 
-  report.membrane = elastic.membrane;
-  report.bending = elastic.bending;
+  report.membrane = now.elastic.membrane;
+  report.bending = now.elastic.bending;
   report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
-  for (size_t i = 0; i < constraints.size(); ++i) {
-    const VertexConstraint& c = constraints[i];
-    if (c.hold == Hold::fixed)
+  for (const VertexConstraint& c : now.constraints) {
+    if (c.hold == Hold::fixed) {
       (c.grasp >= 0 ? report.grasp_forces[c.grasp] : report.fixed_force) += c.reaction;
-    else if (c.hold != Hold::free)
-      report.obstacle_forces[c.obstacle] += c.reaction;
+      continue;
+    }
+    report.penetration_max = std::max(report.penetration_max, -c.gap);
+    if (c.hold == Hold::free) continue;
+    report.complementarity = std::max(report.complementarity, std::abs(c.gap));
+    report.obstacle_forces[c.obstacle] += c.reaction;
   }
-  environment.state.velocities = (x - start.positions) / h;
-  environment.state.positions = x;
+  environment.state.velocities = (now.positions - start.positions) / h;
+  environment.state.positions = now.positions;
   environment.state.time = time;
   const Eigen::VectorXd& mass = problem.mass();
   report.kinetic =
       0.5 *
       (mass.asDiagonal() * environment.state.velocities).cwiseProduct(environment.state.velocities).sum();
-  report.potential = -(mass.transpose() * x * environment.gravity)(0);
+  report.potential = -(mass.transpose() * now.positions * environment.gravity)(0);
   return report;
 }
 

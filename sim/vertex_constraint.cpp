@@ -88,6 +88,7 @@ void update_contacts(const Environment& environment, double time, double time_st
     const Gap gap = nearest_gap(environment, positions.row(i), time, constraint.obstacle);
     const double normal_force = gap.normal.dot(needed);
     constraint.gap = gap.distance;
+    constraint.normal = gap.normal;
     if (gap.distance > touching || normal_force <= 0) continue;
 
     const Obstacle& obstacle = environment.obstacles[constraint.obstacle];

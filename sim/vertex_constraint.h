@@ -17,11 +17,13 @@ enum class Hold {
 /// The constraint on one vertex at the current iterate of a step.
 struct VertexConstraint {
   Hold hold = Hold::free;
-  int grasp = -1;                                      ///< which grasp holds it
-  int obstacle = -1;                                   ///< which obstacle is nearest
-  double gap = 0.0;                                    ///< to that obstacle [m]
-  Eigen::Matrix3d free = Eigen::Matrix3d::Identity();  ///< projector on the directions it may move in
-  Eigen::Vector3d reaction = Eigen::Vector3d::Zero();  ///< force on the vertex, always admissible [N]
+  int grasp = -1;                                        ///< which grasp holds it
+  int obstacle = -1;                                     ///< which obstacle is nearest
+  double gap = 0.0;                                      ///< to that obstacle [m]
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();      ///< of that obstacle
+  Eigen::Vector3d correction = Eigen::Vector3d::Zero();  ///< displacement that a held direction must make [m]
+  Eigen::Matrix3d free = Eigen::Matrix3d::Identity();    ///< projector on the directions it may move in
+  Eigen::Vector3d reaction = Eigen::Vector3d::Zero();    ///< force on the vertex, always admissible [N]
   Eigen::Vector3d slip_direction =
       Eigen::Vector3d::Zero();  ///< slip / its smoothed length; unit where slip starts
   double friction_bound = 0.0;  ///< mu lambda_n [N]

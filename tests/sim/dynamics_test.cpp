@@ -1,0 +1,159 @@
+// Closed forms of implicit Euler that any solver of it must show.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sheet_scene.h"
+
+namespace flash::sim {
+namespace {
+
+using Eigen::RowVector3d;
+using Eigen::Vector3d;
+
+constexpr double g = 9.81;
+
+TEST(Dynamics, FreeFallFollowsTheDiscreteLaw) {
+  const Sheet sheet = small_sheet();
+  for (const double h : {0.01, 0.001}) {
+    Environment environment = environment_of(sheet);
+    const RowVector3d velocity(0.3, -0.2, 1.0);
+    environment.state.velocities.rowwise() = velocity;
+    Solver solver(sheet, {.time_step = h, .tolerance = 1e-12});
+    const int steps = 50;
+    for (int n = 0; n < steps; ++n) solver.step(environment);
+    // x_n = x_0 + v_0 t + g h^2 n (n + 1) / 2
+    const RowVector3d moved =
+        velocity * (steps * h) + RowVector3d(0, 0, -g) * (h * h * steps * (steps + 1) / 2);
+    const data::Points expected = sheet.rest.vertices.rowwise() + moved;
+    EXPECT_LT((environment.state.positions - expected).cwiseAbs().maxCoeff(), 1e-11);
+  }
+}
+
+TEST(Dynamics, AirDragFollowsTheDiscreteLaw) {
+  const Sheet sheet = small_sheet();
+  Environment environment = environment_of(sheet);
+  environment.gravity.setZero();
+  environment.material.air_drag = 2.0;
+  environment.state.velocities.col(0).setOnes();
+  Solver solver(sheet, {.tolerance = 1e-12});
+  for (int n = 0; n < 30; ++n) solver.step(environment);
+  EXPECT_NEAR(environment.state.velocities(0, 0), std::pow(1 + 2.0 * 0.01, -30), 1e-10);
+}
+
+/// Velocity of the tangential slide on a plane tilted by `angle`, from the rotated gravity.
+Environment on_incline(const Sheet& sheet, double angle, double tangent_direction, double friction) {
+  Environment environment = environment_of(sheet);
+  environment.material.friction = friction;
+  environment.gravity = g * Vector3d(std::sin(angle) * std::cos(tangent_direction),
+                                     std::sin(angle) * std::sin(tangent_direction), -std::cos(angle));
+  environment.obstacles.push_back({Plane{}});
+  return environment;
+}
+
+class Incline : public testing::TestWithParam<double> {};
+
+TEST_P(Incline, SticksBelowTheConeAndSlidesAboveIt) {
+  const Sheet sheet = small_sheet();
+  const double direction = GetParam(), friction = 0.3, h = 0.01;
+  const int steps = 100;
+  for (const double offset : {-0.001, 0.001}) {
+    const double angle = std::atan(friction + offset);
+    Environment environment = on_incline(sheet, angle, direction, friction);
+    Solver solver(sheet, {.time_step = h, .tolerance = 1e-10});
+    for (int n = 0; n < steps; ++n) EXPECT_TRUE(solver.step(environment).converged);
+    const data::Points moved = environment.state.positions - sheet.rest.vertices;
+    if (offset < 0) {
+      EXPECT_EQ(moved.cwiseAbs().maxCoeff(), 0.0);
+    } else {
+      const double acceleration = g * (std::sin(angle) - friction * std::cos(angle));
+      const double expected = acceleration * h * h * steps * (steps + 1) / 2;
+      const Eigen::VectorXd along = moved.col(0) * std::cos(direction) + moved.col(1) * std::sin(direction);
+      // Friction starts smoothly at a slip of 1e-8 m; the first step here slips 1e-6 m.
+      EXPECT_LT((along.array() - expected).abs().maxCoeff(), 1e-3 * expected);
+      EXPECT_EQ(moved.col(2).cwiseAbs().maxCoeff(), 0.0);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(TangentBases, Incline, testing::Values(0.0, M_PI / 4));
+
+TEST(Dynamics, EachEnvironmentHasItsOwnFriction) {
+  const Sheet sheet = small_sheet(4, 0.08);
+  std::vector<Environment> environments;
+  const double angle = std::atan(0.3);
+  for (const double friction : {0.299, 0.301}) environments.push_back(on_incline(sheet, angle, 0, friction));
+  const auto rollouts = simulate(sheet, environments, 50, {.tolerance = 1e-10}, 2);
+  EXPECT_GT(rollouts[0].positions.back()(0, 0) - sheet.rest.vertices(0, 0), 1e-4);
+  EXPECT_EQ(rollouts[1].positions.back()(0, 0), sheet.rest.vertices(0, 0));
+}
+
+TEST(Dynamics, ASlidingSheetStopsAfterTheDiscreteDistance) {
+  const Sheet sheet = small_sheet();
+  const double h = 0.01, friction = 0.3;
+  Environment environment = on_incline(sheet, 0, 0, friction);
+  environment.state.velocities.col(0).setOnes();
+  Solver solver(sheet, {.time_step = h, .tolerance = 1e-10});
+  double expected = 0;
+  for (double v = 1 - h * friction * g; v > 0; v -= h * friction * g) expected += h * v;
+  for (int n = 0; n < 60; ++n) solver.step(environment);
+  const Eigen::VectorXd moved = environment.state.positions.col(0) - sheet.rest.vertices.col(0);
+  EXPECT_LT((moved.array() - expected).abs().maxCoeff(), 1e-6);
+  EXPECT_LT(environment.state.velocities.cwiseAbs().maxCoeff(), 1e-9);
+}
+
+TEST(Dynamics, InternalForcesNeitherPushNorTurn) {
+  // Free sheet, no gravity, stretched at the start. sum m dv = 0 and, the forces being those at the end of
+  // the step, sum x_(n+1) x m dv = 0.
+  const Sheet sheet = small_sheet();
+  Environment environment = environment_of(sheet);
+  environment.gravity.setZero();
+  environment.state.positions *= 1.05;
+  environment.state.positions(3, 2) += 0.004;
+  Solver solver(sheet, {.tolerance = 1e-12});
+  for (int n = 0; n < 20; ++n) {
+    const data::Points before = environment.state.velocities;
+    solver.step(environment);
+    const data::Points gained = sheet.vertex_area.asDiagonal() * (environment.state.velocities - before);
+    RowVector3d turn = RowVector3d::Zero();
+    double scale = 0;
+    for (int i = 0; i < gained.rows(); ++i) {
+      const RowVector3d x = environment.state.positions.row(i), p = gained.row(i);
+      turn += x.cross(p);
+      scale += x.norm() * p.norm();
+    }
+    EXPECT_LT(gained.colwise().sum().norm(), 1e-9 * gained.norm());
+    EXPECT_LT(turn.norm(), 1e-9 * scale);
+  }
+}
+
+TEST(Dynamics, ABatchEqualsItsEnvironmentsAloneBitForBit) {
+  const Sheet sheet = small_sheet();
+  std::vector<Environment> environments;
+  for (const double stiffness : {30.0, 100.0, 300.0}) {
+    Environment environment = on_incline(sheet, 0.1, 0.3, 0.2);
+    environment.material.membrane_stiffness = stiffness;
+    environment.state.positions.col(2).array() += 0.02;
+    environment.state.positions(0, 2) += 0.01;
+    environments.push_back(environment);
+  }
+  const auto batch = simulate(sheet, environments, 30, {}, 2);
+  const auto reversed = simulate(sheet, {environments.rbegin(), environments.rend()}, 30, {}, 1);
+  for (size_t e = 0; e < environments.size(); ++e) {
+    const auto alone = simulate(sheet, {environments[e]}, 30, {}, 1);
+    EXPECT_EQ(batch[e].positions.back(), alone[0].positions.back());
+    EXPECT_EQ(batch[e].positions.back(), reversed[environments.size() - 1 - e].positions.back());
+  }
+}
+
+TEST(Dynamics, AnUnconvergedStepSaysSo) {
+  const Sheet sheet = small_sheet();
+  Environment environment = environment_of(sheet);
+  environment.fixed.push_back({0, {true, true, true}, sheet.rest.vertices.row(0)});
+  environment.state.velocities.setRandom();
+  Solver solver(sheet, {.max_iterations = 1, .tolerance = 1e-12});
+  EXPECT_FALSE(solver.step(environment).converged);
+}
+
+}  // namespace
+}  // namespace flash::sim
