@@ -8,31 +8,27 @@ void Anderson::reset() {
   x_.resize(0);
   dx_.clear();
   df_.clear();
-  dr_.clear();
 }
 
-Eigen::VectorXd Anderson::next(const Eigen::VectorXd& x, const Eigen::VectorXd& f, const Eigen::VectorXd& r) {
+Eigen::VectorXd Anderson::next(const Eigen::VectorXd& x, const Eigen::VectorXd& f) {
   if (x_.size() == x.size() && depth_ > 0) {
     dx_.push_back(x - x_);
     df_.push_back(f - f_);
-    dr_.push_back(r - r_);
     if (static_cast<int>(dx_.size()) > depth_) {
       dx_.pop_front();
       df_.pop_front();
-      dr_.pop_front();
     }
   }
   x_ = x;
   f_ = f;
-  r_ = r;
   const Eigen::Index m = static_cast<Eigen::Index>(dx_.size());
   Eigen::VectorXd next = x + f;
   if (m == 0) return next;
   Eigen::MatrixXd gram(m, m);
   Eigen::VectorXd right(m);
   for (Eigen::Index i = 0; i < m; ++i) {
-    right[i] = df_[i].dot(r);
-    for (Eigen::Index j = 0; j < m; ++j) gram(i, j) = 0.5 * (df_[i].dot(dr_[j]) + df_[j].dot(dr_[i]));
+    right[i] = df_[i].dot(f);
+    for (Eigen::Index j = 0; j < m; ++j) gram(i, j) = df_[i].dot(df_[j]);
   }
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(m, m);
   factor.setThreshold(1e-12);  // drops directions that repeat others

@@ -13,13 +13,13 @@ class Anderson {
 
   void reset();
 
-  /// The next iterate from x, f = f(x) and r. With depth 0, or without a history, x + f.
-  Eigen::VectorXd next(const Eigen::VectorXd& x, const Eigen::VectorXd& f, const Eigen::VectorXd& r);
+  /// The next iterate from x and f(x). With depth 0, or without a history, x + f.
+  Eigen::VectorXd next(const Eigen::VectorXd& x, const Eigen::VectorXd& f);
 
  private:
   int depth_;
-  Eigen::VectorXd x_, f_, r_;                 ///< the last iterate
-  std::deque<Eigen::VectorXd> dx_, df_, dr_;  ///< differences, the newest last
+  Eigen::VectorXd x_, f_;                ///< the last iterate
+  std::deque<Eigen::VectorXd> dx_, df_;  ///< differences, the newest last
 };
 
 }  // namespace flash::sim

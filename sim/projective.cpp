@@ -149,20 +149,23 @@ ContactProblem contact_problem(const std::vector<VertexContact>& contacts, const
   return problem;
 }
 
-/// Penetration that the inertia metric leaves, N_s g h^2 / K [m], N_s the free vertices a loaded contact
-/// carries.
-double inertia_penetration(const Environment& environment, const ProjectiveSettings& settings,
-                           double carried) {
-  return carried * environment.gravity.norm() * settings.time_step * settings.time_step / settings.iterations;
+/// Whether each contact moves its own vertex alone, so that the inertia metric is close to the full one.
+bool carries_itself(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system) {
+  return std::all_of(contacts.begin(), contacts.end(), [&](const VertexContact& contact) {
+    return system.mass()[contact.vertex] * system.inverse(contact.vertex, contact.vertex).maxCoeff() >= 0.5;
+  });
 }
 
-std::string inertia_warning(double carried, double penetration, double creep) {
-  char text[256];
+/// What the inertia metric leaves when one contact vertex carries `carried` of them: N_s g h^2 / K of
+/// penetration, N_s g h / K of creep.
+std::string inertia_warning(double carried, double gravity, const ProjectiveSettings& settings) {
+  const double creep = carried * gravity * settings.time_step / settings.iterations;
+  char text[200];
   std::snprintf(text, sizeof text,
                 "contact metric inertia: %.1f vertices carried per contact vertex leave about %.2g m of "
                 "penetration and "
                 "%.2g m/s of creep; use metric full",
-                carried, penetration, creep);
+                carried, creep * settings.time_step, creep);
   return text;
 }
 
@@ -221,10 +224,9 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
       const auto found = known.find({contacts[k].vertex, contacts[k].obstacle});
       if (found != known.end()) multiplier.segment<3>(3 * k) = contacts[k].directions * found->second;
     }
-    const double carried = contacts.empty() ? 0.0 : double(n) / contacts.size();
     if (settings.metric != ContactMetric::automatic)
       report.metric = settings.metric;
-    else if (inertia_penetration(environment, settings, carried) > settings.allowed_penetration)
+    else if (!carries_itself(contacts, system))
       report.metric = ContactMetric::full;  // for the rest of the step
     double violation = 0;
     if (!contacts.empty()) {
@@ -266,7 +268,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
     if (report.metric == ContactMetric::inertia && !contacts.empty()) {
       x = plain;
     } else {
-      x = Eigen::Map<const Points>(anderson.next(flat(x), flat(motion), -flat(residual)).data(), n, 3);
+      x = Eigen::Map<const Points>(anderson.next(flat(x), flat(motion)).data(), n, 3);
       accelerated = settings.acceleration > 0;
     }
   }
@@ -290,12 +292,8 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
       report.complementarity = std::max(report.complementarity, std::abs(contacts[k].gap[0]));
     }
   }
-  if (report.metric == ContactMetric::inertia && loaded > 0) {
-    const double carried = double(n) / loaded,
-                 penetration = inertia_penetration(environment, settings, carried);
-    if (penetration > settings.allowed_penetration)
-      report.warning = inertia_warning(carried, penetration, penetration / h);
-  }
+  if (report.metric == ContactMetric::inertia && n > 2 * loaded && loaded > 0)
+    report.warning = inertia_warning(static_cast<double>(n) / loaded, environment.gravity.norm(), settings);
 
   environment.state.velocities = (x - environment.state.positions) / h;
   environment.state.positions = x;

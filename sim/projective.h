@@ -9,7 +9,7 @@ namespace flash::sim {
 
 /// What stands for the compliance of the contacts in the Newton system of their multipliers.
 enum class ContactMetric {
-  automatic,  ///< inertia where its estimated penetration stays below `allowed_penetration`, else full
+  automatic,  ///< inertia where no contact moves more than its own vertex, m_i (A^-1)_ii >= 1/2, else full
   full,       ///< W = H A^-1 H^T: contacts are met to the tolerance in every iteration
   inertia,    ///< W = H M^-1 H^T, the published "lite": cheap, safe only where every vertex carries itself
 };
@@ -22,7 +22,6 @@ struct ProjectiveSettings {
       1e-8;              ///< on |min(c, r lambda_n)| and its friction like, for a converged step [m]
   int acceleration = 5;  ///< depth of the Anderson acceleration, 0 for none
   ContactMetric metric = ContactMetric::automatic;
-  double allowed_penetration = 1e-6;  ///< for `automatic` [m]
   int dense_contacts = 300;  ///< up to this number the named dense solver, above it the matrix-free one
   double tangent_angle = 0;  ///< of the tangent basis about the normal [rad]; no result depends on it
   ConstraintSettings constraints{};

@@ -2,11 +2,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
+#include <Eigen/Dense>
 #include <cmath>
-#include <numeric>
 
 #include "data/procedural_mesh.h"
+#include "sim/projective_contact.h"
 
 namespace flash::sim {
 namespace {
@@ -62,11 +62,6 @@ TEST(Projective, FreeFallIsTheDiscreteLaw) {
   const Points expected = sheet.rest.vertices.rowwise() + moved.transpose();
   EXPECT_LE((environment.state.positions - expected).cwiseAbs().maxCoeff(), 1e-9);
 }
-
-struct Slide {
-  double slope, friction;
-  bool slides;
-};
 
 TEST(Projective, InclineSticksAndSlipsToAThousandthInBothTangentBases) {
   const Sheet sheet = square_sheet(0.1, 3);
@@ -141,6 +136,177 @@ TEST(Projective, EveryNamedSolverAndBothComplementaritiesGiveTheSameStep) {
       // Ten steps converged to 1e-8 m each.
       EXPECT_LE((environment.state.positions - reference).cwiseAbs().maxCoeff(), 1e-7) << name;
     }
+}
+
+/// A sheet hung over a thin horizontal rail at its middle row, at rest: few contacts carry all of it.
+Environment over_a_peg(const Sheet& sheet, double friction) {
+  Environment environment = environment_of(sheet);
+  environment.material.membrane_stiffness = 200;
+  environment.material.bending_rigidity = 1e-4;
+  const double size = sheet.rest.vertices.col(0).maxCoeff(), radius = 0.01;
+  environment.obstacles.push_back(
+      {Cylinder{Vector3d(size / 2, 0, -radius), Vector3d::UnitY(), radius}, friction});
+  return environment;
+}
+
+/// The largest move of the vertices that start on the peg.
+double creep(const Sheet& sheet, const Environment& environment) {
+  const double middle = sheet.rest.vertices.col(0).maxCoeff() / 2;
+  double largest = 0;
+  for (Eigen::Index i = 0; i < sheet.rest.vertices.rows(); ++i)
+    if (std::abs(sheet.rest.vertices(i, 0) - middle) < 1e-9)
+      largest = std::max(largest, (environment.state.positions.row(i) - sheet.rest.vertices.row(i)).norm());
+  return largest;
+}
+
+TEST(Projective, SheetOnAPegNeitherSinksNorCreepsWithTheFullMetric) {
+  const Sheet sheet = square_sheet(0.2, 10);
+  Environment environment = over_a_peg(sheet, 0.5);
+  environment.gravity = g * Vector3d(0, std::sin(0.2), -std::cos(0.2));  // the peg slopes by 0.2 rad
+  environment.material.air_drag = 10;
+  ProjectiveSolver solver(sheet, {});
+  ProjectiveReport report;
+  double slid = 0;
+  for (int k = 0; k < 200; ++k) {
+    report = solver.step(environment);
+    EXPECT_EQ(report.metric, ContactMetric::full);  // chosen by `automatic`
+    EXPECT_LE(report.penetration_max, 1e-12) << k;
+    EXPECT_LE(report.cone_violation, 1e-12) << k;
+    if (k == 30) slid = creep(sheet, environment);  // while it fell and hardly weighed on the peg
+    EXPECT_TRUE(report.warning.empty());
+  }
+  EXPECT_NEAR(creep(sheet, environment), slid, 1e-9);  // 170 steps to the rounding of a slip
+  const double weight = total_mass(sheet, environment) * g;
+  // Nearly at rest, the rest of it to the tolerance on |r| / |M g| of 121 vertices.
+  EXPECT_NEAR((report.obstacle_forces[0] / weight + environment.gravity / g).norm(), 0, 1e-3 * 11);
+}
+
+TEST(Projective, TheInertiaMetricSinksAndCreepsAsDocumentedAndSaysSo) {
+  const Sheet sheet = square_sheet(0.2, 10);
+  const double carried = 121.0 / 11;
+  double last_penetration = 1;
+  for (const int iterations : {10, 30}) {
+    Environment environment = over_a_peg(sheet, 0.5);
+    environment.gravity = g * Vector3d(0, std::sin(0.2), -std::cos(0.2));
+    environment.material.air_drag = 10;
+    ProjectiveSettings settings;
+    settings.metric = ContactMetric::inertia;
+    settings.iterations = iterations;
+    ProjectiveSolver solver(sheet, settings);
+    ProjectiveReport report;
+    for (int k = 0; k < 200; ++k) report = solver.step(environment);
+    const double estimate = carried * g * h * h / iterations;
+    // The estimate is one of size: neighbours help to carry.
+    EXPECT_GT(report.penetration_max, 0.1 * estimate);
+    EXPECT_LT(report.penetration_max, 3 * estimate);
+    EXPECT_LT(report.penetration_max, last_penetration);
+    EXPECT_GT(creep(sheet, environment), 1e-3);
+    EXPECT_NE(report.warning.find("use metric full"), std::string::npos);
+    last_penetration = report.penetration_max;
+  }
+}
+
+TEST(Projective, ConvergesToTheStepThatNewtonsMethodFinds) {
+  // Two formulations of one law: multipliers with a Schur complement here, constraints condensed into
+  // vertices there.
+  const Sheet sheet = square_sheet(0.2, 6);
+  for (const auto constitutive : {data::Constitutive::tri_arap, data::Constitutive::tri_corotated,
+                                  data::Constitutive::tri_stvk, data::Constitutive::tri_neohookean})
+    for (const auto bending :
+         {data::BendingModel::plate, data::BendingModel::isometric, data::BendingModel::hinge}) {
+      if (constitutive != data::Constitutive::tri_corotated && bending != data::BendingModel::plate) continue;
+      Environment a = environment_of(sheet);
+      a.material.constitutive = constitutive;
+      a.material.bending_model = bending;
+      a.material.membrane_stiffness = 60;
+      a.material.bending_rigidity = 1e-4;
+      a.material.air_drag = 0.5;
+      a.material.stiffness_damping = 1e-3;
+      a.material.friction = 0.3;
+      a.obstacles.push_back({Plane{}, -1});
+      a.loads.push_back({24, {0.01, 0, 0.005}});
+      // A corner is lifted off the table and dragged.
+      Grasp grasp;
+      grasp.vertices = {0, 1};
+      for (int k = 0; k <= 20; ++k) {
+        Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+        pose.translation() = Vector3d(0.3 * k * h, 0.1 * k * h, 0.4 * k * h);
+        grasp.gripper.times.push_back(k * h);
+        grasp.gripper.poses.push_back(pose);
+      }
+      a.grasps.push_back(grasp);
+      Environment b = a;
+      ProjectiveSettings settings;
+      settings.iterations = 3000;
+      settings.acceleration = 10;
+      settings.tolerance = 1e-8;
+      ProjectiveSolver projective(sheet, settings);
+      SolverSettings newton_settings;
+      newton_settings.tolerance = 1e-9;
+      newton_settings.max_iterations = 200;
+      Solver newton(sheet, newton_settings);
+      for (int k = 0; k < 10; ++k) {
+        const ProjectiveReport report = projective.step(a);
+        const StepReport expected = newton.step(b);
+        EXPECT_TRUE(report.converged) << k << " " << report.residual;
+        EXPECT_TRUE(expected.converged) << k << " " << expected.residual;
+        const double difference = (a.state.positions - b.state.positions).cwiseAbs().maxCoeff();
+        EXPECT_LE(difference, 1e-9) << k;  // |r| / |M g| <= 1e-8: h^2 g 1e-8 times the vertices that share it
+        EXPECT_LE((report.grasp_forces[0] - expected.grasp_forces[0]).norm(), 1e-8);
+        EXPECT_LE((report.obstacle_forces[0] - expected.obstacle_forces[0]).norm(), 1e-8);
+        b.state = a.state;
+      }
+    }
+}
+
+TEST(Projective, AnUnconvergedStepIsReported) {
+  const Sheet sheet = square_sheet(0.2, 10);
+  Environment environment = over_a_peg(sheet, 0.5);
+  ProjectiveSettings settings;
+  settings.iterations = 3;
+  ProjectiveSolver solver(sheet, settings);
+  const ProjectiveReport report = solver.step(environment);
+  EXPECT_FALSE(report.converged);
+  EXPECT_EQ(report.iterations, 3);
+  EXPECT_GT(report.residual, settings.tolerance);
+}
+
+TEST(Projective, EveryNamedSolverSolvesTheMetricOfARealSheet) {
+  // 25 contacts in the middle of a stiff sheet, the rest free: neighbours coupled over the whole patch.
+  const Sheet sheet = square_sheet(0.2, 8);
+  const auto plan = make_sheet_plan(sheet);
+  Environment environment = environment_of(sheet);
+  environment.material.membrane_stiffness = 300;
+  environment.obstacles.push_back({Box{.half_extents = {0.051, 0.051, 0.01},
+                                       .pose = Eigen::Isometry3d(Eigen::Translation3d(0.1, 0.1, -0.01)),
+                                       .trajectory = {}},
+                                   0.3});
+  const auto bending =
+      make_bending_operator(*plan, environment.material.bending_model, environment.material.poissons_ratio);
+  ProjectiveSystem system(*plan, *bending, environment.material, h);
+  system.hold({std::vector<int>{0, 8}, {0}, {0, 8, 40}});
+  std::vector<Vector3d> free_axes(81, Vector3d::Ones());
+  const auto contacts = find_contacts(environment, h, h, environment.state.positions,
+                                      Eigen::VectorXd::Constant(81, 1e-6), free_axes, 0.3);
+  ASSERT_EQ(contacts.size(), 25u);
+  const Eigen::MatrixXd W = full_metric(contacts, system);
+  // Column by column against the definition, with A^-1 on the free coordinates.
+  for (int j = 0; j < W.cols(); j += 7) {
+    const Points u = system.solve(contact_forces(contacts, Eigen::VectorXd::Unit(W.cols(), j), 81));
+    EXPECT_LE((along_contacts(contacts, u) - W.col(j)).norm(), 1e-10 * W.col(j).norm());
+    EXPECT_EQ(u(0, 1), 0);
+    EXPECT_NEAR(u.row(8).norm(), std::abs(u(8, 1)), 1e-15);
+  }
+  const Eigen::VectorXd b = W * Eigen::VectorXd::LinSpaced(W.cols(), -1, 1);
+  const Eigen::VectorXd exact = W.partialPivLu().solve(b);
+  for (const std::string& name : dual_solver_names()) {
+    DualSolverSettings settings;
+    settings.solver = dual_solver_from_name(name);
+    const DualSolution found = solve_symmetric(W, b, settings);
+    EXPECT_TRUE(found.converged) << name;
+    EXPECT_LE((b - W * found.x).norm(), 2 * settings.tolerance * b.norm()) << name;
+    EXPECT_LE((found.x - exact).norm(), 1e-5 * exact.norm()) << name;
+  }
 }
 
 }  // namespace
