@@ -1,5 +1,5 @@
+#include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -10,12 +10,10 @@
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
 #include "data/text.h"
-#include "sysid/next_steps.h"
+#include "sysid/judge.h"
 #include "sysid/overlay.h"
 #include "sysid/parameter_label.h"
-#include "sysid/predictability.h"
 #include "sysid/report.h"
-#include "sysid/solver_check.h"
 #include "sysid/summarize.h"
 
 namespace flash {
@@ -39,14 +37,29 @@ struct GridOptions {
   std::string out;
 };
 
-std::vector<sysid::Axis> parse_axes(const GridOptions& options) {
-  std::vector<sysid::Axis> axes;
-  for (const auto& [name, text] : options.axes) axes.push_back(sysid::parse_axis(name, text));
-  if (axes.empty()) throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
-  return axes;
+std::vector<std::string> names_of(const std::vector<data::Recording>& recordings) {
+  std::vector<std::string> names;
+  for (const data::Recording& recording : recordings) names.push_back(recording.name);
+  return names;
 }
 
-// The order the loaded results have, so that a resumed search reads its own folder.
+sysid::GridSettings grid_settings(const GridOptions& options, const sysid::MaterialBase& base, int threads) {
+  sysid::GridSettings settings;
+  settings.base = base;
+  settings.score = score_settings(options.replay);
+  settings.envs = options.envs;
+  settings.threads = threads;
+  for (const auto& [name, text] : options.axes) settings.axes.push_back(sysid::parse_axis(name, text));
+  if (settings.axes.empty())
+    throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
+  for (const std::string& assignment : options.fixed)
+    settings.fixed.push_back(sysid::parse_fixed(assignment));
+  std::vector<sysid::Axis> all = settings.axes;
+  all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
+  sysid::check_axes(all, base.material.constitutive);
+  return settings;
+}
+
 void clear_results(const std::string& folder) {
   for (const char* file :
        {"results.csv", "registrations.csv", "keyframes.csv", "grid.json", "summary.json", "report.html"})
@@ -100,35 +113,49 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
   return replays;
 }
 
+// The best candidate over the observations, recording by recording; kept with the run.
+std::vector<sysid::Overlay> keep_best(const sysid::GridResults& results, const sysid::Summary& summary,
+                                      const std::vector<sysid::Replay>& replays,
+                                      const sysid::GridSettings& settings, const std::string& out) {
+  std::vector<sysid::Overlay> overlays;
+  if (summary.best.empty()) return overlays;
+  const auto better = [](const auto& a, const auto& b) { return a.score < b.score; };
+  const sysid::CandidateResult& best =
+      *std::min_element(results.candidates.begin(), results.candidates.end(), better);
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    const sysid::ReplayResult motion =
+        std::move(sysid::run(replays[r], {sysid::candidate_of(best, settings)}).front());
+    overlays.push_back(sysid::make_overlay(replays[r], motion.motion, best.recordings[r]));
+    sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / overlays.back().name).string());
+  }
+  return overlays;
+}
+
+void write_results(const sysid::Summary& summary, const sysid::GridResults& results,
+                   const std::vector<sysid::Overlay>& overlays, const GridOptions& options) {
+  sysid::save_summary(summary, (fs::path(options.out) / "summary.json").string());
+  sysid::ReportSettings report;
+  for (std::size_t k = 0; k < options.map.size() && k < 2; ++k) report.map_axes[k] = options.map[k];
+  sysid::write_report(summary, results, overlays, report, (fs::path(options.out) / "report.html").string());
+}
+
 int run_grid(const CLI::App& verb, const GridOptions& options) {
   const auto begin = std::chrono::steady_clock::now();
   const std::string device = choose_device(options.common);
-  const int threads = thread_count(options.common);
   std::vector<data::Recording> recordings;
-  std::vector<std::string> names;
-  for (const std::string& path : options.recordings) {
-    recordings.push_back(data::load_recording(path));
-    names.push_back(recordings.back().name);
-  }
+  for (const std::string& path : options.recordings) recordings.push_back(data::load_recording(path));
   const data::Asset asset = load_asset_for(options.asset, recordings.front());
-  const std::vector<sysid::Replay> replays =
+  const int threads = thread_count(options.common);
+  std::vector<sysid::Replay> replays =
       make_replays(recordings, replay_settings(verb, options.replay, threads), options.common);
 
-  sysid::GridSettings settings;
-  settings.base = material_base(asset, replays.front().sheet.rest, options.common);
-  settings.axes = parse_axes(options);
-  for (const std::string& assignment : options.fixed)
-    settings.fixed.push_back(sysid::parse_fixed(assignment));
-  settings.score = score_settings(options.replay);
-  settings.envs = options.envs;
-  settings.threads = threads;
-  std::vector<sysid::Axis> all = settings.axes;
-  all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
-  sysid::check_axes(all, settings.base.material.constitutive);
-
+  std::vector<std::string> notices;
+  const sysid::GridSettings settings =
+      grid_settings(options, material_base(asset, replays.front().sheet.rest, notices), threads);
   if (options.common.force && !options.resume) clear_results(options.out);
-  sysid::ResultsStore store(options.out, settings.axes, names, sysid::fingerprint(replays, settings),
-                            options.resume);
+  sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
+                            sysid::fingerprint(replays, settings), options.resume);
+  for (const std::string& notice : notices) say(options.common, notice);
   say(options.common,
       data::format_count(sysid::cartesian_product(settings.axes).size()) + " candidates, " +
           data::format_count(static_cast<std::size_t>(replays.front().sheet.rest.vertices.rows())) +
@@ -137,43 +164,25 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   {
     ProgressLine line(options.common);
     complete = sysid::grid_search(
-        replays, settings, store, [&](const sysid::Progress& p) { line.show(p); }, &stop_on_interrupt());
+        replays, settings, store, [&](const sysid::Progress& progress) { line.show(progress); },
+        &stop_on_interrupt());
   }
 
+  if (!complete) {
+    warn("stopped after " + data::format_count(store.results().candidates.size()) + " candidates, kept in " +
+         options.out + "; --resume goes on");
+    return exit_failed;
+  }
   sysid::GridResults results = store.results();
-  const std::optional<double> repeatability =
-      options.repeatability > 0 ? std::optional(options.repeatability) : std::nullopt;
-  sysid::GridVerdict verdict = sysid::profile_grid(results, repeatability);
-  std::vector<std::optional<double>> horizons(replays.size());
-  if (complete && !options.no_horizon && verdict.best >= 0) {
-    const sysid::ReplayCandidate best = sysid::candidate_of(results.candidates[verdict.best], settings);
-    for (std::size_t r = 0; r < replays.size(); ++r)
-      horizons[r] = sysid::predictability_horizon(replays[r], best);
-    sysid::drop_beyond_horizons(horizons, results);
-    verdict = sysid::profile_grid(results, repeatability);
-  }
-
-  sysid::Summary summary = sysid::summarize(results, verdict, replays, settings);
+  sysid::JudgeSettings judge;
+  if (options.repeatability > 0) judge.repeatability = options.repeatability;
+  judge.horizon = !options.no_horizon;
+  judge.solver_check = !options.no_solver_check;
+  sysid::Summary summary = sysid::judge(results, replays, settings, judge);
   summary.asset = fs::absolute(asset.source).lexically_normal().string();
   summary.device = device;
-  std::vector<sysid::Overlay> overlays;
-  if (verdict.best >= 0) {
-    const sysid::CandidateResult& best = results.candidates[static_cast<std::size_t>(verdict.best)];
-    const sysid::ReplayCandidate candidate = sysid::candidate_of(best, settings);
-    if (complete && !options.no_solver_check)
-      summary.solver_check = sysid::check_solver(replays, candidate, settings.score);
-    for (std::size_t r = 0; r < replays.size(); ++r) {
-      summary.recordings[r].horizon_s = horizons[r];
-      const sysid::ReplayResult motion = std::move(sysid::run(replays[r], {candidate}).front());
-      overlays.push_back(sysid::make_overlay(replays[r], motion.motion, best.recordings[r]));
-      sysid::save_overlay(overlays.back(), (fs::path(options.out) / "best" / names[r]).string());
-    }
-  }
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  sysid::save_summary(summary, (fs::path(options.out) / "summary.json").string());
-  sysid::ReportSettings report;
-  for (std::size_t k = 0; k < options.map.size() && k < 2; ++k) report.map_axes[k] = options.map[k];
-  sysid::write_report(summary, results, overlays, report, (fs::path(options.out) / "report.html").string());
+  write_results(summary, results, keep_best(results, summary, replays, settings, options.out), options);
 
   for (const std::string& warning : summary.warnings) warn(warning);
   if (options.common.json) {
@@ -181,7 +190,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   } else {
     print_answer(summary, options.out);
   }
-  return complete ? summary.exit_code : static_cast<int>(exit_failed);
+  return summary.exit_code;
 }
 
 }  // namespace

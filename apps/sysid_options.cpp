@@ -163,10 +163,10 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
 }
 
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
-                                  const CommonOptions& options) {
+                                  std::vector<std::string>& notices) {
   const double area = sim::make_sheet(mesh).vertex_area.sum();
   const data::ResolvedSheet resolved = data::resolve_sheet(asset, area);
-  for (const std::string& notice : resolved.notices) say(options, notice);
+  notices.insert(notices.end(), resolved.notices.begin(), resolved.notices.end());
   sysid::MaterialBase base;
   base.material = resolved.material;
   base.thickness = asset.thickness;

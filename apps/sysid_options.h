@@ -58,8 +58,10 @@ void check_output(const std::string& path, const CommonOptions& options);
 
 /// The asset named on the command line or, without one, by the recording.
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
+
+/// The asset's material; what was understood is appended to `notices`.
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
-                                  const CommonOptions& options);
+                                  std::vector<std::string>& notices);
 
 /// A line of progress with rate and time left, drawn over itself; silent when stderr is no terminal.
 class ProgressLine {

@@ -94,7 +94,8 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
       sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common)));
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
-  const sysid::MaterialBase base = material_base(asset, replay.sheet.rest, options.common);
+  std::vector<std::string> notices;
+  const sysid::MaterialBase base = material_base(asset, replay.sheet.rest, notices);
   std::vector<sysid::Axis> axes;
   std::vector<double> values;
   for (const std::string& assignment : options.set) {
@@ -102,6 +103,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
     values.push_back(axes.back().values.front());
   }
   check_output(options.out, options.common);
+  for (const std::string& notice : notices) say(options.common, notice);
 
   const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
   const sysid::ReplayResult motion = std::move(sysid::run(replay, {candidate}).front());

@@ -7,6 +7,7 @@
 #include "apps/command_line.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
+#include "sysid/predictability.h"
 #include "sysid/report.h"
 
 namespace flash {
@@ -24,7 +25,10 @@ struct ReportOptions {
 
 int run_report(const ReportOptions& options) {
   const sysid::Summary summary = sysid::load_summary((fs::path(options.run) / "summary.json").string());
-  const sysid::GridResults results = sysid::load_grid_results(options.run);
+  sysid::GridResults results = sysid::load_grid_results(options.run);
+  std::vector<std::optional<double>> horizons;
+  for (const sysid::SummaryRecording& recording : summary.recordings) horizons.push_back(recording.horizon_s);
+  if (!horizons.empty()) sysid::drop_beyond_horizons(horizons, results);
   std::vector<sysid::Overlay> overlays;
   for (const sysid::SummaryRecording& recording : summary.recordings) {
     const fs::path folder = fs::path(options.run) / "best" / recording.name;

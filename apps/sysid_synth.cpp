@@ -89,7 +89,8 @@ int run_synth(SynthOptions options) {
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
   const data::TriangleMesh mesh = data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
                                                                 : data::load_triangle_mesh(mesh_spec);
-  const sysid::MaterialBase base = material_base(asset, mesh, options.common);
+  std::vector<std::string> notices;
+  const sysid::MaterialBase base = material_base(asset, mesh, notices);
   std::vector<sysid::Axis> axes;
   std::vector<double> values;
   for (const std::string& assignment : options.set) {
@@ -97,6 +98,7 @@ int run_synth(SynthOptions options) {
     values.push_back(axes.back().values.front());
   }
   check_output(options.out, options.common);
+  for (const std::string& notice : notices) say(options.common, notice);
 
   sysid::SynthSettings& settings = options.synth;
   settings.name = fs::path(options.out).lexically_normal().filename().string();

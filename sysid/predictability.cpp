@@ -49,4 +49,15 @@ void drop_beyond_horizons(const std::vector<std::optional<double>>& horizons, Gr
   }
 }
 
+void drop_beyond_horizon(std::optional<double> horizon, Replay& replay) {
+  if (!horizon) return;
+  std::vector<Observation> kept = replay.observations;
+  double weight = 0;
+  for (Observation& observation : kept) {
+    if (observation.t >= *horizon) observation.weight = 0;
+    if (observation.points.rows() > 0) weight += observation.weight;
+  }
+  if (weight > 0) replay.observations = std::move(kept);
+}
+
 }  // namespace flash::sysid

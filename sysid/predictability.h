@@ -18,4 +18,7 @@ std::optional<double> predictability_horizon(const Replay& replay, const ReplayC
 /// candidates anew from the keyframes that remain. Where none would remain, a recording keeps its own.
 void drop_beyond_horizons(const std::vector<std::optional<double>>& horizons, GridResults& results);
 
+/// The same for the observations of one recording.
+void drop_beyond_horizon(std::optional<double> horizon, Replay& replay);
+
 }  // namespace flash::sysid

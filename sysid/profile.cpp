@@ -22,6 +22,13 @@ double value_at(const Axis& axis, double coordinate) {
   return axis.logarithmic ? std::exp(coordinate) : coordinate;
 }
 
+/// chi^2 of a score over the best one; a score is known to `score_error` only.
+double misfit(double score, const GridVerdict& verdict) {
+  const double least = std::max(score - verdict.score_error, verdict.score);
+  return verdict.keyframes * (least * least - verdict.score * verdict.score) /
+         (verdict.sigma * verdict.sigma);
+}
+
 std::size_t index_of(const Axis& axis, double value) {
   const auto nearer = [&](double a, double b) { return std::abs(a - value) < std::abs(b - value); };
   return static_cast<std::size_t>(std::min_element(axis.values.begin(), axis.values.end(), nearer) -
@@ -92,8 +99,7 @@ ParameterFinding find_parameter(const GridResults& results, std::size_t k, const
   }
   std::vector<double> chi2;
   for (const double score : finding.scores) {
-    const double rise = (score * score - verdict.score * verdict.score) / (verdict.sigma * verdict.sigma);
-    chi2.push_back(std::isfinite(score) ? std::max(0.0, verdict.keyframes * rise) : kInfinity);
+    chi2.push_back(std::isfinite(score) ? misfit(score, verdict) : kInfinity);
   }
 
   const std::size_t last = axis.values.size() - 1;
@@ -108,6 +114,9 @@ ParameterFinding find_parameter(const GridResults& results, std::size_t k, const
   finding.estimate = refined_estimate(axis, finding.scores, best);
   finding.interval95 = {closed_below ? crossing(axis, chi2, low, low - 1, limit) : axis.values.front(),
                         closed_above ? crossing(axis, chi2, high, high + 1, limit) : axis.values.back()};
+  // On a coarse grid the vertex may lie where no candidate stands: it belongs to the interval all the same.
+  finding.interval95 = {std::min((*finding.interval95)[0], *finding.estimate),
+                        std::max((*finding.interval95)[1], *finding.estimate)};
   if (axis.values.size() > 1) {
     finding.identifiable = closed_below && closed_above ? Identifiable::yes
                            : closed_above               ? Identifiable::upper_bound
@@ -132,9 +141,7 @@ Eigen::MatrixXd covariance_of(const GridResults& results, const GridVerdict& ver
   std::vector<double> rises;
   const CandidateResult& best = results.candidates[verdict.best];
   for (const CandidateResult& candidate : results.candidates) {
-    const double rise = verdict.keyframes *
-                        (candidate.score * candidate.score - verdict.score * verdict.score) /
-                        (verdict.sigma * verdict.sigma);
+    const double rise = misfit(candidate.score, verdict);
     if (!(rise < kReach)) continue;
     Eigen::VectorXd row(unknowns);
     Eigen::Index column = 0;
@@ -166,8 +173,10 @@ Eigen::MatrixXd covariance_of(const GridResults& results, const GridVerdict& ver
 
 }  // namespace
 
-GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability) {
+GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability,
+                         double score_error) {
   GridVerdict verdict;
+  verdict.score_error = score_error;
   verdict.score = kInfinity;
   for (std::size_t i = 0; i < results.candidates.size(); ++i) {
     if (!(results.candidates[i].score < verdict.score)) continue;
@@ -185,7 +194,8 @@ GridVerdict profile_grid(const GridResults& results, std::optional<double> repea
   verdict.sigma_source = repeatability && *repeatability >= verdict.score ? "repeatability" : "residual";
   const std::size_t freedom = std::clamp<std::size_t>(results.axes.size(), 1, kQuantile95.size());
   const double variance_share = kQuantile95[freedom - 1] / std::max(verdict.keyframes, 1);
-  verdict.level95 = std::sqrt(verdict.score * verdict.score + variance_share * verdict.sigma * verdict.sigma);
+  verdict.level95 =
+      score_error + std::sqrt(verdict.score * verdict.score + variance_share * verdict.sigma * verdict.sigma);
   for (std::size_t k = 0; k < results.axes.size(); ++k) {
     verdict.parameters.push_back(find_parameter(results, k, verdict, kQuantile95[0]));
   }

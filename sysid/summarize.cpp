@@ -67,12 +67,9 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
 }
 
 std::vector<std::string> warnings_of(const Summary& summary, const CandidateResult& best,
-                                     const GridSettings& settings, std::size_t wanted) {
+                                     const GridSettings& settings) {
   std::vector<std::string> warnings;
   const std::size_t found = static_cast<std::size_t>(summary.candidates);
-  if (found < wanted)
-    warnings.push_back("stopped after " + data::format_count(found) + " of " + data::format_count(wanted) +
-                       " candidates; --resume goes on");
   for (const ParameterFinding& finding : summary.parameters) {
     if (finding.identifiable == Identifiable::no)
       warnings.push_back(finding.name + " is not identifiable from " +
@@ -173,7 +170,7 @@ Summary summarize(const GridResults& results, const GridVerdict& verdict, const 
   summary.fixed = fixed_of(summary, settings);
   for (std::size_t r = 0; r < replays.size(); ++r)
     summary.recordings.push_back(summarize_recording(replays[r], best.recordings[r], verdict, nuisance));
-  summary.warnings = warnings_of(summary, best, settings, cartesian_product(settings.axes).size());
+  summary.warnings = warnings_of(summary, best, settings);
   if (const std::string reason = reason_unusable(summary, best); !reason.empty()) {
     summary.exit_code = 3;
     summary.warnings.insert(summary.warnings.begin(), reason);

@@ -12,6 +12,7 @@
 #include "data/asset.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "sysid/depth_camera.h"
 #include "sysid/replay.h"
@@ -301,7 +302,7 @@ std::string truth_text(const data::SheetMaterial& material, const SynthSettings&
   json["time_offset"] = settings.time_offset;
   json["depth_noise_m"] = settings.depth_noise;
   json["seed"] = settings.seed;
-  return json.dump(2) + "\n";
+  return data::format_json(json);
 }
 
 }  // namespace flash::sysid
