@@ -263,7 +263,7 @@ StepReport Solver::step(Environment& environment) {
   const double force_scale = problem.mass().norm() * gravity;
 
   StepReport report;
-  Iterate now, trial;
+  Iterate now, trial, longer;
   const auto evaluate = [&](Iterate& iterate) {
     iterate.potential = problem.evaluate(iterate.positions, iterate.force, iterate.elastic);
     update_contacts(environment, time, h, iterate.positions, iterate.force, iterate.constraints);
@@ -274,7 +274,7 @@ StepReport Solver::step(Environment& environment) {
   now.positions = start.positions + h * start.velocities;
   now.constraints = begin_step(environment, time, now.positions);
   evaluate(now);
-  trial.constraints = now.constraints;
+  longer.constraints = trial.constraints = now.constraints;
   Points direction;
   while (report.iterations < w.settings.max_iterations &&
          now.residual.norm() > w.settings.tolerance * force_scale) {
@@ -296,17 +296,26 @@ StepReport Solver::step(Environment& environment) {
     const double before =
         now.potential + friction_potential(environment, time, h, now.constraints, now.positions);
     const double slope = now.residual.cwiseProduct(direction).sum();
-    double length = 1.0;
-    for (int cut = 0;; ++cut) {
-      trial.positions = now.positions + length * direction;
-      project_to_feasible(environment, time, h, linear, trial.positions);
-      evaluate(trial);
-      const double after =
-          trial.potential + friction_potential(environment, time, h, now.constraints, trial.positions);
-      if (cut == 8 || after <= before + 1e-4 * length * slope ||
-          trial.residual.norm() <= (1 - 0.1 * length) * now.residual.norm())
-        break;
-      length *= 0.5;
+    const auto move = [&](double length, Iterate& to) {
+      to.positions = now.positions + length * direction;
+      project_to_feasible(environment, time, h, linear, to.positions);
+      evaluate(to);
+      return to.potential + friction_potential(environment, time, h, now.constraints, to.positions);
+    };
+    double length = 1.0, after = move(length, trial);
+    for (int cut = 0; cut < 8 && after > before + 1e-4 * length * slope &&
+                      trial.residual.norm() > (1 - 0.1 * length) * now.residual.norm();
+         ++cut)
+      after = move(length *= 0.5, trial);
+    // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short. Go on along
+    // the direction, by secants, while the potential falls.
+    for (double end_slope; length >= 1 && length < 30; std::swap(trial, longer)) {
+      end_slope = trial.residual.cwiseProduct(direction).sum();
+      if (end_slope > 0.2 * slope) break;
+      length *= std::clamp(slope / (slope - end_slope), 1.5, 3.0);
+      const double further = move(length, longer);
+      if (further >= after || !(longer.residual.norm() < 10 * now.residual.norm())) break;
+      after = further;
     }
     std::swap(now, trial);
   }
