@@ -203,7 +203,6 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
   verb->add_option("--fix", options->fixed, "A measured constant, as friction=0.3; carried into the asset")
-      ->expected(1)
       ->allow_extra_args(false);
   verb->add_option("--envs", options->envs, "Candidates a batch")
       ->check(CLI::PositiveNumber)

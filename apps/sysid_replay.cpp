@@ -153,7 +153,6 @@ void add_replay_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recording, "Folder with recording.json")->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("--set", options->set, "A parameter in place of the asset's, as bending=1e-4")
-      ->expected(1)
       ->allow_extra_args(false);
   verb->add_option("--frames", options->frames, "Keyframes to draw, counted from 0; without it six")
       ->delimiter(',');

@@ -151,7 +151,6 @@ void add_synth_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--mesh", options->mesh, "Mesh in place of the asset's, as sheet:0.4x0.4:0.02");
   verb->add_option("--set", options->set, "A parameter in place of the asset's, as bending=1e-4")
-      ->expected(1)
       ->allow_extra_args(false);
   verb->add_option("--displacement", options->displacement, "Of the gripper x,y,z in place of the kind's [m]")
       ->delimiter(',')
@@ -166,7 +165,6 @@ void add_synth_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--camera", options->cameras,
                    "Position x,y,z of a camera [m], aimed at the sheet; repeat for more")
-      ->expected(1)
       ->allow_extra_args(false);
   verb->add_option("--resolution", options->resolution, "Of the cameras [px]")->capture_default_str();
   verb->add_option("--fov", options->field_of_view, "Horizontal field of view [deg]")

@@ -41,14 +41,16 @@ std::vector<std::string> next_steps(const Summary& summary) {
   bool usable = false;
   for (const ParameterFinding& finding : summary.parameters) {
     usable = usable || finding.identifiable != Identifiable::no;
-    if (finding.edge != RangeEdge::none && finding.identifiable == Identifiable::yes)
+    if (finding.edge != RangeEdge::none && finding.identifiable != Identifiable::no)
       steps.push_back("Widen the range of " + label(summary, finding.name) + " (--" + finding.name +
                       "): the best value is its " +
                       (finding.edge == RangeEdge::low ? "lowest." : "highest."));
   }
   for (const ParameterFinding& finding : summary.parameters) {
     const auto experiment = telling_experiments().find(finding.name);
-    if (finding.identifiable != Identifiable::yes && experiment != telling_experiments().end())
+    const bool widen_first = finding.edge != RangeEdge::none && finding.identifiable != Identifiable::no;
+    if (finding.identifiable != Identifiable::yes && !widen_first &&
+        experiment != telling_experiments().end())
       steps.push_back(experiment->second);
   }
   if (summary.unconverged > 0 && 10 * summary.unconverged > summary.candidates)

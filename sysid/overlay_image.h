@@ -10,7 +10,7 @@ struct OverlayImageSettings {
   int panel_width = 640;      ///< of each of the two views [px]
   int panel_height = 520;     ///< [px]
   double elevation = 0.2;     ///< the eye stands this high above the horizon [rad]
-  double point_radius = 1.6;  ///< of an observed point [px]
+  double point_radius = 1.3;  ///< of an observed point [px]
   double tolerance = 0.004;   ///< points deeper than this behind the surface are drawn pale [m]
 };
 
