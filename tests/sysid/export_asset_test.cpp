@@ -4,8 +4,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../data/temporary_folder.h"
-#include "summary_fixture.h"
+#include "tests/data/temporary_folder.h"
+#include "tests/sysid/summary_fixture.h"
 
 namespace flash::sysid {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "summary_fixture.h"
+#include "tests/sysid/summary_fixture.h"
 
 namespace flash::sysid {
 namespace {

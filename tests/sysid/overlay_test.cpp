@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "../data/temporary_folder.h"
 #include "data/procedural_mesh.h"
 #include "sysid/overlay_image.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {
 namespace {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "data/error.h"
-#include "summary_fixture.h"
+#include "tests/sysid/summary_fixture.h"
 
 namespace flash::sysid {
 namespace {

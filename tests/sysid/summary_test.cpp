@@ -5,9 +5,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "../data/temporary_folder.h"
 #include "data/atomic_file.h"
-#include "summary_fixture.h"
+#include "tests/data/temporary_folder.h"
+#include "tests/sysid/summary_fixture.h"
 
 namespace flash::sysid {
 namespace {
