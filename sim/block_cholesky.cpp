@@ -237,15 +237,16 @@ BlockCholesky<Scalar>::BlockCholesky(std::shared_ptr<const SymbolicFactor> symbo
     largest_stack = std::max(largest_stack, stack + update_entries<Scalar>(node));
     stack += update_entries<Scalar>(node) - children;
   }
-  factor_.resize(entries + lanes<Scalar>);
+  factor_.resize(entries + 2 * lanes<Scalar>);
   stack_.resize(largest_stack);
   update_offsets_.resize(symbolic_->supernodes.size());
-  gathered_.resize(3 * symbolic_->largest_front);
+  front_.resize(3 * symbolic_->largest_front + 2 * lanes<Scalar>);
   permuted_.resize(3 * symbolic_->size);
+  inverses_.resize(6 * symbolic_->size);
 }
 
 template <typename Scalar>
-bool BlockCholesky<Scalar>::factorize(const BlockValues<Scalar>& values) {
+bool BlockCholesky<Scalar>::factorize(const BlockValues<double>& values) {
   const auto& nodes = symbolic_->supernodes;
   long top = 0;
   for (size_t s = 0; s < nodes.size(); ++s) {
@@ -255,11 +256,12 @@ bool BlockCholesky<Scalar>::factorize(const BlockValues<Scalar>& values) {
     Scalar* factor = factor_.data() + offsets_[s];
     std::fill(factor, factor + static_cast<long>(front_rows) * columns, Scalar(0));
     for (const Placement& place : symbolic_->placements[s]) {
-      const Scalar* block = values.data() + 9L * place.block;
+      const double* block = values.data() + 9L * place.block;
       Scalar* target = factor + 3L * place.front_column * front_rows + 3L * place.front_row;
       for (int c = 0; c < 3; ++c)
         for (int r = 0; r < 3; ++r)
-          target[c * front_rows + r] = place.transpose ? block[3 * r + c] : block[3 * c + r];
+          target[c * front_rows + r] =
+              static_cast<Scalar>(place.transpose ? block[3 * r + c] : block[3 * c + r]);
     }
     Scalar* update = stack_.data() + top;
     std::fill(update, update + update_entries<Scalar>(node), Scalar(0));
@@ -286,6 +288,7 @@ bool BlockCholesky<Scalar>::factorize(const BlockValues<Scalar>& values) {
     }
     if (!eliminate_columns(factor, front_rows, columns)) return false;
     if (rows > 0) subtract_outer_product(update, update_rows, rows, factor, front_rows, columns);
+    extract_diagonal(factor, front_rows, columns, inverses_.data() + 6L * node.first_column);
     if (!node.children.empty()) {
       const long base = update_offsets_[node.children.front()];
       std::copy(update, update + update_entries<Scalar>(node), stack_.data() + base);
@@ -298,25 +301,35 @@ bool BlockCholesky<Scalar>::factorize(const BlockValues<Scalar>& values) {
 }
 
 template <typename Scalar>
-void BlockCholesky<Scalar>::solve_in_place(Scalar* x) const {
+void BlockCholesky<Scalar>::solve_in_place(double* x) const {
   const auto& nodes = symbolic_->supernodes;
+  const auto gather = [&](const Supernode& node) {
+    const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
+    std::copy_n(permuted_.data() + 3 * node.first_column, columns, front_.data());
+    for (size_t r = 0; r < node.rows.size(); ++r)
+      std::copy_n(permuted_.data() + 3 * node.rows[r], 3, front_.data() + columns + 3 * r);
+    std::fill(front_.begin() + columns + rows, front_.begin() + padded<Scalar>(columns + rows), Scalar(0));
+  };
   for (int vertex = 0; vertex < symbolic_->size; ++vertex)
-    for (int c = 0; c < 3; ++c) permuted_[3 * symbolic_->position[vertex] + c] = x[3 * vertex + c];
+    for (int c = 0; c < 3; ++c)
+      permuted_[3 * symbolic_->position[vertex] + c] = static_cast<Scalar>(x[3 * vertex + c]);
   for (size_t s = 0; s < nodes.size(); ++s) {
     const Supernode& node = nodes[s];
     const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
-    solve_forward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns, rows,
-                  permuted_.data() + 3 * node.first_column, gathered_.data());
+    gather(node);
+    solve_forward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns,
+                  inverses_.data() + 6L * node.first_column, front_.data());
+    std::copy_n(front_.data(), columns, permuted_.data() + 3 * node.first_column);
     for (size_t r = 0; r < node.rows.size(); ++r)
-      for (int c = 0; c < 3; ++c) permuted_[3 * node.rows[r] + c] -= gathered_[3 * r + c];
+      std::copy_n(front_.data() + columns + 3 * r, 3, permuted_.data() + 3 * node.rows[r]);
   }
   for (size_t s = nodes.size(); s-- > 0;) {
     const Supernode& node = nodes[s];
     const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
-    for (size_t r = 0; r < node.rows.size(); ++r)
-      for (int c = 0; c < 3; ++c) gathered_[3 * r + c] = permuted_[3 * node.rows[r] + c];
-    solve_backward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns, rows,
-                   permuted_.data() + 3 * node.first_column, gathered_.data());
+    gather(node);
+    solve_backward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns,
+                   inverses_.data() + 6L * node.first_column, front_.data());
+    std::copy_n(front_.data(), columns, permuted_.data() + 3 * node.first_column);
   }
   for (int vertex = 0; vertex < symbolic_->size; ++vertex)
     for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted_[3 * symbolic_->position[vertex] + c];

@@ -1,6 +1,8 @@
 #pragma once
 #include <cmath>
 #include <cstring>
+#include <new>
+#include <vector>
 
 namespace flash::sim {
 
@@ -20,6 +22,32 @@ template <typename Scalar>
 struct VectorOf {
   typedef Scalar type __attribute__((vector_size(vector_bytes), aligned(sizeof(Scalar))));
 };
+
+template <typename Scalar>
+Scalar sum_of_lanes(typename VectorOf<Scalar>::type vector) {
+  Scalar halves[lanes<Scalar>];
+  std::memcpy(halves, &vector, sizeof(vector));
+  for (int width = lanes<Scalar> / 2; width > 0; width /= 2)
+    for (int lane = 0; lane < width; ++lane) halves[lane] += halves[lane + width];
+  return halves[0];
+}
+
+/// Storage that starts on a whole vector.
+template <typename Scalar>
+struct VectorAllocator {
+  using value_type = Scalar;
+  VectorAllocator() = default;
+  template <typename Other>
+  VectorAllocator(const VectorAllocator<Other>&) {}
+  Scalar* allocate(size_t count) {
+    return static_cast<Scalar*>(::operator new(count * sizeof(Scalar), std::align_val_t(vector_bytes)));
+  }
+  void deallocate(Scalar* data, size_t) { ::operator delete(data, std::align_val_t(vector_bytes)); }
+  bool operator==(const VectorAllocator&) const { return true; }
+};
+
+template <typename Scalar>
+using VectorStorage = std::vector<Scalar, VectorAllocator<Scalar>>;
 
 template <typename Scalar>
 constexpr int padded(int rows) {
@@ -117,36 +145,71 @@ void subtract_outer_product(Scalar* update, int padded_update_rows, int rows, co
   }
 }
 
-/// [own; below] of one right-hand side through [L11; L21]: own <- L11^-1 own, below <- L21 own.
+/// Takes the diagonal 3 x 3 blocks out of a factorized front: their inverses (6 numbers each, lower triangle
+/// row by row) go to `inverses`, and every entry on or above them becomes zero. Solves then run over whole
+/// aligned vectors.
 template <typename Scalar>
-void solve_forward(const Scalar* front, int padded_rows, int columns, int rows, Scalar* own, Scalar* below) {
-  for (int i = 0; i < rows; ++i) below[i] = 0;
-  for (int j = 0; j < columns; ++j) {
-    const Scalar* column = front + static_cast<long>(j) * padded_rows;
-    const Scalar value = own[j] /= column[j];
-    for (int i = j + 1; i < columns; ++i) own[i] -= column[i] * value;
-    for (int i = 0; i < rows; ++i) below[i] += column[columns + i] * value;
+void extract_diagonal(Scalar* front, int padded_rows, int columns, Scalar* inverses) {
+  for (int j = 0; j < columns; j += 3, inverses += 6) {
+    Scalar* l0 = front + static_cast<long>(j) * padded_rows;
+    Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
+    const Scalar d0 = 1 / l0[j], d1 = 1 / l1[j + 1], d2 = 1 / l2[j + 2];
+    inverses[0] = d0;
+    inverses[1] = -l0[j + 1] * d0 * d1;
+    inverses[2] = d1;
+    inverses[3] = (l0[j + 1] * l1[j + 2] * d1 - l0[j + 2]) * d0 * d2;
+    inverses[4] = -l1[j + 2] * d1 * d2;
+    inverses[5] = d2;
+    for (Scalar* column : {l0, l1, l2})
+      for (int i = 0; i < j + 3; ++i) column[i] = 0;
   }
 }
 
-/// own <- L11^-T (own - L21^T below).
+// One right-hand side through a front, in place: x holds the front's own entries, then those below, then
+// zeros up to `padded_rows`. Three columns at a time.
+
+/// x <- [L11^-1 x_own; x_below - L21 L11^-1 x_own].
 template <typename Scalar>
-void solve_backward(const Scalar* front, int padded_rows, int columns, int rows, Scalar* own,
-                    const Scalar* below) {
+void solve_forward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
   using Vector = typename VectorOf<Scalar>::type;
-  constexpr int step = lanes<Scalar>;
-  for (int j = columns - 1; j >= 0; --j) {
-    const Scalar* column = front + static_cast<long>(j) * padded_rows;
-    Vector sum{};
-    int i = 0;
-    for (; i + step <= rows; i += step)
-      sum += *reinterpret_cast<const Vector*>(column + columns + i) *
-             *reinterpret_cast<const Vector*>(below + i);
-    Scalar value = own[j];
-    for (int lane = 0; lane < step; ++lane) value -= sum[lane];
-    for (; i < rows; ++i) value -= column[columns + i] * below[i];
-    for (int k = j + 1; k < columns; ++k) value -= column[k] * own[k];
-    own[j] = value / column[j];
+  for (int j = 0; j < columns; j += 3, inverses += 6) {
+    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
+    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
+    const Scalar x0 = inverses[0] * x[j];
+    const Scalar x1 = inverses[1] * x[j] + inverses[2] * x[j + 1];
+    const Scalar x2 = inverses[3] * x[j] + inverses[4] * x[j + 1] + inverses[5] * x[j + 2];
+    x[j] = x0;
+    x[j + 1] = x1;
+    x[j + 2] = x2;
+    for (int i = (j + 3) / lanes<Scalar> * lanes<Scalar>; i < padded_rows; i += lanes<Scalar>) {
+      Vector& target = *reinterpret_cast<Vector*>(x + i);
+      target -= *reinterpret_cast<const Vector*>(l0 + i) * x0 +
+                *reinterpret_cast<const Vector*>(l1 + i) * x1 + *reinterpret_cast<const Vector*>(l2 + i) * x2;
+    }
+  }
+}
+
+/// x_own <- L11^-T (x_own - L21^T x_below).
+template <typename Scalar>
+void solve_backward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
+  using Vector = typename VectorOf<Scalar>::type;
+  inverses += 2 * columns;
+  for (int j = columns - 3; j >= 0; j -= 3) {
+    inverses -= 6;
+    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
+    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
+    Vector sum0{}, sum1{}, sum2{};
+    for (int i = (j + 3) / lanes<Scalar> * lanes<Scalar>; i < padded_rows; i += lanes<Scalar>) {
+      const Vector below = *reinterpret_cast<const Vector*>(x + i);
+      sum0 += *reinterpret_cast<const Vector*>(l0 + i) * below;
+      sum1 += *reinterpret_cast<const Vector*>(l1 + i) * below;
+      sum2 += *reinterpret_cast<const Vector*>(l2 + i) * below;
+    }
+    const Scalar x0 = x[j] - sum_of_lanes<Scalar>(sum0), x1 = x[j + 1] - sum_of_lanes<Scalar>(sum1),
+                 x2 = x[j + 2] - sum_of_lanes<Scalar>(sum2);
+    x[j] = inverses[0] * x0 + inverses[1] * x1 + inverses[3] * x2;
+    x[j + 1] = inverses[2] * x1 + inverses[4] * x2;
+    x[j + 2] = inverses[5] * x2;
   }
 }
 

@@ -98,7 +98,7 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
 
 void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
                          const data::SheetMaterial& material, const data::Points& positions, double scale,
-                         BlockValues<double>& values) {
+                         Curvature curvature, BlockValues<double>& values) {
   const SheetLame lame = sheet_lame(material.membrane_stiffness, material.poissons_ratio);
   for (size_t t = 0; t < plan.sheet.triangles.size(); ++t) {
     const RestTriangle& triangle = plan.sheet.triangles[t];
@@ -107,7 +107,7 @@ void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
     Matrix32 stress;
     Matrix66 hessian;
     membrane_response(material.constitutive, deformation_gradient(triangle, w, positions), lame, density,
-                      stress, &hessian);
+                      stress, &hessian, curvature);
     const double factor = scale * triangle.area;
     const Matrix3d h00 = factor * hessian.topLeftCorner<3, 3>(),
                    h01 = factor * hessian.topRightCorner<3, 3>(),

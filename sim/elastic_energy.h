@@ -1,5 +1,6 @@
 #pragma once
 #include "data/material.h"
+#include "sim/membrane.h"
 #include "sim/sheet_plan.h"
 
 namespace flash::sim {
@@ -14,11 +15,11 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
                                    const data::SheetMaterial& material, const data::Points& positions,
                                    data::Points& gradient);
 
-/// Adds `scale` times the elastic Hessian, with its negative eigenvalues element by element set to zero and
-/// with the stand-in for the plate's bending.
+/// Adds `scale` times the elastic Hessian, with the stand-in for the plate's bending. Of the hinge model the
+/// Gauss-Newton part. `positive`: the negative eigenvalues of each triangle set to zero.
 void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
                          const data::SheetMaterial& material, const data::Points& positions, double scale,
-                         BlockValues<double>& values);
+                         Curvature curvature, BlockValues<double>& values);
 
 /// y += scale * values * x, vertex by vertex.
 void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale,

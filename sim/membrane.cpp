@@ -218,14 +218,14 @@ Matrix66 membrane_hessian_projected(Constitutive constitutive, const Matrix32& F
 }
 
 void membrane_response(Constitutive constitutive, const Matrix32& F, const SheetLame& lame, double& energy,
-                       Matrix32& P, Matrix66* projected_hessian) {
+                       Matrix32& P, Matrix66* response_hessian, Curvature curvature) {
   const SingularValues f = singular_values(F);
   Principal r = principal(constitutive, f.s1, f.s2, lame);
   energy = r.energy;
   P = stress(f, r);
-  if (projected_hessian) {
-    clamp(r);
-    *projected_hessian = hessian(f, r);
+  if (response_hessian) {
+    if (curvature == Curvature::positive) clamp(r);
+    *response_hessian = hessian(f, r);
   }
 }
 

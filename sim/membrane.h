@@ -42,8 +42,12 @@ Matrix66 membrane_hessian(data::Constitutive constitutive, const Matrix32& F, co
 Matrix66 membrane_hessian_projected(data::Constitutive constitutive, const Matrix32& F,
                                     const SheetLame& lame);
 
-/// Energy, stress and (unless null) projected Hessian from one singular value decomposition.
+/// `positive`: negative eigenvalues set to zero.
+enum class Curvature { exact, positive };
+
+/// Energy, stress and (unless null) the Hessian from one singular value decomposition.
 void membrane_response(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame,
-                       double& energy, Matrix32& stress, Matrix66* projected_hessian);
+                       double& energy, Matrix32& stress, Matrix66* response_hessian,
+                       Curvature curvature = Curvature::positive);
 
 }  // namespace flash::sim

@@ -41,8 +41,8 @@ struct Solver::Workspace {
   std::shared_ptr<const SheetPlan> plan;
   SolverSettings settings;
   std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> bending;
-  BlockCholesky<double> factor;
-  BlockValues<double> values, restricted, damping;
+  BlockCholesky<float> factor;  ///< a preconditioner: single precision halves its traffic
+  BlockValues<double> values, damping;
   bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
 
   Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
@@ -50,10 +50,10 @@ struct Solver::Workspace {
 
   const BendingOperator& bending_of(const data::SheetMaterial& material);
 
-  /// Newton direction by conjugate gradients on the free directions. The matrix has the bending operator
-  /// itself and the constraints of this iterate; the factor that preconditions it has the operator's
-  /// stand-in, and may be of an earlier iterate. Returns false where the matrix could not be factorized.
-  bool solve(const BendingOperator& bending_operator, double bending_rigidity,
+  /// Newton direction by conjugate gradients on the free directions, until the matrix curves down. The matrix
+  /// is exact; the factor that preconditions it is positive definite, has the stand-in of the bending
+  /// operator, and may be of an earlier iterate. Adds to `force` what the direction changes.
+  void solve(const BendingOperator& bending_operator, double bending_rigidity,
              const std::vector<VertexConstraint>& constraints, const Points& gradient, double tolerance,
              Points& direction, Points& force, StepReport& report);
 };
@@ -101,11 +101,11 @@ class StepProblem {
     return potential + elastic.membrane + elastic.bending;
   }
 
-  /// A positive definite stand-in for the Hessian of the potential.
-  void assemble(const Points& positions, BlockValues<double>& values) const {
+  /// Hessian of the potential, the plate's bending replaced by its stand-in.
+  void assemble(const Points& positions, Curvature curvature, BlockValues<double>& values) const {
     values.assign(9 * (plan_.pattern.size + plan_.pattern.pairs.size()), 0.0);
     if (!damping_.empty()) values = damping_;
-    add_elastic_hessian(plan_, bending_, environment_.material, positions, 1.0, values);
+    add_elastic_hessian(plan_, bending_, environment_.material, positions, 1.0, curvature, values);
     const double per_mass = 1 / (h_ * h_) + environment_.material.air_drag / h_;
     for (int i = 0; i < plan_.pattern.size; ++i)
       for (int c = 0; c < 3; ++c) values[9L * i + 4 * c] += mass_[i] * per_mass;
@@ -142,9 +142,8 @@ void add_slip_stiffness(const std::vector<VertexConstraint>& constraints, BlockV
 
 /// P B P + (I - P) scaled to its neighbours: the matrix of the free directions.
 void restrict_matrix(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints,
-                     const BlockValues<double>& values, BlockValues<double>& restricted) {
-  restricted = values;
-  const auto block = [&](size_t k) { return Map<Matrix3d>(restricted.data() + 9 * k); };
+                     BlockValues<double>& values) {
+  const auto block = [&](size_t k) { return Map<Matrix3d>(values.data() + 9 * k); };
   const auto is_free = [&](int i) { return constraints[i].hold == Hold::free; };
   for (int i = 0; i < pattern.size; ++i) {
     if (is_free(i)) continue;
@@ -191,14 +190,9 @@ bool exchange_contacts(const Points& direction, const Points& force_before, cons
 
 }  // namespace
 
-bool Solver::Workspace::solve(const BendingOperator& bending_operator, double bending_rigidity,
+void Solver::Workspace::solve(const BendingOperator& bending_operator, double bending_rigidity,
                               const std::vector<VertexConstraint>& constraints, const Points& gradient,
                               double tolerance, Points& direction, Points& force, StepReport& report) {
-  if (refactor) {
-    restrict_matrix(plan->pattern, constraints, values, restricted);
-    if (!factor.factorize(restricted)) return false;
-    ++report.factorizations;
-  }
   const auto multiply = [&](const Points& x, Points& product) {
     product.setZero(x.rows(), 3);
     add_block_product(plan->pattern, values, 1.0, x, product);
@@ -213,10 +207,10 @@ bool Solver::Workspace::solve(const BendingOperator& bending_operator, double be
     residual -= product;
   }
   restrict_vectors(constraints, residual);
-  const double target = std::max(0.05 * residual.norm(), tolerance);
+  const double target = std::max(0.1 * residual.norm(), tolerance);
   double previous = 0;
   int iteration = 0;
-  while (residual.norm() > target && iteration < 30) {
+  while (residual.norm() > target && iteration < 20) {
     ++iteration;
     preconditioned = residual;
     factor.solve_in_place(preconditioned.data());
@@ -226,7 +220,14 @@ bool Solver::Workspace::solve(const BendingOperator& bending_operator, double be
     previous = along;
     multiply(search, product);
     restrict_vectors(constraints, product);
-    const double step = along / search.cwiseProduct(product).sum();
+    const double curvature = search.cwiseProduct(product).sum();
+    // Steihaug 1983: where the sheet is about to buckle the matrix is indefinite, and what was found so far
+    // leads down.
+    if (curvature <= 0) {
+      if (iteration == 1) direction += search;
+      break;
+    }
+    const double step = along / curvature;
     direction += step * search;
     residual -= step * product;
   }
@@ -234,7 +235,6 @@ bool Solver::Workspace::solve(const BendingOperator& bending_operator, double be
   force += product;
   report.solves += iteration;
   refactor = iteration > settings.stale_factor_solves;
-  return true;
 }
 
 Solver::Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings)
@@ -256,7 +256,7 @@ StepReport Solver::step(Environment& environment) {
   if (environment.material.stiffness_damping > 0) {
     w.damping.assign(9 * (w.plan->pattern.size + w.plan->pattern.pairs.size()), 0.0);
     add_elastic_hessian(*w.plan, bending, environment.material, start.positions,
-                        environment.material.stiffness_damping / h, w.damping);
+                        environment.material.stiffness_damping / h, Curvature::positive, w.damping);
   }
   const StepProblem problem(*w.plan, bending, environment, h, w.damping);
   const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
@@ -279,15 +279,21 @@ StepReport Solver::step(Environment& environment) {
   while (report.iterations < w.settings.max_iterations &&
          now.residual.norm() > w.settings.tolerance * force_scale) {
     ++report.iterations;
-    problem.assemble(now.positions, w.values);
+    if (w.refactor) {
+      problem.assemble(now.positions, Curvature::positive, w.values);
+      add_slip_stiffness(now.constraints, w.values);
+      restrict_matrix(w.plan->pattern, now.constraints, w.values);
+      if (!w.factor.factorize(w.values)) break;
+      ++report.factorizations;
+    }
+    problem.assemble(now.positions, Curvature::exact, w.values);
     add_slip_stiffness(now.constraints, w.values);
     std::vector<VertexConstraint> linear = now.constraints;
     Points gradient = now.residual, force;
     for (int exchange = 0; exchange < 6; ++exchange) {
       force = now.force;
-      if (!w.solve(bending, environment.material.bending_rigidity, linear, gradient,
-                   0.3 * w.settings.tolerance * force_scale, direction, force, report))
-        break;
+      w.solve(bending, environment.material.bending_rigidity, linear, gradient,
+              0.3 * w.settings.tolerance * force_scale, direction, force, report);
       if (!exchange_contacts(direction, now.force, force, gradient, linear)) break;
     }
 
@@ -307,8 +313,8 @@ StepReport Solver::step(Environment& environment) {
                       trial.residual.norm() > (1 - 0.1 * length) * now.residual.norm();
          ++cut)
       after = move(length *= 0.5, trial);
-    // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short. Go on along
-    // the direction, by secants, while the potential falls.
+    // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short.
+    // Go on along the direction, by secants, while the potential falls.
     for (double end_slope; length >= 1 && length < 30; std::swap(trial, longer)) {
       end_slope = trial.residual.cwiseProduct(direction).sum();
       if (end_slope > 0.2 * slope) break;

@@ -58,12 +58,12 @@ TEST(BlockCholesky, SolvesLikeADenseFactorization) {
 TEST(BlockCholesky, SinglePrecisionSolvesToItsRounding) {
   const Example example = random_example(90, 200, 5);
   BlockCholesky<float> factor(analyze(example.pattern));
-  ASSERT_TRUE(factor.factorize({example.values.begin(), example.values.end()}));
+  ASSERT_TRUE(factor.factorize(example.values));
   const VectorXd right = VectorXd::LinSpaced(270, -1, 2);
-  Eigen::VectorXf x = right.cast<float>();
+  VectorXd x = right;
   factor.solve_in_place(x.data());
   const VectorXd expected = example.dense.llt().solve(right);
-  EXPECT_LT((x.cast<double>() - expected).norm(), 1e-5 * expected.norm());
+  EXPECT_LT((x - expected).norm(), 1e-5 * expected.norm());
 }
 
 TEST(BlockCholesky, FactorizingAgainForgetsTheFirstMatrix) {

@@ -64,7 +64,7 @@ TEST(ElasticEnergy, HessianOfAStretchedSheetIsTheDerivativeOfTheGradient) {
     const Points x = 1.1 * sheet.rest.vertices + noise(sheet.rest.vertices.rows(), 2e-4, 4);
     const Points along = noise(x.rows(), 1, 6);
     BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, *bending, material, x, 1.0, values);
+    add_elastic_hessian(*plan, *bending, material, x, 1.0, Curvature::exact, values);
     Points product = Points::Zero(x.rows(), 3);
     add_block_product(plan->pattern, values, 1.0, along, product);
     add_bending_correction(*bending, material.bending_rigidity, along, product);
