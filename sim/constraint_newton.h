@@ -21,7 +21,7 @@ struct ConstraintSettings {
       1e-12;                ///< on the worst violation of a row, |min(c, r lambda)| and its friction like [m]
   double max_force = 1e10;  ///< clamp on lambda_n [N]
   double damping = 0;  ///< fixed step length in (0, 1], 0.75 as published; 0: the best of 1, 1/2, 1/4, 1/8
-  DualSolverSettings linear;
+  DualSolverSettings linear{};
 };
 
 /// Contacts with gaps linear in their multipliers, c(lambda) = free_gap + h^2 W lambda. Contact k has the

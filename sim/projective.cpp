@@ -65,18 +65,29 @@ class StepForces {
     const double damping = environment.material.stiffness_damping;
     if (damping > 0) {
       damping_.assign(9 * (plan.pattern.size + plan.pattern.pairs.size()), 0.0);
-      add_elastic_hessian(plan, bending, environment.material, start.positions, damping / h_, damping_);
+      add_elastic_hessian(plan, bending, environment.material, start.positions, damping / h_,
+                          Curvature::positive, damping_);
     }
   }
 
-  /// What every vertex needs from outside to obey its equation of motion at x [N].
-  Points needed(const Points& x, ElasticEnergy& energy) const {
-    const Points moved = x - environment_.state.positions;
-    Points force =
-        mass_.asDiagonal() * ((x - target_) / (h_ * h_) + environment_.material.air_drag / h_ * moved);
+  /// What every vertex needs from outside to obey its equation of motion at x [N], the gradient of
+  /// `potential` [J].
+  Points needed(const Points& x, ElasticEnergy& energy, double& potential) const {
+    const Points moved = x - environment_.state.positions, ahead = x - target_;
+    const double drag = environment_.material.air_drag / h_;
+    Points force = mass_.asDiagonal() * (ahead / (h_ * h_) + drag * moved);
+    potential = 0.5 * (mass_.asDiagonal() * ahead).cwiseProduct(ahead).sum() / (h_ * h_) +
+                0.5 * drag * (mass_.asDiagonal() * moved).cwiseProduct(moved).sum() -
+                loads_.cwiseProduct(x).sum();
     force -= loads_;
-    if (!damping_.empty()) add_block_product(plan_.pattern, damping_, 1.0, moved, force);
+    if (!damping_.empty()) {
+      Points damped = Points::Zero(x.rows(), 3);
+      add_block_product(plan_.pattern, damping_, 1.0, moved, damped);
+      potential += 0.5 * damped.cwiseProduct(moved).sum();
+      force += damped;
+    }
     energy = add_elastic_gradient(plan_, bending_, environment_.material, x, force);
+    potential += energy.membrane + energy.bending;
     return force;
   }
 
@@ -169,6 +180,34 @@ std::string inertia_warning(double carried, double gravity, const ProjectiveSett
   return text;
 }
 
+/// Forces of grasps, supports and obstacles, and how well the contacts are met. `needed`: from grasps and
+/// supports [N].
+void report_forces(const Environment& environment, const ProjectiveSettings& settings,
+                   const std::vector<VertexConstraint>& holds, const std::vector<VertexContact>& contacts,
+                   const VectorXd& multiplier, const Points& needed, ProjectiveReport& report) {
+  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
+  report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
+  for (std::size_t i = 0; i < holds.size(); ++i) {
+    const Vector3d force = needed.row(i), held = force - holds[i].free * force;
+    (holds[i].grasp >= 0 ? report.grasp_forces[holds[i].grasp] : report.fixed_force) += held;
+  }
+  std::size_t loaded = 0;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const VertexContact& contact = contacts[k];
+    const Vector3d l = multiplier.segment<3>(3 * k);
+    report.obstacle_forces[contact.obstacle] += contact.directions.transpose() * l;
+    report.penetration_max = std::max(report.penetration_max, -contact.gap[0]);
+    report.cone_violation = std::max(report.cone_violation, l.tail<2>().norm() - contact.friction * l[0]);
+    if (l[0] == 0) continue;
+    ++loaded;
+    report.complementarity = std::max(report.complementarity, std::abs(contact.gap[0]));
+  }
+  report.contacts = static_cast<int>(contacts.size());
+  if (report.metric == ContactMetric::inertia && loaded > 0 && holds.size() > 2 * loaded)
+    report.warning = inertia_warning(static_cast<double>(holds.size()) / static_cast<double>(loaded),
+                                     environment.gravity.norm(), settings);
+}
+
 }  // namespace
 
 ProjectiveSolver::ProjectiveSolver(const Sheet& sheet, const ProjectiveSettings& settings)
@@ -210,11 +249,22 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   VectorXd multiplier;
   Points force, residual, plain;
   Points reaction = Points::Zero(n, 3);
-  double previous = std::numeric_limits<double>::infinity();
+  double bound = 0;  // on the potential of an accelerated iterate
   bool accelerated = false;
   for (;; ++report.iterations) {
     ElasticEnergy elastic;
-    force = forces.needed(x, elastic);
+    double potential;
+    force = forces.needed(x, elastic, potential);
+    // The plain iteration lowers the potential of the step, contact forces frozen, because A bounds its
+    // curvature; an accelerated iterate that raises it is taken back. A guard by the residual would not do:
+    // on the way through a buckle the residual has to rise.
+    const double there = potential + contact_potential(environment, time, h, contacts, multiplier, x);
+    if (accelerated && report.iterations < settings.iterations && !(there <= bound)) {
+      anderson.reset();
+      x = plain;
+      accelerated = false;
+      continue;
+    }
     const Points free_motion = system.solve(-h * h * (force - reaction));
     contacts =
         find_contacts(environment, time, h, x, 2 * free_motion.rowwise().norm() + VectorXd::Constant(n, 1e-6),
@@ -254,16 +304,8 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
     report.solves += 1;
     if (report.converged || report.iterations == settings.iterations) break;
 
-    // |motion|_A^2: the plain iteration does not increase it, an accelerated one that does is taken back.
-    const double merit = -h * h * flat(motion).dot(flat(residual));
-    if (accelerated && !(merit < 2 * previous)) {
-      anderson.reset();
-      x = plain;
-      accelerated = false;
-      previous = std::numeric_limits<double>::infinity();
-      continue;
-    }
-    previous = merit;
+    const double here = potential + contact_potential(environment, time, h, contacts, multiplier, x);
+    bound = here + 1e-13 * std::abs(here);
     plain = x + motion;
     if (report.metric == ContactMetric::inertia && !contacts.empty()) {
       x = plain;
@@ -273,28 +315,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
     }
   }
 
-  report.contacts = static_cast<int>(contacts.size());
-  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
-  report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
-  for (Index i = 0; i < n; ++i) {
-    const Vector3d hold =
-        (Vector3d::Ones() - free_axes[i]).cwiseProduct((force - reaction).row(i).transpose());
-    (holds[i].grasp >= 0 ? report.grasp_forces[holds[i].grasp] : report.fixed_force) += hold;
-  }
-  int loaded = 0;
-  for (std::size_t k = 0; k < contacts.size(); ++k) {
-    const Vector3d l = multiplier.segment<3>(3 * k);
-    report.obstacle_forces[contacts[k].obstacle] += contacts[k].directions.transpose() * l;
-    report.penetration_max = std::max(report.penetration_max, -contacts[k].gap[0]);
-    report.cone_violation = std::max(report.cone_violation, l.tail<2>().norm() - contacts[k].friction * l[0]);
-    if (l[0] > 0) {
-      ++loaded;
-      report.complementarity = std::max(report.complementarity, std::abs(contacts[k].gap[0]));
-    }
-  }
-  if (report.metric == ContactMetric::inertia && n > 2 * loaded && loaded > 0)
-    report.warning = inertia_warning(static_cast<double>(n) / loaded, environment.gravity.norm(), settings);
-
+  report_forces(environment, settings, holds, contacts, multiplier, force - reaction, report);
   environment.state.velocities = (x - environment.state.positions) / h;
   environment.state.positions = x;
   environment.state.time = time;

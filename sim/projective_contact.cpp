@@ -17,6 +17,13 @@ double regular(double compliance, double inverse_mass) {
   return compliance > 1e-9 * inverse_mass ? compliance : inverse_mass;
 }
 
+/// Displacement of a vertex since the start of the step against the surface [m].
+Vector3d moved_against(const Environment& environment, const Gap& gap, double time_step,
+                       const data::Points& positions, Index vertex) {
+  return (positions.row(vertex) - environment.state.positions.row(vertex)).transpose() -
+         time_step * gap.surface_velocity;
+}
+
 }  // namespace
 
 std::vector<VertexContact> find_contacts(const Environment& environment, double time, double time_step,
@@ -58,6 +65,22 @@ Eigen::VectorXd along_contacts(const std::vector<VertexContact>& contacts, const
   for (std::size_t k = 0; k < contacts.size(); ++k)
     along.segment<3>(3 * k) = contacts[k].directions * u.row(contacts[k].vertex).transpose();
   return along;
+}
+
+double contact_potential(const Environment& environment, double time, double time_step,
+                         const std::vector<VertexContact>& contacts, const Eigen::VectorXd& multiplier,
+                         const data::Points& positions) {
+  double potential = 0;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const double normal = multiplier[3 * k];
+    if (normal == 0) continue;
+    const VertexContact& contact = contacts[k];
+    const Gap gap = gap_to(environment.obstacles[contact.obstacle], positions.row(contact.vertex), time);
+    const Vector3d moved = moved_against(environment, gap, time_step, positions, contact.vertex);
+    const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
+    potential += normal * (contact.friction * slip - gap.distance);
+  }
+  return potential;
 }
 
 Eigen::MatrixXd full_metric(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system) {

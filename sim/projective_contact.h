@@ -30,6 +30,12 @@ data::Points contact_forces(const std::vector<VertexContact>& contacts, const Ei
 /// H u, three rows a contact.
 Eigen::VectorXd along_contacts(const std::vector<VertexContact>& contacts, const data::Points& u);
 
+/// Potential of contact and friction at other positions, with the normal forces frozen: sum mu lambda_n
+/// |slip| - lambda_n gap [J].
+double contact_potential(const Environment& environment, double time, double time_step,
+                         const std::vector<VertexContact>& contacts, const Eigen::VectorXd& multiplier,
+                         const data::Points& positions);
+
 /// W = H A^-1 H^T, dense.
 Eigen::MatrixXd full_metric(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system);
 
