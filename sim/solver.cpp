@@ -276,6 +276,8 @@ StepReport Solver::step(Environment& environment) {
   evaluate(now);
   longer.constraints = trial.constraints = now.constraints;
   Points direction;
+  bool stuck = false;
+  int forced_moves = 0;
   while (report.iterations < w.settings.max_iterations &&
          now.residual.norm() > w.settings.tolerance * force_scale) {
     ++report.iterations;
@@ -286,7 +288,7 @@ StepReport Solver::step(Environment& environment) {
       if (!w.factor.factorize(w.values)) break;
       ++report.factorizations;
     }
-    problem.assemble(now.positions, Curvature::exact, w.values);
+    problem.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, w.values);
     add_slip_stiffness(now.constraints, w.values);
     std::vector<VertexConstraint> linear = now.constraints;
     Points gradient = now.residual, force;
@@ -309,10 +311,19 @@ StepReport Solver::step(Environment& environment) {
       return to.potential + friction_potential(environment, time, h, now.constraints, to.positions);
     };
     double length = 1.0, after = move(length, trial);
-    for (int cut = 0; cut < 8 && after > before + 1e-4 * length * slope &&
-                      trial.residual.norm() > (1 - 0.1 * length) * now.residual.norm();
-         ++cut)
-      after = move(length *= 0.5, trial);
+    const auto acceptable = [&] {
+      return after <= before + 1e-4 * length * slope ||
+             trial.residual.norm() <= (1 - 0.1 * length) * now.residual.norm();
+    };
+    while (!acceptable() && length > 1e-3) after = move(length *= 0.5, trial);
+    if (!acceptable() && !stuck) {
+      // Once more with a fresh factor and a positive matrix, whose direction leads down.
+      stuck = w.refactor = true;
+      continue;
+    }
+    // A small step all the same lets the contacts decide anew.
+    if (!acceptable() && ++forced_moves > 6) break;
+    stuck = false;
     // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short.
     // Go on along the direction, by secants, while the potential falls.
     for (double end_slope; length >= 1 && length < 30; std::swap(trial, longer)) {

@@ -127,7 +127,9 @@ void project_to_feasible(const Environment& environment, double time, double tim
     int obstacle = -1;
     const Gap gap = nearest_gap(environment, positions.row(i), time, obstacle);
     const bool held = constraint.hold != Hold::free && obstacle == constraint.obstacle;
-    if (gap.distance < 0 || held) positions.row(i) -= gap.distance * gap.normal.transpose();
+    // A vertex that is to land does so where the step is long enough to bring it down.
+    const bool lands = held && (constraint.correction.isZero(0) || gap.distance <= 0.01 * constraint.gap);
+    if (gap.distance < 0 || lands) positions.row(i) -= gap.distance * gap.normal.transpose();
     if (held && constraint.hold == Hold::slip) {
       const Vector3d slip = slip_of(environment, gap, time_step, positions, static_cast<int>(i));
       if (slip.dot(constraint.slip_direction) < 0) positions.row(i) -= slip.transpose();
