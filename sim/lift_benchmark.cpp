@@ -141,13 +141,13 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
   BlockValues<double> values;
   const auto assemble = [&] {
     values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, *bending, material, x, 1.0, values);
+    add_elastic_hessian(*plan, *bending, material, x, 1.0, Curvature::positive, values);
     for (int i = 0; i < plan->pattern.size; ++i)
       for (int c = 0; c < 3; ++c)
         values[9L * i + 4 * c] +=
             material.areal_density * plan->sheet.vertex_area[i] / (benchmark.time_step * benchmark.time_step);
   };
-  BlockCholesky<double> factor(plan->symbolic);
+  BlockCholesky<float> factor(plan->symbolic);
   const auto add = [&](const char* name, double calls, const std::function<void()>& phase) {
     result.phases.push_back({name, calls, milliseconds_of(phase)});
   };
