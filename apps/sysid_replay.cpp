@@ -58,6 +58,27 @@ std::string numbered(const std::string& folder, const char* format, int k) {
   return (fs::path(folder) / name).string();
 }
 
+// A column a frame, from the side above, from the front below.
+data::Picture draw_sequence(const sysid::Overlay& overlay, const std::vector<int>& frames,
+                            const Eigen::AlignedBox3d& bounds) {
+  sysid::OverlayImageSettings small;
+  small.panel_width = 300;
+  small.panel_height = 280;
+  small.point_radius = 0.8;
+  data::Picture sequence(small.panel_width * static_cast<int>(frames.size()), 2 * small.panel_height,
+                         {255, 255, 255});
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const sysid::OverlayFrame& frame = overlay.frames[static_cast<std::size_t>(frames[i])];
+    const data::Picture picture =
+        sysid::draw_overlay({frame.vertices, overlay.triangles}, frame.cloud, bounds, small);
+    for (int v = 0; v < picture.height; ++v)
+      for (int u = 0; u < picture.width; ++u)
+        sequence.at(static_cast<int>(i) * small.panel_width + u % small.panel_width,
+                    v + (u < small.panel_width ? 0 : small.panel_height)) = picture.at(u, v);
+  }
+  return sequence;
+}
+
 void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, const std::string& folder) {
   const Eigen::AlignedBox3d bounds = bounds_of(overlay, frames);
   for (const int k : frames) {
@@ -65,6 +86,8 @@ void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, 
     data::save_png(sysid::draw_overlay({frame.vertices, overlay.triangles}, frame.cloud, bounds),
                    numbered(folder, "%03d.png", k));
   }
+  if (frames.size() > 1)
+    data::save_png(draw_sequence(overlay, frames, bounds), (fs::path(folder) / "sequence.png").string());
 }
 
 nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const sysid::ReplayResult& motion) {
@@ -154,7 +177,8 @@ void add_replay_verb(CLI::App& app, Action& action) {
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("--set", options->set, "A parameter in place of the asset's, as bending=1e-4")
       ->allow_extra_args(false);
-  verb->add_option("--frames", options->frames, "Keyframes to draw, counted from 0; without it six")
+  verb->add_option("--frames", options->frames,
+                   "Keyframes to draw, counted from 0, each and together in sequence.png; without it six")
       ->delimiter(',');
   verb->add_flag("--every-step", options->every_step, "Write the mesh of every step too");
   verb->add_option("-o,--out", options->out, "Folder for meshes, clouds, overlay.csv and pictures")
