@@ -22,7 +22,7 @@ struct Plane {
 struct Box {
   Eigen::Vector3d half_extents = Eigen::Vector3d::Constant(0.01);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  data::Trajectory trajectory;
+  data::Trajectory trajectory = {};
 };
 
 /// Solid cylinder without ends: a peg or a rail.
