@@ -2,6 +2,7 @@
 BUILD ?= build/release
 PREFIX ?= /usr/local
 DEMO ?= demo
+DATA ?= ../shared/data
 JOBS ?= $(shell nproc)
 CMAKE_ARGS ?=
 
@@ -9,7 +10,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo build test configure-test format check-format tidy install clean
+.PHONY: help demo build test validate configure-test format check-format tidy install clean
 .PHONY: packages-build packages-test packages-check
 
 help:  ## This list
@@ -33,6 +34,10 @@ test: configure-test  ## Packages, build, then all tests
 
 configure-test: packages-build packages-test
 	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=ON $(CMAKE_ARGS)
+
+validate: build  ## Fit the recordings in $(DATA) and renew docs/validation.md; ONLY=lift_navy: that clip alone
+	python3 tests/validation/validate.py --sysid $(sysid) --data $(DATA) --out $(BUILD)/validation \
+	  --document docs/validation.md $(if $(ONLY),--only $(ONLY))
 
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i

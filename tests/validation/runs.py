@@ -1,0 +1,71 @@
+"""Runs of flash-sysid that are kept and not repeated."""
+import csv
+import json
+import pathlib
+import subprocess
+import sys
+import time
+
+
+class Runs:
+    """Each run has a folder below `out`; one that holds the answer to the same command is left alone."""
+
+    def __init__(self, sysid, out):
+        self.sysid = str(sysid)
+        self.out = pathlib.Path(out)
+
+    def grid(self, name, recordings, *options):
+        """The summary of a search, with the rows of results.csv as `rows`. Exit code 3 (finished, but nothing is
+        identifiable or the best candidate missed a step) is an answer too."""
+        folder = self.out / name
+        command = ["grid", *map(str, recordings), *options, "--no-horizon", "--quiet", "-o", str(folder)]
+        if not self._done(folder, command, "summary.json"):
+            begun = self._same(folder, command) and (folder / "results.csv").exists()
+            self._call(folder, command, ["--resume"] if begun else ["--force"])
+        summary = json.loads((folder / "summary.json").read_text())
+        with open(folder / "results.csv", newline="") as file:
+            rows = [{key: _number(text) for key, text in row.items()} for row in csv.DictReader(file)]
+        summary["rows"] = sorted(rows, key=lambda row: row["score_m"])
+        return summary
+
+    def replay(self, name, recording, parameters, *options, frames="20"):
+        """Score, offsets and keyframes of one set of parameters; meshes, clouds and pictures in the folder."""
+        folder = self.out / name
+        settings = [word for key, value in parameters.items() for word in ("--set", f"{key}={value!r}")]
+        command = ["replay", str(recording), *settings, *options, "--json", "--quiet", "--frames", frames,
+                   "-o", str(folder)]
+        if not self._done(folder, command, "score.json"):
+            text = self._call(folder, command, ["--force"])
+            (folder / "score.json").write_text(text)
+        return json.loads((folder / "score.json").read_text())
+
+    def import_clouds(self, name, clouds, *options):
+        folder = self.out / name
+        command = ["import", str(clouds), *options, "--quiet", "-o", str(folder)]
+        if not self._done(folder, command, "recording.json"):
+            self._call(folder, command, ["--force"])
+        return folder
+
+    def _same(self, folder, command):
+        kept = folder / "command.json"
+        return kept.exists() and json.loads(kept.read_text()) == command
+
+    def _done(self, folder, command, answer):
+        return self._same(folder, command) and (folder / answer).exists()
+
+    def _call(self, folder, command, more):
+        folder.mkdir(parents=True, exist_ok=True)
+        begin = time.monotonic()
+        (folder / "command.json").write_text(json.dumps(command))
+        done = subprocess.run([self.sysid, *command, *more], capture_output=True, text=True)
+        if done.returncode not in (0, 3):
+            sys.exit(f"validate: {' '.join(command)}\n{done.stderr}")
+        print(f"{time.monotonic() - begin:6.0f} s  {folder.relative_to(self.out)}", flush=True)
+        return done.stdout
+
+
+def _number(text):
+    try:
+        return float(text)
+    except ValueError:
+        return text

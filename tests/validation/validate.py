@@ -1,0 +1,76 @@
+#!/usr/bin/env python3
+"""Runs flash-sysid on recorded lifts and on recordings of an independent simulator, and writes what came out into
+docs/validation.md. Finished runs are kept: called again, it goes on where it was."""
+import argparse
+import pathlib
+import shutil
+
+import lifts
+import limits
+import tables
+import twins
+from runs import Runs
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sysid", required=True, help="the program flash-sysid")
+    parser.add_argument("--data", required=True, type=pathlib.Path, help="folder with lift/ and twin/")
+    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder of the runs")
+    parser.add_argument("--document", required=True, type=pathlib.Path, help="where the tables go")
+    parser.add_argument("--only", help="lifts or twins: that half of the document; a recording: its fit alone, printed")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    runs = Runs(options.sysid, options.out)
+    if options.only in lifts.CLIPS:
+        fit = lifts.fit(runs, options.data, lifts.write_asset(runs.out), options.only)
+        return print(tables.clip_table({options.only: fit}), end="")
+    if options.only in twins.TWINS:
+        return print(tables.twin_table(run_twins(runs, options.data, options.only)), end="")
+    document = {}
+    if options.only != "twins":
+        results = run_lifts(runs, options.data)
+        document |= tables.lift_tables(results)
+        copy_pictures(options.out, options.document.parent / "images")
+    if options.only != "lifts":
+        document |= tables.twin_tables(run_twins(runs, options.data), run_membrane(runs, options.data))
+    tables.replace_tables(options.document, document)
+    print(options.document)
+
+
+def copy_pictures(out, images):
+    images.mkdir(exist_ok=True)
+    for source, name in (("lift_paper/best_replay/sequence.png", "paper.png"),
+                         ("lift_navy/best_replay/sequence.png", "navy.png"),
+                         ("lift_paper/picture/020.png", "overlay.png")):
+        shutil.copyfile(out / source, images / name)
+
+
+def run_lifts(runs, data):
+    asset = lifts.write_asset(runs.out)
+    fits, pairs = {}, {}
+    for clip in lifts.CLIPS:
+        fits[clip] = lifts.fit(runs, data, asset, clip)
+    for pair, (first, second) in lifts.PAIRS.items():
+        material = {clip: fits[clip]["material"] for clip in (first, second)}
+        pairs[pair] = {"there": lifts.predict(runs, data, asset, first, material[first], second),
+                       "back": lifts.predict(runs, data, asset, second, material[second], first),
+                       "joint": lifts.fit_pair(runs, data, asset, pair, material[first])}
+    lifts.best_replay(runs, data, asset, "lift_paper", fits["lift_paper"]["material"], "picture", "20")
+    return {"fits": fits, "pairs": pairs, "fold": lifts.fold(runs, data, asset, pairs["paper"]["joint"]),
+            "limits": {clip: limits.measure(runs, data, asset, clip, fits[clip]["material"])
+                       for clip in ("lift_paper", "lift_navy")}}
+
+
+def run_twins(runs, data, only=None):
+    inputs = twins.write_inputs(runs.out)
+    return {fit: twins.fit(runs, data, *inputs, *fit) for fit in twins.FITS if only in (None, fit[0])}
+
+
+def run_membrane(runs, data):
+    assets, _ = twins.write_inputs(runs.out)
+    return twins.fit_membrane(runs, data, assets, "lift_a")
+
+
+if __name__ == "__main__":
+    main()
