@@ -152,6 +152,8 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (!result.converged)
     warn("not converged in " + data::format_short(100 * motion.unconverged_share) +
          " % of the steps (residual " + data::format_short(result.residual_max) + ")");
+  for (const std::string& bound : result.recordings.front().bounds_hit)
+    warn(bound + " is at its bound; widen `nuisance` in recording.json");
   if (options.common.json) {
     std::cout << result_json(result, motion).dump(2) << '\n';
   } else {
