@@ -16,10 +16,9 @@ enum class FrictionRow { newton, fixed_point };
 struct ConstraintSettings {
   Complementarity complementarity = Complementarity::minimum_map;
   FrictionRow friction = FrictionRow::newton;
-  int iterations = 50;  ///< Newton steps on the multipliers
-  double tolerance =
-      1e-12;                ///< on the worst violation of a row, |min(c, r lambda)| and its friction like [m]
-  double max_force = 1e10;  ///< clamp on lambda_n [N]
+  int iterations = 50;       ///< Newton steps on the multipliers
+  double tolerance = 1e-14;  ///< on the worst violation of a row, |min(c, r lambda)|, friction alike [m]
+  double max_force = 1e10;   ///< clamp on lambda_n [N]
   double damping = 0;  ///< fixed step length in (0, 1], 0.75 as published; 0: the best of 1, 1/2, 1/4, 1/8
   DualSolverSettings linear{};
 };

@@ -45,7 +45,7 @@ struct ProjectiveSolver::Workspace {
                            {m.constitutive, m.bending_model}};
     const auto found = systems.find(key);
     if (found != systems.end()) return found->second;
-    return systems.emplace(key, ProjectiveSystem(*plan, bending_of(m), m, settings.time_step)).first->second;
+    return systems.emplace(key, ProjectiveSystem(*plan, m, settings.time_step)).first->second;
   }
 };
 
@@ -282,7 +282,11 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
     if (!contacts.empty()) {
       const ContactProblem problem =
           contact_problem(contacts, system, settings, report.metric, force, multiplier);
-      const ConstraintReport solved = solve_contacts(problem, settings.constraints, multiplier);
+      // As exact as this iteration deserves: a part of the way that is still to go.
+      ConstraintSettings inner = settings.constraints;
+      inner.tolerance = std::max(inner.tolerance, 1e-3 * free_motion.rowwise().norm().maxCoeff());
+      if (problem.W.size() == 0) inner.linear.tolerance = std::max(inner.linear.tolerance, 1e-3);
+      const ConstraintReport solved = solve_contacts(problem, inner, multiplier);
       report.constraint_iterations += solved.iterations;
       VectorXd gap(multiplier.size());
       for (std::size_t k = 0; k < contacts.size(); ++k) gap.segment<3>(3 * k) = contacts[k].gap;

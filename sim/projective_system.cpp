@@ -7,6 +7,7 @@
 #include "data/error.h"
 #include "sim/isometric_bending.h"
 #include "sim/membrane.h"
+#include "sim/morley.h"
 
 namespace flash::sim {
 
@@ -16,8 +17,8 @@ struct ProjectiveSystem::Factor {
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt;
 };
 
-ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const BendingOperator& bending,
-                                   const data::SheetMaterial& material, double time_step)
+ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const data::SheetMaterial& material,
+                                   double time_step)
     : mass_(material.areal_density * plan.sheet.vertex_area), factor_(std::make_unique<Factor>()) {
   const double h = time_step;
   const double stiffness_scale = h * h + h * material.stiffness_damping;
@@ -39,10 +40,10 @@ ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const BendingOperator&
   matrix_.resize(mass_.size(), mass_.size());
   matrix_.setFromTriplets(entries.begin(), entries.end());
   const double D = stiffness_scale * material.bending_rigidity;
-  if (bending.model == data::BendingModel::hinge)
-    matrix_ += D * isometric_bending_stiffness(plan.sheet);
+  if (material.bending_model == data::BendingModel::plate)
+    matrix_ += D * plate_bending_stiffness(plan.sheet, material.poissons_ratio, 1e-2);
   else
-    matrix_ += D * Eigen::SparseMatrix<double>(bending.stiffness);
+    matrix_ += D * isometric_bending_stiffness(plan.sheet);
   factor_->llt.compute(matrix_);
   if (factor_->llt.info() != Eigen::Success)
     throw data::InputError(

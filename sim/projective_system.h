@@ -14,13 +14,12 @@ namespace flash::sim {
 ///
 ///     A = M (1 + h air_drag) + (h^2 + h stiffness_damping) (sum_e w a_e G_e^T G_e + K_b)   [kg],
 ///
-/// with w = 2 mu + 2 max(lambda, 0), which bounds the corotational stress from above, and K_b the bending
-/// stiffness (for the hinge model that of the isometric one). Factored once a material; everything else here
-/// follows from it.
+/// with w = 2 mu + 2 max(lambda, 0), which bounds the corotational stress from above, and K_b a sparse
+/// stand-in for the bending stiffness: the plate's without its small entries, the isometric one for the
+/// hinges. Factored once a material; everything else here follows from it.
 class ProjectiveSystem {
  public:
-  ProjectiveSystem(const SheetPlan& plan, const BendingOperator& bending, const data::SheetMaterial& material,
-                   double time_step);
+  ProjectiveSystem(const SheetPlan& plan, const data::SheetMaterial& material, double time_step);
   ~ProjectiveSystem();
   ProjectiveSystem(ProjectiveSystem&&) noexcept;
 
