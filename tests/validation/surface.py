@@ -68,8 +68,21 @@ def piercings(vertices, faces):
     return count
 
 
-def piercings_by_frame(folder, frames):
-    return {frame: piercings(*read_ply(folder / f"{frame:03d}_mesh.ply")) for frame in frames}
+def piercings_by_frame(folder, frames, size=0.278, grasp=0.06):
+    """Without the triangles within `grasp` of the grasped corner (0, 0): a pinch folds the sheet onto itself."""
+    found = {}
+    for frame in frames:
+        vertices, faces = read_ply(folder / f"{frame:03d}_mesh.ply")
+        rest = rest_positions(len(vertices), size)
+        clear = [face for face in faces if all(max(rest[i]) > grasp for i in face)]
+        found[frame] = piercings(vertices, clear)
+    return found
+
+
+def rest_positions(count, size):
+    """Of a square sheet whose vertices are numbered row by row."""
+    side = math.isqrt(count)
+    return [(size * (i % side) / (side - 1), size * (i // side) / (side - 1), 0.0) for i in range(count)]
 
 
 def nearest_on_triangle(p, a, b, c):
@@ -101,13 +114,12 @@ def distance(a, b):
 def residual_by_zone(folder, frames, size=0.278, every=12, trim=0.05):
     """Trimmed mean distance [m] of observed points to the surface in three zones of the sheet, by the material
     distance of the nearest point from the grasped corner (0, 0): within a third of the diagonal, the next,
-    the rest. Vertices of the sheet are numbered row by row. One point of `every` is measured."""
+    the rest. One point of `every` is measured."""
     zones = [[], [], []]
     for frame in frames:
         vertices, faces = read_ply(folder / f"{frame:03d}_mesh.ply")
         cloud, _ = read_ply(folder / f"{frame:03d}_cloud.ply")
-        side = math.isqrt(len(vertices))
-        rest = [(size * (i % side) / (side - 1), size * (i // side) / (side - 1), 0.0) for i in range(len(vertices))]
+        rest = rest_positions(len(vertices), size)
         measured = []
         for point in cloud[::every]:
             near = sorted(range(len(vertices)), key=lambda i: distance(point, vertices[i]))[:8]

@@ -109,7 +109,7 @@ def limits_table(limits):
             [clip, "pinch pitch " + profile_text(found["pinch"], "grasp_pitch", 1, "rad"), ""],
             [clip, "near the grasp / middle / far end of the sheet (frames 12, 16, 20, 24)",
              " / ".join(mm(x, 1) for x in found["zones"])],
-            [clip, "keyframes in which the simulated sheet passes through itself",
+            [clip, "keyframes in which the simulated sheet passes through itself away from the grasp",
              ", ".join(map(str, pierced)) or "none"]]
     for row in rows:
         if not row[2]:
