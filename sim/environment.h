@@ -14,8 +14,8 @@ namespace flash::sim {
 
 /// Half space below a plane.
 struct Plane {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< [m]
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   ///< unit, out of the solid
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< [m]
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, out of the solid
 };
 
 /// Box with half extents [m], moved by a trajectory T_base_box (an empty trajectory stays at `pose`).
@@ -27,9 +27,9 @@ struct Box {
 
 /// Solid cylinder without ends: a peg or a rail.
 struct Cylinder {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();   ///< on the axis [m]
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();   ///< unit
-  double radius = 0.01;                              ///< [m]
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< on the axis [m]
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< unit
+  double radius = 0.01;                             ///< [m]
 };
 
 struct Obstacle {
@@ -37,16 +37,16 @@ struct Obstacle {
   double friction = -1.0;  ///< Coulomb coefficient; below zero: the material's
 };
 
-/// Vertices carried by a gripper while from <= t < to; released after. At activation each held vertex goes, over
-/// `closing_time`, from where it is to T_base_gripper(t) * target.
+/// Vertices carried by a gripper while from <= t < to; released after. At activation each held vertex goes,
+/// over `closing_time`, from where it is to T_base_gripper(t) * target.
 struct Grasp {
   std::vector<int> vertices;
-  data::Points targets;              ///< held positions in the gripper frame [m], one row a vertex;
-                                     ///< empty: the offsets found at activation are kept
-  data::Trajectory gripper;          ///< T_base_gripper
-  double from = 0.0;                 ///< [s]
+  data::Points targets;      ///< held positions in the gripper frame [m], one row a vertex;
+                             ///< empty: the offsets found at activation are kept
+  data::Trajectory gripper;  ///< T_base_gripper
+  double from = 0.0;         ///< [s]
   double to = std::numeric_limits<double>::infinity();  ///< [s]
-  double closing_time = 0.0;         ///< [s]
+  double closing_time = 0.0;                            ///< [s]
 };
 
 /// A vertex held in some axes.
@@ -63,10 +63,11 @@ struct Load {
 };
 
 struct State {
-  double time = 0.0;         ///< [s]
-  data::Points positions;    ///< [m]
-  data::Points velocities;   ///< [m/s]
-  std::vector<data::Points> grasp_offsets;  ///< of held vertices in the gripper frame [m], a grasp each; empty: open
+  double time = 0.0;        ///< [s]
+  data::Points positions;   ///< [m]
+  data::Points velocities;  ///< [m/s]
+  std::vector<data::Points>
+      grasp_offsets;  ///< of held vertices in the gripper frame [m], a grasp each; empty: open
 };
 
 /// One simulated world: its own material, motion and state over a shared Sheet.

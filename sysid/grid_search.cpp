@@ -218,7 +218,8 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
   };
   {
     std::vector<std::jthread> workers;
-    const int threads = std::clamp(std::min(settings.threads, settings.envs), 1, std::max(1, static_cast<int>(wanted.size())));
+    const int threads = std::clamp(std::min(settings.threads, settings.envs), 1,
+                                   std::max(1, static_cast<int>(wanted.size())));
     for (int t = 1; t < threads; ++t) workers.emplace_back(work);
     work();
   }

@@ -17,7 +17,7 @@ struct ReplaySettings {
   std::string mesh;  ///< mesh specification or file in place of the recording's; empty: the recording's
   std::optional<double> pre_roll;  ///< simulated before the recording starts, gripper at its first pose;
                                    ///< absent: 0.4 where a grasp needs time to close, else 0 [s]
-  double closing_time = 0.25;                                    ///< the fingers', within the pre-roll [s]
+  double closing_time = 0.25;      ///< the fingers', within the pre-roll [s]
   std::optional<data::GraspShape> grasp_shape;                   ///< in place of the recording's
   std::optional<double> grasp_within;                            ///< in place of the recording's [m]
   double score_from = -std::numeric_limits<double>::infinity();  ///< keyframes before carry no weight [s]
