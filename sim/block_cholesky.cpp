@@ -300,6 +300,18 @@ bool BlockCholesky<Scalar>::factorize(const BlockValues<double>& values) {
   return true;
 }
 
+namespace {
+
+/// Three numbers: a call of memmove would cost more than the copy.
+template <typename Scalar>
+void copy_vertex(const Scalar* from, Scalar* to) {
+  to[0] = from[0];
+  to[1] = from[1];
+  to[2] = from[2];
+}
+
+}  // namespace
+
 template <typename Scalar>
 void BlockCholesky<Scalar>::solve_in_place(double* x) const {
   const auto& nodes = symbolic_->supernodes;
@@ -307,7 +319,7 @@ void BlockCholesky<Scalar>::solve_in_place(double* x) const {
     const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
     std::copy_n(permuted_.data() + 3 * node.first_column, columns, front_.data());
     for (size_t r = 0; r < node.rows.size(); ++r)
-      std::copy_n(permuted_.data() + 3 * node.rows[r], 3, front_.data() + columns + 3 * r);
+      copy_vertex(permuted_.data() + 3 * node.rows[r], front_.data() + columns + 3 * r);
     std::fill(front_.begin() + columns + rows, front_.begin() + padded<Scalar>(columns + rows), Scalar(0));
   };
   for (int vertex = 0; vertex < symbolic_->size; ++vertex)
@@ -321,7 +333,7 @@ void BlockCholesky<Scalar>::solve_in_place(double* x) const {
                   inverses_.data() + 6L * node.first_column, front_.data());
     std::copy_n(front_.data(), columns, permuted_.data() + 3 * node.first_column);
     for (size_t r = 0; r < node.rows.size(); ++r)
-      std::copy_n(front_.data() + columns + 3 * r, 3, permuted_.data() + 3 * node.rows[r]);
+      copy_vertex(front_.data() + columns + 3 * r, permuted_.data() + 3 * node.rows[r]);
   }
   for (size_t s = nodes.size(); s-- > 0;) {
     const Supernode& node = nodes[s];

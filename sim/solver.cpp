@@ -322,7 +322,7 @@ StepReport Solver::step(Environment& environment) {
       continue;
     }
     // A small step all the same lets the contacts decide anew.
-    if (!acceptable() && ++forced_moves > 6) break;
+    if (!acceptable() && (++forced_moves > 6 || !std::isfinite(after))) break;
     stuck = false;
     // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short.
     // Go on along the direction, by secants, while the potential falls.
