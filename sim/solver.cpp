@@ -205,6 +205,7 @@ void Solver::Workspace::solve(const BendingOperator& bending_operator, double be
   if (!direction.isZero(0)) {
     multiply(direction, product);
     residual -= product;
+    force += product;
   }
   restrict_vectors(constraints, residual);
   const double target = std::max(0.1 * residual.norm(), tolerance);
@@ -219,20 +220,17 @@ void Solver::Workspace::solve(const BendingOperator& bending_operator, double be
     search = iteration == 1 ? preconditioned : Points(preconditioned + along / previous * search);
     previous = along;
     multiply(search, product);
-    restrict_vectors(constraints, product);
     const double curvature = search.cwiseProduct(product).sum();
     // Steihaug 1983: where the sheet is about to buckle the matrix is indefinite, and what was found so far
     // leads down.
-    if (curvature <= 0) {
-      if (iteration == 1) direction += search;
-      break;
-    }
-    const double step = along / curvature;
+    if (curvature <= 0 && iteration > 1) break;
+    const double step = curvature > 0 ? along / curvature : 1.0;
     direction += step * search;
+    force += step * product;
+    if (curvature <= 0) break;
+    restrict_vectors(constraints, product);
     residual -= step * product;
   }
-  multiply(direction, product);
-  force += product;
   report.solves += iteration;
   refactor = iteration > settings.stale_factor_solves;
 }
@@ -360,7 +358,9 @@ StepReport Solver::step(Environment& environment) {
   report.kinetic =
       0.5 *
       (mass.asDiagonal() * environment.state.velocities).cwiseProduct(environment.state.velocities).sum();
-  report.potential = -(mass.transpose() * now.positions * environment.gravity)(0);
+  report.potential = 0;
+  for (int i = 0; i < mass.size(); ++i)
+    report.potential -= mass[i] * environment.gravity.dot(now.positions.row(i));
   return report;
 }
 
