@@ -11,6 +11,7 @@
 #include "data/obj.h"
 #include "data/pcd.h"
 #include "data/ply.h"
+#include "data/stl.h"
 #include "data/text.h"
 #include "data/vtk.h"
 
@@ -53,10 +54,11 @@ Geometry load_geometry(const std::string& path) {
     if (extension == ".ply") return parse_ply(read_file(path), path);
     if (extension == ".obj") return parse_obj(read_file(path), path);
     if (extension == ".vtk") return parse_vtk(read_file(path), path);
+    if (extension == ".stl") return parse_stl(read_file(path), path);
     if (extension == ".tet") return parse_tet(read_file(path), path);
     if (extension == ".pcd") return {parse_pcd(read_file(path), path), {}, {}};
     throw InputError(path + ": ending \"" + extension +
-                     "\" is not known, expected .ply, .obj, .vtk, .pcd or .tet");
+                     "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
   };
   Geometry geometry = parse();
   check_points(geometry.points, path);

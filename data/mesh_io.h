@@ -12,12 +12,13 @@ struct Geometry {
   Tetrahedra tetrahedra;
 };
 
-/// Reads .ply, .obj, .vtk (legacy), .pcd or .tet by the ending of the name. Throws InputError naming the
-/// file, and what is wrong: non-finite points with their count and first index, or an index out of range with
-/// its face.
+/// Reads .ply, .obj, .vtk (legacy), .stl, .pcd or .tet by the ending of the name. Throws InputError naming
+/// the file, and what is wrong: non-finite points with their count and first index, or an index out of range
+/// with its face.
 Geometry load_geometry(const std::string& path);
 
-/// The triangles of .ply, .obj or .vtk. Also throws on no triangles, and names degenerate and duplicate ones.
+/// The triangles of .ply, .obj, .vtk or .stl. Also throws on no triangles, and names degenerate and duplicate
+/// ones.
 TriangleMesh load_triangle_mesh(const std::string& path);
 
 /// The tetrahedra of .vtk or .tet; negative ones are turned, flat ones are an error.
