@@ -1,13 +1,19 @@
 #pragma once
 #include <Eigen/Core>
 #include <string>
+#include <vector>
 
 namespace flash::calib {
 
 enum class TargetKind { chessboard, charuco, aruco, aruco_grid, apriltag, aprilgrid, circle_grid };
 
-/// A flat calibration target. Its frame lies in its plane: x along the columns, y along the rows, z into the
-/// board (away from the camera), the first point where the kind's own convention puts it.
+/// A flat calibration target. Its frame lies in its plane, as one faces the print: x to the right, y down, z
+/// into the board, away from the camera. The origin is
+///   chessboard: an inner corner, with a black square between x and y where the colours allow the choice;
+///   charuco: the outer corner of the upper left square;
+///   aruco, apriltag: the middle of the marker;  aruco_grid: the upper left corner of the first marker;
+///   aprilgrid: the lower left corner of the first tag, as Kalibr prints it: rows run to -y;
+///   circle_grid: the first dot; the big dot, if there is one, stands lower left: rows run to -y.
 struct Target {
   TargetKind kind = TargetKind::chessboard;
   int columns = 1;          ///< inner corners (chessboard), squares (charuco), markers, tags or dots along x
@@ -30,6 +36,12 @@ Target parse_target(const std::string& text);
 Target load_target(const std::string& path);
 
 /// Corners or dots in the target frame [m], 3 x N, z = 0. Their column is the id of a point everywhere else.
+/// Boards row by row; markers and tags their corners upper left, upper right, lower right, lower left.
 Eigen::Matrix3Xd target_points(const Target& target);
+
+/// What a picture alone cannot tell apart: renumberings i -> permutation[i] of the points that turn the
+/// target onto itself, colours included; the identity first. A chessboard with one side odd and one even has
+/// no other.
+std::vector<std::vector<int>> target_symmetries(const Target& target);
 
 }  // namespace flash::calib

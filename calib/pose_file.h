@@ -1,0 +1,47 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace flash::calib {
+
+/// A pose of the robot as a file gives it.
+struct RecordedPose {
+  std::string image;  ///< file name of the picture it belongs to, where the file says so
+  double stamp = 0;   ///< number of the picture, or its time [s]
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  std::optional<Eigen::Vector3d> angles;  ///< as written, where the rotation came as three angles [rad]
+};
+
+/// Robot and target seen from the camera at the same moment, without a picture.
+struct PosePair {
+  Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d T_camera_target = Eigen::Isometry3d::Identity();
+};
+
+/// TUM lines `stamp tx ty tz qx qy qz qw`, or a CSV whose header names the columns: image, or index, or t
+/// (also timestamp; EuRoC's in nanoseconds); tx ty tz (or x y z); qx qy qz qw, or rx ry rz (roll, pitch, yaw
+/// about fixed x, y, z [rad]; with the ending _deg in degrees), or rotvec_x rotvec_y rotvec_z [rad]. Throws
+/// InputError naming file and line: numbers missing, quaternions that are not unit to 1e-3, angles beyond a
+/// turn (degrees), translations of many metres (millimetres).
+std::vector<RecordedPose> load_pose_list(const std::string& path);
+
+/// One pose in YAML: x y z qx qy qz qw; position and orientation, or translation and rotation, of named
+/// parts; a 4 x 4 matrix as {rows, cols, data} or a list of lists; ViSP's vector of translation and axis
+/// times angle. The stamp is the last number in the file name. Throws InputError.
+RecordedPose load_pose_yaml(const std::string& path);
+
+/// easy_handeye2 `.samples` (robot, tracking) or MoveIt `pose_samples.json` (effector in the world, object in
+/// the sensor). Throws InputError.
+std::vector<PosePair> load_pose_pairs(const std::string& path);
+
+/// R = R_c(angles[2]) R_b(angles[1]) R_a(angles[0]) for an order "abc" about fixed axes, as "xyz" (roll,
+/// pitch, yaw).
+Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& angles, const std::string& order = "xyz");
+
+/// The last whole number in a file name without its folder and ending: "frame_000012.png" is 12.
+std::optional<long> number_in_name(const std::string& path);
+
+}  // namespace flash::calib
