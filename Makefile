@@ -4,13 +4,14 @@ PREFIX ?= /usr/local
 DEMO ?= demo
 DATA ?= ../shared/data
 JOBS ?= $(shell nproc)
+FUZZ_SECONDS ?= 600
 CMAKE_ARGS ?=
 
 sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo build test validate configure-test format check-format tidy install clean
+.PHONY: help demo build test validate fuzz configure-test format check-format tidy install clean
 .PHONY: packages-build packages-test packages-check
 
 help:  ## This list
@@ -39,10 +40,20 @@ validate: build  ## Fit the recordings in $(DATA) and renew docs/validation.md; 
 	python3 tests/validation/validate.py --sysid $(sysid) --data $(DATA) --out $(BUILD)/validation \
 	  --document docs/validation.md $(if $(ONLY),--only $(ONLY))
 
+fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s under address and undefined-behaviour sanitizers
+	cmake --preset fuzz
+	cmake --build --preset fuzz -j $(JOBS)
+	scripts/fuzz build/fuzz $(FUZZ_SECONDS)
+
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i
 
-check-format: packages-check  ## Name the sources that `make format` would change
+check-fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s under address and undefined-behaviour sanitizers
+	cmake --preset fuzz
+	cmake --build --preset fuzz -j $(JOBS)
+	scripts/fuzz build/fuzz $(FUZZ_SECONDS)
+
+format: packages-check  ## Name the sources that `make format` would change
 	$(sources) | xargs -r clang-format --dry-run --Werror
 
 tidy: configure-test packages-check  ## Defects found by clang-tidy (.clang-tidy)

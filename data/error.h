@@ -7,7 +7,8 @@ namespace flash::data {
 /// Bad usage or input: one line that names file, field, what was found and what was expected. Tools exit 2 on
 /// it.
 struct InputError : std::runtime_error {
-  using std::runtime_error::runtime_error;
+  /// Control characters in `message`, which may quote the input, become question marks.
+  explicit InputError(const std::string& message);
 };
 
 /// The message "source: field: what", e.g. "towel.json: mechanical_props.poison: unknown field (did you mean

@@ -214,8 +214,12 @@ TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source,
   const std::vector<std::string_view> sizes = split(parts[1], "x");
   if (sizes.size() != 2 || parts.size() > 4) throw fail(form);
   const double width = length(sizes[0]), height = length(sizes[1]);
-  expect_cells(width * height / (cell * cell));
-  if (parts.size() == 4 && parts[3] == "delaunay") return delaunay_rectangle(width, height, cell, 1);
+  const double cells = std::max(1.0, width / cell) * std::max(1.0, height / cell);
+  expect_cells(cells);
+  if (parts.size() == 4 && parts[3] == "delaunay") {
+    if (cells > 2e4) throw fail("at most 20,000 cells of this pattern");
+    return delaunay_rectangle(width, height, cell, 1);
+  }
   RectangleMesh settings;
   settings.width = width;
   settings.height = height;

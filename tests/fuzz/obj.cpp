@@ -1,0 +1,5 @@
+#include "data/mesh_io.h"
+
+#include "tests/fuzz/loader_fuzzer.h"
+
+FLASH_FUZZ_LOADER("mesh.obj", [](const std::string& path) { flash::data::load_triangle_mesh(path); })

@@ -1,0 +1,5 @@
+#include "data/trajectory.h"
+
+#include "tests/fuzz/loader_fuzzer.h"
+
+FLASH_FUZZ_LOADER("gripper.csv", [](const std::string& path) { flash::data::load_trajectory(path); })
