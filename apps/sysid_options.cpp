@@ -106,11 +106,11 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
 
 sysid::ScoreSettings score_settings(const ReplayOptions& options) {
   sysid::ScoreSettings settings;
-  settings.robust.kind = options.distance == "mean"    ? sysid::RobustKind::plain
+  settings.objective.robust.kind = options.distance == "mean"    ? sysid::RobustKind::plain
                          : options.distance == "huber" ? sysid::RobustKind::huber
                                                        : sysid::RobustKind::trimmed;
-  settings.robust.trim_fraction = options.trim;
-  settings.robust.huber_delta = options.huber;
+  settings.objective.robust.trim_fraction = options.trim;
+  settings.objective.robust.huber_delta = options.huber;
   const auto shares = [&](const char* name) {
     return std::find(options.shared.begin(), options.shared.end(), name) != options.shared.end();
   };

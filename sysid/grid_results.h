@@ -11,7 +11,7 @@ namespace flash::sysid {
 struct KeyframeScore {
   double t = 0;       ///< of the recording [s]
   double score = 0;   ///< [m]; meaningless when points == 0
-  int points = 0;     ///< observed points inside the crop
+  int points = 0;     ///< observed points inside the crop, all terms
   double weight = 1;  ///< in the recording's score
 };
 

@@ -78,6 +78,9 @@ void add_recording(const Replay& replay, Hash& hash) {
     hash.add(observation.t);
     hash.add(observation.weight);
     hash.add_matrix(observation.points);
+    hash.add_matrix(observation.contour);
+    hash.add_matrix(observation.markers);
+    if (observation.force) hash.add_matrix(*observation.force);
   }
   for (const double value : {replay.start, static_cast<double>(replay.steps), replay.settings.closing_time,
                              replay.settings.solver.time_step, replay.settings.solver.tolerance,
@@ -111,7 +114,7 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
   }
   result.status = result.converged ? CandidateStatus::ok : CandidateStatus::unconverged;
   const std::vector<RegistrationFit> fits =
-      register_motions(problems, settings.robust, settings.registration, settings.shared);
+      register_motions(problems, settings.objective, settings.registration, settings.shared);
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const RegistrationFit& fit = fits[r];
     RecordingScore& recording = result.recordings.emplace_back();
@@ -122,8 +125,8 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
     recording.bounds_hit = fit.bounds_hit;
     for (std::size_t k = 0; k < replays[r].observations.size(); ++k) {
       const Observation& observation = replays[r].observations[k];
-      recording.keyframes.push_back({observation.t, fit.keyframe_scores[k],
-                                     static_cast<int>(observation.points.rows()), observation.weight});
+      recording.keyframes.push_back(
+          {observation.t, fit.keyframe_scores[k], static_cast<int>(observation.count()), observation.weight});
     }
     result.score += fit.score / static_cast<double>(replays.size());
   }
@@ -148,11 +151,13 @@ std::string fingerprint(const std::vector<Replay>& replays, const GridSettings& 
   }
   const ScoreSettings& score = settings.score;
   for (const double value :
-       {static_cast<double>(score.robust.kind), score.robust.trim_fraction, score.robust.huber_delta,
-        static_cast<double>(score.registration.iterations), score.registration.softening,
-        static_cast<double>(score.registration.points_per_keyframe), score.registration.tolerance,
-        static_cast<double>(score.shared.offset), static_cast<double>(score.shared.yaw),
-        static_cast<double>(score.shared.time)}) {
+       {static_cast<double>(score.objective.robust.kind), score.objective.robust.trim_fraction,
+        score.objective.robust.huber_delta, score.objective.cloud_sigma, score.objective.contour_sigma,
+        score.objective.marker_sigma, score.objective.force_sigma,
+        static_cast<double>(score.objective.two_sided), static_cast<double>(score.registration.iterations),
+        score.registration.softening, static_cast<double>(score.registration.points_per_keyframe),
+        score.registration.tolerance, static_cast<double>(score.shared.offset),
+        static_cast<double>(score.shared.yaw), static_cast<double>(score.shared.time)}) {
     hash.add(value);
   }
   for (const double time : score.registration.time_starts) hash.add(time);

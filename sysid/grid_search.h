@@ -12,7 +12,7 @@
 namespace flash::sysid {
 
 struct ScoreSettings {
-  Robust robust;
+  Objective objective;
   RegistrationSettings registration;
   SharedRegistration shared;  ///< between the recordings of one search
 };

@@ -50,30 +50,72 @@ double robust_mean(std::vector<double>& distances, const Robust& robust) {
   return sum / static_cast<double>(count);
 }
 
+Eigen::Vector3d force_at(const Motion& motion, double t) {
+  if (motion.forces.empty()) return Eigen::Vector3d::Zero();
+  const double last = static_cast<double>(motion.forces.size());
+  const double step = std::clamp(std::round((t - motion.start) / motion.step), 1.0, last);
+  return motion.forces[static_cast<std::size_t>(step) - 1];
+}
+
+std::array<double, 5> term_weights(const Observation& observation, const Objective& objective) {
+  std::array<double, 5> weights = {};
+  if (observation.points.rows() > 0) weights[0] = 1;
+  if (observation.contour.rows() > 0) weights[1] = objective.cloud_sigma / objective.contour_sigma;
+  if (observation.markers.rows() > 0) weights[2] = objective.cloud_sigma / objective.marker_sigma;
+  if (observation.force) weights[3] = objective.cloud_sigma / objective.force_sigma;
+  if (objective.two_sided && observation.points.rows() > 0) weights[4] = 1;
+  const auto terms = std::count_if(weights.begin(), weights.end(), [](double weight) { return weight > 0; });
+  for (double& weight : weights) weight /= static_cast<double>(std::max<std::ptrdiff_t>(terms, 1));
+  return weights;
+}
+
 double keyframe_score(const Motion& motion, const Observation& observation, const Registration& registration,
-                      const Robust& robust, SurfaceDistance& surface) {
+                      const Objective& objective, const data::CropBox& crop, SheetQueries& sheet) {
+  const std::array<double, 5> weights = term_weights(observation, objective);
+  const double t = observation.t + registration.time_offset;
   data::Points positions;
-  surface_at(motion, observation.t + registration.time_offset, positions);
-  surface.move(positions);
+  surface_at(motion, t, positions);
+  sheet.move(positions);
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
-  std::vector<double> distances(observation.points.rows());
+  const auto mean_distance = [&](const data::Points& points, const auto& match) {
+    std::vector<double> distances(static_cast<std::size_t>(points.rows()));
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+      const Eigen::Vector3d point = simulated_from_observed * points.row(i).transpose();
+      distances[static_cast<std::size_t>(i)] = match(i, point).distance;
+    }
+    return robust_mean(distances, objective.robust);
+  };
   int hint = -1;
-  for (Eigen::Index i = 0; i < observation.points.rows(); ++i) {
-    const SurfacePoint nearest =
-        surface.nearest(simulated_from_observed * observation.points.row(i).transpose(), hint);
+  const auto on_surface = [&](Eigen::Index, const Eigen::Vector3d& point) {
+    const SurfacePoint nearest = sheet.nearest(point, hint);
     hint = nearest.triangle;
-    distances[i] = nearest.distance;
-  }
-  return robust_mean(distances, robust);
+    return nearest;
+  };
+  double score = 0;
+  if (weights[0] > 0) score += weights[0] * mean_distance(observation.points, on_surface);
+  if (weights[1] > 0)
+    score += weights[1] * mean_distance(observation.contour, [&](Eigen::Index, const Eigen::Vector3d& point) {
+               return sheet.nearest_on_border(point);
+             });
+  if (weights[2] > 0)
+    score +=
+        weights[2] * mean_distance(observation.markers, [&](Eigen::Index i, const Eigen::Vector3d& point) {
+          return sheet.mark(observation.marks[static_cast<std::size_t>(i)], point);
+        });
+  if (weights[3] > 0) score += weights[3] * (force_at(motion, t) - *observation.force).norm();
+  if (weights[4] > 0)
+    score += weights[4] * keyframe_coverage(motion, observation, registration, objective.robust, crop);
+  return score;
 }
 
 std::vector<double> keyframe_scores(const data::Triangles& triangles, const Motion& motion,
                                     const std::vector<Observation>& observations,
-                                    const Registration& registration, const Robust& robust) {
-  SurfaceDistance surface(triangles, motion.positions.front());
+                                    const Registration& registration, const Objective& objective,
+                                    const data::CropBox& crop) {
+  SheetQueries sheet(triangles, motion.positions.front());
   std::vector<double> scores;
   for (const Observation& observation : observations) {
-    scores.push_back(keyframe_score(motion, observation, registration, robust, surface));
+    scores.push_back(keyframe_score(motion, observation, registration, objective, crop, sheet));
   }
   return scores;
 }
@@ -81,7 +123,7 @@ std::vector<double> keyframe_scores(const data::Triangles& triangles, const Moti
 double weighted_mean_score(const std::vector<double>& scores, const std::vector<Observation>& observations) {
   double sum = 0, weight = 0;
   for (std::size_t i = 0; i < scores.size(); ++i) {
-    if (observations[i].points.rows() == 0) continue;
+    if (!observations[i].seen()) continue;
     sum += observations[i].weight * scores[i];
     weight += observations[i].weight;
   }
@@ -89,8 +131,7 @@ double weighted_mean_score(const std::vector<double>& scores, const std::vector<
 }
 
 double keyframe_coverage(const Motion& motion, const Observation& observation,
-                         const Registration& registration, const Robust& robust, const Eigen::Vector3d& low,
-                         const Eigen::Vector3d& high) {
+                         const Registration& registration, const Robust& robust, const data::CropBox& crop) {
   using Tree = nanoflann::KDTreeEigenMatrixAdaptor<data::Points, 3>;
   if (observation.points.rows() == 0) return 0;
   const Tree tree(3, std::cref(observation.points));
@@ -100,7 +141,7 @@ double keyframe_coverage(const Motion& motion, const Observation& observation,
   std::vector<double> distances;
   for (Eigen::Index i = 0; i < positions.rows(); ++i) {
     const Eigen::Vector3d p = observed_from_simulated * positions.row(i).transpose();
-    if ((p.array() < low.array()).any() || (p.array() > high.array()).any()) continue;
+    if (!crop.contains(p)) continue;
     Eigen::Index index;
     double distance2;
     tree.index->knnSearch(p.data(), 1, &index, &distance2);

@@ -55,7 +55,7 @@ void drop_beyond_horizon(std::optional<double> horizon, Replay& replay) {
   double weight = 0;
   for (Observation& observation : kept) {
     if (observation.t >= *horizon) observation.weight = 0;
-    if (observation.points.rows() > 0) weight += observation.weight;
+    if (observation.seen()) weight += observation.weight;
   }
   if (weight > 0) replay.observations = std::move(kept);
 }

@@ -18,13 +18,17 @@ Eigen::Matrix<double, kParameters, 1> half_widths(const RegistrationBounds& boun
 }
 
 std::vector<Observation> thinned(const std::vector<Observation>& observations, int points) {
+  const auto thin = [points](data::Points& cloud) {
+    const Eigen::Index count = cloud.rows();
+    if (count <= points) return;
+    data::Points kept(points, 3);
+    for (Eigen::Index i = 0; i < points; ++i) kept.row(i) = cloud.row(i * count / points);
+    cloud = kept;
+  };
   std::vector<Observation> result = observations;
   for (Observation& observation : result) {
-    const Eigen::Index count = observation.points.rows();
-    if (count <= points) continue;
-    data::Points kept(points, 3);
-    for (Eigen::Index i = 0; i < points; ++i) kept.row(i) = observation.points.row(i * count / points);
-    observation.points = kept;
+    thin(observation.points);
+    thin(observation.contour);
   }
   return result;
 }
@@ -33,7 +37,7 @@ std::vector<Observation> thinned(const std::vector<Observation>& observations, i
 struct Side {
   const RegistrationProblem& problem;
   std::vector<Observation> observations;
-  SurfaceDistance surface;
+  SheetQueries sheet;
   std::vector<std::vector<int>> hints;
   double total_weight = 0;
   Eigen::Matrix<int, kParameters, 1> index;  // into the vector of unknowns
@@ -41,10 +45,10 @@ struct Side {
   Side(const RegistrationProblem& p, int points)
       : problem(p),
         observations(thinned(*p.observations, points)),
-        surface(*p.triangles, p.motion->positions.front()) {
+        sheet(*p.triangles, p.motion->positions.front()) {
     for (const Observation& observation : observations) {
       hints.emplace_back(observation.points.rows(), -1);
-      if (observation.points.rows() > 0) total_weight += observation.weight;
+      if (observation.seen()) total_weight += observation.weight;
     }
   }
 
@@ -63,76 +67,98 @@ struct NormalEquations {
   Eigen::VectorXd gradient;
 };
 
-/// Adds one side's score, and Gauss-Newton matrix and gradient of the sum of w d^2 / 2 with w = 1 / d.
-void add_side(Side& side, const Eigen::VectorXd& unknowns, const Robust& robust, double softening,
+/// Adds to the normal equations what one term of one keyframe says: Gauss-Newton matrix and gradient of the
+/// sum of w d^2 / 2 with w = 1 / d, and the term's mean distance to the score. `match` gives the place of
+/// point i on the sheet.
+template <class Match>
+void add_term(const data::Points& points, const Match& match, double weight, const Registration& registration,
+              const data::Triangles& triangles, const data::Points& positions, const data::Points& velocities,
+              const Eigen::Matrix<int, kParameters, 1>& index, const Robust& robust, double softening,
               NormalEquations& sum) {
-  if (side.total_weight == 0) return;
-  const Registration registration = side.at(unknowns);
+  const auto count = static_cast<std::size_t>(points.rows());
+  if (count == 0 || weight == 0) return;
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
-  const data::Triangles& triangles = *side.problem.triangles;
-  data::Points positions, velocities;
-  std::vector<double> distances, ranked;
-  std::vector<Eigen::Matrix<double, kParameters, 1>> rows;
-  for (std::size_t k = 0; k < side.observations.size(); ++k) {
-    const Observation& observation = side.observations[k];
-    const Eigen::Index count = observation.points.rows();
-    if (count == 0 || observation.weight == 0) continue;
-    surface_at(*side.problem.motion, observation.t + registration.time_offset, positions, &velocities);
-    side.surface.move(positions);
-    distances.resize(count);
-    rows.resize(count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Eigen::Vector3d point = simulated_from_observed * observation.points.row(i).transpose();
-      const SurfacePoint nearest = side.surface.nearest(point, side.hints[k][i]);
-      side.hints[k][i] = nearest.triangle;
-      distances[i] = nearest.distance;
-      const Eigen::Vector3i corner = triangles.row(nearest.triangle);
-      Eigen::Vector3d direction = point - nearest.position;
-      if (nearest.distance < 1e-9) {
-        const Eigen::Vector3d a = positions.row(corner[0]), b = positions.row(corner[1]),
-                              c = positions.row(corner[2]);
-        direction = (b - a).cross(c - a);
-      }
-      direction.normalize();
-      Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-      for (int c = 0; c < 3; ++c) velocity += nearest.barycentric[c] * velocities.row(corner[c]).transpose();
-      rows[i].head<3>() = -(simulated_from_observed.linear().transpose() * direction);
-      rows[i][3] = -direction.dot(registration.up.cross(point - registration.pivot));
-      rows[i][4] = -direction.dot(velocity);
+  std::vector<double> distances(count);
+  std::vector<Eigen::Matrix<double, kParameters, 1>> rows(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3d point =
+        simulated_from_observed * points.row(static_cast<Eigen::Index>(i)).transpose();
+    const SurfacePoint place = match(i, point);
+    distances[i] = place.distance;
+    const Eigen::Vector3i corner = triangles.row(place.triangle);
+    Eigen::Vector3d direction = point - place.position;
+    if (place.distance < 1e-9) {
+      const Eigen::Vector3d a = positions.row(corner[0]), b = positions.row(corner[1]),
+                            c = positions.row(corner[2]);
+      direction = (b - a).cross(c - a);
     }
-    const double weight = observation.weight / side.total_weight;
-    ranked = distances;
-    sum.score += weight * robust_mean(ranked, robust);
+    direction.normalize();
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+    for (int c = 0; c < 3; ++c) velocity += place.barycentric[c] * velocities.row(corner[c]).transpose();
+    rows[i].head<3>() = -(simulated_from_observed.linear().transpose() * direction);
+    rows[i][3] = -direction.dot(registration.up.cross(point - registration.pivot));
+    rows[i][4] = -direction.dot(velocity);
+  }
+  std::vector<double> ranked = distances;
+  sum.score += weight * robust_mean(ranked, robust);
 
-    double limit = std::numeric_limits<double>::infinity();
-    if (robust.kind == RobustKind::trimmed) {
-      const auto kept = count - static_cast<Eigen::Index>(robust.trim_fraction * static_cast<double>(count));
-      if (kept < count) limit = ranked[kept];  // robust_mean left the kept-th smallest in its place
-    }
-    for (Eigen::Index i = 0; i < count; ++i) {
-      if (distances[i] >= limit) continue;
-      const double d = distances[i], delta = robust.huber_delta;
-      // d(rho)/dd / d: rho = d, and for huber beyond delta rho = sqrt(delta (2 d - delta)).
-      double influence = 1 / std::max(d, softening);
-      if (robust.kind == RobustKind::huber && d > delta)
-        influence *= delta / std::sqrt(delta * (2 * d - delta));
-      const double w = weight * influence / static_cast<double>(count);
-      for (int a = 0; a < kParameters; ++a) {
-        sum.gradient[side.index[a]] += w * d * rows[i][a];
-        for (int b = 0; b < kParameters; ++b) {
-          sum.matrix(side.index[a], side.index[b]) += w * rows[i][a] * rows[i][b];
-        }
-      }
+  double limit = std::numeric_limits<double>::infinity();
+  if (robust.kind == RobustKind::trimmed) {
+    const std::size_t kept =
+        count - static_cast<std::size_t>(robust.trim_fraction * static_cast<double>(count));
+    if (kept < count) limit = ranked[kept];  // robust_mean left the kept-th smallest in its place
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    if (distances[i] >= limit) continue;
+    const double d = distances[i], delta = robust.huber_delta;
+    // d(rho)/dd / d: rho = d, and for huber beyond delta rho = sqrt(delta (2 d - delta)).
+    double influence = 1 / std::max(d, softening);
+    if (robust.kind == RobustKind::huber && d > delta)
+      influence *= delta / std::sqrt(delta * (2 * d - delta));
+    const double w = weight * influence / static_cast<double>(count);
+    for (int a = 0; a < kParameters; ++a) {
+      sum.gradient[index[a]] += w * d * rows[i][a];
+      for (int b = 0; b < kParameters; ++b) sum.matrix(index[a], index[b]) += w * rows[i][a] * rows[i][b];
     }
   }
 }
 
-NormalEquations evaluate(std::vector<Side>& sides, const Eigen::VectorXd& unknowns, const Robust& robust,
-                         double softening) {
+/// Adds one side, all keyframes and terms.
+void add_side(Side& side, const Eigen::VectorXd& unknowns, const Objective& objective, double softening,
+              NormalEquations& sum) {
+  if (side.total_weight == 0) return;
+  const Registration registration = side.at(unknowns);
+  data::Points positions, velocities;
+  for (std::size_t k = 0; k < side.observations.size(); ++k) {
+    const Observation& observation = side.observations[k];
+    if (!observation.seen() || observation.weight == 0) continue;
+    surface_at(*side.problem.motion, observation.t + registration.time_offset, positions, &velocities);
+    side.sheet.move(positions);
+    const std::array<double, 5> weights = term_weights(observation, objective);
+    const double keyframe_weight = observation.weight / side.total_weight;
+    const auto add = [&](const data::Points& points, double weight, const auto& match) {
+      add_term(points, match, keyframe_weight * weight, registration, *side.problem.triangles, positions,
+               velocities, side.index, objective.robust, softening, sum);
+    };
+    add(observation.points, weights[0], [&](std::size_t i, const Eigen::Vector3d& point) {
+      const SurfacePoint nearest = side.sheet.nearest(point, side.hints[k][i]);
+      side.hints[k][i] = nearest.triangle;
+      return nearest;
+    });
+    add(observation.contour, weights[1],
+        [&](std::size_t, const Eigen::Vector3d& point) { return side.sheet.nearest_on_border(point); });
+    add(observation.markers, weights[2], [&](std::size_t i, const Eigen::Vector3d& point) {
+      return side.sheet.mark(observation.marks[i], point);
+    });
+  }
+}
+
+NormalEquations evaluate(std::vector<Side>& sides, const Eigen::VectorXd& unknowns,
+                         const Objective& objective, double softening) {
   NormalEquations sum;
   sum.matrix = Eigen::MatrixXd::Zero(unknowns.size(), unknowns.size());
   sum.gradient = Eigen::VectorXd::Zero(unknowns.size());
-  for (Side& side : sides) add_side(side, unknowns, robust, softening, sum);
+  for (Side& side : sides) add_side(side, unknowns, objective, softening, sum);
   return sum;
 }
 
@@ -158,14 +184,14 @@ Eigen::VectorXd bounded_step(const NormalEquations& equations, const Eigen::Vect
   return result;
 }
 
-double minimize(std::vector<Side>& sides, const Eigen::VectorXd& widths, const Robust& robust,
+double minimize(std::vector<Side>& sides, const Eigen::VectorXd& widths, const Objective& objective,
                 const RegistrationSettings& settings, Eigen::VectorXd& unknowns) {
-  NormalEquations here = evaluate(sides, unknowns, robust, settings.softening);
+  NormalEquations here = evaluate(sides, unknowns, objective, settings.softening);
   double damping = 1e-3;
   for (int iteration = 0; iteration < settings.iterations && damping < 1e6;) {
     const Eigen::VectorXd trial = bounded_step(here, unknowns, widths, damping);
     if (trial == unknowns) break;
-    NormalEquations there = evaluate(sides, trial, robust, settings.softening);
+    NormalEquations there = evaluate(sides, trial, objective, settings.softening);
     ++iteration;
     if (there.score >= here.score) {
       damping *= 10;
@@ -183,7 +209,8 @@ double minimize(std::vector<Side>& sides, const Eigen::VectorXd& widths, const R
 }  // namespace
 
 std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProblem>& problems,
-                                              const Robust& robust, const RegistrationSettings& settings,
+                                              const Objective& objective,
+                                              const RegistrationSettings& settings,
                                               const SharedRegistration& shared) {
   const bool is_shared[kParameters] = {shared.offset, shared.offset, shared.offset, shared.yaw, shared.time};
   std::vector<Side> sides;
@@ -215,7 +242,7 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
     Eigen::VectorXd unknowns = start;
     for (const Side& side : sides) unknowns[side.index[4]] = start[side.index[4]] + time;
     unknowns = unknowns.cwiseMax(-box).cwiseMin(box);
-    const double score = minimize(sides, box, robust, settings, unknowns);
+    const double score = minimize(sides, box, objective, settings, unknowns);
     if (score < best_score) {
       best_score = score;
       best = unknowns;
@@ -227,8 +254,8 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
     RegistrationFit& fit = fits.emplace_back();
     fit.registration = side.at(best);
     for (const Observation& observation : *side.problem.observations) {
-      fit.keyframe_scores.push_back(
-          keyframe_score(*side.problem.motion, observation, fit.registration, robust, side.surface));
+      fit.keyframe_scores.push_back(keyframe_score(*side.problem.motion, observation, fit.registration,
+                                                   objective, side.problem.crop, side.sheet));
     }
     fit.score = weighted_mean_score(fit.keyframe_scores, *side.problem.observations);
     for (int k = 0; k < kParameters; ++k) {

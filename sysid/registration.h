@@ -35,6 +35,7 @@ struct RegistrationProblem {
   const std::vector<Observation>* observations = nullptr;
   RegistrationBounds bounds;
   Registration start;  ///< pivot and up are kept, the rest is where the fit starts
+  data::CropBox crop{};
 };
 
 struct RegistrationFit {
@@ -44,12 +45,13 @@ struct RegistrationFit {
   std::vector<std::string> bounds_hit;  ///< "offset_x", "yaw", "time", ...
 };
 
-/// Minimises the sum over problems of the mean robust point-to-surface distance over offset, yaw and time.
+/// Minimises the sum over problems of the score over offset, yaw and time, all terms but force and two-sided.
 /// Levenberg steps on the distances with weights 1 / d (so that the fixed point minimises the mean distance,
 /// not its square); trimmed points carry no weight; parameters at a bound are dropped while the descent
 /// points outward. The derivative by time comes from the surface's own velocity.
 std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProblem>& problems,
-                                              const Robust& robust, const RegistrationSettings& settings = {},
+                                              const Objective& objective,
+                                              const RegistrationSettings& settings = {},
                                               const SharedRegistration& shared = {});
 
 }  // namespace flash::sysid

@@ -78,13 +78,32 @@ std::vector<int> patch_of(const Replay& replay, const data::RecordedGrasp& recor
   return {*std::min_element(patch.begin(), patch.end(), nearer)};
 }
 
-/// Replaces the recording's mesh; the start follows its pose.
+/// The vertices of `mesh` inside the bounding box, at rest, of those that were taken on the recording's own.
+std::vector<int> same_place(const std::vector<int>& taken, const data::TriangleMesh& own,
+                            const data::TriangleMesh& mesh, const std::string& source) {
+  Eigen::AlignedBox3d box;
+  for (const int vertex : taken) box.extend(own.vertices.row(vertex).transpose());
+  const double slack = 1e-6 * (own.vertices.colwise().maxCoeff() - own.vertices.colwise().minCoeff()).norm();
+  std::vector<int> vertices;
+  for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i)
+    if (box.exteriorDistance(Eigen::Vector3d(mesh.vertices.row(i))) <= slack)
+      vertices.push_back(static_cast<int>(i));
+  if (vertices.empty())
+    throw data::input_error(source, "grasps.select.vertices", "none of the other mesh lies where these do");
+  return vertices;
+}
+
+/// Replaces the recording's mesh; the start follows its pose, grasps the place of their vertices.
 void replace_mesh(data::Recording& recording, const std::string& mesh) {
   if (!recording.start_mesh.empty()) {
     throw data::input_error(recording.source, "object.start",
                             "is a mesh of its own, so that the sheet cannot be meshed anew as " + mesh);
   }
+  const data::TriangleMesh own = std::move(recording.mesh);
   recording.mesh = data::is_mesh_spec(mesh) ? data::parse_mesh_spec(mesh) : data::load_triangle_mesh(mesh);
+  for (data::RecordedGrasp& grasp : recording.grasps)
+    if (!grasp.select.vertices.empty())
+      grasp.select.vertices = same_place(grasp.select.vertices, own, recording.mesh, recording.source);
   recording.mesh_spec = mesh;
   recording.start = (recording.mesh.vertices * recording.base_from_object.linear().transpose()).rowwise() +
                     recording.base_from_object.translation().transpose();
@@ -116,10 +135,20 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   replay.sheet = sim::make_sheet(replay.recording.mesh);
   replay.up = upward(recording);
 
+  // Marks are named by vertices of the recording's own mesh.
+  const SurfaceDistance sheet(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
   for (const data::Keyframe& keyframe : data::load_keyframes(recording, replay.notices)) {
-    Observation observation{.t = keyframe.time, .points = keyframe.cloud};
-    const bool weighs = keyframe.time >= settings.score_from && keyframe.time <= settings.score_to &&
-                        keyframe.cloud.rows() >= settings.min_points;
+    Observation observation{.t = keyframe.time,
+                            .points = keyframe.cloud,
+                            .contour = keyframe.contour,
+                            .markers = keyframe.markers,
+                            .force = keyframe.force};
+    for (const int vertex : keyframe.marker_vertices)
+      observation.marks.push_back(sheet.nearest(recording.mesh.vertices.row(vertex).transpose()));
+    const bool weighs =
+        keyframe.time >= settings.score_from && keyframe.time <= settings.score_to &&
+        (keyframe.cloud.rows() >= settings.min_points || keyframe.contour.rows() >= settings.min_points ||
+         keyframe.markers.rows() > 0 || keyframe.force);
     observation.weight = weighs ? 1 : 0;
     replay.observations.push_back(std::move(observation));
   }
@@ -207,6 +236,9 @@ std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCand
   for (sim::Rollout& rollout : rollouts) {
     ReplayResult& result = results.emplace_back();
     result.motion = {replay.start, replay.settings.solver.time_step, std::move(rollout.positions)};
+    for (const sim::StepReport& report : rollout.reports)
+      result.motion.forces.push_back(report.grasp_forces.empty() ? Eigen::Vector3d::Zero()
+                                                                 : report.grasp_forces.back());
     int missed = 0;
     for (const sim::StepReport& report : rollout.reports) {
       missed += !report.converged;
@@ -232,6 +264,7 @@ RegistrationProblem registration_problem(const Replay& replay, const Motion& mot
                     replay.recording.nuisance.time};
   problem.start.pivot = replay.pivot;
   problem.start.up = replay.up;
+  problem.crop = replay.recording.crop;
   return problem;
 }
 

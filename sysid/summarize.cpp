@@ -118,7 +118,7 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
   texts["max_iterations"] = std::to_string(replay.settings.solver.max_iterations);
   texts["tolerance"] = data::format_number(replay.settings.solver.tolerance);
   if (settings.base.thickness) texts["thickness_m"] = data::format_number(*settings.base.thickness);
-  const Robust& robust = settings.score.robust;
+  const Robust& robust = settings.score.objective.robust;
   texts["distance"] =
       robust.kind == RobustKind::trimmed
           ? "mean without the largest " + data::format_short(100 * robust.trim_fraction) + " %"

@@ -86,12 +86,13 @@ TEST(Registration, ScoreNeverRisesAboveTheStartAndIsThatOfTheObjective) {
     const Registration truth{.offset = {0.05, 0, 0.02}, .yaw = 0.2, .time_offset = 0.08};
     const auto observations = observe(mesh, truth, 5e-3, 0.02, 3);
     const auto problem = problem_of(mesh, motion, observations, truth);
-    const auto fit = register_motions({problem}, robust).front();
+    const auto fit = register_motions({problem}, {.robust = robust}).front();
     const double start = weighted_mean_score(
-        keyframe_scores(mesh.triangles, motion, observations, problem.start, robust), observations);
+        keyframe_scores(mesh.triangles, motion, observations, problem.start, {.robust = robust}),
+        observations);
     EXPECT_LT(fit.score, 0.5 * start);
     EXPECT_DOUBLE_EQ(fit.score, weighted_mean_score(keyframe_scores(mesh.triangles, motion, observations,
-                                                                    fit.registration, robust),
+                                                                    fit.registration, {.robust = robust}),
                                                     observations));
   }
 }

@@ -55,7 +55,7 @@ TEST(Synth, LoadsAsARecordingAndFitsItsOwnTruthToTheNoise) {
   const Replay replay = make_replay(recording, {});
   const ReplayResult result = std::move(run(replay, {{stiff_towel(), {}}}).front());
   ScoreSettings score;
-  score.robust.kind = RobustKind::plain;
+  score.objective.robust.kind = RobustKind::plain;
   const CandidateResult fit = score_motions({replay}, {result}, score);
   // Noise of 1 mm along rays that meet the sheet at angles up to grazing: a mean distance below sqrt(2/pi)
   // mm.
