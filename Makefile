@@ -7,11 +7,14 @@ JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 600
 CMAKE_ARGS ?=
 
+PYTHON ?= /usr/bin/python3
+REFERENCE ?= ../shared/reference
+
 sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo build test validate fuzz configure-test format check-format tidy install clean
+.PHONY: help demo build test validate reference fuzz configure-test format check-format tidy install clean
 .PHONY: packages-build packages-test packages-check
 
 help:  ## This list
@@ -36,9 +39,14 @@ test: configure-test  ## Packages, build, then all tests
 configure-test: packages-build packages-test
 	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=ON $(CMAKE_ARGS)
 
-validate: build  ## Fit the recordings in $(DATA) and renew docs/validation.md; ONLY=lift_navy: that clip alone
-	python3 tests/validation/validate.py --sysid $(sysid) --data $(DATA) --out $(BUILD)/validation \
-	  --document docs/validation.md $(if $(ONLY),--only $(ONLY))
+validate: reference  ## Fit the recordings in $(DATA) and renew docs/validation.md; ONLY=lift_navy: that clip alone
+	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --data $(DATA) --scenes $(REFERENCE)/scenes \
+	  --results $(BUILD)/reference --out $(BUILD)/validation --document docs/validation.md $(if $(ONLY),--only $(ONLY))
+
+reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py
+	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \
+	  --out $(BUILD)/reference
+	$(PYTHON) $(REFERENCE)/compare.py $(BUILD)/reference --all --except solids
 
 fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s under address and undefined-behaviour sanitizers
 	cmake --preset fuzz

@@ -16,7 +16,7 @@
 #include "data/error.h"
 #include "data/scene.h"
 #include "data/text.h"
-#include "sim/scene.h"
+#include "sim/scene_run.h"
 
 namespace flash {
 namespace {
@@ -68,6 +68,7 @@ void print_json(const sim::SceneSummary& summary, const std::string& out, int ex
                                        {"frames", summary.frames},
                                        {"wall_seconds", summary.wall_seconds},
                                        {"interrupted", summary.interrupted},
+                                       {"at_rest", summary.at_rest},
                                        {"warnings", summary.notices},
                                        {"exit_code", exit_code}};
   std::cout << json.dump(2) << '\n';
@@ -100,8 +101,11 @@ int run(const RunOptions& options) {
   const sim::SceneSummary summary = sim::run_scene(scene, settings, options.out);
 
   // One step in a hundred may stay above the tolerance without spoiling a motion.
-  const bool unusable = summary.interrupted ? false : 100 * summary.unconverged_steps > summary.steps;
+  const bool unusable = 100 * summary.unconverged_steps > summary.steps || !summary.at_rest;
   const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
+  if (!summary.at_rest && !summary.interrupted)
+    std::cerr << "flash-sim: warning: not at rest after " << summary.steps << " steps: a vertex still moves "
+              << data::format_short(summary.last_motion) << " m a step; allow more steps or longer ones\n";
   if (summary.unconverged_steps > 0)
     std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps
               << " steps did not converge; worst residual " << data::format_short(summary.residual_max)

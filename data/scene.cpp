@@ -153,14 +153,17 @@ std::vector<int> read_vertices(const JsonObject& object) {
 }
 
 SceneFixed read_fixed(const JsonObject& object) {
-  object.expect_fields({"vertices", "axes", "positions"});
+  object.expect_fields({"name", "vertices", "axes", "positions", "over"});
   SceneFixed fixed;
+  fixed.name = object.string("name", fixed.name);
+  fixed.over = object.not_negative("over", fixed.over);
   fixed.all = object.raw("vertices") == "all";
   if (!fixed.all) fixed.vertices = read_vertices(object);
   const std::string axes = object.string("axes", "xyz");
   for (std::size_t axis = 0; axis < 3; ++axis) fixed.axes[axis] = axes.find("xyz"[axis]) != std::string::npos;
   if (axes.empty() || axes.find_first_not_of("xyz") != std::string::npos)
     throw object.error("axes", "letters of xyz, such as \"z\" for a roller");
+  if (object.has("over") && !object.has("positions")) throw object.error("over", "positions to move to");
   if (!object.has("positions")) return fixed;
   const nlohmann::json& rows = object.raw("positions");
   if (fixed.all || !rows.is_array() || rows.size() != fixed.vertices.size())
@@ -177,8 +180,9 @@ SceneFixed read_fixed(const JsonObject& object) {
 }
 
 ScenePrescribed read_prescribed(const JsonObject& object) {
-  object.expect_fields({"vertices", "trajectory", "keyframes", "from", "to"});
+  object.expect_fields({"name", "vertices", "trajectory", "keyframes", "from", "to"});
   ScenePrescribed prescribed;
+  prescribed.name = object.string("name", prescribed.name);
   prescribed.vertices = read_vertices(object);
   prescribed.trajectory = read_trajectory(object);
   if (prescribed.trajectory.times.empty()) throw object.error("trajectory", "a trajectory, or keyframes");
@@ -304,7 +308,7 @@ Scene load_scene(const std::string& path) {
       throw file.error("schema", "\"flash-scene/1\", or no schema for the published format");
     file.expect_fields({"schema", "name", "note", "timestep", "steps", "duration", "gravity", "linearsolver",
                         "constraintsolver", "solver", "bending_model", "planecollisions", "obstacles",
-                        "objects", "end_effectors", "friction", "keyframes"});
+                        "objects", "end_effectors", "friction", "keyframes", "quasistatic"});
   } else {
     file.expect_fields(
         {"timestep", "gravity", "linearsolver", "constraintsolver", "planecollisions", "objects"});
@@ -321,6 +325,11 @@ Scene load_scene(const std::string& path) {
   read_objects(file, scene);
   read_end_effectors(file, scene);
   read_pair_friction(file, scene);
+  if (file.has("quasistatic")) {
+    const JsonObject object = file.object("quasistatic");
+    object.expect_fields({"motion"});
+    scene.rest_motion = object.positive("motion", 1e-9);
+  }
   if (file.has("keyframes")) {
     const Eigen::VectorXd times = file.vector("keyframes", -1);
     scene.keyframe_times.assign(times.begin(), times.end());

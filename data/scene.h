@@ -56,14 +56,17 @@ struct SceneObstacle {
 
 /// Vertices held in some axes, all for the whole run.
 struct SceneFixed {
+  std::string name = "fixed";  ///< under which their support's force is written
   std::vector<int> vertices;
   bool all = false;                               ///< every vertex of the object; `vertices` is empty then
   std::array<bool, 3> axes = {true, true, true};  ///< "x", "xy", ...: a roller fixes one axis
   Points positions;                               ///< one row a vertex [m]; empty: where they start
+  double over = 0.0;  ///< in which they move from their start to `positions`, evenly [s]
 };
 
 /// Vertices moved rigidly: x(t) = T(t) T(from)^-1 x(from).
 struct ScenePrescribed {
+  std::string name = "prescribed";  ///< under which the force on them is written
   std::vector<int> vertices;
   Trajectory trajectory;  ///< a TUM file, or keyframes {t, translation, rotation_xyzw}
   double from = 0.0;      ///< [s]
@@ -129,6 +132,9 @@ struct Scene {
   std::vector<SceneEndEffector> end_effectors;
   std::vector<ScenePairFriction> pair_friction;
   std::vector<double> keyframe_times;  ///< to write [s]; empty: every step
+  /// Quasistatic: every step starts without velocity, and the run ends at rest, when no vertex moves farther
+  /// than this in a step and all supports have arrived [m].
+  std::optional<double> rest_motion;
   std::vector<std::string> notices;
 };
 

@@ -189,7 +189,8 @@ void report_forces(const Environment& environment, const ProjectiveSettings& set
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
   for (std::size_t i = 0; i < holds.size(); ++i) {
     const Vector3d force = needed.row(i), held = force - holds[i].free * force;
-    (holds[i].grasp >= 0 ? report.grasp_forces[holds[i].grasp] : report.fixed_force) += held;
+    if (holds[i].grasp >= 0) report.grasp_forces[holds[i].grasp] += held;
+    if (holds[i].grasp < 0 && holds[i].hold == Hold::fixed) report.fixed_forces.push_back({int(i), held});
   }
   std::size_t loaded = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {

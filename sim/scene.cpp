@@ -1,23 +1,16 @@
 #include "sim/scene.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <future>
 #include <limits>
 #include <map>
-#include <memory>
-#include <set>
 #include <utility>
 
 #include "data/asset.h"
-#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
-#include "sim/projective.h"
 
 namespace flash::sim {
 namespace {
@@ -68,8 +61,12 @@ void add_supports(const data::Scene& scene, const data::SceneObject& object, Sce
       for (int i = 0; i < int(start.rows()); ++i) vertices.push_back(i);
     for (std::size_t i = 0; i < vertices.size(); ++i) {
       const bool given = fixed.positions.rows() > 0;
-      const Vector3d at = given ? fixed.positions.row(Eigen::Index(i)) : start.row(vertices[i]);
-      environment.fixed.push_back({vertices[i], fixed.axes, at});
+      const Vector3d from = start.row(vertices[i]);
+      const Vector3d to = given ? Vector3d(fixed.positions.row(Eigen::Index(i))) : from;
+      if (fixed.over > 0) body.moving.push_back({int(environment.fixed.size()), from, to, fixed.over});
+      environment.fixed.push_back({vertices[i], fixed.axes, to});
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        if (fixed.axes[axis]) body.support_names[vertices[i]][axis] = fixed.name;
     }
   }
   for (const data::SceneLoad& load : object.loads) {
@@ -84,7 +81,7 @@ void add_supports(const data::Scene& scene, const data::SceneObject& object, Sce
     grasp.from = prescribed.from;
     grasp.to = prescribed.to;
     environment.grasps.push_back(grasp);
-    body.grasp_names.push_back("prescribed");
+    body.grasp_names.push_back(prescribed.name);
   }
 }
 
@@ -143,107 +140,8 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object,
   return body;
 }
 
-/// Advances an environment by one step.
-using Stepper = std::function<StepReport(Environment&)>;
-
-Stepper make_stepper(const data::SceneSolver& solver, double time_step, const SceneBody& body) {
-  if (solver.integrator == "newton") {
-    SolverSettings settings;
-    settings.time_step = time_step;
-    settings.max_iterations = solver.max_iterations;
-    settings.tolerance = solver.tolerance;
-    return
-        [newton = std::make_shared<Solver>(body.sheet, settings)](Environment& e) { return newton->step(e); };
-  }
-  ProjectiveSettings settings;
-  settings.time_step = time_step;
-  settings.iterations = solver.max_iterations;
-  settings.tolerance = solver.tolerance;
-  settings.metric = solver.constraint_solver.starts_with("Lite")        ? ContactMetric::inertia
-                    : solver.constraint_solver.starts_with("NonSmooth") ? ContactMetric::full
-                                                                        : ContactMetric::automatic;
-  settings.constraints.iterations = solver.constraint_iterations;
-  settings.constraints.tolerance = solver.constraint_tolerance;
-  settings.constraints.max_force = solver.max_force;
-  settings.constraints.linear.solver = dual_solver_from_name(solver.constraint_linear_solver);
-  return [projective = std::make_shared<ProjectiveSolver>(body.sheet, settings)](Environment& e) {
-    return projective->step(e);
-  };
-}
-
 double distance_to_box(const Vector3d& half_extents, const Vector3d& point) {
   return (point.cwiseAbs() - half_extents).cwiseMax(0.0).norm();
-}
-
-data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
-  data::TriangleMesh mesh;
-  Eigen::Index vertices = 0, triangles = 0;
-  for (const SceneBody& body : bodies) {
-    const data::Points& x = body.environment.state.positions;
-    const data::Triangles& t = body.sheet.rest.triangles;
-    mesh.vertices.conservativeResize(vertices + x.rows(), 3);
-    mesh.triangles.conservativeResize(triangles + t.rows(), 3);
-    mesh.vertices.bottomRows(x.rows()) = x;
-    mesh.triangles.bottomRows(t.rows()) = t.array() + int(vertices);
-    vertices += x.rows();
-    triangles += t.rows();
-  }
-  return mesh;
-}
-
-std::string log_row(int step, double time, const std::vector<StepReport>& reports) {
-  StepReport worst, sum;
-  bool converged = true;
-  for (const StepReport& r : reports) {
-    worst.residual = std::max(worst.residual, r.residual);
-    worst.penetration_max = std::max(worst.penetration_max, r.penetration_max);
-    worst.complementarity = std::max(worst.complementarity, r.complementarity);
-    sum.iterations += r.iterations;
-    sum.kinetic += r.kinetic;
-    sum.membrane += r.membrane;
-    sum.bending += r.bending;
-    sum.potential += r.potential;
-    converged = converged && r.converged;
-  }
-  std::string row = std::to_string(step) + "," + data::format_number(time);
-  row += "," + data::format_number(worst.residual) + "," + std::to_string(sum.iterations);
-  for (double value :
-       {worst.penetration_max, worst.complementarity, sum.kinetic, sum.membrane + sum.bending, sum.potential})
-    row += "," + data::format_number(value);
-  return row + (converged ? ",1\n" : ",0\n");
-}
-
-std::string force_rows(double time, const std::vector<SceneBody>& bodies,
-                       const std::vector<StepReport>& reports) {
-  std::map<std::string, Vector3d> forces;
-  const auto add = [&](const std::string& body, const Vector3d& force) {
-    forces.try_emplace(body, Vector3d::Zero()).first->second += force;
-  };
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    for (std::size_t k = 0; k < reports[b].grasp_forces.size(); ++k)
-      add(bodies[b].grasp_names[k], reports[b].grasp_forces[k]);
-    for (std::size_t k = 0; k < reports[b].obstacle_forces.size(); ++k)
-      add(bodies[b].obstacle_names[k], reports[b].obstacle_forces[k]);
-    if (!bodies[b].environment.fixed.empty()) add("fixed", reports[b].fixed_force);
-  }
-  std::string rows;
-  for (const auto& [body, force] : forces) {
-    rows += data::format_number(time) + "," + body;
-    for (double component : force) rows += "," + data::format_number(component);
-    rows += "\n";
-  }
-  return rows;
-}
-
-std::set<int> frames_to_write(const data::Scene& scene, int steps) {
-  std::set<int> frames;
-  if (scene.keyframe_times.empty())
-    for (int k = 0; k <= steps; ++k) frames.insert(k);
-  for (double t : scene.keyframe_times) {
-    const long k = std::lround(t / scene.time_step);
-    if (k >= 0 && k <= steps) frames.insert(int(k));
-  }
-  return frames;
 }
 
 }  // namespace
@@ -283,72 +181,14 @@ void close_pending_grasps(SceneBody& body) {
   std::erase_if(body.pending, [&](const auto& pending) { return state.time >= pending.from - 1e-9; });
 }
 
-SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std::string& output_dir) {
-  const auto start = std::chrono::steady_clock::now();
-  namespace fs = std::filesystem;
-  SceneSummary summary;
-  summary.notices = scene.notices;
-  std::vector<SceneBody> bodies = scene_bodies(scene, summary.notices);
-  if (run.notice)
-    for (const std::string& notice : summary.notices) run.notice(notice);
-
-  std::vector<Stepper> steppers;
-  for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
-
-  const int steps = run.steps >= 0 ? run.steps : scene.steps;
-  const std::set<int> frames = frames_to_write(scene, steps);
-  const auto write_frame = [&](int step) {
-    if (!frames.count(step)) return;
-    char name[32];
-    std::snprintf(name, sizeof name, "%06d.ply", step);
-    data::save_triangle_mesh(merged(bodies), (fs::path(output_dir) / "frames" / name).string());
-    ++summary.frames;
-  };
-  std::string log =
-      "step,t,residual,iterations,penetration_max_m,complementarity,kinetic_J,elastic_J,potential_J,"
-      "converged\n";
-  std::string forces = "t,body,fx,fy,fz\n";
-  const auto write_tables = [&] {
-    data::write_atomically((fs::path(output_dir) / "log.csv").string(), log);
-    data::write_atomically((fs::path(output_dir) / "forces.csv").string(), forces);
-  };
-
-  std::vector<StepReport> reports(bodies.size());
-  try {
-    write_frame(0);
-    for (int step = 1; step <= steps && !summary.interrupted; ++step) {
-      for (SceneBody& body : bodies) close_pending_grasps(body);
-      std::vector<std::future<void>> pending;
-      const auto advance = [&](std::size_t b) { reports[b] = steppers[b](bodies[b].environment); };
-      for (std::size_t b = 0; b < bodies.size(); ++b)
-        if (run.threads > 1 && b + 1 < bodies.size())
-          pending.push_back(std::async(std::launch::async, advance, b));
-        else
-          advance(b);
-      for (std::future<void>& other : pending) other.get();
-
-      const double time = bodies.empty() ? step * scene.time_step : bodies.front().environment.state.time;
-      log += log_row(step, time, reports);
-      forces += force_rows(time, bodies, reports);
-      bool converged = true;
-      for (const StepReport& report : reports) {
-        converged = converged && report.converged;
-        summary.residual_max = std::max(summary.residual_max, report.residual);
-        summary.penetration_max = std::max(summary.penetration_max, report.penetration_max);
-        summary.iterations += report.iterations;
-      }
-      summary.unconverged_steps += !converged;
-      summary.steps = step;
-      write_frame(step);
-      if (run.progress && !run.progress(step, steps)) summary.interrupted = step < steps;
-    }
-  } catch (...) {
-    write_tables();
-    throw;
+bool move_supports(SceneBody& body, double time) {
+  bool arrived = true;
+  for (const SceneBody::MovingSupport& support : body.moving) {
+    const double share = std::min(1.0, time / support.over);
+    body.environment.fixed[support.fixed].position = support.start + share * (support.end - support.start);
+    arrived = arrived && share >= 1;
   }
-  write_tables();
-  summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return summary;
+  return arrived;
 }
 
 }  // namespace flash::sim

@@ -1,5 +1,6 @@
 #pragma once
-#include <functional>
+#include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,7 +17,8 @@ struct SceneBody {
                 ///< vertices
   Environment environment;
   std::vector<std::string> obstacle_names;  ///< one an obstacle of the environment
-  std::vector<std::string> grasp_names;     ///< one a grasp: end effectors, or "prescribed"
+  std::vector<std::string> grasp_names;     ///< one a grasp: end effectors and prescribed motions
+  std::map<int, std::array<std::string, 3>> support_names;  ///< of fixed vertices, by axis; "" where free
   /// Grasps whose vertices are those near the end effector's box when they close.
   struct PendingGrasp {
     int grasp;         ///< index in the environment
@@ -26,6 +28,13 @@ struct SceneBody {
     bool zero_length;
   };
   std::vector<PendingGrasp> pending;
+  /// Supports that move to their place.
+  struct MovingSupport {
+    int fixed;  ///< index in the environment
+    Eigen::Vector3d start, end;
+    double over;  ///< [s]
+  };
+  std::vector<MovingSupport> moving;
 };
 
 /// The objects of a scene; what was understood of units and what cannot be done goes to `notices`.
@@ -36,30 +45,7 @@ std::vector<SceneBody> scene_bodies(const data::Scene& scene, std::vector<std::s
 /// within the threshold, with the distance of the nearest.
 void close_pending_grasps(SceneBody& body);
 
-/// How a run of a scene went.
-struct SceneSummary {
-  int steps = 0;               ///< done
-  int unconverged_steps = 0;   ///< with an object whose residual stayed above the tolerance
-  double residual_max = 0;     ///< worst |r| / |M g|
-  double penetration_max = 0;  ///< [m]
-  long iterations = 0;         ///< of all objects and steps
-  int frames = 0;              ///< written
-  double wall_seconds = 0;
-  bool interrupted = false;
-  std::vector<std::string> notices;
-};
-
-struct SceneRun {
-  int steps = -1;                                     ///< to run; below zero: the scene's
-  int threads = 1;                                    ///< objects step in parallel
-  std::function<void(const std::string&)> notice;     ///< told each notice before the first step
-  std::function<bool(int done, int steps)> progress;  ///< after each step; false stops the run
-};
-
-/// Runs a scene and writes, into output_dir: frames/%06d.ply (number: the step; all objects in one mesh),
-/// log.csv (step, t, residual, iterations, penetration_max_m, complementarity, kinetic_J, elastic_J,
-/// potential_J, converged) and forces.csv (t, body, fx, fy, fz: of the body on the objects [N]). What was
-/// done is kept when the run stops early.
-SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std::string& output_dir);
+/// Puts the moving supports where they are at `time`. Returns whether all have arrived.
+bool move_supports(SceneBody& body, double time);
 
 }  // namespace flash::sim

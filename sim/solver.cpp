@@ -341,9 +341,11 @@ StepReport Solver::step(Environment& environment) {
   report.bending = now.elastic.bending;
   report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
-  for (const VertexConstraint& c : now.constraints) {
+  for (size_t i = 0; i < now.constraints.size(); ++i) {
+    const VertexConstraint& c = now.constraints[i];
     if (c.hold == Hold::fixed) {
-      (c.grasp >= 0 ? report.grasp_forces[c.grasp] : report.fixed_force) += c.reaction;
+      if (c.grasp < 0) report.fixed_forces.push_back({int(i), c.reaction});
+      if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
       continue;
     }
     report.penetration_max = std::max(report.penetration_max, -c.gap);

@@ -28,7 +28,7 @@ struct StepReport {
   double kinetic = 0, membrane = 0, bending = 0, potential = 0;  ///< energies [J]
   std::vector<Eigen::Vector3d> grasp_forces;                     ///< gripper on sheet, one a grasp [N]
   std::vector<Eigen::Vector3d> obstacle_forces;                  ///< obstacle on sheet, one an obstacle [N]
-  Eigen::Vector3d fixed_force = Eigen::Vector3d::Zero();         ///< supports on sheet [N]
+  std::vector<Load> fixed_forces;                                ///< support on sheet, one a fixed vertex
 };
 
 /// Steps an environment by implicit Euler: semi-smooth Newton on the potential of the step, feasible at every

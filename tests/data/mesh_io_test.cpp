@@ -159,7 +159,8 @@ TEST(MeshIo, BrokenMeshesAreNamed) {
             ": triangle 0: found vertex index 3, expected 0 to 2");
   EXPECT_EQ(message("a.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n"),
             ": DATASET STRUCTURED_POINTS, expected POLYDATA or UNSTRUCTURED_GRID");
-  EXPECT_EQ(message("a.stl", ""), ": ending \".stl\" is not known, expected .ply, .obj, .vtk, .pcd or .tet");
+  EXPECT_EQ(message("a.fbx", ""),
+            ": ending \".fbx\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
 }
 
 TEST(MeshIo, TruncatedBinaryFilesAreErrorsNotCrashes) {

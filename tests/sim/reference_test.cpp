@@ -364,6 +364,7 @@ class CornerLift : public testing::TestWithParam<std::string> {};
 
 TEST_P(CornerLift, MovesAsTheReferenceUntilItFolds) {
   FLASH_REFERENCE_SCENE(scene, GetParam());
+  Judge judge(scene);
   ReferenceRun run(scene);
   Grasp grasp;
   for (int v : scene.at("fixed").at("vertices")) grasp.vertices.push_back(v);
@@ -379,6 +380,7 @@ TEST_P(CornerLift, MovesAsTheReferenceUntilItFolds) {
   settings.tolerance = 1e-5;
   Solver solver(run.plan, settings);
   const double tolerance = scene.at("expected")[0].at("tolerance").at("atol");
+  std::vector<double> distances;
   for (int k = 1; k <= std::lround(2.5 / dt); ++k) {
     solver.step(run.environment);
     for (const auto& [time, frame] : scene.at("frames").items()) {
@@ -387,8 +389,10 @@ TEST_P(CornerLift, MovesAsTheReferenceUntilItFolds) {
       const double rms = std::sqrt(difference.rowwise().squaredNorm().mean());
       EXPECT_LE(rms, tolerance + 0.05e-3 * frame.at("rms_sensitivity_mm").at("logE").get<double>())
           << time << " s";
+      distances.push_back(rms);
     }
   }
+  judge("vertex rms to reference positions at each frame [m]", distances);
 }
 GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(CornerLift);
 INSTANTIATE_TEST_SUITE_P(Reference, CornerLift, testing::ValuesIn(scene_names("lift11_")), test_name);

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -13,6 +15,7 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/scene.h"
+#include "sim/scene_run.h"
 
 namespace flash::sim {
 namespace {
@@ -128,6 +131,44 @@ TEST_F(SceneRunTest, PrescribedVerticesFollowTheirKeyframes) {
   EXPECT_LT((last.vertices.row(0) - Eigen::RowVector3d(0, 0, 0.02)).norm(), 1e-9);
   EXPECT_LT((last.vertices.row(5) - Eigen::RowVector3d(0.1, 0, 0.02)).norm(), 1e-9);
   EXPECT_LT((last.vertices.row(30) - Eigen::RowVector3d(0, 0.1, 0)).norm(), 1e-9);
+}
+
+// Uniaxial tension of the corotational sheet is exact: T = E t (s - 1) on each end, width 1 - nu (s - 1).
+TEST_F(SceneRunTest, QuasistaticPullComesToRestWithTheForceOnEachSupport) {
+  const std::string path = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 1, "steps": 50,
+    "gravity": [0, 0, 0], "keyframes": [], "solver": {"tolerance": 1e-9}, "quasistatic": {"motion": 1e-9},
+    "objects": {"cloth": {"asset": "cloth.json", "fixed": [
+      {"name": "left", "vertices": [0, 6, 12, 18, 24, 30], "axes": "x"},
+      {"name": "right", "vertices": [5, 11, 17, 23, 29, 35], "axes": "x", "over": 5, "positions":
+        [[0.11, 0, 0], [0.11, 0, 0], [0.11, 0, 0], [0.11, 0, 0], [0.11, 0, 0], [0.11, 0, 0]]},
+      {"name": "corner", "vertices": [0], "axes": "y"}, {"name": "floor", "vertices": "all", "axes": "z"}]}}})");
+  const SceneSummary summary = run_scene(data::load_scene(path), {}, out());
+  EXPECT_TRUE(summary.at_rest);
+  EXPECT_LE(summary.last_motion, 1e-9);
+  EXPECT_GT(summary.steps, 5);  // the supports take five
+  EXPECT_LT(summary.steps, 50);
+  std::map<std::string, double> fx;
+  const std::vector<std::string> body = column("forces.csv", "body"), force = column("forces.csv", "fx");
+  for (std::size_t i = 0; i < body.size(); ++i) fx[body[i]] = std::stod(force[i]);
+  EXPECT_NEAR(fx.at("right"), 100 * 0.1 * 0.1, 1e-8);  // E t, strain, width
+  EXPECT_NEAR(fx.at("left"), -1.0, 1e-8);
+  EXPECT_NEAR(fx.at("corner"), 0, 1e-12);
+  EXPECT_EQ(fx.at("floor"), 0);
+  char last[32];
+  std::snprintf(last, sizeof last, "/frames/%06d.ply", summary.steps);
+  const data::TriangleMesh mesh = data::load_triangle_mesh(out() + last);
+  EXPECT_NEAR(mesh.vertices(35, 0), 0.11, 1e-12);
+  EXPECT_NEAR(mesh.vertices(35, 1), 0.1 * (1 - 0.3 * 0.1), 1e-9);
+  const double energy = std::stod(column("log.csv", "membrane_J").back());
+  EXPECT_NEAR(energy, 0.5 * 100 * 0.1 * 0.1 * 0.01, 1e-9);  // E t strain^2 / 2 times the area
+}
+
+TEST_F(SceneRunTest, QuasistaticRunThatDoesNotComeToRestSaysSo) {
+  const std::string path = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 3,
+    "gravity": [0, 0, -9.81], "quasistatic": {"motion": 1e-9}, "objects": {"cloth": "cloth.json"}})");
+  const SceneSummary summary = run_scene(data::load_scene(path), {}, out());
+  EXPECT_FALSE(summary.at_rest);
+  EXPECT_NEAR(summary.last_motion, 9.81e-4, 1e-6);  // h^2 g: a free sheet never rests
 }
 
 TEST_F(SceneRunTest, PublishedSceneRunsAsItStands) {

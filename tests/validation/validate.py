@@ -7,6 +7,7 @@ import shutil
 
 import lifts
 import limits
+import reference
 import tables
 import twins
 from runs import Runs
@@ -18,7 +19,10 @@ def main():
     parser.add_argument("--data", required=True, type=pathlib.Path, help="folder with lift/ and twin/")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder of the runs")
     parser.add_argument("--document", required=True, type=pathlib.Path, help="where the tables go")
-    parser.add_argument("--only", help="lifts or twins: that half of the document; a recording: its fit alone, printed")
+    parser.add_argument("--scenes", type=pathlib.Path, help="folder of the reference scenes")
+    parser.add_argument("--results", type=pathlib.Path, help="what make reference wrote of them")
+    parser.add_argument("--only", help="lifts, twins or reference: that part of the document; a recording: its fit "
+                                       "alone, printed")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     runs = Runs(options.sysid, options.out)
@@ -28,11 +32,13 @@ def main():
     if options.only in twins.TWINS:
         return print(tables.twin_table(run_twins(runs, options.data, options.only)), end="")
     document = {}
-    if options.only != "twins":
+    if options.only in (None, "reference") and options.results:
+        document |= reference.tables(options.scenes, options.results, tables.table)
+    if options.only in (None, "lifts"):
         results = run_lifts(runs, options.data)
         document |= tables.lift_tables(results)
         copy_pictures(options.out, options.document.parent / "images")
-    if options.only != "lifts":
+    if options.only in (None, "twins"):
         document |= tables.twin_tables(run_twins(runs, options.data), run_membrane(runs, options.data))
     tables.replace_tables(options.document, document)
     print(options.document)

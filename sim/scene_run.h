@@ -1,0 +1,39 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "data/scene.h"
+
+namespace flash::sim {
+
+/// How a run of a scene went.
+struct SceneSummary {
+  int steps = 0;               ///< done
+  int unconverged_steps = 0;   ///< with an object whose residual stayed above the tolerance
+  double residual_max = 0;     ///< worst |r| / |M g|
+  double penetration_max = 0;  ///< [m]
+  long iterations = 0;         ///< of all objects and steps
+  int frames = 0;              ///< written
+  double wall_seconds = 0;
+  bool interrupted = false;
+  double last_motion = 0;  ///< quasistatic: of the vertex that moved farthest in the last step [m]
+  bool at_rest = true;     ///< quasistatic: whether that is below the scene's bound
+  std::vector<std::string> notices;
+};
+
+struct SceneRun {
+  int steps = -1;                                     ///< to run; below zero: the scene's
+  int threads = 1;                                    ///< objects step in parallel
+  std::function<void(const std::string&)> notice;     ///< told each notice before the first step
+  std::function<bool(int done, int steps)> progress;  ///< after each step; false stops the run
+};
+
+/// Runs a scene and writes, into output_dir: frames/%06d.ply (number: the step; all objects in one mesh),
+/// log.csv (step, t, residual, iterations, penetration_max_m, complementarity, kinetic_J, elastic_J,
+/// potential_J, converged, membrane_J, bending_J) and forces.csv (t, body, fx, fy, fz: of the body on the
+/// objects [N]). The last step of a quasistatic run is always a frame. What was done is kept when the run
+/// stops early.
+SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std::string& output_dir);
+
+}  // namespace flash::sim

@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+"""Runs reference scenes with flash-sim and writes, a scene each, RESULTS/<scene>.json with the positions, frames and
+quantities that the scene's judge asks for. Scenes of solids are left out: only sheets can be simulated."""
+import argparse
+import concurrent.futures
+import json
+import pathlib
+import subprocess
+import sys
+import time
+
+import quantities
+import scene_files
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "validation"))
+import reference  # noqa: E402
+
+TABLES = ("elastica_table", "cantilever_convergence")
+SOLIDS = ("tet_", "unit_tet_", "tetdrop_")
+
+
+def names(scenes):
+    return sorted(path.stem for path in scenes.glob("*.json")
+                  if path.stem not in TABLES and not path.stem.startswith(SOLIDS))
+
+
+def read_obj(path):
+    return [tuple(map(float, line.split()[1:4])) for line in path.read_text().splitlines() if line.startswith("v ")]
+
+
+def solve(name, scenes, results, sim):
+    scene = json.loads((scenes / f"{name}.json").read_text())
+    rest = read_obj(scenes / scene["mesh"])
+    folder = results / "runs" / name
+    begin = time.monotonic()
+    path = scene_files.write(scene, rest, folder, scenes)
+    done = subprocess.run([sim, "run", str(path), "-o", str(folder / "out"), "--force", "--quiet", "--threads", "1"],
+                          capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{name}: exit code {done.returncode}: {done.stderr}")
+    output = quantities.Output(folder / "out")
+    result = {}
+    expected = None
+    if "frames" in scene:
+        expected = {t: scene_files.read_points(scenes / frame["positions"]) for t, frame in scene["frames"].items()
+                     if float(t) <= scene_files.LIFT_SECONDS}
+        result["frames"] = {t: output.frame(round(float(t) / scene["dt"])) for t in expected}
+    elif "reference_positions" in scene:
+        expected = scene_files.read_points(scenes / scene["reference_positions"])
+        result["positions"] = output.last
+    found = quantities.of(scene, rest, output, expected)
+    result["quantities"] = {entry["quantity"]: found[entry["quantity"]] for entry in scene["expected"]}
+    (results / f"{name}.json").write_text(json.dumps(result))
+    return name, time.monotonic() - begin, done.stderr.strip()
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sim", required=True, help="the program flash-sim")
+    parser.add_argument("--scenes", required=True, type=pathlib.Path, help="folder of the reference scenes")
+    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder of the results")
+    parser.add_argument("--jobs", type=int, default=1, help="scenes at once")
+    parser.add_argument("--judge", action="store_true", help="fail where a quantity is farther off than allowed")
+    parser.add_argument("scene", nargs="*", help="these alone")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    failed = False
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        runs = pool.map(lambda name: solve(name, options.scenes, options.out, options.sim),
+                        options.scene or names(options.scenes))
+        for name, seconds, warnings in runs:
+            print(f"{seconds:6.1f} s  {name}  {warnings}".rstrip(), flush=True)
+            for quantity, value, wanted, error, allowed in reference.rows_of(name, options.scenes, options.out):
+                if options.judge and not error <= allowed:
+                    failed = True
+                    print(f"  {quantity}: found {value!r}, expected {wanted!r} within {allowed:.3g}")
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
