@@ -222,6 +222,8 @@ std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern) {
   return symbolic;
 }
 
+const std::vector<int>& elimination_position(const SymbolicFactor& symbolic) { return symbolic.position; }
+
 long factor_entries(const SymbolicFactor& symbolic) { return symbolic.entries; }
 
 template <typename Scalar>
@@ -313,27 +315,24 @@ void copy_vertex(const Scalar* from, Scalar* to) {
 }  // namespace
 
 template <typename Scalar>
-void BlockCholesky<Scalar>::solve_in_place(double* x) const {
+void BlockCholesky<Scalar>::solve_in_order(Scalar* x) const {
   const auto& nodes = symbolic_->supernodes;
   const auto gather = [&](const Supernode& node) {
     const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
-    std::copy_n(permuted_.data() + 3 * node.first_column, columns, front_.data());
+    std::copy_n(x + 3L * node.first_column, columns, front_.data());
     for (size_t r = 0; r < node.rows.size(); ++r)
-      copy_vertex(permuted_.data() + 3 * node.rows[r], front_.data() + columns + 3 * r);
+      copy_vertex(x + 3L * node.rows[r], front_.data() + columns + 3 * r);
     std::fill(front_.begin() + columns + rows, front_.begin() + padded<Scalar>(columns + rows), Scalar(0));
   };
-  for (int vertex = 0; vertex < symbolic_->size; ++vertex)
-    for (int c = 0; c < 3; ++c)
-      permuted_[3 * symbolic_->position[vertex] + c] = static_cast<Scalar>(x[3 * vertex + c]);
   for (size_t s = 0; s < nodes.size(); ++s) {
     const Supernode& node = nodes[s];
     const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
     gather(node);
     solve_forward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns,
                   inverses_.data() + 6L * node.first_column, front_.data());
-    std::copy_n(front_.data(), columns, permuted_.data() + 3 * node.first_column);
+    std::copy_n(front_.data(), columns, x + 3L * node.first_column);
     for (size_t r = 0; r < node.rows.size(); ++r)
-      copy_vertex(front_.data() + columns + 3 * r, permuted_.data() + 3 * node.rows[r]);
+      copy_vertex(front_.data() + columns + 3 * r, x + 3L * node.rows[r]);
   }
   for (size_t s = nodes.size(); s-- > 0;) {
     const Supernode& node = nodes[s];
@@ -341,8 +340,16 @@ void BlockCholesky<Scalar>::solve_in_place(double* x) const {
     gather(node);
     solve_backward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns,
                    inverses_.data() + 6L * node.first_column, front_.data());
-    std::copy_n(front_.data(), columns, permuted_.data() + 3 * node.first_column);
+    std::copy_n(front_.data(), columns, x + 3L * node.first_column);
   }
+}
+
+template <typename Scalar>
+void BlockCholesky<Scalar>::solve_in_place(double* x) const {
+  for (int vertex = 0; vertex < symbolic_->size; ++vertex)
+    for (int c = 0; c < 3; ++c)
+      permuted_[3 * symbolic_->position[vertex] + c] = static_cast<Scalar>(x[3 * vertex + c]);
+  solve_in_order(permuted_.data());
   for (int vertex = 0; vertex < symbolic_->size; ++vertex)
     for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted_[3 * symbolic_->position[vertex] + c];
 }

@@ -23,6 +23,9 @@ using BlockValues = std::vector<Scalar>;
 struct SymbolicFactor;
 std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern);
 
+/// Where a vertex comes in the elimination.
+const std::vector<int>& elimination_position(const SymbolicFactor& symbolic);
+
 /// Entries of L, in scalars.
 long factor_entries(const SymbolicFactor& symbolic);
 
@@ -38,6 +41,9 @@ class BlockCholesky {
 
   /// x <- (L L^T)^-1 x, for x of 3 * size entries, vertex by vertex.
   void solve_in_place(double* x) const;
+
+  /// The same for vertices in elimination order: no number is moved.
+  void solve_in_order(Scalar* x) const;
 
  private:
   std::shared_ptr<const SymbolicFactor> symbolic_;

@@ -1,6 +1,6 @@
 #include "sim/elastic_energy.h"
 
-#include "sim/membrane.h"
+#include "sim/membrane_response.h"
 
 namespace flash::sim {
 
@@ -10,21 +10,131 @@ using data::Points;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// Derivatives of the deformation gradient: F = x_0 w_0^T + x_1 w_1^T + x_2 w_2^T, row k of the result is
-/// w_k.
-Eigen::Matrix<double, 3, 2> shape_gradients(const RestTriangle& triangle) {
-  Eigen::Matrix<double, 3, 2> w;
-  w.bottomRows<2>() = triangle.inverse_edges;
-  w.row(0) = -w.row(1) - w.row(2);
-  return w;
+using Triple = Vector3<Lanes>;
+static_assert(lane_count == triangle_group_size);
+
+/// Rows of `points` at eight vertices.
+Triple gather(const Points& points, const std::array<int, lane_count>& vertices) {
+  alignas(64) double x[lane_count], y[lane_count], z[lane_count];
+  for (int lane = 0; lane < lane_count; ++lane) {
+    const double* row = points.data() + 3L * vertices[lane];
+    x[lane] = row[0];
+    y[lane] = row[1];
+    z[lane] = row[2];
+  }
+  return {load_lanes(x), load_lanes(y), load_lanes(z)};
 }
 
-Matrix32 deformation_gradient(const RestTriangle& triangle, const Eigen::Matrix<double, 3, 2>& w,
-                              const data::Points& x) {
-  Matrix32 F = x.row(triangle.vertices[0]).transpose() * w.row(0);
-  F += x.row(triangle.vertices[1]).transpose() * w.row(1);
-  F += x.row(triangle.vertices[2]).transpose() * w.row(2);
-  return F;
+/// The group's triangles at `positions`.
+SingularFrame<Lanes> frame_of(const TriangleGroup& group, const Points& positions) {
+  const Triple x0 = gather(positions, group.vertices[0]);
+  const Triple e1 = gather(positions, group.vertices[1]) - x0, e2 = gather(positions, group.vertices[2]) - x0;
+  const Lanes w10 = load_lanes(group.gradients[0]), w11 = load_lanes(group.gradients[1]),
+              w20 = load_lanes(group.gradients[2]), w21 = load_lanes(group.gradients[3]);
+  return singular_frame(w10 * e1 + w20 * e2, w11 * e1 + w21 * e2);
+}
+
+/// Column after column.
+struct BlockLanes {
+  Triple columns[3];
+};
+
+BlockLanes operator+(const BlockLanes& a, const BlockLanes& b) {
+  return {{a.columns[0] + b.columns[0], a.columns[1] + b.columns[1], a.columns[2] + b.columns[2]}};
+}
+BlockLanes negative(const BlockLanes& a) {
+  const Lanes minus = Lanes{} - 1.0;
+  return {{minus * a.columns[0], minus * a.columns[1], minus * a.columns[2]}};
+}
+BlockLanes transposed(const BlockLanes& a) {
+  const auto& [c0, c1, c2] = a.columns;
+  return {{{c0.x, c1.x, c2.x}, {c0.y, c1.y, c2.y}, {c0.z, c1.z, c2.z}}};
+}
+
+/// Adds lane after lane to the blocks it belongs to.
+void scatter(const BlockLanes& block, const std::array<int, lane_count>& slots, int count,
+             BlockValues<double>& values) {
+  alignas(64) double entries[9][lane_count];
+  for (int c = 0; c < 3; ++c) {
+    store_lanes(block.columns[c].x, entries[3 * c]);
+    store_lanes(block.columns[c].y, entries[3 * c + 1]);
+    store_lanes(block.columns[c].z, entries[3 * c + 2]);
+  }
+  for (int lane = 0; lane < count; ++lane) {
+    double* target = values.data() + 9L * slots[lane];
+    for (int k = 0; k < 9; ++k) target[k] += entries[k][lane];
+  }
+}
+
+void scatter(const Triple& rows, const std::array<int, lane_count>& vertices, int count, Points& points) {
+  alignas(64) double x[lane_count], y[lane_count], z[lane_count];
+  store_lanes(rows.x, x);
+  store_lanes(rows.y, y);
+  store_lanes(rows.z, z);
+  for (int lane = 0; lane < count; ++lane) {
+    double* row = points.data() + 3L * vertices[lane];
+    row[0] += x[lane];
+    row[1] += y[lane];
+    row[2] += z[lane];
+  }
+}
+
+template <typename Law>
+double add_membrane_gradient(const SheetPlan& plan, const SheetLame& lame, const Points& positions,
+                             Points& gradient) {
+  double energy = 0;
+  for (const TriangleGroup& group : plan.triangle_groups) {
+    const SingularFrame<Lanes> frame = frame_of(group, positions);
+    const PrincipalResponse<Lanes> response = Law::at(frame.s1, frame.s2, lame.mu, lame.lambda);
+    const StressColumns<Lanes> stress = stress_of(frame, response);
+    const Lanes area = load_lanes(group.area);
+    const auto along = [&](int k) {
+      return area *
+             (load_lanes(group.gradients[k]) * stress.p1 + load_lanes(group.gradients[k + 1]) * stress.p2);
+    };
+    const Triple g1 = along(0), g2 = along(2), g0 = Lanes(Lanes{} - 1.0) * (g1 + g2);
+    scatter(g0, group.vertices[0], group.count, gradient);
+    scatter(g1, group.vertices[1], group.count, gradient);
+    scatter(g2, group.vertices[2], group.count, gradient);
+    Lanes energies = area * response.energy;
+    for (int lane = group.count; lane < lane_count; ++lane) energies[lane] = 0;
+    energy += sum_of(energies);
+  }
+  return energy;
+}
+
+template <typename Law>
+void add_membrane_hessian(const SheetPlan& plan, const SheetLame& lame, const Points& positions, double scale,
+                          Curvature curvature, BlockValues<double>& values) {
+  for (const TriangleGroup& group : plan.triangle_groups) {
+    const SingularFrame<Lanes> frame = frame_of(group, positions);
+    PrincipalResponse<Lanes> response = Law::at(frame.s1, frame.s2, lame.mu, lame.lambda);
+    if (curvature == Curvature::positive) clamp(response);
+    const HessianBlocks<Lanes> H = hessian_of(frame, response);
+    const Lanes factor = scale * load_lanes(group.area);
+    // sum_cd w_ic w_jd H_cd, where H_10 = H_01^T.
+    const auto block = [&](int i, int j) {
+      const Lanes i0 = factor * load_lanes(group.gradients[2 * i - 2]),
+                  i1 = factor * load_lanes(group.gradients[2 * i - 1]);
+      const Lanes j0 = load_lanes(group.gradients[2 * j - 2]), j1 = load_lanes(group.gradients[2 * j - 1]);
+      const BlockLanes turned = transposed({{H.h01[0], H.h01[1], H.h01[2]}});
+      BlockLanes sum;
+      for (int c = 0; c < 3; ++c)
+        sum.columns[c] = Lanes(i0 * j0) * H.h00[c] + Lanes(i0 * j1) * H.h01[c] +
+                         Lanes(i1 * j0) * turned.columns[c] + Lanes(i1 * j1) * H.h11[c];
+      return sum;
+    };
+    // Rows and columns of a triangle sum to zero.
+    const BlockLanes b11 = block(1, 1), b22 = block(2, 2), b21 = block(2, 1);
+    const BlockLanes b10 = negative(b11 + transposed(b21)), b20 = negative(b21 + b22),
+                     b00 = negative(b10 + b20);
+    scatter(b00, group.vertices[0], group.count, values);
+    scatter(b11, group.vertices[1], group.count, values);
+    scatter(b22, group.vertices[2], group.count, values);
+    scatter(b10, group.slots[0], group.count, values);
+    scatter(b20, group.slots[1], group.count, values);
+    scatter(b21, group.slots[2], group.count, values);
+  }
 }
 
 void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& block) {
@@ -38,16 +148,16 @@ void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& bloc
 /// y += scale * S x. Four lanes a vertex: one vector multiply-add an entry of S.
 void add_product(const Eigen::SparseMatrix<double, Eigen::RowMajor>& S, double scale, const Points& x,
                  Points& y) {
-  typedef double Lanes __attribute__((vector_size(32), aligned(8)));
+  typedef double Four __attribute__((vector_size(32), aligned(8)));
   Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor> lanes(x.rows(), 4);
   lanes.leftCols<3>() = x;
   lanes.col(3).setZero();
   for (int i = 0; i < S.outerSize(); ++i) {
-    Lanes even{}, odd{};
+    Four even{}, odd{};
     int k = S.outerIndexPtr()[i];
     const int end = S.outerIndexPtr()[i + 1];
     const auto column = [&](int entry) {
-      return *reinterpret_cast<const Lanes*>(lanes.data() + 4L * S.innerIndexPtr()[entry]);
+      return *reinterpret_cast<const Four*>(lanes.data() + 4L * S.innerIndexPtr()[entry]);
     };
     for (; k + 1 < end; k += 2) {
       even += S.valuePtr()[k] * column(k);
@@ -65,17 +175,11 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
                                    const data::SheetMaterial& material, const data::Points& positions,
                                    data::Points& gradient) {
   ElasticEnergy energy;
-  const SheetLame lame = sheet_lame(material.membrane_stiffness, material.poissons_ratio);
-  for (const RestTriangle& triangle : plan.sheet.triangles) {
-    const auto w = shape_gradients(triangle);
-    double density;
-    Matrix32 stress;
-    membrane_response(material.constitutive, deformation_gradient(triangle, w, positions), lame, density,
-                      stress, nullptr);
-    energy.membrane += triangle.area * density;
-    for (int k = 0; k < 3; ++k)
-      gradient.row(triangle.vertices[k]) += triangle.area * (stress * w.row(k).transpose()).transpose();
-  }
+  energy.membrane = with_membrane_law(
+      material.constitutive, sheet_lame(material.membrane_stiffness, material.poissons_ratio),
+      [&](auto law, const SheetLame& lame) {
+        return add_membrane_gradient<decltype(law)>(plan, lame, positions, gradient);
+      });
 
   const double D = material.bending_rigidity;
   if (bending.model == data::BendingModel::hinge) {
@@ -99,55 +203,35 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
 void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
                          const data::SheetMaterial& material, const data::Points& positions, double scale,
                          Curvature curvature, BlockValues<double>& values) {
-  const SheetLame lame = sheet_lame(material.membrane_stiffness, material.poissons_ratio);
-  for (size_t t = 0; t < plan.sheet.triangles.size(); ++t) {
-    const RestTriangle& triangle = plan.sheet.triangles[t];
-    const auto w = shape_gradients(triangle);
-    double density;
-    Matrix32 stress;
-    Matrix66 hessian;
-    membrane_response(material.constitutive, deformation_gradient(triangle, w, positions), lame, density,
-                      stress, &hessian, curvature);
-    const double factor = scale * triangle.area;
-    const Matrix3d h00 = factor * hessian.topLeftCorner<3, 3>(),
-                   h01 = factor * hessian.topRightCorner<3, 3>(),
-                   h11 = factor * hessian.bottomRightCorner<3, 3>();
-    const auto block = [&](int i, int j) -> Matrix3d {
-      return (w(i, 0) * w(j, 0)) * h00 + (w(i, 0) * w(j, 1)) * h01 + (w(i, 1) * w(j, 0)) * h01.transpose() +
-             (w(i, 1) * w(j, 1)) * h11;
-    };
-    for (int k = 0; k < 3; ++k) add_block(values, {triangle.vertices[k], false}, block(k, k));
-    add_block(values, plan.triangle_slots[t][0], block(1, 0));
-    add_block(values, plan.triangle_slots[t][1], block(2, 0));
-    add_block(values, plan.triangle_slots[t][2], block(2, 1));
-  }
-
+  with_membrane_law(material.constitutive, sheet_lame(material.membrane_stiffness, material.poissons_ratio),
+                    [&](auto law, const SheetLame& lame) {
+                      add_membrane_hessian<decltype(law)>(plan, lame, positions, scale, curvature, values);
+                    });
+  if (bending.model != data::BendingModel::hinge) return;
   const double D = scale * material.bending_rigidity;
-  if (bending.model == data::BendingModel::hinge) {
-    for (size_t e = 0; e < plan.hinges.size(); ++e) {
-      const Hinge& hinge = plan.hinges[e];
-      HingePositions x, hinge_gradient;
-      for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);
-      double hinge_energy;
-      Matrix12 hessian;
-      hinge_response(hinge, x, hinge_energy, hinge_gradient, &hessian);
-      for (int k = 0; k < 4; ++k)
-        add_block(values, {hinge.vertices[k], false}, D * hessian.block<3, 3>(3 * k, 3 * k));
-      constexpr std::array<std::pair<int, int>, 6> blocks = {
-          {{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}}};
-      for (int b = 0; b < 6; ++b)
-        add_block(values, plan.hinge_slots[e][b],
-                  D * hessian.block<3, 3>(3 * blocks[b].first, 3 * blocks[b].second));
-    }
-    return;
+  for (size_t e = 0; e < plan.hinges.size(); ++e) {
+    const Hinge& hinge = plan.hinges[e];
+    HingePositions x, hinge_gradient;
+    for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);
+    double hinge_energy;
+    Matrix12 hessian;
+    hinge_response(hinge, x, hinge_energy, hinge_gradient, &hessian);
+    for (int k = 0; k < 4; ++k)
+      add_block(values, {hinge.vertices[k], false}, D * hessian.block<3, 3>(3 * k, 3 * k));
+    constexpr std::array<std::pair<int, int>, 6> blocks = {{{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}}};
+    for (int b = 0; b < 6; ++b)
+      add_block(values, plan.hinge_slots[e][b],
+                D * hessian.block<3, 3>(3 * blocks[b].first, 3 * blocks[b].second));
   }
-  for (size_t block = 0; block < bending.stand_in.size(); ++block)
-    for (int c = 0; c < 3; ++c) values[9 * block + 4 * c] += D * bending.stand_in[block];
 }
 
-void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const Points& x,
-                            Points& y) {
-  add_product(bending.correction, bending_rigidity, x, y);
+void add_bending_stand_in(const BendingOperator& bending, double rigidity, BlockValues<double>& values) {
+  for (size_t block = 0; block < bending.stand_in.size(); ++block)
+    for (int c = 0; c < 3; ++c) values[9 * block + 4 * c] += rigidity * bending.stand_in[block];
+}
+
+void add_bending_product(const BendingOperator& bending, double rigidity, const Points& x, Points& y) {
+  if (bending.stiffness.rows() > 0) add_product(bending.stiffness, rigidity, x, y);
 }
 
 void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale,

@@ -15,18 +15,21 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
                                    const data::SheetMaterial& material, const data::Points& positions,
                                    data::Points& gradient);
 
-/// Adds `scale` times the elastic Hessian, with the stand-in for the plate's bending. Of the hinge model the
-/// Gauss-Newton part. `positive`: the negative eigenvalues of each triangle set to zero.
+/// Adds `scale` times the Hessian of the membrane and of hinges, of these the Gauss-Newton part. `positive`:
+/// the negative eigenvalues of each triangle set to zero.
 void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
                          const data::SheetMaterial& material, const data::Points& positions, double scale,
                          Curvature curvature, BlockValues<double>& values);
 
+/// Adds `rigidity` times the stand-in for the Hessian of a quadratic bending model.
+void add_bending_stand_in(const BendingOperator& bending, double rigidity, BlockValues<double>& values);
+
+/// y += rigidity * stiffness * x: the Hessian itself of a quadratic bending model, for other models nothing.
+void add_bending_product(const BendingOperator& bending, double rigidity, const data::Points& x,
+                         data::Points& y);
+
 /// y += scale * values * x, vertex by vertex.
 void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale,
                        const data::Points& x, data::Points& y);
-
-/// y += D (stiffness - stand-in) x: what the Newton matrix lacks against the bending operator.
-void add_bending_correction(const BendingOperator& bending, double bending_rigidity, const data::Points& x,
-                            data::Points& y);
 
 }  // namespace flash::sim

@@ -139,29 +139,33 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
   const data::Points& x = counts[benchmark.environments / 2].middle;
   data::Points y = data::Points::Zero(x.rows(), 3);
   BlockValues<double> values;
-  const auto assemble = [&] {
+  const auto assemble = [&](Curvature curvature) {
     values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, *bending, material, x, 1.0, Curvature::positive, values);
+    add_elastic_hessian(*plan, *bending, material, x, 1.0, curvature, values);
     for (int i = 0; i < plan->pattern.size; ++i)
       for (int c = 0; c < 3; ++c)
         values[9L * i + 4 * c] +=
             material.areal_density * plan->sheet.vertex_area[i] / (benchmark.time_step * benchmark.time_step);
   };
   BlockCholesky<float> factor(plan->symbolic);
+  SheetProduct<float> product;
   const auto add = [&](const char* name, double calls, const std::function<void()>& phase) {
     result.phases.push_back({name, calls, milliseconds_of(phase)});
   };
   add("energy and forces", result.iterations + 1,
       [&] { add_elastic_gradient(*plan, *bending, material, x, y); });
-  add("matrix", result.iterations, assemble);
-  add("factorization", factorizations, [&] { factor.factorize(values); });
-  y = x;
-  add("triangular solves", solves, [&] { factor.solve_in_place(y.data()); });
-  y.setZero();
-  add("matrix products", solves, [&] {
-    add_block_product(plan->pattern, values, 1.0, x, y);
-    add_bending_correction(*bending, material.bending_rigidity, x, y);
+  add("matrix", result.iterations, [&] {
+    assemble(Curvature::exact);
+    product.assign(plan->triangle_product, values, bending->rows, material.bending_rigidity);
   });
+  add("factorization", factorizations, [&] {
+    assemble(Curvature::positive);
+    add_bending_stand_in(*bending, material.bending_rigidity, values);
+    factor.factorize(values);
+  });
+  Eigen::VectorXf from = Eigen::VectorXf::Ones(y.size()), to = from;
+  add("triangular solves", solves, [&] { factor.solve_in_order(to.data()); });
+  add("matrix products", solves, [&] { product.multiply(from.data(), to.data()); });
   return result;
 }
 

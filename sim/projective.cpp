@@ -67,6 +67,7 @@ class StepForces {
       damping_.assign(9 * (plan.pattern.size + plan.pattern.pairs.size()), 0.0);
       add_elastic_hessian(plan, bending, environment.material, start.positions, damping / h_,
                           Curvature::positive, damping_);
+      add_bending_stand_in(bending, damping / h_ * environment.material.bending_rigidity, damping_);
     }
   }
 

@@ -8,6 +8,7 @@
 #include "sim/block_cholesky.h"
 #include "sim/hinge_bending.h"
 #include "sim/sheet.h"
+#include "sim/sheet_product.h"
 
 namespace flash::sim {
 
@@ -17,13 +18,26 @@ struct BlockSlot {
   bool transpose;  ///< the stored block is that of (column, row)
 };
 
+inline constexpr int triangle_group_size = 8;
+
+/// Eight triangles that go through the membrane's formulas together. In each triangle the vertices ascend, so
+/// that its blocks (1, 0), (2, 0) and (2, 1) are stored as they are.
+struct alignas(64) TriangleGroup {
+  double gradients[4][triangle_group_size];  ///< w of F = (x1 - x0) w1^T + (x2 - x0) w2^T: w1, then w2 [1/m]
+  double area[triangle_group_size];          ///< [m^2]
+  std::array<int, triangle_group_size> vertices[3];
+  std::array<int, triangle_group_size> slots[3];  ///< of blocks (1, 0), (2, 0), (2, 1) in a BlockPattern
+  int count = 0;                                  ///< triangles; the lanes behind them repeat the last
+};
+
 /// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone.
 struct SheetPlan {
   Sheet sheet;
   std::vector<Hinge> hinges;
-  BlockPattern pattern;  ///< neighbours over an edge and across a hinge
+  BlockPattern pattern;  ///< neighbours over an edge, then those across a hinge
   std::shared_ptr<const SymbolicFactor> symbolic;
-  std::vector<std::array<BlockSlot, 3>> triangle_slots;  ///< blocks (1, 0), (2, 0), (2, 1) of a triangle
+  ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
+  std::vector<TriangleGroup> triangle_groups;
   std::vector<std::array<BlockSlot, 6>>
       hinge_slots;  ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
 };
@@ -33,11 +47,9 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
 /// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
 struct BendingOperator {
   data::BendingModel model;
-  Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness;  ///< exact; empty for the hinge model
-  Eigen::SparseMatrix<double, Eigen::RowMajor>
-      correction;  ///< stiffness less the stand-in; for the plate only
-  std::vector<double>
-      stand_in;  ///< one number a block of the pattern: a sparser stiffness for the Newton matrix
+  Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness;  ///< empty for the hinge model
+  ScalarRows rows;                                         ///< the same in elimination order
+  std::vector<double> stand_in;  ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 
 /// Throws data::InputError where the model needs a flat rest shape and the sheet has none.

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "sim/elastic_energy.h"
+#include "sim/newton_matrix.h"
 #include "sim/vertex_constraint.h"
 
 namespace flash::sim {
@@ -41,21 +42,14 @@ struct Solver::Workspace {
   std::shared_ptr<const SheetPlan> plan;
   SolverSettings settings;
   std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> bending;
-  BlockCholesky<float> factor;  ///< a preconditioner: single precision halves its traffic
+  NewtonMatrix matrix;
   BlockValues<double> values, damping;
   bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
 
   Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
-      : plan(std::move(plan_in)), settings(settings_in), factor(plan->symbolic) {}
+      : plan(std::move(plan_in)), settings(settings_in), matrix(plan) {}
 
   const BendingOperator& bending_of(const data::SheetMaterial& material);
-
-  /// Newton direction by conjugate gradients on the free directions, until the matrix curves down. The matrix
-  /// is exact; the factor that preconditions it is positive definite, has the stand-in of the bending
-  /// operator, and may be of an earlier iterate. Adds to `force` what the direction changes.
-  void solve(const BendingOperator& bending_operator, double bending_rigidity,
-             const std::vector<VertexConstraint>& constraints, const Points& gradient, double tolerance,
-             Points& direction, Points& force, StepReport& report);
 };
 
 const BendingOperator& Solver::Workspace::bending_of(const data::SheetMaterial& material) {
@@ -101,10 +95,12 @@ class StepProblem {
     return potential + elastic.membrane + elastic.bending;
   }
 
-  /// Hessian of the potential, the plate's bending replaced by its stand-in.
+  /// Hessian of the potential, without the stiffness of a quadratic bending model.
   void assemble(const Points& positions, Curvature curvature, BlockValues<double>& values) const {
-    values.assign(9 * (plan_.pattern.size + plan_.pattern.pairs.size()), 0.0);
-    if (!damping_.empty()) values = damping_;
+    if (damping_.empty())
+      values.assign(9 * (plan_.pattern.size + plan_.pattern.pairs.size()), 0.0);
+    else
+      values = damping_;
     add_elastic_hessian(plan_, bending_, environment_.material, positions, 1.0, curvature, values);
     const double per_mass = 1 / (h_ * h_) + environment_.material.air_drag / h_;
     for (int i = 0; i < plan_.pattern.size; ++i)
@@ -158,11 +154,6 @@ void restrict_matrix(const BlockPattern& pattern, const std::vector<VertexConstr
   }
 }
 
-void restrict_vectors(const std::vector<VertexConstraint>& constraints, Points& vectors) {
-  for (size_t i = 0; i < constraints.size(); ++i)
-    if (constraints[i].hold != Hold::free) vectors.row(i) *= constraints[i].free;
-}
-
 /// One exchange of the active set of the linear problem: holds free vertices that `direction` drives into a
 /// surface and frees held ones that the surface would have to pull (`force`: what they would need at its
 /// end). Returns whether any.
@@ -190,51 +181,6 @@ bool exchange_contacts(const Points& direction, const Points& force_before, cons
 
 }  // namespace
 
-void Solver::Workspace::solve(const BendingOperator& bending_operator, double bending_rigidity,
-                              const std::vector<VertexConstraint>& constraints, const Points& gradient,
-                              double tolerance, Points& direction, Points& force, StepReport& report) {
-  const auto multiply = [&](const Points& x, Points& product) {
-    product.setZero(x.rows(), 3);
-    add_block_product(plan->pattern, values, 1.0, x, product);
-    if (bending_operator.model == data::BendingModel::plate)
-      add_bending_correction(bending_operator, bending_rigidity, x, product);
-  };
-  Points residual = -gradient, product, preconditioned, search;
-  direction.setZero(residual.rows(), 3);
-  for (size_t i = 0; i < constraints.size(); ++i) direction.row(i) = constraints[i].correction;
-  if (!direction.isZero(0)) {
-    multiply(direction, product);
-    residual -= product;
-    force += product;
-  }
-  restrict_vectors(constraints, residual);
-  const double target = std::max(0.1 * residual.norm(), tolerance);
-  double previous = 0;
-  int iteration = 0;
-  while (residual.norm() > target && iteration < 20) {
-    ++iteration;
-    preconditioned = residual;
-    factor.solve_in_place(preconditioned.data());
-    restrict_vectors(constraints, preconditioned);
-    const double along = residual.cwiseProduct(preconditioned).sum();
-    search = iteration == 1 ? preconditioned : Points(preconditioned + along / previous * search);
-    previous = along;
-    multiply(search, product);
-    const double curvature = search.cwiseProduct(product).sum();
-    // Steihaug 1983: where the sheet is about to buckle the matrix is indefinite, and what was found so far
-    // leads down.
-    if (curvature <= 0 && iteration > 1) break;
-    const double step = curvature > 0 ? along / curvature : 1.0;
-    direction += step * search;
-    force += step * product;
-    if (curvature <= 0) break;
-    restrict_vectors(constraints, product);
-    residual -= step * product;
-  }
-  report.solves += iteration;
-  refactor = iteration > settings.stale_factor_solves;
-}
-
 Solver::Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings)
     : workspace_(std::make_unique<Workspace>(std::move(plan), settings)) {}
 Solver::Solver(const Sheet& sheet, const SolverSettings& settings)
@@ -248,6 +194,7 @@ StepReport Solver::step(Environment& environment) {
   const State& start = environment.state;
   const double time = start.time + h;
   const BendingOperator& bending = w.bending_of(environment.material);
+  const double rigidity = environment.material.bending_rigidity;
   update_grasps(environment, time);
 
   w.damping.clear();
@@ -255,6 +202,7 @@ StepReport Solver::step(Environment& environment) {
     w.damping.assign(9 * (w.plan->pattern.size + w.plan->pattern.pairs.size()), 0.0);
     add_elastic_hessian(*w.plan, bending, environment.material, start.positions,
                         environment.material.stiffness_damping / h, Curvature::positive, w.damping);
+    add_bending_stand_in(bending, environment.material.stiffness_damping / h * rigidity, w.damping);
   }
   const StepProblem problem(*w.plan, bending, environment, h, w.damping);
   const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
@@ -281,19 +229,24 @@ StepReport Solver::step(Environment& environment) {
     ++report.iterations;
     if (w.refactor) {
       problem.assemble(now.positions, Curvature::positive, w.values);
+      add_bending_stand_in(bending, rigidity, w.values);
       add_slip_stiffness(now.constraints, w.values);
       restrict_matrix(w.plan->pattern, now.constraints, w.values);
-      if (!w.factor.factorize(w.values)) break;
+      if (!w.matrix.factorize(w.values)) break;
       ++report.factorizations;
     }
     problem.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, w.values);
     add_slip_stiffness(now.constraints, w.values);
+    const bool sparse = w.damping.empty() && bending.model != data::BendingModel::hinge;
+    w.matrix.assign(w.values, sparse, bending, rigidity, problem.mass().minCoeff() / (h * h));
     std::vector<VertexConstraint> linear = now.constraints;
     Points gradient = now.residual, force;
     for (int exchange = 0; exchange < 6; ++exchange) {
       force = now.force;
-      w.solve(bending, environment.material.bending_rigidity, linear, gradient,
-              0.3 * w.settings.tolerance * force_scale, direction, force, report);
+      const int solves =
+          w.matrix.solve(linear, gradient, 0.3 * w.settings.tolerance * force_scale, direction, force);
+      report.solves += solves;
+      w.refactor = solves > w.settings.stale_factor_solves;
       if (!exchange_contacts(direction, now.force, force, gradient, linear)) break;
     }
 

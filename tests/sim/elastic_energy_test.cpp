@@ -67,7 +67,7 @@ TEST(ElasticEnergy, HessianOfAStretchedSheetIsTheDerivativeOfTheGradient) {
     add_elastic_hessian(*plan, *bending, material, x, 1.0, Curvature::exact, values);
     Points product = Points::Zero(x.rows(), 3);
     add_block_product(plan->pattern, values, 1.0, along, product);
-    add_bending_correction(*bending, material.bending_rigidity, along, product);
+    add_bending_product(*bending, material.bending_rigidity, along, product);
     const double step = 1e-7;
     Points ahead = Points::Zero(x.rows(), 3), behind = ahead;
     add_elastic_gradient(*plan, *bending, material, x + step * along, ahead);

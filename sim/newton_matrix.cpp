@@ -1,0 +1,126 @@
+#include "sim/newton_matrix.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace flash::sim {
+namespace {
+
+using data::Points;
+
+template <typename Scalar>
+using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
+
+/// A vertex that may not move in every direction.
+template <typename Scalar>
+struct Restriction {
+  int position;
+  Eigen::Matrix<Scalar, 3, 3> free;
+};
+
+template <typename Scalar>
+void restrict_to_free(const std::vector<Restriction<Scalar>>& restrictions, Vector<Scalar>& x) {
+  for (const Restriction<Scalar>& restriction : restrictions) {
+    auto own = x.template segment<3>(3L * restriction.position);
+    own = (restriction.free * own).eval();
+  }
+}
+
+void precondition(const BlockCholesky<float>& factor, const Vector<float>& residual, Vector<float>&,
+                  Vector<float>& result) {
+  result = residual;
+  factor.solve_in_order(result.data());
+}
+
+void precondition(const BlockCholesky<float>& factor, const Vector<double>& residual, Vector<float>& single,
+                  Vector<double>& result) {
+  const double size = residual.cwiseAbs().maxCoeff();  // out of the range of single precision at times
+  single = (residual / size).cast<float>();
+  factor.solve_in_order(single.data());
+  result = size * single.cast<double>();
+}
+
+}  // namespace
+
+NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
+    : plan_(std::move(plan)), factor_(plan_->symbolic) {}
+
+void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse, const BendingOperator& bending,
+                          double rigidity, double least_eigenvalue) {
+  double largest = 0;
+  for (int i = 0; i < plan_->pattern.size; ++i)
+    for (int c = 0; c < 3; ++c) largest = std::max(largest, blocks[9L * i + 4 * c]);
+  single_ = std::numeric_limits<float>::epsilon() * largest < 0.01 * least_eigenvalue;
+  const ProductPattern& pattern = sparse ? plan_->triangle_product : plan_->full_product;
+  if (single_)
+    single_product_.assign(pattern, blocks, bending.rows, rigidity);
+  else
+    double_product_.assign(pattern, blocks, bending.rows, rigidity);
+}
+
+int NewtonMatrix::solve(const std::vector<VertexConstraint>& constraints, const Points& gradient,
+                        double tolerance, Points& direction, Points& force) {
+  return single_ ? conjugate_gradients(single_product_, constraints, gradient, tolerance, direction, force)
+                 : conjugate_gradients(double_product_, constraints, gradient, tolerance, direction, force);
+}
+
+template <typename Scalar>
+int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product,
+                                      const std::vector<VertexConstraint>& constraints,
+                                      const Points& gradient, double tolerance, Points& direction,
+                                      Points& force) {
+  const std::vector<int>& position = elimination_position(*plan_->symbolic);
+  const long size = gradient.size();
+  Vector<Scalar> residual(size), x = Vector<Scalar>::Zero(size), change = Vector<Scalar>::Zero(size),
+                                 preconditioned(size), search(size), image(size);
+  Vector<float> single(size);
+  std::vector<Restriction<Scalar>> restrictions;
+  bool corrected = false;
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    residual.template segment<3>(3L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
+    const VertexConstraint& constraint = constraints[i];
+    if (constraint.hold == Hold::free) continue;
+    restrictions.push_back({position[i], constraint.free.cast<Scalar>()});
+    x.template segment<3>(3L * position[i]) = constraint.correction.cast<Scalar>();
+    corrected = corrected || !constraint.correction.isZero(0);
+  }
+  if (corrected) {
+    product.multiply(x.data(), image.data());
+    residual -= image;
+    change += image;
+  }
+  restrict_to_free(restrictions, residual);
+  Scalar norm = residual.norm(), previous = 0;
+  const Scalar target = std::max(Scalar(0.1) * norm, static_cast<Scalar>(tolerance));
+  int iteration = 0;
+  while (norm > target && iteration < 20) {
+    ++iteration;
+    precondition(factor_, residual, single, preconditioned);
+    restrict_to_free(restrictions, preconditioned);
+    const Scalar along = residual.dot(preconditioned);
+    if (iteration == 1)
+      search = preconditioned;
+    else
+      search = preconditioned + along / previous * search;
+    previous = along;
+    product.multiply(search.data(), image.data());
+    const Scalar curvature = search.dot(image);
+    // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
+    if (curvature <= 0 && iteration > 1) break;
+    const Scalar step = curvature > 0 ? along / curvature : Scalar(1);
+    x += step * search;
+    change += step * image;
+    if (curvature <= 0) break;
+    restrict_to_free(restrictions, image);
+    residual -= step * image;
+    norm = residual.norm();
+  }
+  direction.resize(gradient.rows(), 3);
+  for (int i = 0; i < direction.rows(); ++i) {
+    direction.row(i) = x.template segment<3>(3L * position[i]).transpose().template cast<double>();
+    force.row(i) += change.template segment<3>(3L * position[i]).transpose().template cast<double>();
+  }
+  return iteration;
+}
+
+}  // namespace flash::sim
