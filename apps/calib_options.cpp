@@ -1,0 +1,89 @@
+#include "apps/calib_options.h"
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <iostream>
+
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash {
+
+void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options) {
+  CLI::App& group = *verb.add_option_group("Common");
+  group.add_flag("--json", options.json, "Print the result as JSON on stdout");
+  CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
+  group.add_flag("--verbose", options.verbose, "Print every notice")->excludes(quiet);
+  group.add_flag("--force", options.force, "Overwrite what is there");
+  group.add_option("--threads", options.threads, "0: one a processor")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+}
+
+void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
+  CLI::App& group = *verb.add_option_group("Dataset");
+  group.add_option("dataset", choice.path, "Folder of pictures and poses, or a file of pose pairs")
+      ->required();
+  group.add_option("--target", choice.target,
+                   "chessboard:9x6:0.025 (inner corners), charuco:5x7:0.036:0.018:DICT_6X6_250, "
+                   "aruco:DICT_4X4_50:0:0.09, aruco_grid:5x7:0.04:0.01:DICT_4X4_50, apriltag:36h11:0:0.048, "
+                   "aprilgrid:6x6:0.088:0.3, circles:10x10:0.0254:origin-dot, or a file; lengths in metres");
+  group.add_option("--poses", choice.poses, "File or folder of T_base_gripper in place of the dataset's");
+  group.add_option("--camera", choice.camera,
+                   "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain");
+  group.add_option("--depth-scale", choice.depth_scale, "Metres a count of the depth pictures")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");
+}
+
+calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {
+  calib::DatasetOptions options;
+  options.poses = choice.poses;
+  options.camera = choice.camera;
+  options.needs_poses = needs_poses;
+  options.needs_camera = needs_camera;
+  options.depth_scale = choice.depth_scale;
+  return calib::load_dataset(choice.path, options);
+}
+
+calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset) {
+  if (!choice.target.empty())
+    return std::filesystem::is_regular_file(choice.target) ? calib::load_target(choice.target)
+                                                           : calib::parse_target(choice.target);
+  if (dataset.target.empty())
+    throw data::InputError(dataset.source + ": names no target; add one, as --target chessboard:9x6:0.025");
+  return calib::parse_target(dataset.target);
+}
+
+std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const calib::Target& target,
+                                         const DatasetChoice& choice, const CalibCommonOptions& options) {
+  calib::DetectSettings settings;
+  settings.threads = options.threads;
+  settings.cache = choice.cache;
+  const bool visible = !options.quiet && isatty(STDERR_FILENO) != 0;
+  std::vector<calib::Detection> detections =
+      calib::detect(dataset, target, settings, [&](int done, int total) {
+        if (visible) std::cerr << "\r" << done << " of " << total << " pictures\033[K" << std::flush;
+      });
+  if (visible) std::cerr << "\r\033[K";
+  for (const calib::Detection& detection : detections)
+    if (!detection.reason.empty() && !options.quiet)
+      warn_calib(detection.image + ": left out: " + detection.reason);
+  return detections;
+}
+
+void say(const CalibCommonOptions& options, const std::string& line) {
+  if (!options.quiet) std::cerr << line << '\n';
+}
+
+void warn_calib(const std::string& line) { std::cerr << "flash-calib: warning: " << line << '\n'; }
+
+void check_calib_output(const std::string& path, const CalibCommonOptions& options) {
+  if (options.force || !std::filesystem::exists(path)) return;
+  if (std::filesystem::is_directory(path) && std::filesystem::is_empty(path)) return;
+  throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
+}
+
+}  // namespace flash

@@ -1,0 +1,51 @@
+#pragma once
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "calib/dataset.h"
+#include "calib/detect.h"
+#include "calib/target.h"
+
+namespace flash {
+
+/// Options that every verb of flash-calib has.
+struct CalibCommonOptions {
+  bool json = false;
+  bool quiet = false;
+  bool verbose = false;
+  bool force = false;
+  int threads = 0;  ///< 0: one a processor
+};
+void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options);
+
+/// Which pictures, poses and intrinsics, and what is to be seen in them.
+struct DatasetChoice {
+  std::string path;
+  std::string target;  ///< text or file; empty: as the dataset says
+  std::string poses;
+  std::string camera;
+  std::string cache;
+  double depth_scale = 0.001;
+};
+void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
+
+calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
+
+/// The target of the command line or, without one, of the dataset. Throws data::InputError where neither
+/// names one.
+calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset);
+
+/// Detections of the whole set, with a line of progress and a warning for each view left out.
+std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const calib::Target& target,
+                                         const DatasetChoice& choice, const CalibCommonOptions& options);
+
+/// What a verb says to people, on stderr, unless --quiet.
+void say(const CalibCommonOptions& options, const std::string& line);
+void warn_calib(const std::string& line);
+
+/// Throws data::InputError where the file, or a folder with something in it, exists already and --force is
+/// not given.
+void check_calib_output(const std::string& path, const CalibCommonOptions& options);
+
+}  // namespace flash

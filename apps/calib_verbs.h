@@ -1,0 +1,16 @@
+#pragma once
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace flash {
+
+/// What the chosen verb does; its result is the exit code.
+using Action = std::function<int()>;
+
+/// Each adds one verb to `flash-calib`; parsing it sets `action`.
+void add_detect_verb(CLI::App& app, Action& action);
+
+}  // namespace flash
