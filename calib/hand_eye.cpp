@@ -1,0 +1,156 @@
+#include "calib/hand_eye.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "calib/linearization.h"
+
+namespace flash::calib {
+namespace {
+
+// Below these a noise level means an exact robot or an exact corner; smaller ones only cost digits.
+constexpr double kFloorPixels = 1e-4, kFloorRotation = 1e-6, kFloorTranslation = 1e-6, kFloorDepth = 1e-5;
+
+Bundle subset(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside) {
+  Bundle result = bundle;
+  std::erase_if(result.views, [&](const BundleView& view) {
+    return (fold[static_cast<std::size_t>(view.pose)] == part) != inside;
+  });
+  return result;
+}
+
+std::vector<PoseLoop> loops_of(const Bundle& bundle, const std::vector<BundleView>& views,
+                               const std::vector<Eigen::Isometry3d>& T_camera_target) {
+  std::vector<PoseLoop> loops;
+  loops.reserve(views.size());
+  for (const BundleView& view : views) {
+    const auto pose = static_cast<std::size_t>(view.pose);
+    loops.push_back(pose_loop(bundle.setup, bundle.poses[pose].T_base_gripper, T_camera_target[pose]));
+  }
+  return loops;
+}
+
+void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
+         const NoiseLevels& noise, BundleSettings settings) {
+  if (method == Method::park || method == Method::shah) {
+    const std::vector<PoseLoop> loops = loops_of(bundle, bundle.views, T_camera_target);
+    const HandEyePoses poses = method == Method::park ? park(loops) : shah(loops);
+    bundle.cameras.front() = poses.X;
+    bundle.targets.front() = poses.Z;
+    return;
+  }
+  settings.unknowns.corrections = method == Method::errors_in_variables;
+  if (method == Method::bundle) {
+    settings.huber = 0;
+    for (RobotPose& pose : bundle.poses) pose.correction.setIdentity();
+  }
+  solve_bundle(bundle, noise, settings);
+}
+
+}  // namespace
+
+NoiseLevels uniform_noise(const Bundle& bundle, double corner, double rotation, double translation,
+                          double depth) {
+  const std::size_t cameras = bundle.cameras.size(), arms = bundle.bases.size();
+  return {std::vector<double>(cameras, corner), std::vector<double>(arms, rotation),
+          std::vector<double>(arms, translation), std::vector<double>(cameras, depth)};
+}
+
+Refinement refine(Bundle bundle, const RefineSettings& settings) {
+  Refinement result{
+      .bundle = std::move(bundle), .noise = settings.noise, .covariance = {}, .noise_log_sd = {}};
+  if (result.noise.corner.empty()) result.noise = uniform_noise(result.bundle, 0.5, 3e-3, 3e-3, 3e-3);
+  const std::vector<double> floor = to_components(
+      uniform_noise(result.bundle, kFloorPixels, kFloorRotation, kFloorTranslation, kFloorDepth));
+  LinearModel model;
+  for (; result.rounds < settings.rounds && !result.converged; ++result.rounds) {
+    const BundleSummary summary = solve_bundle(result.bundle, result.noise, settings.bundle);
+    model = linearize(result.bundle, result.noise, settings.bundle);
+    if (!settings.estimate_noise) {
+      result.converged = summary.converged;
+      break;
+    }
+    const VarianceComponents estimate =
+        estimate_variance_components(model, to_components(result.noise), floor);
+    result.converged = summary.converged && estimate.gain < settings.tolerance;
+    result.noise_log_sd = estimate.log_covariance.diagonal().cwiseSqrt();
+    if (!result.converged) result.noise = to_noise(estimate.sigmas, result.noise);
+    result.covariance = adjusted_covariance(model, estimate);
+  }
+  if (settings.estimate_noise) return result;
+  const LinearSolution solution = solve_linear(model, to_components(result.noise));
+  result.covariance = solution.information.ldlt().solve(
+      Eigen::MatrixXd::Identity(solution.information.rows(), solution.information.cols()));
+  return result;
+}
+
+Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
+                   const std::vector<Observation>& observations, const HandEyePoses& seed) {
+  Bundle bundle{.setup = setup,
+                .cameras = {seed.X},
+                .intrinsics = {camera},
+                .bases = {Eigen::Isometry3d::Identity()},
+                .targets = {seed.Z},
+                .scales = {1.0},
+                .time_offsets = {0.0},
+                .poses = {},
+                .views = {}};
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const Observation& observation = observations[i];
+    RobotPose pose;
+    pose.T_base_gripper = observation.T_base_gripper;
+    bundle.poses.push_back(pose);
+    BundleView view;
+    view.pose = static_cast<int>(i);
+    view.points = target_points(Eigen::all, observation.points);
+    view.pixels = observation.pixels;
+    bundle.views.push_back(std::move(view));
+  }
+  return bundle;
+}
+
+const char* to_string(Method method) {
+  switch (method) {
+    case Method::park:
+      return "park";
+    case Method::shah:
+      return "shah";
+    case Method::bundle:
+      return "bundle";
+    case Method::errors_in_variables:
+      break;
+  }
+  return "errors_in_variables";
+}
+
+HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
+                 const NoiseLevels& noise, const BundleSettings& settings, int folds) {
+  const int count = static_cast<int>(bundle.poses.size());
+  const int parts = std::min(folds, count);
+  HeldOut result;
+  for (int i = 0; i < count; ++i) result.fold.push_back(i % parts);
+  double corners = 0, views = 0;
+  for (int part = 0; part < parts; ++part) {
+    Bundle train = subset(bundle, result.fold, part, false);
+    fit(train, T_camera_target, method, noise, settings);
+    const Bundle test = subset(bundle, result.fold, part, true);
+    for (const BundleView& view : test.views) {
+      const Eigen::Isometry3d predicted = predicted_pose(train, view, false);
+      const Eigen::Isometry3d& seen = T_camera_target[static_cast<std::size_t>(view.pose)];
+      const Eigen::Vector3d centre = view.points.rowwise().mean();
+      const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
+      result.px += residuals(train, view, false).squaredNorm();
+      result.mm += (1e3 * (predicted * centre - seen * centre)).squaredNorm();
+      result.deg += std::pow(angle * 180 / M_PI, 2);
+      corners += static_cast<double>(view.points.cols());
+      ++views;
+    }
+  }
+  result.px = std::sqrt(result.px / corners);
+  result.mm = std::sqrt(result.mm / views);
+  result.deg = std::sqrt(result.deg / views);
+  return result;
+}
+
+}  // namespace flash::calib

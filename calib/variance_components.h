@@ -1,0 +1,53 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+namespace flash::calib {
+
+/// Residuals of one component of variance within one group, linear in the group's own unknowns d and the
+/// shared ones s:  r = r_0 + J_d d + J_s s  with independent errors of one standard deviation.
+struct GramBlock {
+  int group = 0, component = 0;
+  double count = 0;      ///< residuals, robust weights taken into account
+  Eigen::MatrixXd gram;  ///< [J_d J_s r_0]^T [J_d J_s r_0]
+};
+
+/// A mixed linear model in the form that any standard deviations can be put to.
+struct LinearModel {
+  int groups = 0, components = 0;
+  int own = 0;     ///< unknowns of a group
+  int shared = 0;  ///< unknowns of all
+  std::vector<GramBlock> blocks;
+};
+
+/// The least squares solution for given standard deviations, group unknowns eliminated.
+struct LinearSolution {
+  Eigen::MatrixXd information;  ///< of the shared unknowns, group unknowns marginalised
+  Eigen::VectorXd shared;
+  std::vector<Eigen::VectorXd> own;
+  Eigen::VectorXd squares;     ///< of each component: sum of squared residuals, unweighted
+  Eigen::VectorXd redundancy;  ///< of each component: residuals minus the unknowns they pay for
+  double deviance = 0;         ///< -2 log restricted likelihood, up to a constant
+};
+LinearSolution solve_linear(const LinearModel& model, const std::vector<double>& sigmas);
+
+struct VarianceComponents {
+  std::vector<double> sigmas;
+  Eigen::MatrixXd log_covariance;  ///< of log sigma; wide where a component cannot be told from 0
+  double gain = 0;                 ///< fall of the deviance from the start
+  int iterations = 0;
+  bool converged = false;
+};
+
+/// Restricted maximum likelihood (Patterson and Thompson 1971). Its equations, squares = redundancy sigma^2
+/// for each component, are also the fixed point of Helmert's and Foerstner's iterations; here Newton's method
+/// on log sigma. Components without residuals keep their start; none falls below `floor`.
+VarianceComponents estimate_variance_components(const LinearModel& model, const std::vector<double>& start,
+                                                const std::vector<double>& floor);
+
+/// Covariance of the shared unknowns that knows that the noise levels are estimates: the mean of Phi(sigma)
+/// plus the spread of the solution over the distribution of log sigma, to second order along its axes. What
+/// Kackar and Harville 1984 and Kenward and Roger 1997 give in closed form.
+Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComponents& components);
+
+}  // namespace flash::calib

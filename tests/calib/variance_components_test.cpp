@@ -1,0 +1,111 @@
+#include "calib/variance_components.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <random>
+
+namespace flash::calib {
+namespace {
+
+constexpr int kGroups = 12, kRepeats = 5;
+
+/// One-way layout y_ij = s + d_i + e_ij, d_i with a prior of its own standard deviation.
+LinearModel one_way(double between, double within, unsigned seed, std::vector<double>& y) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  LinearModel model{.groups = kGroups, .components = 2, .own = 1, .shared = 1, .blocks = {}};
+  for (int i = 0; i < kGroups; ++i) {
+    const double effect = between * normal(random);
+    Eigen::MatrixXd rows(kRepeats, 3);
+    for (int j = 0; j < kRepeats; ++j) {
+      y.push_back(3 + effect + within * normal(random));
+      rows.row(j) << 1, 1, -y.back();
+    }
+    model.blocks.push_back({i, 0, kRepeats, rows.transpose() * rows});
+    Eigen::RowVector3d prior(1, 0, 0);
+    model.blocks.push_back({i, 1, 1, prior.transpose() * prior});
+  }
+  return model;
+}
+
+struct AnalysisOfVariance {
+  double mean = 0, within = 0, between = 0;
+};
+
+AnalysisOfVariance analyse(const std::vector<double>& y) {
+  AnalysisOfVariance result;
+  double inside = 0, outside = 0;
+  for (const double value : y) result.mean += value / static_cast<double>(y.size());
+  for (int i = 0; i < kGroups; ++i) {
+    double mean = 0;
+    for (int j = 0; j < kRepeats; ++j) mean += y[static_cast<std::size_t>(i * kRepeats + j)] / kRepeats;
+    for (int j = 0; j < kRepeats; ++j)
+      inside += std::pow(y[static_cast<std::size_t>(i * kRepeats + j)] - mean, 2);
+    outside += kRepeats * std::pow(mean - result.mean, 2);
+  }
+  inside /= kGroups * (kRepeats - 1);
+  outside /= kGroups - 1;
+  result.within = std::sqrt(inside);
+  result.between = std::sqrt(std::max(0.0, (outside - inside) / kRepeats));
+  return result;
+}
+
+TEST(VarianceComponents, BalancedOneWayLayoutGivesTheAnalysisOfVariance) {
+  std::vector<double> y;
+  const LinearModel model = one_way(2, 0.5, 1, y);
+  const AnalysisOfVariance expected = analyse(y);
+  for (const double start : {0.01, 1.0, 50.0}) {
+    const VarianceComponents found = estimate_variance_components(model, {start, start}, {1e-6, 1e-6});
+    EXPECT_TRUE(found.converged);
+    EXPECT_NEAR(found.sigmas[0], expected.within, 1e-5 * expected.within);
+    EXPECT_NEAR(found.sigmas[1], expected.between, 1e-5 * expected.between);
+    // Of log sigma: 1 / sqrt(2 n) for n independent residuals.
+    EXPECT_NEAR(std::sqrt(found.log_covariance(0, 0)), 1 / std::sqrt(2.0 * kGroups * (kRepeats - 1)), 1e-3);
+  }
+  const LinearSolution solution = solve_linear(model, {expected.within, expected.between});
+  EXPECT_NEAR(solution.shared[0], expected.mean, 1e-12);
+  EXPECT_NEAR(1 / solution.information(0, 0),
+              std::pow(expected.between, 2) / kGroups + std::pow(expected.within, 2) / (kGroups * kRepeats),
+              1e-12);
+  EXPECT_NEAR(solution.redundancy.sum(), kGroups * kRepeats - 1, 1e-9);
+}
+
+TEST(VarianceComponents, ComponentThatIsNotThereGoesToItsFloor) {
+  std::vector<double> y;
+  unsigned seed = 1;
+  LinearModel model = one_way(0, 0.5, seed, y);
+  while (analyse(y).between > 0) {
+    y.clear();
+    model = one_way(0, 0.5, ++seed, y);
+  }
+  const VarianceComponents found = estimate_variance_components(model, {1, 1}, {1e-6, 1e-6});
+  EXPECT_LT(found.sigmas[1], 0.02);  // a tenth of what the mean of five repeats can show: the deviance is flat
+  EXPECT_NEAR(found.sigmas[0], 0.5, 0.2);
+}
+
+TEST(VarianceComponents, DevianceIsMinusTwiceTheLogOfTheRestrictedLikelihood) {
+  std::vector<double> y;
+  const LinearModel model = one_way(1, 0.7, 3, y);
+  // By brute force: y ~ N(1 s, V), s integrated over: log det V + log det(1' V^-1 1) + y' P y.
+  const auto dense = [&](double within, double between) {
+    const Eigen::Index n = kGroups * kRepeats;
+    Eigen::MatrixXd V = within * within * Eigen::MatrixXd::Identity(n, n);
+    for (int i = 0; i < kGroups; ++i)
+      V.block(i * kRepeats, i * kRepeats, kRepeats, kRepeats).array() += between * between;
+    const Eigen::Map<const Eigen::VectorXd> data(y.data(), n);
+    const Eigen::MatrixXd W = V.inverse();
+    const Eigen::VectorXd ones = Eigen::VectorXd::Ones(n);
+    const double information = ones.dot(W * ones);
+    return std::log(V.determinant()) + std::log(information) + data.dot(W * data) -
+           std::pow(ones.dot(W * data), 2) / information;
+  };
+  const auto fast = [&](double within, double between) {
+    return solve_linear(model, {within, between}).deviance;
+  };
+  EXPECT_NEAR(fast(0.5, 2) - fast(0.9, 0.4), dense(0.5, 2) - dense(0.9, 0.4), 1e-8);
+}
+
+}  // namespace
+}  // namespace flash::calib

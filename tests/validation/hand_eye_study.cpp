@@ -1,0 +1,76 @@
+// How accurate hand-eye calibration is, and whether its stated uncertainty is true, over seeded scenes: six
+// rows of corner and robot noise, each with a closed form, the bundle and errors in variables side by side.
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
+
+#include "calib/linearization.h"
+#include "tests/calib/hand_eye_scene.h"
+
+namespace flash::calib {
+namespace {
+
+struct Errors {
+  std::vector<double> deg, mm;
+  void add(const Eigen::Isometry3d& estimate, const Eigen::Isometry3d& truth) {
+    deg.push_back(rotation_angle(estimate.linear().transpose() * truth.linear()) * 180 / M_PI);
+    mm.push_back(1e3 * (estimate.translation() - truth.translation()).norm());
+  }
+};
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  if (values.size() % 2 == 1) return *middle;
+  return 0.5 * (*middle + *std::max_element(values.begin(), middle));
+}
+
+struct Row {
+  Setup setup;
+  double robot_deg, robot_mm;
+};
+
+void study(const Row& row, int trials) {
+  SceneSettings settings = protocol_settings(row.setup);
+  settings.robot_deg = row.robot_deg;
+  settings.robot_mm = row.robot_mm;
+  const bool in_hand = row.setup == Setup::eye_in_hand;
+  Errors closed, bundled, corrected;
+  double nees = 0, corner = 0, rotation = 0, translation = 0;
+  for (int trial = 0; trial < trials; ++trial) {
+    const HandEyeScene scene =
+        make_scene(settings, in_hand ? board_points() : tag_points(), 1 + static_cast<unsigned>(trial));
+    const HandEyePoses seed = park(loops_of(scene));
+    closed.add(seed.X, scene.truth.X);
+    Bundle bundle =
+        make_bundle(row.setup, scene.camera, scene.points, scene.observations, shah(loops_of(scene)));
+    BundleSettings plain{.unknowns = {.corrections = false}, .huber = 0};
+    solve_bundle(bundle, uniform_noise(bundle, 1, 1, 1, 1), plain);
+    bundled.add(bundle.cameras.front(), scene.truth.X);
+    const Refinement refined = refine(bundle);
+    corrected.add(refined.bundle.cameras.front(), scene.truth.X);
+    const Vector6d error = motion_between(refined.bundle.cameras.front(), scene.truth.X);
+    nees += error.dot(refined.covariance.topLeftCorner<6, 6>().ldlt().solve(error)) / trials;
+    corner += refined.noise.corner.front() / trials;
+    rotation += refined.noise.rotation.front() * 180 / M_PI / trials;
+    translation += refined.noise.translation.front() * 1e3 / trials;
+  }
+  std::printf(
+      "%s %4.2f deg %4.2f mm | park %.3f/%.2f | bundle %.4f/%.3f | eiv %.4f/%.3f | nees %.2f | sigma %.3f px "
+      "%.4f deg %.3f mm\n",
+      in_hand ? "eih" : "eth", row.robot_deg, row.robot_mm, median(closed.deg), median(closed.mm),
+      median(bundled.deg), median(bundled.mm), median(corrected.deg), median(corrected.mm), nees, corner,
+      rotation, translation);
+}
+
+}  // namespace
+}  // namespace flash::calib
+
+int main(int argc, char** argv) {
+  using flash::calib::Setup;
+  const int trials = argc > 1 ? std::atoi(argv[1]) : 60;
+  for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand})
+    for (const auto& [deg, mm] : {std::pair{0.0, 0.0}, {0.05, 0.5}, {0.1, 1.0}})
+      flash::calib::study({setup, deg, mm}, trials);
+}
