@@ -135,13 +135,13 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
 
   const data::SheetMaterial material =
       lift_environment(benchmark, plan->sheet, benchmark.environments / 2).material;
-  const auto bending = make_bending_operator(*plan, material.bending_model, material.poissons_ratio);
+  const BendingOperator& bending = bending_operator(*plan, material.bending_model, material.poissons_ratio);
   const data::Points& x = counts[benchmark.environments / 2].middle;
   data::Points y = data::Points::Zero(x.rows(), 3);
   BlockValues<double> values;
   const auto assemble = [&](Curvature curvature) {
     values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, *bending, material, x, 1.0, curvature, values);
+    add_elastic_hessian(*plan, bending, material, x, 1.0, curvature, values);
     for (int i = 0; i < plan->pattern.size; ++i)
       for (int c = 0; c < 3; ++c)
         values[9L * i + 4 * c] +=
@@ -153,14 +153,14 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
     result.phases.push_back({name, calls, milliseconds_of(phase)});
   };
   add("energy and forces", result.iterations + 1,
-      [&] { add_elastic_gradient(*plan, *bending, material, x, y); });
+      [&] { add_elastic_gradient(*plan, bending, material, x, y); });
   add("matrix", result.iterations, [&] {
     assemble(Curvature::exact);
-    product.assign(plan->triangle_product, values, bending->rows, material.bending_rigidity);
+    product.assign(plan->triangle_product, values, bending.rows, material.bending_rigidity);
   });
   add("factorization", factorizations, [&] {
     assemble(Curvature::positive);
-    add_bending_stand_in(*bending, material.bending_rigidity, values);
+    add_bending_stand_in(bending, material.bending_rigidity, values);
     factor.factorize(values);
   });
   Eigen::VectorXf from = Eigen::VectorXf::Ones(y.size()), to = from;

@@ -1,12 +1,15 @@
 #include "sim/newton_matrix.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace flash::sim {
 namespace {
 
 using data::Points;
+
+constexpr double neighbours = 6;  ///< of a vertex, in a regular mesh
 
 template <typename Scalar>
 using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
@@ -47,10 +50,12 @@ NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
 
 void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse, const BendingOperator& bending,
                           double rigidity, double least_eigenvalue) {
+  // Of the blocks between vertices: the stiffness of friction, large where slip starts, rounds in its own
+  // vertex alone.
   double largest = 0;
-  for (int i = 0; i < plan_->pattern.size; ++i)
-    for (int c = 0; c < 3; ++c) largest = std::max(largest, blocks[9L * i + 4 * c]);
-  single_ = std::numeric_limits<float>::epsilon() * largest < 0.01 * least_eigenvalue;
+  for (size_t k = plan_->pattern.size; k < plan_->pattern.size + plan_->edge_count; ++k)
+    for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(blocks[9 * k + 4 * c]));
+  single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < 0.01 * least_eigenvalue;
   const ProductPattern& pattern = sparse ? plan_->triangle_product : plan_->full_product;
   if (single_)
     single_product_.assign(pattern, blocks, bending.rows, rigidity);

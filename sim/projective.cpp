@@ -24,20 +24,11 @@ Eigen::Map<const VectorXd> flat(const Points& x) { return {x.data(), x.size()}; 
 }  // namespace
 
 struct ProjectiveSolver::Workspace {
-  using BendingKey = std::pair<data::BendingModel, double>;
   using SystemKey = std::pair<std::array<double, 6>, std::pair<data::Constitutive, data::BendingModel>>;
 
   std::shared_ptr<const SheetPlan> plan;
   ProjectiveSettings settings;
-  std::map<BendingKey, std::shared_ptr<const BendingOperator>> bending;
   std::map<SystemKey, ProjectiveSystem> systems;
-
-  const BendingOperator& bending_of(const data::SheetMaterial& m) {
-    auto& entry =
-        bending[{m.bending_model, m.bending_model == data::BendingModel::plate ? m.poissons_ratio : 0.0}];
-    if (!entry) entry = make_bending_operator(*plan, m.bending_model, m.poissons_ratio);
-    return *entry;
-  }
 
   ProjectiveSystem& system_of(const data::SheetMaterial& m) {
     const SystemKey key = {{m.membrane_stiffness, m.poissons_ratio, m.areal_density, m.bending_rigidity,
@@ -224,7 +215,8 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   Workspace& w = *workspace_;
   const ProjectiveSettings& settings = w.settings;
   const double h = settings.time_step, time = environment.state.time + h;
-  const BendingOperator& bending = w.bending_of(environment.material);
+  const BendingOperator& bending =
+      bending_operator(*w.plan, environment.material.bending_model, environment.material.poissons_ratio);
   ProjectiveSystem& system = w.system_of(environment.material);
   update_grasps(environment, time);
   const StepForces forces(*w.plan, bending, environment, system.mass(), h);

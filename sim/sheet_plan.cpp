@@ -43,33 +43,6 @@ TriangleGroup group_of(const std::vector<RestTriangle>& triangles, size_t first,
   return group;
 }
 
-}  // namespace
-
-std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet) {
-  auto plan = std::make_shared<SheetPlan>();
-  plan->sheet = sheet;
-  plan->hinges = sheet_hinges(sheet);
-  plan->pattern.size = static_cast<int>(sheet.rest.vertices.rows());
-  PairIndex index;
-  const auto slot = [&](int row, int column) {
-    return BlockSlot{plan->pattern.size + pair_index(index, plan->pattern, row, column), row < column};
-  };
-  for (size_t first = 0; first < sheet.triangles.size(); first += triangle_group_size)
-    plan->triangle_groups.push_back(
-        group_of(sheet.triangles, first, [&](int row, int column) { return slot(row, column).block; }));
-  const size_t edges = plan->pattern.pairs.size();
-  for (const Hinge& hinge : plan->hinges) {
-    const auto& v = hinge.vertices;
-    plan->hinge_slots.push_back({slot(v[1], v[0]), slot(v[2], v[0]), slot(v[2], v[1]), slot(v[3], v[0]),
-                                 slot(v[3], v[1]), slot(v[3], v[2])});
-  }
-  plan->symbolic = analyze(plan->pattern);
-  const std::vector<int>& position = elimination_position(*plan->symbolic);
-  plan->triangle_product = product_pattern(plan->pattern, edges, position);
-  plan->full_product = product_pattern(plan->pattern, plan->pattern.pairs.size(), position);
-  return plan;
-}
-
 std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, data::BendingModel model,
                                                              double poissons_ratio) {
   auto bending = std::make_shared<BendingOperator>();
@@ -88,6 +61,42 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   for (const auto& [row, column] : plan.pattern.pairs)
     bending->stand_in.push_back(scale * isometric.coeff(row, column));
   return bending;
+}
+
+}  // namespace
+
+std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet) {
+  auto plan = std::make_shared<SheetPlan>();
+  plan->sheet = sheet;
+  plan->hinges = sheet_hinges(sheet);
+  plan->pattern.size = static_cast<int>(sheet.rest.vertices.rows());
+  PairIndex index;
+  const auto slot = [&](int row, int column) {
+    return BlockSlot{plan->pattern.size + pair_index(index, plan->pattern, row, column), row < column};
+  };
+  for (size_t first = 0; first < sheet.triangles.size(); first += triangle_group_size)
+    plan->triangle_groups.push_back(
+        group_of(sheet.triangles, first, [&](int row, int column) { return slot(row, column).block; }));
+  plan->edge_count = plan->pattern.pairs.size();
+  for (const Hinge& hinge : plan->hinges) {
+    const auto& v = hinge.vertices;
+    plan->hinge_slots.push_back({slot(v[1], v[0]), slot(v[2], v[0]), slot(v[2], v[1]), slot(v[3], v[0]),
+                                 slot(v[3], v[1]), slot(v[3], v[2])});
+  }
+  plan->symbolic = analyze(plan->pattern);
+  const std::vector<int>& position = elimination_position(*plan->symbolic);
+  plan->triangle_product = product_pattern(plan->pattern, plan->edge_count, position);
+  plan->full_product = product_pattern(plan->pattern, plan->pattern.pairs.size(), position);
+  return plan;
+}
+
+const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
+                                        double poissons_ratio) {
+  const double key = model == data::BendingModel::plate ? poissons_ratio : 0.0;
+  const std::lock_guard lock(plan.bending->mutex);
+  auto& entry = plan.bending->made[{model, key}];
+  if (!entry) entry = make_bending_operator(plan, model, poissons_ratio);
+  return *entry;
 }
 
 }  // namespace flash::sim

@@ -1,7 +1,10 @@
 #pragma once
 #include <Eigen/SparseCore>
 #include <array>
+#include <map>
 #include <memory>
+#include <mutex>
+#include <utility>
 #include <vector>
 
 #include "data/material.h"
@@ -30,20 +33,6 @@ struct alignas(64) TriangleGroup {
   int count = 0;                                  ///< triangles; the lanes behind them repeat the last
 };
 
-/// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone.
-struct SheetPlan {
-  Sheet sheet;
-  std::vector<Hinge> hinges;
-  BlockPattern pattern;  ///< neighbours over an edge, then those across a hinge
-  std::shared_ptr<const SymbolicFactor> symbolic;
-  ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
-  std::vector<TriangleGroup> triangle_groups;
-  std::vector<std::array<BlockSlot, 6>>
-      hinge_slots;  ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
-};
-
-std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
-
 /// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
 struct BendingOperator {
   data::BendingModel model;
@@ -52,8 +41,31 @@ struct BendingOperator {
   std::vector<double> stand_in;  ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 
-/// Throws data::InputError where the model needs a flat rest shape and the sheet has none.
-std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, data::BendingModel model,
-                                                             double poissons_ratio);
+/// Those made so far, for all environments of a sheet.
+struct BendingOperators {
+  std::mutex mutex;
+  std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
+};
+
+/// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone.
+struct SheetPlan {
+  Sheet sheet;
+  std::vector<Hinge> hinges;
+  BlockPattern pattern;   ///< neighbours over an edge, then those across a hinge
+  size_t edge_count = 0;  ///< of the pattern's pairs, those over an edge
+  std::shared_ptr<const SymbolicFactor> symbolic;
+  ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
+  std::vector<TriangleGroup> triangle_groups;
+  std::vector<std::array<BlockSlot, 6>>
+      hinge_slots;  ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
+  std::shared_ptr<BendingOperators> bending = std::make_shared<BendingOperators>();
+};
+
+std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
+
+/// Made once for a sheet, model and, where it matters, Poisson's ratio, and kept with the plan; threads may
+/// ask at once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.
+const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
+                                        double poissons_ratio);
 
 }  // namespace flash::sim

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "sim/elastic_energy.h"
 #include "sim/newton_matrix.h"
@@ -41,23 +40,13 @@ void update_grasps(Environment& environment, double time) {
 struct Solver::Workspace {
   std::shared_ptr<const SheetPlan> plan;
   SolverSettings settings;
-  std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> bending;
   NewtonMatrix matrix;
   BlockValues<double> values, damping;
   bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
 
   Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
       : plan(std::move(plan_in)), settings(settings_in), matrix(plan) {}
-
-  const BendingOperator& bending_of(const data::SheetMaterial& material);
 };
-
-const BendingOperator& Solver::Workspace::bending_of(const data::SheetMaterial& material) {
-  const bool depends_on_nu = material.bending_model == data::BendingModel::plate;
-  auto& entry = bending[{material.bending_model, depends_on_nu ? material.poissons_ratio : 0.0}];
-  if (!entry) entry = make_bending_operator(*plan, material.bending_model, material.poissons_ratio);
-  return *entry;
-}
 
 namespace {
 
@@ -96,9 +85,11 @@ class StepProblem {
   }
 
   /// Hessian of the potential, without the stiffness of a quadratic bending model.
-  void assemble(const Points& positions, Curvature curvature, BlockValues<double>& values) const {
+  /// `sparse`: over edges alone.
+  void assemble(const Points& positions, Curvature curvature, bool sparse,
+                BlockValues<double>& values) const {
     if (damping_.empty())
-      values.assign(9 * (plan_.pattern.size + plan_.pattern.pairs.size()), 0.0);
+      values.assign(9 * (plan_.pattern.size + (sparse ? plan_.edge_count : plan_.pattern.pairs.size())), 0.0);
     else
       values = damping_;
     add_elastic_hessian(plan_, bending_, environment_.material, positions, 1.0, curvature, values);
@@ -193,7 +184,8 @@ StepReport Solver::step(Environment& environment) {
   const double h = w.settings.time_step;
   const State& start = environment.state;
   const double time = start.time + h;
-  const BendingOperator& bending = w.bending_of(environment.material);
+  const BendingOperator& bending =
+      bending_operator(*w.plan, environment.material.bending_model, environment.material.poissons_ratio);
   const double rigidity = environment.material.bending_rigidity;
   update_grasps(environment, time);
 
@@ -208,6 +200,7 @@ StepReport Solver::step(Environment& environment) {
   const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
   const double force_scale = problem.mass().norm() * gravity;
 
+  const bool sparse = w.damping.empty() && bending.model != data::BendingModel::hinge;
   StepReport report;
   Iterate now, trial, longer;
   const auto evaluate = [&](Iterate& iterate) {
@@ -228,16 +221,15 @@ StepReport Solver::step(Environment& environment) {
          now.residual.norm() > w.settings.tolerance * force_scale) {
     ++report.iterations;
     if (w.refactor) {
-      problem.assemble(now.positions, Curvature::positive, w.values);
+      problem.assemble(now.positions, Curvature::positive, false, w.values);
       add_bending_stand_in(bending, rigidity, w.values);
       add_slip_stiffness(now.constraints, w.values);
       restrict_matrix(w.plan->pattern, now.constraints, w.values);
       if (!w.matrix.factorize(w.values)) break;
       ++report.factorizations;
     }
-    problem.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, w.values);
+    problem.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, sparse, w.values);
     add_slip_stiffness(now.constraints, w.values);
-    const bool sparse = w.damping.empty() && bending.model != data::BendingModel::hinge;
     w.matrix.assign(w.values, sparse, bending, rigidity, problem.mass().minCoeff() / (h * h));
     std::vector<VertexConstraint> linear = now.constraints;
     Points gradient = now.residual, force;

@@ -37,16 +37,16 @@ TEST(ElasticEnergy, GradientIsTheDerivativeOfTheEnergy) {
   for (const Constitutive constitutive : membranes) {
     for (const BendingModel model : bendings) {
       const data::SheetMaterial material = material_of(constitutive, model);
-      const auto bending = make_bending_operator(*plan, model, material.poissons_ratio);
+      const BendingOperator& bending = bending_operator(*plan, model, material.poissons_ratio);
       const Points x = sheet.rest.vertices + noise(sheet.rest.vertices.rows(), 2e-3, 4);
       const Points along = noise(x.rows(), 1, 5);
       const auto energy = [&](double step) {
         Points unused = Points::Zero(x.rows(), 3);
-        const ElasticEnergy e = add_elastic_gradient(*plan, *bending, material, x + step * along, unused);
+        const ElasticEnergy e = add_elastic_gradient(*plan, bending, material, x + step * along, unused);
         return e.membrane + e.bending;
       };
       Points gradient = Points::Zero(x.rows(), 3);
-      add_elastic_gradient(*plan, *bending, material, x, gradient);
+      add_elastic_gradient(*plan, bending, material, x, gradient);
       const double step = 1e-6;  // central differences: step^2 truncation against 1e-16 / step rounding
       const double slope = (energy(step) - energy(-step)) / (2 * step);
       EXPECT_NEAR(gradient.cwiseProduct(along).sum(), slope, 1e-5 * std::abs(slope));
@@ -60,18 +60,18 @@ TEST(ElasticEnergy, HessianOfAStretchedSheetIsTheDerivativeOfTheGradient) {
   const auto plan = make_sheet_plan(sheet);
   for (const Constitutive constitutive : membranes) {
     const data::SheetMaterial material = material_of(constitutive, BendingModel::plate);
-    const auto bending = make_bending_operator(*plan, material.bending_model, material.poissons_ratio);
+    const BendingOperator& bending = bending_operator(*plan, material.bending_model, material.poissons_ratio);
     const Points x = 1.1 * sheet.rest.vertices + noise(sheet.rest.vertices.rows(), 2e-4, 4);
     const Points along = noise(x.rows(), 1, 6);
     BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, *bending, material, x, 1.0, Curvature::exact, values);
+    add_elastic_hessian(*plan, bending, material, x, 1.0, Curvature::exact, values);
     Points product = Points::Zero(x.rows(), 3);
     add_block_product(plan->pattern, values, 1.0, along, product);
-    add_bending_product(*bending, material.bending_rigidity, along, product);
+    add_bending_product(bending, material.bending_rigidity, along, product);
     const double step = 1e-7;
     Points ahead = Points::Zero(x.rows(), 3), behind = ahead;
-    add_elastic_gradient(*plan, *bending, material, x + step * along, ahead);
-    add_elastic_gradient(*plan, *bending, material, x - step * along, behind);
+    add_elastic_gradient(*plan, bending, material, x + step * along, ahead);
+    add_elastic_gradient(*plan, bending, material, x - step * along, behind);
     const Points expected = (ahead - behind) / (2 * step);
     EXPECT_LT((product - expected).norm(), 1e-6 * expected.norm());
   }
@@ -85,9 +85,9 @@ TEST(ElasticEnergy, RigidMotionCostsNothing) {
   for (const Constitutive constitutive : membranes) {
     for (const BendingModel model : bendings) {
       const data::SheetMaterial material = material_of(constitutive, model);
-      const auto bending = make_bending_operator(*plan, model, material.poissons_ratio);
+      const BendingOperator& bending = bending_operator(*plan, model, material.poissons_ratio);
       Points gradient = Points::Zero(moved.rows(), 3);
-      const ElasticEnergy energy = add_elastic_gradient(*plan, *bending, material, moved, gradient);
+      const ElasticEnergy energy = add_elastic_gradient(*plan, bending, material, moved, gradient);
       EXPECT_NEAR(energy.membrane, 0, 1e-12);
       EXPECT_NEAR(energy.bending, 0, 1e-12);
       EXPECT_LT(gradient.cwiseAbs().maxCoeff(),

@@ -282,7 +282,7 @@ TEST(Projective, EveryNamedSolverSolvesTheMetricOfARealSheet) {
                                        .trajectory = {}},
                                    0.3});
   const auto bending =
-      make_bending_operator(*plan, environment.material.bending_model, environment.material.poissons_ratio);
+      bending_operator(*plan, environment.material.bending_model, environment.material.poissons_ratio);
   ProjectiveSystem system(*plan, environment.material, h);
   system.hold({std::vector<int>{0, 8}, {0}, {0, 8, 40}});
   std::vector<Vector3d> free_axes(81, Vector3d::Ones());

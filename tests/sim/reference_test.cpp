@@ -144,7 +144,7 @@ struct ReferenceRun {
   data::Points support_forces(ElasticEnergy& energy) const {
     const data::SheetMaterial& m = environment.material;
     data::Points force = data::Points::Zero(sheet.rest.vertices.rows(), 3);
-    energy = add_elastic_gradient(*plan, *make_bending_operator(*plan, m.bending_model, m.poissons_ratio), m,
+    energy = add_elastic_gradient(*plan, bending_operator(*plan, m.bending_model, m.poissons_ratio), m,
                                   environment.state.positions, force);
     return force - m.areal_density * sheet.vertex_area * environment.gravity.transpose();
   }
