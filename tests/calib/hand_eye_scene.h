@@ -16,8 +16,8 @@ struct SceneSettings {
   double robot_deg = 0, robot_mm = 0;         ///< per axis
   double distance = 0.42;                     ///< camera to target [m]
   Eigen::Vector3d spread{0.05, 0.035, 0.10};  ///< of the target's place in the camera frame, either way [m]
-  double tilt_deg = 35;                       ///< of the target against the optical axis, at most
-  double roll_deg = 60;                       ///< about the optical axis, at most
+  double tilt_deg = 45;                       ///< of the target against the optical axis, at most
+  double roll_deg = 90;                       ///< about the optical axis, at most
 };
 
 /// 15 views of a board of 9 x 6 corners, 25 mm, 0.32 to 0.52 m away; or 20 of a tag of 90 mm, about a metre
@@ -28,6 +28,7 @@ inline SceneSettings protocol_settings(Setup setup) {
   settings.distance = 0.9;
   settings.spread = {0.15, 0.10, 0.30};
   settings.tilt_deg = 50;
+  settings.roll_deg = 60;
   return settings;
 }
 

@@ -1,0 +1,175 @@
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/calib_options.h"
+#include "apps/calib_verbs.h"
+#include "apps/command_line.h"
+#include "calib/extrinsics.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+
+namespace flash {
+namespace {
+
+struct HandEyeOptions {
+  CalibCommonOptions common;
+  DatasetChoice dataset;
+  std::string setup;
+  bool refine_intrinsics = false;
+  std::string parent, child = "camera";
+  std::string ros, urdf, easy_handeye2;
+  std::string out;
+};
+
+calib::Setup setup_of(const HandEyeOptions& options, const calib::Dataset& dataset) {
+  if (!options.setup.empty()) return calib::parse_setup(options.setup, "command line", "--setup");
+  if (dataset.setup) return *dataset.setup;
+  throw data::InputError(dataset.source +
+                         ": says nothing of the setup; add --setup eye-in-hand or eye-to-hand");
+}
+
+/// Numberings that a detector may have confused: those of plain grids; markers say who they are.
+std::vector<calib::Symmetry> symmetries_of(const calib::Target& target) {
+  std::vector<calib::Symmetry> all = calib::grid_symmetries(calib::target_points(target));
+  const bool plain =
+      target.kind == calib::TargetKind::chessboard || target.kind == calib::TargetKind::circle_grid;
+  if (!plain) all.resize(1);
+  return all;
+}
+
+/// A view for each picture, without poses where the target was not found.
+std::vector<calib::Observation> views_of(const std::vector<calib::Detection>& detections,
+                                         const std::string& refiner) {
+  const std::vector<calib::Observation> found = calib::observations_of(detections, refiner);
+  std::vector<calib::Observation> views;
+  auto next = found.begin();
+  for (const calib::Detection& detection : detections) {
+    calib::Observation missing;
+    missing.image = detection.image;
+    views.push_back(detection.readings.empty() ? missing : *next++);
+  }
+  return views;
+}
+
+struct Solved {
+  calib::Calibration calibration;
+  std::string refiner;
+};
+
+/// Refiners that fit the corners alike are told apart by how the robot's chain closes on them.
+Solved solve(calib::Setup setup, const data::CameraIntrinsics& camera, const calib::Target& target,
+             const std::vector<calib::Detection>& detections, const calib::CalibrateSettings& settings) {
+  constexpr double kTie = 1.05;
+  const std::vector<calib::RefinerScore> ranking = calib::rank_refiners(detections);
+  const auto calibrated = [&](const std::string& refiner) {
+    return Solved{calib::calibrate(setup, camera, calib::target_points(target), symmetries_of(target),
+                                   views_of(detections, refiner), settings),
+                  refiner};
+  };
+  Solved best = calibrated(ranking.front().refiner);
+  for (std::size_t i = 1; i < ranking.size() && ranking[i].rms <= kTie * ranking.front().rms; ++i) {
+    Solved other = calibrated(ranking[i].refiner);
+    if (other.calibration.held_out.px < best.calibration.held_out.px) best = std::move(other);
+  }
+  for (std::size_t i = 0; i < detections.size(); ++i)
+    if (!detections[i].reason.empty()) best.calibration.views[i].reason = detections[i].reason;
+  return best;
+}
+
+void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
+  const Eigen::Vector3d t = extrinsics.transform.T.translation();
+  const calib::Vector6d sd = c.covariance.diagonal().cwiseSqrt();
+  constexpr double kDegrees = 180 / M_PI;
+  std::printf("%s <- %s: (%.5f, %.5f, %.5f) m, +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n",
+              extrinsics.transform.parent.c_str(), extrinsics.transform.child.c_str(), t.x(), t.y(), t.z(),
+              1e3 * sd[0], 1e3 * sd[1], 1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
+  std::printf("%zu of %zu views; corners %.3f px, robot %.3f deg %.2f mm an axis\n", c.used.size(),
+              c.views.size(), extrinsics.corner_px, kDegrees * extrinsics.robot_rotation_rad,
+              1e3 * extrinsics.robot_translation_m);
+  std::printf("weakest: %s, %.2f mm, %.3f deg\n\n", c.weakest.name.c_str(), 1e3 * c.weakest.translation,
+              kDegrees * c.weakest.rotation);
+  std::printf("%-20s %10s %10s %8s   held out: %8s %8s %8s\n", "method", "AX=XB deg", "mm", "px", "px", "mm",
+              "deg");
+  for (const calib::ComparedMethod& method : c.comparison) {
+    std::printf("%-20s %10.3f %10.2f %8.3f", method.name.c_str(), kDegrees * method.relative.rotation,
+                1e3 * method.relative.translation, method.px);
+    if (method.held_out)
+      std::printf("             %8.3f %8.2f %8.3f", method.held_out->px, method.held_out->mm,
+                  method.held_out->deg);
+    std::printf("%s\n", method.wild ? "  wild" : "");
+  }
+}
+
+int run_handeye(const HandEyeOptions& options) {
+  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  const calib::Dataset dataset = load_dataset(options.dataset);
+  const calib::Setup setup = setup_of(options, dataset);
+  const calib::Target target = target_of(options.dataset, dataset);
+  const std::vector<calib::Detection> detections =
+      detect_all(dataset, target, options.dataset, options.common);
+  calib::CalibrateSettings settings;
+  constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
+  if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
+  const Solved solved = solve(setup, *dataset.camera, target, detections, settings);
+
+  const calib::ExtrinsicsInputs inputs{
+      dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
+      dataset.poses_path, dataset.camera_path, solved.refiner};
+  calib::Extrinsics extrinsics = calib::extrinsics_of(solved.calibration, inputs);
+  const int exit_code = solved.calibration.usable ? exit_done : exit_unusable;
+  nlohmann::ordered_json json = calib::to_json(solved.calibration, inputs, exit_code);
+  if (!options.parent.empty()) extrinsics.transform.parent = options.parent;
+  extrinsics.transform.child = options.child;
+  json["transform"] = calib::to_json(extrinsics.transform);
+  const std::string text = data::format_json(json);
+  if (!options.out.empty()) data::write_atomically(options.out, text);
+  if (!options.ros.empty())
+    data::write_atomically(options.ros, calib::ros_static_transform(extrinsics.transform));
+  if (!options.urdf.empty()) data::write_atomically(options.urdf, calib::urdf_joint(extrinsics.transform));
+  if (!options.easy_handeye2.empty())
+    data::write_atomically(options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup));
+
+  if (!options.common.quiet)
+    for (const calib::ViewResult& view : solved.calibration.views)
+      if (!view.used)
+        warn_calib(solved.calibration.repair
+                       .observations[static_cast<std::size_t>(&view - solved.calibration.views.data())]
+                       .image +
+                   ": not used: " + view.reason);
+  for (const std::string& warning : solved.calibration.warnings) warn_calib(warning);
+  if (options.common.json)
+    std::cout << text;
+  else
+    print(solved.calibration, extrinsics);
+  return exit_code;
+}
+
+}  // namespace
+
+void add_handeye_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<HandEyeOptions>();
+  CLI::App* verb = app.add_subcommand("handeye", "Where the camera sits, in the hand or before the robot");
+  add_dataset_options(*verb, options->dataset);
+  verb->add_option("--setup", options->setup,
+                   "Camera on the gripper, or beside the robot that holds the target")
+      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+  verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
+  verb->add_option("--parent-frame", options->parent, "Name of the gripper's or the base's frame");
+  verb->add_option("--child-frame", options->child, "Name of the camera's frame")->capture_default_str();
+  verb->add_option("--ros", options->ros, "File for a static_transform_publisher line");
+  verb->add_option("--urdf", options->urdf, "File for a fixed joint");
+  verb->add_option("--easy-handeye2", options->easy_handeye2, "File for easy_handeye2's .calib");
+  verb->add_option("-o,--out", options->out, "File for the extrinsics, JSON");
+  add_calib_common_options(*verb, options->common);
+  verb->footer(
+      "Examples:\n"
+      "  flash-calib handeye wrist --setup eye-in-hand --target chessboard:9x6:0.025 -o camera.json\n"
+      "  flash-calib handeye left --setup eye-to-hand --target aruco:DICT_4X4_50:0:0.09 -o left.json");
+  verb->callback([options, &action] { action = [options] { return run_handeye(*options); }; });
+}
+
+}  // namespace flash

@@ -1,0 +1,72 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/hand_eye.h"
+#include "calib/observability.h"
+#include "calib/reference_methods.h"
+#include "calib/repair.h"
+
+namespace flash::calib {
+
+struct CalibrateSettings {
+  RepairSettings repair;
+  RefineSettings refine;
+  int least_views = 4;      ///< fewer are refused
+  double surprise = 35;     ///< squared size of a correction over that of most views, 6 degrees of freedom
+  int folds = 10;           ///< of the held-out residuals
+  bool check_scale = true;  ///< estimate the target's size too, for the warning
+};
+
+/// A method of the comparison table.
+struct ComparedMethod {
+  std::string name;
+  HandEyePoses poses;
+  ClosingError relative;  ///< rms of A X = X B over all pairs of views
+  double px = 0;          ///< reprojection through the chain, robot poses as reported, 2-D rms per corner
+  std::optional<HeldOut> held_out;
+  bool wild = false;
+};
+
+struct ScaleCheck {
+  double estimate = 1;  ///< true size of the target over the size stated
+  double sd = 0;
+};
+
+struct ViewResult {
+  bool used = true;
+  std::string reason;
+  double px = 0;                           ///< reprojection with the view's correction, 2-D rms per corner
+  double chain_px = 0;                     ///< without
+  Vector6d correction = Vector6d::Zero();  ///< of the robot's pose, of a used view
+};
+
+struct Calibration {
+  Setup setup = Setup::eye_in_hand;
+  Repair repair;
+  std::vector<int> used;  ///< views in the solution, by their place in the set
+  Refinement refined;
+  HandEyePoses poses;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of X, right perturbation (dt, dtheta)
+  double corner_rms = 0;                   ///< with corrections, 2-D rms per corner [px]
+  double chain_rms = 0;                    ///< without [px]
+  double centre_rms = 0;  ///< of the target's projected middle against the view's own pose, without [px]
+  HeldOut held_out;
+  std::vector<ComparedMethod> comparison;
+  std::vector<ViewResult> views;
+  RotationDiversity diversity;
+  WeakestDirection weakest;
+  std::optional<ScaleCheck> scale;
+  std::vector<std::string> warnings;  ///< worst first
+  bool usable = true;
+};
+
+/// From observations to the answer: repair, seed, bundle, errors in variables, a second look for views that
+/// do not belong, held-out residuals, comparison. Throws data::InputError where too few views are left or
+/// nothing can be determined, with the one sentence that names the cause.
+Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& observations,
+                      const CalibrateSettings& settings = {});
+
+}  // namespace flash::calib

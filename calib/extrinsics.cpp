@@ -1,0 +1,189 @@
+#include "calib/extrinsics.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "data/json_reader.h"
+#include "data/trajectory.h"
+
+namespace flash::calib {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegrees = 180 / M_PI;
+
+template <class Vector>
+Json list(const Vector& v) {
+  Json values = Json::array();
+  for (Eigen::Index i = 0; i < v.size(); ++i) values.push_back(v[i]);
+  return values;
+}
+
+template <class Matrix>
+Json rows(const Matrix& m) {
+  Json values = Json::array();
+  for (Eigen::Index i = 0; i < m.rows(); ++i) values.push_back(list(m.row(i)));
+  return values;
+}
+
+Json comparison_json(const Calibration& calibration) {
+  Json methods = Json::object();
+  for (const ComparedMethod& method : calibration.comparison) {
+    Json entry = {{"relative_deg", method.relative.rotation * kDegrees},
+                  {"relative_mm", 1e3 * method.relative.translation},
+                  {"reprojection_rms_px", method.px}};
+    if (method.held_out) {
+      entry["heldout_px"] = method.held_out->px;
+      entry["heldout_mm"] = method.held_out->mm;
+      entry["heldout_deg"] = method.held_out->deg;
+    }
+    entry["wild"] = method.wild;
+    entry["translation"] = list(method.poses.X.translation());
+    entry["rotation_xyzw"] = list(data::to_vector(method.poses.X).tail<4>());
+    methods[method.name] = std::move(entry);
+  }
+  return methods;
+}
+
+Json views_json(const Calibration& calibration) {
+  Json views = Json::array();
+  for (std::size_t i = 0; i < calibration.views.size(); ++i) {
+    const ViewResult& view = calibration.views[i];
+    Json entry = {{"image", calibration.repair.observations[i].image}, {"used", view.used}};
+    entry["reason"] = view.used ? Json(nullptr) : Json(view.reason);
+    entry["px"] = view.used ? Json(view.px) : Json(nullptr);
+    if (view.used) {
+      entry["chain_px"] = view.chain_px;
+      entry["correction_mm"] = 1e3 * view.correction.head<3>().norm();
+      entry["correction_deg"] = view.correction.tail<3>().norm() * kDegrees;
+      entry["renumbered"] = calibration.repair.views[i].symmetry != 0;
+    }
+    views.push_back(std::move(entry));
+  }
+  return views;
+}
+
+NamedTransform transform_from(const data::JsonObject& object) {
+  object.expect_fields({"parent", "child", "translation", "rotation_xyzw"});
+  NamedTransform result{.parent = object.string("parent"), .child = object.string("child"), .T = {}};
+  Eigen::Matrix<double, 7, 1> v;
+  v << object.vector("translation", 3), object.vector("rotation_xyzw", 4);
+  if (std::abs(v.tail<4>().norm() - 1) > 1e-3) throw object.error("rotation_xyzw", "a unit quaternion");
+  result.T = data::from_vector(v);
+  return result;
+}
+
+}  // namespace
+
+const char* to_string(Setup setup) { return setup == Setup::eye_in_hand ? "eye-in-hand" : "eye-to-hand"; }
+
+Setup parse_setup(const std::string& text, const std::string& source, const std::string& field) {
+  if (text == "eye-in-hand") return Setup::eye_in_hand;
+  if (text == "eye-to-hand") return Setup::eye_to_hand;
+  throw data::input_error(source, field, "found \"" + text + "\", expected eye-in-hand or eye-to-hand");
+}
+
+Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs) {
+  const bool in_hand = calibration.setup == Setup::eye_in_hand;
+  Extrinsics extrinsics;
+  extrinsics.setup = calibration.setup;
+  extrinsics.method = to_string(Method::errors_in_variables);
+  extrinsics.transform = {in_hand ? "gripper" : "base", "camera", calibration.poses.X};
+  extrinsics.target_pose = {in_hand ? "base" : "gripper", "target", calibration.poses.Z};
+  extrinsics.covariance = calibration.covariance;
+  extrinsics.corner_px = calibration.refined.noise.corner.front();
+  extrinsics.robot_rotation_rad = calibration.refined.noise.rotation.front();
+  extrinsics.robot_translation_m = calibration.refined.noise.translation.front();
+  extrinsics.inputs = inputs;
+  return extrinsics;
+}
+
+Json to_json(const NamedTransform& transform) {
+  const Eigen::Matrix<double, 7, 1> v = data::to_vector(transform.T);
+  return {{"parent", transform.parent},
+          {"child", transform.child},
+          {"translation", list(v.head<3>())},
+          {"rotation_xyzw", list(v.tail<4>())}};
+}
+
+Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code) {
+  const Extrinsics extrinsics = extrinsics_of(calibration, inputs);
+  const Vector6d sd = calibration.covariance.diagonal().cwiseSqrt();
+  Json json = {{"schema", "flash-extrinsics/1"},
+               {"setup", to_string(extrinsics.setup)},
+               {"method", extrinsics.method},
+               {"transform", to_json(extrinsics.transform)},
+               {"target_pose", to_json(extrinsics.target_pose)},
+               {"covariance", rows(calibration.covariance)}};
+  json["predicted_sd"] = {{"translation_mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
+                          {"rotation_deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
+  json["sigmas"] = {{"corner_px", extrinsics.corner_px},
+                    {"robot_rotation_rad", extrinsics.robot_rotation_rad},
+                    {"robot_translation_m", extrinsics.robot_translation_m}};
+  json["residuals"] = {
+      {"reprojection_rms_px", calibration.chain_rms}, {"corner_rms_px", calibration.corner_rms},
+      {"centre_rms_px", calibration.centre_rms},      {"heldout_px", calibration.held_out.px},
+      {"heldout_mm", calibration.held_out.mm},        {"heldout_deg", calibration.held_out.deg}};
+  json["comparison"] = comparison_json(calibration);
+  json["views"] = views_json(calibration);
+  json["observability"] = {
+      {"turn_spread_deg", list(Eigen::Vector3d(kDegrees * calibration.diversity.spread))},
+      {"first_axis_share", calibration.diversity.first_share},
+      {"condition", calibration.weakest.condition},
+      {"weakest", calibration.weakest.name},
+      {"weakest_mm", 1e3 * calibration.weakest.translation},
+      {"weakest_deg", kDegrees * calibration.weakest.rotation}};
+  json["convention_findings"] = Json::array();
+  json["scale"] = calibration.scale
+                      ? Json{{"estimate", calibration.scale->estimate}, {"sd", calibration.scale->sd}}
+                      : Json(nullptr);
+  json["warnings"] = calibration.warnings;
+  json["exit_code"] = exit_code;
+  json["provenance"] = {{"tool", "flash-calib"},    {"version", FLASH_VERSION}, {"dataset", inputs.dataset},
+                        {"target", inputs.target},  {"poses", inputs.poses},    {"camera", inputs.camera},
+                        {"refiner", inputs.refiner}};
+  return json;
+}
+
+Extrinsics load_extrinsics(const std::string& path) {
+  const nlohmann::json file = data::load_json(path);
+  const data::JsonObject object(file, path);
+  object.expect_fields({"schema", "setup", "method", "transform", "target_pose", "covariance", "predicted_sd",
+                        "sigmas", "residuals", "comparison", "views", "observability", "convention_findings",
+                        "scale", "warnings", "exit_code", "provenance"});
+  if (object.string("schema") != "flash-extrinsics/1") throw object.error("schema", "flash-extrinsics/1");
+  Extrinsics extrinsics;
+  extrinsics.setup = parse_setup(object.string("setup"), path, "setup");
+  extrinsics.method = object.string("method");
+  extrinsics.transform = transform_from(object.object("transform"));
+  extrinsics.target_pose = transform_from(object.object("target_pose"));
+  const nlohmann::json& covariance = object.raw("covariance");
+  if (!covariance.is_array() || covariance.size() != 6) throw object.error("covariance", "6 x 6 numbers");
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const nlohmann::json& row = covariance[static_cast<std::size_t>(i)];
+    if (!row.is_array() || row.size() != 6) throw object.error("covariance", "6 x 6 numbers");
+    for (Eigen::Index j = 0; j < 6; ++j) {
+      const nlohmann::json& value = row[static_cast<std::size_t>(j)];
+      if (!value.is_number()) throw object.error("covariance", "6 x 6 numbers");
+      extrinsics.covariance(i, j) = value.get<double>();
+    }
+  }
+  if (!extrinsics.covariance.isApprox(extrinsics.covariance.transpose(), 1e-6) ||
+      extrinsics.covariance.diagonal().minCoeff() < 0)
+    throw object.error("covariance", "a symmetric matrix");
+  if (object.has("sigmas")) {
+    const data::JsonObject sigmas = object.object("sigmas");
+    extrinsics.corner_px = sigmas.not_negative("corner_px");
+    extrinsics.robot_rotation_rad = sigmas.not_negative("robot_rotation_rad");
+    extrinsics.robot_translation_m = sigmas.not_negative("robot_translation_m");
+  }
+  if (object.has("provenance")) {
+    const data::JsonObject from = object.object("provenance");
+    extrinsics.inputs = {from.string("dataset", ""), from.string("target", ""), from.string("poses", ""),
+                         from.string("camera", ""), from.string("refiner", "")};
+  }
+  return extrinsics;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,55 @@
+#pragma once
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <vector>
+
+#include "calib/calibrate.h"
+
+namespace flash::calib {
+
+/// A transform between two named frames.
+struct NamedTransform {
+  std::string parent, child;
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();  ///< maps points of the child into the parent
+};
+
+/// What a calibration was made from, so that it can be made again.
+struct ExtrinsicsInputs {
+  std::string dataset, target, poses, camera, refiner;
+};
+
+/// "flash-extrinsics/1", as far as other programs need it.
+struct Extrinsics {
+  Setup setup = Setup::eye_in_hand;
+  std::string method;
+  NamedTransform transform;                ///< gripper <- camera (eye-in-hand) or base <- camera
+  NamedTransform target_pose;              ///< base <- target (eye-in-hand) or gripper <- target
+  Matrix6d covariance = Matrix6d::Zero();  ///< of the transform, right perturbation (dt, dtheta) [m, rad]
+  double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
+  ExtrinsicsInputs inputs;
+};
+
+const char* to_string(Setup setup);  ///< "eye-in-hand", "eye-to-hand"
+/// Throws data::InputError naming `source` and `field`.
+Setup parse_setup(const std::string& text, const std::string& source, const std::string& field);
+
+Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs);
+
+/// Everything that formats.md asks for: transform, covariance, noise, residuals, comparison, views,
+/// observability, findings, scale, warnings, provenance.
+nlohmann::ordered_json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code);
+
+/// Throws data::InputError naming file, field, what was found and what was expected.
+Extrinsics load_extrinsics(const std::string& path);
+
+/// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
+nlohmann::ordered_json to_json(const NamedTransform& transform);
+
+/// `ros2 run tf2_ros static_transform_publisher --x ... --frame-id parent --child-frame-id child`
+std::string ros_static_transform(const NamedTransform& transform);
+/// A fixed joint, roll, pitch and yaw about fixed x, y, z.
+std::string urdf_joint(const NamedTransform& transform);
+/// easy_handeye2's calibration file.
+std::string easy_handeye2(const NamedTransform& transform, Setup setup);
+
+}  // namespace flash::calib
