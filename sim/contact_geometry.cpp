@@ -8,11 +8,11 @@ namespace {
 
 using Eigen::Vector3d;
 
-Gap gap_of(const Plane& plane, const Vector3d& point, double) {
+Gap gap_of(const Plane& plane, const Vector3d& point, double, double) {
   return {plane.normal.dot(point - plane.point), plane.normal, Vector3d::Zero()};
 }
 
-Gap gap_of(const Cylinder& cylinder, const Vector3d& point, double) {
+Gap gap_of(const Cylinder& cylinder, const Vector3d& point, double, double) {
   Vector3d radial = point - cylinder.point;
   radial -= cylinder.axis * cylinder.axis.dot(radial);
   const double length = radial.norm();
@@ -20,7 +20,7 @@ Gap gap_of(const Cylinder& cylinder, const Vector3d& point, double) {
           Vector3d::Zero()};
 }
 
-Gap gap_of(const Box& box, const Vector3d& point, double time) {
+Gap gap_of(const Box& box, const Vector3d& point, double time, double time_step) {
   const Eigen::Isometry3d pose =
       box.trajectory.times.empty() ? box.pose : data::pose_at(box.trajectory, time);
   const Vector3d local = pose.inverse() * point;
@@ -35,19 +35,16 @@ Gap gap_of(const Box& box, const Vector3d& point, double time) {
     gap.distance = outside.norm();
     gap.normal = pose.linear() * (outside / gap.distance);
   }
-  gap.surface_velocity = Vector3d::Zero();
-  if (!box.trajectory.times.empty()) {
-    const double span = 1e-3;  // [s], short against any motion of a robot
-    const Eigen::Isometry3d before = data::pose_at(box.trajectory, time - span);
-    gap.surface_velocity = (pose * local - before * local) / span;
-  }
+  gap.surface_moved = Vector3d::Zero();
+  if (!box.trajectory.times.empty())
+    gap.surface_moved = point - data::pose_at(box.trajectory, time - time_step) * local;
   return gap;
 }
 
 }  // namespace
 
-Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time) {
-  return std::visit([&](const auto& shape) { return gap_of(shape, point, time); }, obstacle.shape);
+Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double time_step) {
+  return std::visit([&](const auto& shape) { return gap_of(shape, point, time, time_step); }, obstacle.shape);
 }
 
 }  // namespace flash::sim

@@ -7,13 +7,13 @@ namespace flash::sim {
 
 /// Where a point stands against an obstacle.
 struct Gap {
-  double distance;                   ///< to the surface, negative inside [m]
-  Eigen::Vector3d normal;            ///< unit, out of the obstacle
-  Eigen::Vector3d surface_velocity;  ///< of the obstacle's material at the contact [m/s]
+  double distance;                ///< to the surface, negative inside [m]
+  Eigen::Vector3d normal;         ///< unit, out of the obstacle
+  Eigen::Vector3d surface_moved;  ///< by the obstacle's material at the contact, over the step [m]
 };
 
-/// Signed distance of `point` [m] to the obstacle at `time` [s]. Exact outside; inside a box the nearest face
-/// decides.
-Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time);
+/// Signed distance of `point` [m] to the obstacle at `time` [s], the end of a step of `time_step`. Exact
+/// outside; inside a box the nearest face decides.
+Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, double time_step);
 
 }  // namespace flash::sim

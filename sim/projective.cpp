@@ -8,6 +8,7 @@
 
 #include "sim/anderson.h"
 #include "sim/elastic_energy.h"
+#include "sim/grasp.h"
 #include "sim/projective_contact.h"
 #include "sim/vertex_constraint.h"
 
@@ -92,23 +93,6 @@ class StepForces {
   Points target_, loads_;
   BlockValues<double> damping_;
 };
-
-/// Grasps close and open for the step that ends at `time`.
-void update_grasps(Environment& environment, double time) {
-  auto& offsets = environment.state.grasp_offsets;
-  offsets.resize(environment.grasps.size());
-  for (std::size_t k = 0; k < environment.grasps.size(); ++k) {
-    const Grasp& grasp = environment.grasps[k];
-    if (environment.state.time < grasp.from - 1e-9 || time > grasp.to + 1e-9) {
-      offsets[k].resize(0, 3);
-    } else if (offsets[k].rows() == 0) {
-      const Eigen::Isometry3d gripper = data::pose_at(grasp.gripper, environment.state.time).inverse();
-      offsets[k].resize(static_cast<Index>(grasp.vertices.size()), 3);
-      for (std::size_t v = 0; v < grasp.vertices.size(); ++v)
-        offsets[k].row(v) = gripper * environment.state.positions.row(grasp.vertices[v]).transpose();
-    }
-  }
-}
 
 /// The law of the contacts at an iterate, gaps linear in the multipliers: with dx = -h^2 A^-1 (force - H^T
 /// lambda) from the multipliers at hand, and W for a change of them.

@@ -18,10 +18,9 @@ double regular(double compliance, double inverse_mass) {
 }
 
 /// Displacement of a vertex since the start of the step against the surface [m].
-Vector3d moved_against(const Environment& environment, const Gap& gap, double time_step,
-                       const data::Points& positions, Index vertex) {
-  return (positions.row(vertex) - environment.state.positions.row(vertex)).transpose() -
-         time_step * gap.surface_velocity;
+Vector3d moved_against(const Environment& environment, const Gap& gap, const data::Points& positions,
+                       Index vertex) {
+  return (positions.row(vertex) - environment.state.positions.row(vertex)).transpose() - gap.surface_moved;
 }
 
 }  // namespace
@@ -34,16 +33,14 @@ std::vector<VertexContact> find_contacts(const Environment& environment, double 
     if (free_axes[i].isZero()) continue;
     for (std::size_t k = 0; k < environment.obstacles.size(); ++k) {
       const Obstacle& obstacle = environment.obstacles[k];
-      const Gap gap = gap_to(obstacle, positions.row(i), time);
+      const Gap gap = gap_to(obstacle, positions.row(i), time, time_step);
       if (!(gap.distance < reach[i]) || gap.normal.cwiseProduct(free_axes[i]).norm() < 1e-6) continue;
       VertexContact contact{static_cast<int>(i), static_cast<int>(k), {}, {}, 0};
       const Vector3d first = gap.normal.unitOrthogonal(), second = gap.normal.cross(first);
       contact.directions.row(0) = gap.normal;
       contact.directions.row(1) = std::cos(tangent_angle) * first + std::sin(tangent_angle) * second;
       contact.directions.row(2) = std::cos(tangent_angle) * second - std::sin(tangent_angle) * first;
-      const Vector3d moved = (positions.row(i) - environment.state.positions.row(i)).transpose() -
-                             time_step * gap.surface_velocity;
-      contact.gap = contact.directions * moved;
+      contact.gap = contact.directions * moved_against(environment, gap, positions, i);
       contact.gap[0] = gap.distance;
       contact.friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
       contacts.push_back(contact);
@@ -75,8 +72,9 @@ double contact_potential(const Environment& environment, double time, double tim
     const double normal = multiplier[3 * k];
     if (normal == 0) continue;
     const VertexContact& contact = contacts[k];
-    const Gap gap = gap_to(environment.obstacles[contact.obstacle], positions.row(contact.vertex), time);
-    const Vector3d moved = moved_against(environment, gap, time_step, positions, contact.vertex);
+    const Gap gap =
+        gap_to(environment.obstacles[contact.obstacle], positions.row(contact.vertex), time, time_step);
+    const Vector3d moved = moved_against(environment, gap, positions, contact.vertex);
     const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
     potential += normal * (contact.friction * slip - gap.distance);
   }

@@ -4,38 +4,16 @@
 #include <cmath>
 
 #include "sim/elastic_energy.h"
+#include "sim/grasp.h"
 #include "sim/newton_matrix.h"
 #include "sim/vertex_constraint.h"
 
 namespace flash::sim {
 
-namespace {
-
 using data::Points;
 using Eigen::Map;
 using Eigen::Matrix3d;
-using Eigen::RowVector3d;
 using Eigen::Vector3d;
-
-/// Closes and opens grasps for the step that ends at `time`.
-void update_grasps(Environment& environment, double time) {
-  auto& offsets = environment.state.grasp_offsets;
-  offsets.resize(environment.grasps.size());
-  for (size_t k = 0; k < environment.grasps.size(); ++k) {
-    const Grasp& grasp = environment.grasps[k];
-    const bool closed = environment.state.time >= grasp.from - 1e-9 && time <= grasp.to + 1e-9;
-    if (!closed) {
-      offsets[k].resize(0, 3);
-    } else if (offsets[k].rows() == 0) {
-      const Eigen::Isometry3d gripper = data::pose_at(grasp.gripper, environment.state.time).inverse();
-      offsets[k].resize(grasp.vertices.size(), 3);
-      for (size_t v = 0; v < grasp.vertices.size(); ++v)
-        offsets[k].row(v) = gripper * environment.state.positions.row(grasp.vertices[v]).transpose();
-    }
-  }
-}
-
-}  // namespace
 
 struct Solver::Workspace {
   std::shared_ptr<const SheetPlan> plan;
@@ -288,12 +266,12 @@ StepReport Solver::step(Environment& environment) {
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
   for (size_t i = 0; i < now.constraints.size(); ++i) {
     const VertexConstraint& c = now.constraints[i];
+    report.penetration_max = std::max(report.penetration_max, -c.gap);
     if (c.hold == Hold::fixed) {
       if (c.grasp < 0) report.fixed_forces.push_back({int(i), c.reaction});
       if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
       continue;
     }
-    report.penetration_max = std::max(report.penetration_max, -c.gap);
     if (c.hold == Hold::free) continue;
     report.complementarity = std::max(report.complementarity, std::abs(c.gap));
     report.obstacle_forces[c.obstacle] += c.reaction;

@@ -18,10 +18,11 @@ constexpr double resting = 1e-13;  ///< slip up to which a vertex has not moved:
 constexpr double smoothing =
     1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
 
-Gap nearest_gap(const Environment& environment, const Vector3d& point, double time, int& obstacle) {
+Gap nearest_gap(const Environment& environment, const Vector3d& point, double time, double time_step,
+                int& obstacle) {
   Gap nearest{std::numeric_limits<double>::infinity(), Vector3d::Zero(), Vector3d::Zero()};
   for (size_t k = 0; k < environment.obstacles.size(); ++k) {
-    const Gap gap = gap_to(environment.obstacles[k], point, time);
+    const Gap gap = gap_to(environment.obstacles[k], point, time, time_step);
     if (gap.distance < nearest.distance) {
       nearest = gap;
       obstacle = static_cast<int>(k);
@@ -31,10 +32,9 @@ Gap nearest_gap(const Environment& environment, const Vector3d& point, double ti
 }
 
 /// Tangential displacement since the start of the step against the surface [m].
-Vector3d slip_of(const Environment& environment, const Gap& gap, double time_step,
-                 const data::Points& positions, int i) {
+Vector3d slip_of(const Environment& environment, const Gap& gap, const data::Points& positions, int i) {
   const Vector3d moved =
-      (positions.row(i) - environment.state.positions.row(i)).transpose() - time_step * gap.surface_velocity;
+      (positions.row(i) - environment.state.positions.row(i)).transpose() - gap.surface_moved;
   return moved - gap.normal * gap.normal.dot(moved);
 }
 
@@ -82,10 +82,14 @@ void update_contacts(const Environment& environment, double time, double time_st
     const Vector3d needed = force.row(i);
     if (constraint.hold == Hold::fixed) {
       constraint.reaction = needed - constraint.free * needed;
+      // Not kept out of the obstacles, but seen there.
+      if (!constraint.free.isZero())
+        constraint.gap =
+            nearest_gap(environment, positions.row(i), time, time_step, constraint.obstacle).distance;
       continue;
     }
     constraint = VertexConstraint{};
-    const Gap gap = nearest_gap(environment, positions.row(i), time, constraint.obstacle);
+    const Gap gap = nearest_gap(environment, positions.row(i), time, time_step, constraint.obstacle);
     const double normal_force = gap.normal.dot(needed);
     constraint.gap = gap.distance;
     constraint.normal = gap.normal;
@@ -95,7 +99,7 @@ void update_contacts(const Environment& environment, double time, double time_st
     const double friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
     const double bound = friction * normal_force;
     const Vector3d needed_tangential = needed - normal_force * gap.normal;
-    const Vector3d slip = slip_of(environment, gap, time_step, positions, static_cast<int>(i));
+    const Vector3d slip = slip_of(environment, gap, positions, static_cast<int>(i));
     const double slip_length = slip.norm(), needed_length = needed_tangential.norm();
     constraint.friction_bound = bound;
     constraint.reaction = normal_force * gap.normal;
@@ -125,13 +129,13 @@ void project_to_feasible(const Environment& environment, double time, double tim
     const VertexConstraint& constraint = constraints[i];
     if (constraint.hold == Hold::fixed) continue;
     int obstacle = -1;
-    const Gap gap = nearest_gap(environment, positions.row(i), time, obstacle);
+    const Gap gap = nearest_gap(environment, positions.row(i), time, time_step, obstacle);
     const bool held = constraint.hold != Hold::free && obstacle == constraint.obstacle;
     // A vertex that is to land does so where the step is long enough to bring it down.
     const bool lands = held && (constraint.correction.isZero(0) || gap.distance <= 0.01 * constraint.gap);
     if (gap.distance < 0 || lands) positions.row(i) -= gap.distance * gap.normal.transpose();
     if (held && constraint.hold == Hold::slip) {
-      const Vector3d slip = slip_of(environment, gap, time_step, positions, static_cast<int>(i));
+      const Vector3d slip = slip_of(environment, gap, positions, static_cast<int>(i));
       if (slip.dot(constraint.slip_direction) < 0) positions.row(i) -= slip.transpose();
     }
   }
@@ -143,8 +147,8 @@ double friction_potential(const Environment& environment, double time, double ti
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& constraint = constraints[i];
     if (constraint.friction_bound == 0) continue;
-    const Gap gap = gap_to(environment.obstacles[constraint.obstacle], positions.row(i), time);
-    const Vector3d slip = slip_of(environment, gap, time_step, positions, static_cast<int>(i));
+    const Gap gap = gap_to(environment.obstacles[constraint.obstacle], positions.row(i), time, time_step);
+    const Vector3d slip = slip_of(environment, gap, positions, static_cast<int>(i));
     potential += constraint.friction_bound *
                  (constraint.slip_stiffness > 0 ? std::hypot(slip.norm(), smoothing) : slip.norm());
   }
