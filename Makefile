@@ -15,7 +15,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo build test validate reference fuzz configure-test format check-format tidy install clean
-.PHONY: packages-build packages-test packages-check
+.PHONY: bench packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -35,6 +35,12 @@ build: packages-build  ## Packages, then the release build in $(BUILD)
 test: configure-test  ## Packages, build, then all tests
 	cmake --build $(BUILD) -j $(JOBS)
 	ctest --test-dir $(BUILD) -j $(JOBS) --output-on-failure --no-tests=error
+
+bench: packages-build packages-test packages-bench  ## Packages, build, then the benchmarks of the solver
+	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=ON -DFLASH_BENCHMARKS=ON $(CMAKE_ARGS)
+	cmake --build $(BUILD) -j $(JOBS) --target flash_bench flash-sim
+	$(BUILD)/tests/flash_bench
+	$(BUILD)/bin/flash-sim bench --vertices 1000 --envs 64 --steps 250 --threads 2
 
 configure-test: packages-build packages-test
 	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=ON $(CMAKE_ARGS)
@@ -73,5 +79,5 @@ install: build  ## To $(PREFIX), for find_package(flash)
 clean:  ## Remove build and demo output
 	rm -rf build $(DEMO)
 
-packages-build packages-test packages-check: packages-%:
+packages-build packages-test packages-bench packages-check: packages-%:
 	@scripts/install-packages $*
