@@ -10,6 +10,7 @@
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "sysid/fingerprint.h"
 #include "sysid/judge.h"
 #include "sysid/overlay.h"
 #include "sysid/parameter_label.h"

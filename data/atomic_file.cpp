@@ -8,6 +8,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <regex>
 #include <sstream>
 #include <system_error>
 
@@ -51,6 +52,12 @@ void write_atomically(const std::string& path, std::string_view contents) {
   if (::fsync(file.descriptor) != 0) throw_errno(path);
   if (::rename(file.path.c_str(), path.c_str()) != 0) throw_errno(path);
   file.path.clear();
+}
+
+void remove_leftovers(const std::string& folder) {
+  static const std::regex name(R"(.+\.\d+-\d+\.tmp)");  // path.PID-SERIAL.tmp, see above
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    if (std::regex_match(entry.path().filename().string(), name)) std::filesystem::remove(entry.path());
 }
 
 std::string read_file(const std::string& path) {

@@ -8,6 +8,9 @@ namespace flash::data {
 /// the new one, never half. Missing folders are made. Throws std::system_error naming the path.
 void write_atomically(const std::string& path, std::string_view contents);
 
+/// Removes from `folder` the temporary files of writers that were killed. Only while nobody writes there.
+void remove_leftovers(const std::string& folder);
+
 /// The whole file as bytes. Throws InputError naming the path.
 std::string read_file(const std::string& path);
 

@@ -1,15 +1,22 @@
 #include "sysid/grid_results.h"
 
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "sysid/fingerprint.h"
 
 namespace flash::sysid {
 namespace {
@@ -111,10 +118,34 @@ void for_each_row(const std::string& path, const Use& use) {
   }
 }
 
-void append_text(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::app | std::ios::binary);
-  file << text << std::flush;
-  if (!file) throw std::runtime_error(path + ": cannot be written");
+/// At the end of the file, and on the disk when it returns.
+void append_text(const std::string& path, std::string_view text) {
+  const int descriptor = ::open(path.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
+  bool done = descriptor >= 0;
+  while (done && !text.empty()) {
+    const ssize_t written = ::write(descriptor, text.data(), text.size());
+    if (written < 0 && errno == EINTR) continue;
+    done = written >= 0;
+    if (done) text.remove_prefix(static_cast<std::size_t>(written));
+  }
+  done = done && ::fdatasync(descriptor) == 0;
+  const int reason = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!done) throw std::runtime_error(path + ": cannot be written: " + std::strerror(reason));
+}
+
+/// Leaves of a file the header and the whole lines whose id is one of `ids`.
+void keep_lines_of(const std::string& path, const std::set<int>& ids) {
+  const std::string text = data::read_file(path);
+  std::string kept;
+  data::LineReader lines(std::string_view(text).substr(0, text.rfind('\n') + 1));
+  std::string_view line;
+  while (lines.next(line)) {
+    const std::optional<long> id = data::parse_integer(line.substr(0, line.find(',')));
+    const bool header = lines.number() == 1;
+    if (header || (id && ids.count(static_cast<int>(*id)) > 0)) kept += std::string(line) + '\n';
+  }
+  if (kept != text) data::write_atomically(path, kept);
 }
 
 std::string results_line(const CandidateResult& result) {
@@ -223,29 +254,30 @@ GridResults load_grid_results(const std::string& folder) {
 }
 
 ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
-                           const std::vector<std::string>& recordings, const std::string& fingerprint,
+                           const std::vector<std::string>& recordings, const Fingerprint& fingerprint,
                            bool resume)
     : folder_(folder) {
-  const std::string results = path_of(folder, "results.csv");
-  if (fs::exists(path_of(folder, "grid.json")) && fs::exists(results)) {
-    if (!resume) {
-      throw data::InputError(folder + ": holds results already; go on with --resume, or name another folder");
-    }
-    const nlohmann::json grid = load_grid(folder);
-    if (grid.value("fingerprint", "") != fingerprint) {
-      throw data::InputError(folder +
-                             ": --resume: its results come from other inputs or settings than these; name "
-                             "another folder, or repeat the first command");
-    }
-    results_ = load_grid_results(folder);
-    for (const char* file : {"results.csv", "registrations.csv", "keyframes.csv"}) {
-      const std::string path = path_of(folder, file);
-      const std::string text = data::read_file(path);
-      const std::size_t whole = text.rfind('\n') + 1;
-      if (whole != text.size()) fs::resize_file(path, whole);
-    }
-    return;
+  fs::create_directories(folder);
+  lock_ = ::open(path_of(folder, ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  if (lock_ < 0) throw std::runtime_error(folder + ": cannot be written: " + std::strerror(errno));
+  try {
+    if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
+      throw data::InputError(folder + ": another run is writing to it; wait for it, or name another folder");
+    data::remove_leftovers(folder);
+    if (fs::exists(path_of(folder, "grid.json")))
+      go_on(fingerprint, resume);
+    else
+      begin(axes, recordings, fingerprint);
+  } catch (...) {
+    ::close(lock_);
+    throw;
   }
+}
+
+ResultsStore::~ResultsStore() { ::close(lock_); }
+
+void ResultsStore::begin(const std::vector<Axis>& axes, const std::vector<std::string>& recordings,
+                         const Fingerprint& fingerprint) {
   results_.axes = axes;
   results_.recordings = recordings;
   nlohmann::json grid = {{"schema", kSchema}, {"fingerprint", fingerprint}, {"recordings", recordings}};
@@ -253,35 +285,61 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
   for (const Axis& axis : axes) {
     grid["axes"].push_back({{"name", axis.name}, {"values", axis.values}, {"log", axis.logarithmic}});
   }
-  fs::create_directories(folder);
-  data::write_atomically(path_of(folder, "registrations.csv"), kRegistrationsHeader);
-  data::write_atomically(path_of(folder, "keyframes.csv"), kKeyframesHeader);
-  data::write_atomically(results, results_header(axes));
-  data::write_atomically(path_of(folder, "grid.json"), grid.dump(1) + "\n");
+  data::write_atomically(path_of(folder_, "registrations.csv"), kRegistrationsHeader);
+  data::write_atomically(path_of(folder_, "keyframes.csv"), kKeyframesHeader);
+  data::write_atomically(path_of(folder_, "results.csv"), results_header(axes));
+  data::write_atomically(path_of(folder_, "grid.json"), grid.dump(1) + "\n");  // last: all is there
 }
 
-void ResultsStore::append(const CandidateResult& result) {
-  std::string registrations, keyframes;
-  for (std::size_t r = 0; r < result.recordings.size(); ++r) {
-    const RecordingScore& recording = result.recordings[r];
-    const std::string head = std::to_string(result.id) + "," + field(results_.recordings[r]);
-    registrations += head;
-    for (const double value : {recording.score, recording.offset.x(), recording.offset.y(),
-                               recording.offset.z(), recording.yaw, recording.time_offset}) {
-      registrations += "," + data::format_number(value);
-    }
-    registrations += "," + joined(recording.bounds_hit) + "\n";
-    for (const KeyframeScore& keyframe : recording.keyframes) {
-      keyframes += head + "," + data::format_number(keyframe.t) + "," + data::format_number(keyframe.score) +
-                   "," + std::to_string(keyframe.points) + "," + data::format_number(keyframe.weight) + "\n";
+void ResultsStore::go_on(const Fingerprint& fingerprint, bool resume) {
+  if (!resume) {
+    throw data::InputError(folder_ + ": holds results already; go on with --resume, or name another folder");
+  }
+  const nlohmann::json grid = load_grid(folder_);
+  const auto was = grid.find("fingerprint");
+  const std::string changed = was == grid.end() || !was->is_object()
+                                  ? "they come from another version of the program"
+                                  : difference(was->get<Fingerprint>(), fingerprint);
+  if (!changed.empty()) {
+    throw data::InputError(folder_ + ": --resume: these are not the inputs and settings of its results: " +
+                           changed + "; name another folder, or repeat the first command");
+  }
+  results_ = load_grid_results(folder_);
+  std::set<int> ids;
+  for (const CandidateResult& result : results_.candidates) ids.insert(result.id);
+  for (const char* file : {"results.csv", "registrations.csv", "keyframes.csv"}) {
+    keep_lines_of(path_of(folder_, file), ids);
+  }
+}
+
+void ResultsStore::append(const std::vector<CandidateResult>& batch) {
+  std::string registrations, keyframes, lines;
+  for (const CandidateResult& result : batch) {
+    lines += results_line(result);
+    for (std::size_t r = 0; r < result.recordings.size(); ++r) {
+      const RecordingScore& recording = result.recordings[r];
+      const std::string head = std::to_string(result.id) + "," + field(results_.recordings[r]);
+      registrations += head;
+      for (const double value : {recording.score, recording.offset.x(), recording.offset.y(),
+                                 recording.offset.z(), recording.yaw, recording.time_offset}) {
+        registrations += "," + data::format_number(value);
+      }
+      registrations += "," + joined(recording.bounds_hit) + "\n";
+      for (const KeyframeScore& keyframe : recording.keyframes) {
+        keyframes += head + "," + data::format_number(keyframe.t) + "," +
+                     data::format_number(keyframe.score) + "," + std::to_string(keyframe.points) + "," +
+                     data::format_number(keyframe.weight) + "\n";
+      }
     }
   }
   append_text(path_of(folder_, "keyframes.csv"), keyframes);
   append_text(path_of(folder_, "registrations.csv"), registrations);
-  append_text(path_of(folder_, "results.csv"), results_line(result));
-  const auto place = std::lower_bound(results_.candidates.begin(), results_.candidates.end(), result.id,
-                                      [](const CandidateResult& a, int id) { return a.id < id; });
-  results_.candidates.insert(place, result);
+  append_text(path_of(folder_, "results.csv"), lines);
+  for (const CandidateResult& result : batch) {
+    const auto place = std::lower_bound(results_.candidates.begin(), results_.candidates.end(), result,
+                                        [](const auto& a, const auto& b) { return a.id < b.id; });
+    results_.candidates.insert(place, result);
+  }
 }
 
 bool ResultsStore::contains(int id) const {

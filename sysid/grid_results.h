@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -51,25 +52,41 @@ struct GridResults {
   std::vector<CandidateResult> candidates;
 };
 
+/// What decides the results of a search, by name; see sysid/fingerprint.h.
+using Fingerprint = std::map<std::string, std::string>;
+
 /// A folder of results that only ever grows: results.csv (one line a candidate; with several recordings its
 /// offsets are those of the first), registrations.csv (one line a candidate and recording) and keyframes.csv
-/// (one line a candidate, recording and keyframe). The line in results.csv is written last and flushed: a
-/// candidate is there as a whole or not at all. grid.json holds axes, recordings and the fingerprint of
+/// (one line a candidate, recording and keyframe). grid.json holds axes, recordings and the fingerprint of
 /// inputs and settings.
+///
+/// It survives an end at any moment, by kill -9 or a power cut. Every batch is on the disk before the next
+/// begins, its lines in results.csv last: a candidate is there as a whole or not at all. Opening the folder
+/// again cuts off what belongs to none.
 class ResultsStore {
  public:
   /// Creates `folder`, or with `resume` goes on with what it holds. Throws data::InputError where it holds
-  /// results and `resume` is not asked for, or results of another fingerprint.
+  /// results and `resume` is not asked for, or results of another fingerprint (naming what differs), and
+  /// where another process writes to it.
   ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
-               const std::vector<std::string>& recordings, const std::string& fingerprint, bool resume);
+               const std::vector<std::string>& recordings, const Fingerprint& fingerprint, bool resume);
+  ~ResultsStore();
+  ResultsStore(const ResultsStore&) = delete;
+  ResultsStore& operator=(const ResultsStore&) = delete;
 
-  void append(const CandidateResult& result);
+  void append(const std::vector<CandidateResult>& batch);
+  void append(const CandidateResult& result) { append(std::vector{result}); }
   const GridResults& results() const { return results_; }
   bool contains(int id) const;
 
  private:
+  void begin(const std::vector<Axis>& axes, const std::vector<std::string>& recordings,
+             const Fingerprint& fingerprint);
+  void go_on(const Fingerprint& fingerprint, bool resume);
+
   std::string folder_;
   GridResults results_;
+  int lock_ = -1;  ///< descriptor of the file that is locked
 };
 
 /// Reads a folder written by ResultsStore; a last line cut off by a crash is left out. Throws

@@ -2,94 +2,14 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstdint>
-#include <cstdio>
+#include <condition_variable>
 #include <exception>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <thread>
 
 namespace flash::sysid {
-namespace {
-
-/// FNV-1a, 64 bits: tells inputs apart, promises nothing against intent.
-class Hash {
- public:
-  void add(const void* bytes, std::size_t size) {
-    const auto* byte = static_cast<const unsigned char*>(bytes);
-    for (std::size_t i = 0; i < size; ++i) state_ = (state_ ^ byte[i]) * 0x100000001b3ULL;
-  }
-  void add(double value) { add(&value, sizeof value); }
-  void add(const std::string& text) {
-    add(static_cast<double>(text.size()));
-    add(text.data(), text.size());
-  }
-  template <class Derived>
-  void add_matrix(const Eigen::DenseBase<Derived>& matrix) {
-    add(static_cast<double>(matrix.rows()));
-    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
-      for (Eigen::Index j = 0; j < matrix.cols(); ++j) add(static_cast<double>(matrix(i, j)));
-    }
-  }
-  std::string text() const {
-    char buffer[17];
-    std::snprintf(buffer, sizeof buffer, "%016llx", static_cast<unsigned long long>(state_));
-    return buffer;
-  }
-
- private:
-  std::uint64_t state_ = 0xcbf29ce484222325ULL;
-};
-
-void add_recording(const Replay& replay, Hash& hash) {
-  const data::Recording& recording = replay.recording;
-  hash.add(recording.name);
-  hash.add_matrix(recording.gravity);
-  hash.add_matrix(recording.mesh.vertices);
-  hash.add_matrix(recording.mesh.triangles);
-  hash.add_matrix(recording.start);
-  hash.add(recording.has_table);
-  hash.add_matrix(recording.table_point);
-  hash.add_matrix(recording.table_normal);
-  hash.add_matrix(recording.nuisance.offset);
-  hash.add(recording.nuisance.yaw);
-  hash.add(recording.nuisance.time);
-  for (const auto& [name, trajectory] : recording.trajectories) {
-    hash.add(name);
-    for (std::size_t i = 0; i < trajectory.times.size(); ++i) {
-      hash.add(trajectory.times[i]);
-      hash.add_matrix(trajectory.poses[i].matrix());
-    }
-  }
-  const auto shape = replay.settings.grasp_shape;
-  for (const data::RecordedGrasp& grasp : recording.grasps) {
-    hash.add(grasp.gripper);
-    for (const int vertex : grasp.select.vertices) hash.add(vertex);
-    if (grasp.select.corner) hash.add(2 * (*grasp.select.corner)[0] + (*grasp.select.corner)[1]);
-    if (grasp.select.position) hash.add_matrix(*grasp.select.position);
-    for (const double value :
-         {grasp.from, grasp.to, replay.settings.grasp_within.value_or(grasp.select.within), grasp.depth,
-          grasp.pitch, static_cast<double>(shape.value_or(grasp.shape))}) {
-      hash.add(value);
-    }
-    hash.add_matrix(grasp.direction);
-  }
-  for (const Observation& observation : replay.observations) {
-    hash.add(observation.t);
-    hash.add(observation.weight);
-    hash.add_matrix(observation.points);
-    hash.add_matrix(observation.contour);
-    hash.add_matrix(observation.markers);
-    if (observation.force) hash.add_matrix(*observation.force);
-  }
-  for (const double value : {replay.start, static_cast<double>(replay.steps), replay.settings.closing_time,
-                             replay.settings.solver.time_step, replay.settings.solver.tolerance,
-                             static_cast<double>(replay.settings.solver.max_iterations)}) {
-    hash.add(value);
-  }
-}
-
-}  // namespace
 
 CandidateResult score_motions(const std::vector<Replay>& replays, const std::vector<ReplayResult>& results,
                               const ScoreSettings& settings) {
@@ -133,36 +53,19 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
   return result;
 }
 
-std::string fingerprint(const std::vector<Replay>& replays, const GridSettings& settings) {
-  Hash hash;
-  for (const Replay& replay : replays) add_recording(replay, hash);
-  const data::SheetMaterial& m = settings.base.material;
-  for (const double value :
-       {static_cast<double>(m.constitutive), static_cast<double>(m.bending_model), m.membrane_stiffness,
-        m.poissons_ratio, m.areal_density, m.bending_rigidity, m.friction, m.air_drag, m.stiffness_damping,
-        settings.base.thickness.value_or(-1), static_cast<double>(settings.base.bending_from_thickness)}) {
-    hash.add(value);
-  }
-  for (const auto* axes : {&settings.axes, &settings.fixed}) {
-    for (const Axis& axis : *axes) {
-      hash.add(axis.name);
-      for (const double value : axis.values) hash.add(value);
-    }
-  }
-  const ScoreSettings& score = settings.score;
-  for (const double value :
-       {static_cast<double>(score.objective.robust.kind), score.objective.robust.trim_fraction,
-        score.objective.robust.huber_delta, score.objective.cloud_sigma, score.objective.contour_sigma,
-        score.objective.marker_sigma, score.objective.force_sigma,
-        static_cast<double>(score.objective.two_sided), static_cast<double>(score.registration.iterations),
-        score.registration.softening, static_cast<double>(score.registration.points_per_keyframe),
-        score.registration.tolerance, static_cast<double>(score.shared.offset),
-        static_cast<double>(score.shared.yaw), static_cast<double>(score.shared.time)}) {
-    hash.add(value);
-  }
-  for (const double time : score.registration.time_starts) hash.add(time);
-  return hash.text();
+namespace {
+
+CandidateResult score_candidate(const std::vector<Replay>& replays, const GridSettings& settings,
+                                const std::vector<Axis>& axes, const std::vector<double>& values) {
+  const ReplayCandidate candidate = make_candidate(settings.base, axes, values);
+  std::vector<ReplayResult> motions;
+  for (const Replay& replay : replays) motions.push_back(std::move(run(replay, {candidate}).front()));
+  CandidateResult result = score_motions(replays, motions, settings.score);
+  result.values.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(settings.axes.size()));
+  return result;
 }
+
+}  // namespace
 
 bool grid_search(const std::vector<Replay>& replays, const GridSettings& settings, ResultsStore& store,
                  const std::function<void(const Progress&)>& progress, const std::atomic<bool>* stop) {
@@ -189,36 +92,46 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
       replays;  // one candidate a thread: the solver is not to spawn threads of its own
   for (Replay& replay : single) replay.settings.threads = 1;
   const Clock::time_point begin = Clock::now();
-  std::atomic<std::size_t> next = 0;
-  std::mutex mutex;
+  std::mutex mutex;  // of all below
+  std::condition_variable written;
+  std::size_t next = 0, next_to_write = 0;  // indices into wanted
+  std::map<std::size_t, CandidateResult> finished;
   std::exception_ptr failure;
   const auto work = [&] {
+    std::unique_lock lock(mutex);
     try {
-      while (!(stop != nullptr && stop->load())) {
+      while (true) {
+        // Results are written in order of id: those that come early wait, a batch of them at most.
+        written.wait(lock, [&] {
+          return failure || next >= wanted.size() ||
+                 next < next_to_write + static_cast<std::size_t>(settings.envs);
+        });
+        if (failure || next >= wanted.size() || (stop != nullptr && stop->load())) return;
         const std::size_t i = next++;
-        if (i >= wanted.size()) return;
-        const std::vector<double>& values = grid[wanted[i]];
-        const ReplayCandidate candidate = make_candidate(settings.base, axes, values);
-        std::vector<ReplayResult> motions;
-        for (const Replay& replay : single) motions.push_back(std::move(run(replay, {candidate}).front()));
-        CandidateResult result = score_motions(single, motions, settings.score);
+        lock.unlock();
+        CandidateResult result = score_candidate(single, settings, axes, grid[wanted[i]]);
         result.id = wanted[i];
-        result.values.assign(values.begin(),
-                             values.begin() + static_cast<std::ptrdiff_t>(settings.axes.size()));
+        lock.lock();
 
-        const std::lock_guard lock(mutex);
-        store.append(result);
         state.best_score = std::min(state.best_score, result.score);
         ++state.done;
+        finished.emplace(i, std::move(result));
+        std::vector<CandidateResult> batch;
+        for (; !finished.empty() && finished.begin()->first == next_to_write; ++next_to_write) {
+          batch.push_back(std::move(finished.begin()->second));
+          finished.erase(finished.begin());
+        }
+        if (!batch.empty()) store.append(batch);
+        written.notify_all();
         const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
         state.candidates_per_second = (state.done - done_before) / std::max(seconds, 1e-9);
         state.seconds_left = (state.total - state.done) / state.candidates_per_second;
         if (progress) progress(state);
       }
     } catch (...) {
-      const std::lock_guard lock(mutex);
+      if (!lock.owns_lock()) lock.lock();
       failure = std::current_exception();
-      next = wanted.size();
+      written.notify_all();
     }
   };
   {

@@ -38,13 +38,12 @@ struct Progress {
 CandidateResult score_motions(const std::vector<Replay>& replays, const std::vector<ReplayResult>& results,
                               const ScoreSettings& settings);
 
-/// Hash of everything that decides the results: recordings as read, sheet, settings, axes. Hexadecimal.
-std::string fingerprint(const std::vector<Replay>& replays, const GridSettings& settings);
-
 /// Simulates and scores every candidate of the grid that `store` does not hold yet and appends it there. Each
 /// thread takes one candidate at a time, through all recordings. Candidates that diverge or miss the
-/// tolerance are marked, never a reason to stop. `progress` is called after each candidate, one thread at a
-/// time; `stop`, when set, ends the search after the candidates in work. True when the grid is complete.
+/// tolerance are marked, never a reason to stop. Results are appended in order of id, so that the files do
+/// not depend on threads; an end at any moment loses at most `envs` of them. `progress` is called after each
+/// candidate, one thread at a time; `stop`, when set, ends the search after the candidates in work. True when
+/// the grid is complete.
 bool grid_search(const std::vector<Replay>& replays, const GridSettings& settings, ResultsStore& store,
                  const std::function<void(const Progress&)>& progress = {},
                  const std::atomic<bool>* stop = nullptr);

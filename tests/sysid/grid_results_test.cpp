@@ -7,7 +7,8 @@
 #include <fstream>
 #include <limits>
 
-#include "data/error.h"
+#include "data/atomic_file.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {
 namespace {
@@ -15,6 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 
 const std::vector<Axis> kAxes = {{"young", {10, 100}, true}, {"friction", {0.1, 0.3}, false}};
+
+const Fingerprint kPrint = {{"time_step_s", "0.01"}, {"asset friction", "0.3"}};
 
 CandidateResult result_of(int id, double score) {
   CandidateResult result;
@@ -47,7 +50,7 @@ class Results : public ::testing::Test {
 
 TEST_F(Results, ComeBackAsTheyWereWritten) {
   {
-    ResultsStore store(folder, kAxes, {"lift, one", "lift two"}, "abc", false);
+    ResultsStore store(folder, kAxes, {"lift, one", "lift two"}, kPrint, false);
     store.append(result_of(3, 0.005));
     CandidateResult lost = result_of(0, std::numeric_limits<double>::infinity());
     lost.status = CandidateStatus::diverged;
@@ -75,13 +78,13 @@ TEST_F(Results, ComeBackAsTheyWereWritten) {
 
 TEST_F(Results, GoOnWhereTheyStoppedAfterACutLine) {
   {
-    ResultsStore store(folder, kAxes, {"a", "b"}, "abc", false);
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, false);
     store.append(result_of(0, 0.005));
     store.append(result_of(1, 0.006));
   }
   std::ofstream(folder + "/results.csv", std::ios::app) << "2,100,0.1,0.00";
   {
-    ResultsStore store(folder, kAxes, {"a", "b"}, "abc", true);
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, true);
     EXPECT_TRUE(store.contains(1));
     EXPECT_FALSE(store.contains(2));
     store.append(result_of(2, 0.007));
@@ -92,14 +95,47 @@ TEST_F(Results, GoOnWhereTheyStoppedAfterACutLine) {
 }
 
 TEST_F(Results, AreNeverMixedWithOthers) {
-  { ResultsStore(folder, kAxes, {"a"}, "abc", false); }
-  EXPECT_THROW(ResultsStore(folder, kAxes, {"a"}, "abc", false), data::InputError);
-  EXPECT_THROW(ResultsStore(folder, kAxes, {"a"}, "abd", true), data::InputError);
-  EXPECT_NO_THROW(ResultsStore(folder, kAxes, {"a"}, "abc", true));
+  { ResultsStore(folder, kAxes, {"a"}, kPrint, false); }
+  EXPECT_THROW(ResultsStore(folder, kAxes, {"a"}, kPrint, false), data::InputError);
+  const Fingerprint other = {{"time_step_s", "0.005"}, {"asset friction", "0.4"}};
+  EXPECT_EQ(
+      data::input_error_of([&] { ResultsStore(folder, kAxes, {"a"}, other, true); }),
+      folder +
+          ": --resume: these are not the inputs and settings of its results: asset friction was 0.3 and is "
+          "0.4, and 1 more; name another folder, or repeat the first command");
+  EXPECT_NO_THROW(ResultsStore(folder, kAxes, {"a"}, kPrint, true));
+}
+
+// What is left when the program ends between the lines of a batch, or within one.
+TEST_F(Results, LinesThatBelongToNoResultAreCutOffAndTheRestStaysAsItWas) {
+  {
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, false);
+    store.append({result_of(0, 0.005), result_of(1, 0.006)});
+  }
+  const auto text = [&](const char* file) { return data::read_file(folder + "/" + file); };
+  const char* const files[] = {"results.csv", "registrations.csv", "keyframes.csv"};
+  std::vector<std::string> whole;
+  for (const char* file : files) whole.push_back(text(file));
+  std::ofstream(folder + "/keyframes.csv", std::ios::app)
+      << "2,a,0.1,0.5,120,1\n2,a,0.2,0.5,120,1\n2,b,0.1,0.";
+  std::ofstream(folder + "/registrations.csv", std::ios::app) << "2,a,0.5,0,0,0,0,0,\n2,";
+  std::ofstream(folder + "/results.csv", std::ios::app) << "2,100,0.1,0.00";
+  std::ofstream(folder + "/summary.json.123-0.tmp") << "{";
+  ResultsStore(folder, kAxes, {"a", "b"}, kPrint, true);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(text(files[i]), whole[i]) << files[i];
+  EXPECT_FALSE(fs::exists(folder + "/summary.json.123-0.tmp"));
+}
+
+TEST_F(Results, HaveOneWriterAtATime) {
+  const ResultsStore store(folder, kAxes, {"a"}, kPrint, false);
+  EXPECT_NE(data::input_error_of([&] {
+              ResultsStore(folder, kAxes, {"a"}, kPrint, true);
+            }).find("another run is writing to it"),
+            std::string::npos);
 }
 
 TEST_F(Results, HeaderNamesTheColumnsOfTheContract) {
-  { ResultsStore(folder, kAxes, {"a"}, "abc", false); }
+  { ResultsStore(folder, kAxes, {"a"}, kPrint, false); }
   std::ifstream file(folder + "/results.csv");
   std::string header;
   std::getline(file, header);

@@ -7,6 +7,7 @@
 
 #include "data/error.h"
 #include "data/procedural_mesh.h"
+#include "sysid/fingerprint.h"
 #include "sysid/grid_search.h"
 
 namespace flash::sysid {
@@ -126,7 +127,7 @@ TEST_F(Lift, GridSearchEqualsItselfWithMoreThreadsAndAfterAStop) {
     std::filesystem::remove_all(place);
     return place.string();
   };
-  const std::string key = fingerprint({replay}, grid);
+  const Fingerprint key = fingerprint({replay}, grid);
   const std::string at_once = folder("flash_grid_at_once"), stopped = folder("flash_grid_stopped");
   ResultsStore one(at_once, grid.axes, {recording.name}, key, false);
   EXPECT_TRUE(grid_search({replay}, grid, one));
@@ -155,7 +156,7 @@ TEST_F(Lift, FingerprintFollowsSettingsAndInputs) {
   const Replay replay = make_replay(recording, settings);
   GridSettings grid;
   grid.axes = {parse_axis("bending", "1e-4")};
-  const std::string key = fingerprint({replay}, grid);
+  const Fingerprint key = fingerprint({replay}, grid);
   GridSettings other = grid;
   other.base.material.friction += 0.1;
   EXPECT_NE(fingerprint({replay}, other), key);

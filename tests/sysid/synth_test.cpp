@@ -6,6 +6,7 @@
 
 #include "data/procedural_mesh.h"
 #include "sysid/depth_camera.h"
+#include "sysid/fingerprint.h"
 #include "sysid/grid_search.h"
 #include "sysid/judge.h"
 #include "tests/data/temporary_folder.h"

@@ -1,0 +1,27 @@
+"""The programs under test, and recordings that they make themselves."""
+import json
+import subprocess
+
+ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.2:0.05", "element_type": "TRIANGLE",
+         "mechanical_props": {"areal_density": 0.2, "thickness": 0.001, "young": 5e4, "poisson": 0.3,
+                              "constitutive": "TRI_COROTATED", "bending_rigidity": 1e-4, "friction": 0.3}}
+
+
+def call(program, *words, **options):
+    return subprocess.run([str(program), *map(str, words)], capture_output=True, text=True, errors="replace", **options)
+
+
+def must(program, *words):
+    done = call(program, *words)
+    if done.returncode != 0:
+        raise SystemExit(f"{program} {' '.join(map(str, words))}: exit code {done.returncode}\n{done.stderr}")
+    return done
+
+
+def synthesize(sysid, folder, *options):
+    """An asset and a recording of it, a short corner lift."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "asset.json").write_text(json.dumps(ASSET, indent=1))
+    must(sysid, "synth", "--asset", folder / "asset.json", "--kind", "corner_lift", "--mesh", "sheet:0.2x0.2:0.05",
+         "--duration", "0.6", "--seed", "1", "--quiet", *options, "-o", folder / "recording")
+    return folder / "asset.json", folder / "recording"
