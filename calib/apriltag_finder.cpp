@@ -7,6 +7,7 @@
 #include <tagStandard52h13.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <memory>
 
@@ -41,7 +42,25 @@ struct Tag {
   int id;
   Quad corners;
   double border;  ///< width of the black border as a share of the side
+  bool is_rough;  ///< corners are good to a pixel only
 };
+
+/// A picture whose dark parts have lost a pixel all around: what touched at a corner stands apart.
+GreyImage thinned(const GreyImage& image) {
+  GreyImage result = image;
+  cv::Mat picture = as_mat(result);
+  cv::dilate(as_mat(image), picture, cv::Mat());
+  return result;
+}
+
+/// Each corner moved away from the middle, so that the sides move by `distance` [px] in a view from the
+/// front.
+Quad widened(const Quad& quad, double distance) {
+  const Eigen::Vector2d middle = (quad[0] + quad[1] + quad[2] + quad[3]) / 4;
+  Quad result = quad;
+  for (Eigen::Vector2d& corner : result) corner += std::sqrt(2.0) * distance * (corner - middle).normalized();
+  return result;
+}
 
 /// The library's detector with its families.
 class TagDetector {
@@ -67,6 +86,21 @@ class TagDetector {
   TagDetector(const TagDetector&) = delete;
   TagDetector& operator=(const TagDetector&) = delete;
 
+  /// The tags of a grid that fills the crossings of its gaps, as Kalibr's does, touch the squares there: the
+  /// library takes them for one shape. Those it misses are looked for in a thinned picture.
+  std::vector<Tag> detect_grid(const GreyImage& image, int tags) {
+    std::vector<Tag> found = detect(image);
+    if (static_cast<int>(found.size()) >= tags) return found;
+    for (Tag& tag : detect(thinned(image))) {
+      if (std::any_of(found.begin(), found.end(), [&](const Tag& known) { return known.id == tag.id; }))
+        continue;
+      tag.corners = widened(tag.corners, 1);
+      tag.is_rough = true;
+      found.push_back(tag);
+    }
+    return found;
+  }
+
   std::vector<Tag> detect(const GreyImage& image) {
     image_u8_t view = {image.width, image.height, image.width,
                        const_cast<std::uint8_t*>(image.pixels.data())};
@@ -76,7 +110,7 @@ class TagDetector {
       apriltag_detection_t* seen = nullptr;
       zarray_get(list, k, &seen);
       if (seen->hamming > 1 || seen->decision_margin < kLeastMargin) continue;
-      Tag tag{seen->id, {}, borders_.at(seen->family) / seen->family->width_at_border};
+      Tag tag{seen->id, {}, borders_.at(seen->family) / seen->family->width_at_border, false};
       // Counter-clockwise from the lower left, and the centre of the first pixel at (0.5, 0.5).
       for (std::size_t i = 0; i < 4; ++i)
         tag.corners[i] = Eigen::Vector2d(seen->p[3 - i][0] - 0.5, seen->p[3 - i][1] - 0.5);
@@ -169,7 +203,9 @@ Finder apriltag_finder(const Target& target, const Rectifier& rectifier) {
   return [target, grid, &rectifier, detector](const GreyImage& image) {
     Found found;
     Sighting fitted{kImageModel, {}, {}}, library{"apriltag", {}, {}};
-    for (const Tag& tag : chosen(detector->detect(image), target, rectifier, found.reason)) {
+    const std::vector<Tag> seen =
+        grid ? detector->detect_grid(image, target.columns * target.rows) : detector->detect(image);
+    for (const Tag& tag : chosen(seen, target, rectifier, found.reason)) {
       const double outside = grid ? std::min(tag.border, target.marker_gap / target.marker_size) : tag.border;
       Quad seed;
       std::transform(tag.corners.begin(), tag.corners.end(), seed.begin(),
@@ -177,8 +213,10 @@ Finder apriltag_finder(const Target& target, const Rectifier& rectifier) {
       const std::optional<Quad> sides = fit_quad(image, rectifier, seed, tag.border, outside);
       for (int i = 0; i < 4; ++i) {
         const int point = (grid ? 4 * tag.id : 0) + i;
-        library.points.push_back(point);
-        library.pixels.push_back(tag.corners[static_cast<std::size_t>(i)]);
+        if (!tag.is_rough) {
+          library.points.push_back(point);
+          library.pixels.push_back(tag.corners[static_cast<std::size_t>(i)]);
+        }
         if (!sides) continue;
         fitted.points.push_back(point);
         fitted.pixels.push_back(rectifier.distorted((*sides)[static_cast<std::size_t>(i)]));
@@ -186,6 +224,7 @@ Finder apriltag_finder(const Target& target, const Rectifier& rectifier) {
     }
     if (!fitted.points.empty()) found.sightings.push_back(std::move(fitted));
     if (!library.points.empty()) found.sightings.push_back(std::move(library));
+    if (found.sightings.empty() && found.reason.empty()) found.reason = "the tags seen have no clear edges";
     return found;
   };
 }

@@ -12,11 +12,12 @@ using Corners = std::vector<Eigen::Vector2d>;
 
 constexpr double kLargestDisc = 9;     // of a crossing [px]; beyond it little is gained
 constexpr double kSmallestDisc = 2.5;  // [px]
+constexpr int kSearchWidth = 800;      // of the picture that is searched [px]
 constexpr double kLeastShare = 0.8;    // of the corners must show a crossing
 
 /// Corners of a board, row by row.
 struct Grid {
-  int columns, rows;
+  int columns = 0, rows = 0;
   Corners corners;
 
   std::size_t index(int c, int r) const { return static_cast<std::size_t>(r * columns + c); }
@@ -74,17 +75,26 @@ void put_in_order(const GreyImage& image, Grid& grid) {
   }
 }
 
+/// On a picture made small: the corners are only seeds, and what takes long on a large one is what is not
+/// found.
 Corners find_classic(const GreyImage& image, const Target& target) {
+  const double scale = std::min(1.0, static_cast<double>(kSearchWidth) / image.width);
+  cv::Mat picture = as_mat(image);
+  if (scale < 1) cv::resize(picture, picture, {}, scale, scale, cv::INTER_AREA);
   std::vector<cv::Point2f> corners;
-  const bool found = cv::findChessboardCorners(as_mat(image), {target.columns, target.rows}, corners,
-                                               cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE);
-  return found ? to_eigen(corners) : Corners();
+  if (!cv::findChessboardCorners(picture, {target.columns, target.rows}, corners,
+                                 cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE))
+    return {};
+  Corners places;
+  for (const Eigen::Vector2d& corner : to_eigen(corners))
+    places.emplace_back((corner.array() + 0.5) / scale - 0.5);
+  return places;
 }
 
 Corners find_sectors(const GreyImage& image, const Target& target) {
   std::vector<cv::Point2f> corners;
   const bool found = cv::findChessboardCornersSB(as_mat(image), {target.columns, target.rows}, corners,
-                                                 cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY);
+                                                 cv::CALIB_CB_NORMALIZE_IMAGE);
   return found ? to_eigen(corners) : Corners();
 }
 
@@ -125,32 +135,36 @@ Sighting fit_crossings(const GreyImage& image, const Rectifier& rectifier, const
 
 Finder chessboard_finder(const Target& target, const Rectifier& rectifier) {
   return [target, &rectifier](const GreyImage& image) {
+    const int count = target.columns * target.rows;
     Found found;
-    Sighting best{kImageModel, {}, {}};
+    Sighting fitted{kImageModel, {}, {}};
+    Grid seed;
     const Corners classic = find_classic(image, target), sectors = find_sectors(image, target);
     for (const Corners* corners : {&classic, &sectors}) {
       if (corners->empty()) continue;
       Grid grid{target.columns, target.rows, *corners};
       put_in_order(image, grid);
-      if (corners == &classic)
-        found.sightings.push_back(
-            all_points("corner_sub_pix", corner_sub_pix(image, grid.corners, half_window(grid))));
-      else
-        found.sightings.push_back(all_points("sectors", grid.corners));
-      Sighting fitted = fit_crossings(image, rectifier, grid);
-      if (fitted.points.size() > best.points.size()) best = std::move(fitted);
+      if (corners == &sectors) found.sightings.push_back(all_points("sectors", grid.corners));
+      if (static_cast<int>(fitted.points.size()) == count) continue;
+      Sighting candidate = fit_crossings(image, rectifier, grid);
+      if (candidate.points.size() <= fitted.points.size()) continue;
+      fitted = std::move(candidate);
+      seed = std::move(grid);
     }
-    const double share = static_cast<double>(best.points.size()) / (target.columns * target.rows);
-    if (!found.sightings.empty() && share < kLeastShare) {
-      found.sightings.clear();
-      found.reason = "a chessboard was found, but only " + std::to_string(best.points.size()) + " of its " +
-                     std::to_string(target.columns * target.rows) + " corners show a crossing";
-    } else if (found.sightings.empty()) {
+    if (classic.empty() && sectors.empty()) {
       found.reason = "no chessboard of " + std::to_string(target.columns) + " x " +
                      std::to_string(target.rows) + " inner corners";
-    } else {
-      found.sightings.insert(found.sightings.begin(), std::move(best));
+      return found;
     }
+    if (static_cast<double>(fitted.points.size()) < kLeastShare * count) {
+      found.sightings.clear();
+      found.reason = "a chessboard was found, but only " + std::to_string(fitted.points.size()) + " of its " +
+                     std::to_string(count) + " corners show a crossing";
+      return found;
+    }
+    found.sightings.push_back(
+        {"corner_sub_pix", fitted.points, corner_sub_pix(image, fitted.pixels, half_window(seed))});
+    found.sightings.push_back(std::move(fitted));
     return found;
   };
 }

@@ -13,6 +13,7 @@ namespace {
 using Places = std::vector<Eigen::Vector2d>;
 
 constexpr double kLeastShare = 0.8;  // of the dots must show an ellipse
+constexpr double kBigger = 1.5;      // area of the dot at the origin over that of the others
 
 /// Dots of the grid as OpenCV orders them: row by row from one of the corners.
 Places find_grid(const GreyImage& image, int columns, int rows) {
@@ -49,7 +50,22 @@ Places find_grid(const GreyImage& image, int columns, int rows) {
 struct FittedGrid {
   Places centres;             ///< of the ellipses, rectified px
   std::vector<double> areas;  ///< [px^2]; zero where none was found
+  std::vector<double> dark;   ///< pixels darker than half way around each [px^2]; known of cut dots too
 };
+
+/// Pixels of a disc nearer in brightness to its darkest than to its brightest.
+double dark_pixels(const GreyImage& image, const Eigen::Vector2d& pixel, double radius) {
+  std::vector<int> values;
+  for (int y = static_cast<int>(pixel.y() - radius); y <= static_cast<int>(pixel.y() + radius); ++y)
+    for (int x = static_cast<int>(pixel.x() - radius); x <= static_cast<int>(pixel.x() + radius); ++x)
+      if (x >= 0 && y >= 0 && x < image.width && y < image.height &&
+          (Eigen::Vector2d(x, y) - pixel).norm() < radius)
+        values.push_back(image.at(x, y));
+  if (values.empty()) return 0;
+  const auto [dark, bright] = std::minmax_element(values.begin(), values.end());
+  const int middle = (*dark + *bright) / 2;
+  return static_cast<double>(std::count_if(values.begin(), values.end(), [&](int v) { return v < middle; }));
+}
 
 FittedGrid fit_grid(const GreyImage& image, const Rectifier& rectifier, const Places& seeds, int columns,
                     int rows) {
@@ -63,16 +79,19 @@ FittedGrid fit_grid(const GreyImage& image, const Rectifier& rectifier, const Pl
     const Eigen::Vector2d& place = places[static_cast<std::size_t>(i)];
     const double spacing = std::min((places[static_cast<std::size_t>(beside)] - place).norm(),
                                     (places[static_cast<std::size_t>(below)] - place).norm());
-    const std::optional<Dot> dot = fit_dot(image, rectifier, place, 0.62 * spacing);
+    std::optional<Dot> dot = fit_dot(image, rectifier, place, 0.6 * spacing);
+    if (!dot) dot = fit_dot(image, rectifier, place, 0.75 * spacing);  // the big one reaches farther
     grid.centres.push_back(dot ? dot->centre : place);
     grid.areas.push_back(dot ? dot->area : 0);
+    grid.dark.push_back(dark_pixels(image, seeds[static_cast<std::size_t>(i)], 0.6 * spacing));
   }
   return grid;
 }
 
-/// Where OpenCV's first row and column may begin: turn by quarter turns, corners in order around the grid.
-Places turned(const Places& places, int columns, int rows, int turn, bool mirrored) {
-  Places result(places.size());
+/// The grid read from another of its corners: by quarter turns, and mirrored or not. Which dot then comes
+/// i-th.
+std::vector<std::size_t> turned(int columns, int rows, int turn, bool mirrored) {
+  std::vector<std::size_t> order(static_cast<std::size_t>(columns * rows));
   for (int r = 0; r < rows; ++r)
     for (int c = 0; c < columns; ++c) {
       int x = mirrored ? columns - 1 - c : c, y = r;
@@ -85,16 +104,39 @@ Places turned(const Places& places, int columns, int rows, int turn, bool mirror
         x = columns - 1 - y;
         y = t;
       }
-      result[static_cast<std::size_t>(r * columns + c)] = places[static_cast<std::size_t>(y * columns + x)];
+      order[static_cast<std::size_t>(r * columns + c)] = static_cast<std::size_t>(y * columns + x);
     }
-  return result;
+  return order;
 }
 
 /// Above zero where x turns to y clockwise in the picture, as x right and y down do.
-double handedness(const Places& places, int columns, int rows) {
-  const Eigen::Vector2d x = places[static_cast<std::size_t>(columns - 1)] - places[0];
-  const Eigen::Vector2d y = places[static_cast<std::size_t>((rows - 1) * columns)] - places[0];
+double handedness(const Places& places, const std::vector<std::size_t>& order, int columns, int rows) {
+  const Eigen::Vector2d& origin = places[order[0]];
+  const Eigen::Vector2d x = places[order[static_cast<std::size_t>(columns - 1)]] - origin;
+  const Eigen::Vector2d y = places[order[static_cast<std::size_t>((rows - 1) * columns)]] - origin;
   return x.x() * y.y() - x.y() * y.x();
+}
+
+/// Rows run down from the first dot, or up from a bigger one. Empty where no corner has a bigger dot from
+/// where they do.
+std::vector<std::size_t> right_order(const Target& target, const FittedGrid& grid) {
+  const int columns = target.columns, rows = target.rows;
+  std::vector<std::size_t> best;
+  double biggest = target.has_origin ? kBigger : 0;
+  for (const bool mirrored : {false, true})
+    for (int turn = 0; turn < 4; ++turn) {
+      if (turn % 2 == 1 && columns != rows) continue;
+      std::vector<std::size_t> order = turned(columns, rows, turn, mirrored);
+      const bool down = handedness(grid.centres, order, columns, rows) > 0;
+      if (down == target.has_origin) continue;
+      // Against its neighbours: perspective makes a whole side of the grid bigger.
+      const double beside = grid.dark[order[1]], below = grid.dark[order[static_cast<std::size_t>(columns)]];
+      const double size = target.has_origin ? grid.dark[order[0]] / std::max(1.0, (beside + below) / 2) : 1;
+      if (size <= biggest) continue;
+      biggest = size;
+      best = std::move(order);
+    }
+  return best;
 }
 
 double local_scale(const Eigen::Matrix3d& H, const Eigen::Vector2d& place, double step) {
@@ -130,51 +172,36 @@ void correct_for_perspective(const Target& target, FittedGrid& grid) {
   for (std::size_t k = 0; k < seen.size(); ++k) grid.centres[seen[k]] = centres[k];
 }
 
-/// The order in which the biggest dot comes first and rows run the right way round; empty where there is
-/// none.
-Places with_origin_first(const GreyImage& image, const Rectifier& rectifier, const Places& places,
-                         const Target& target, std::string& reason) {
-  const int columns = target.columns, rows = target.rows;
-  const FittedGrid grid = fit_grid(image, rectifier, places, columns, rows);
-  std::vector<double> areas = grid.areas;
-  std::nth_element(areas.begin(), areas.begin() + static_cast<std::ptrdiff_t>(areas.size() / 2), areas.end());
-  const double usual = areas[areas.size() / 2];
-  // Counter-clockwise in the picture: rows run up from the origin.
-  for (const bool mirrored : {false, true})
-    for (int turn = 0; turn < 4; ++turn) {
-      if (turn % 2 == 1 && columns != rows) continue;
-      Places candidate = turned(places, columns, rows, turn, mirrored);
-      if (handedness(candidate, columns, rows) >= 0) continue;
-      const auto first = std::find(places.begin(), places.end(), candidate.front());
-      if (grid.areas[static_cast<std::size_t>(first - places.begin())] > 1.5 * usual) return candidate;
-    }
-  reason = "no big dot in the corner where a grid of " + std::to_string(columns) + " x " +
-           std::to_string(rows) + " has its origin";
-  return {};
-}
-
 }  // namespace
 
 Finder circle_finder(const Target& target, const Rectifier& rectifier) {
   return [target, &rectifier](const GreyImage& image) {
     Found found;
-    Places places = find_grid(image, target.columns, target.rows);
+    const Places places = find_grid(image, target.columns, target.rows);
     if (places.empty()) {
       found.reason =
           "no grid of " + std::to_string(target.columns) + " x " + std::to_string(target.rows) + " dots";
       return found;
     }
-    if (target.has_origin)
-      places = with_origin_first(image, rectifier, places, target, found.reason);
-    else if (handedness(places, target.columns, target.rows) < 0)
-      places = turned(places, target.columns, target.rows, 0, true);
-    if (places.empty()) return found;
-    FittedGrid grid = fit_grid(image, rectifier, places, target.columns, target.rows);
+    FittedGrid unordered = fit_grid(image, rectifier, places, target.columns, target.rows);
+    const std::vector<std::size_t> order = right_order(target, unordered);
+    if (order.empty()) {
+      found.reason = "no big dot in the corner where a grid of " + std::to_string(target.columns) + " x " +
+                     std::to_string(target.rows) + " has its origin";
+      return found;
+    }
+    FittedGrid grid;
+    Places seeds;
+    for (const std::size_t i : order) {
+      seeds.push_back(places[i]);
+      grid.centres.push_back(unordered.centres[i]);
+      grid.areas.push_back(unordered.areas[i]);
+    }
     correct_for_perspective(target, grid);
     Sighting fitted{kImageModel, {}, {}}, blobs{"blobs", {}, {}};
     for (std::size_t i = 0; i < places.size(); ++i) {
       blobs.points.push_back(static_cast<int>(i));
-      blobs.pixels.push_back(places[i]);
+      blobs.pixels.push_back(seeds[i]);
       if (!(grid.areas[i] > 0)) continue;
       fitted.points.push_back(static_cast<int>(i));
       fitted.pixels.push_back(rectifier.distorted(grid.centres[i]));

@@ -14,7 +14,9 @@ namespace {
 constexpr double kSharpest = 0.2;  // blur of an edge below that of a pixel's own width [px]
 constexpr double kBluntest = 6;    // [px]
 constexpr double kContrast = 8;    // least difference of brightness that counts as an edge, of 255
-constexpr double kMisfit = 0.2;    // largest rms left over, as a share of the contrast
+constexpr double kBowEvidence =
+    25;                          // gain in squared error a bend must show, in those of a pixel: five sigma
+constexpr double kMisfit = 0.2;  // largest rms left over, as a share of the contrast
 
 double erf_step(double distance, double blur) { return std::erf(distance / (std::sqrt(2.0) * blur)); }
 
@@ -53,35 +55,54 @@ bool whole_disc(const Rectifier& rectifier, const Eigen::Vector2d& centre, doubl
          pixel.y() + radius <= rectifier.height() - 1;
 }
 
-/// Line through two points, a x + b y + c = 0.
-Eigen::Vector3d line_through(const Eigen::Vector2d& p, const Eigen::Vector2d& q) {
-  return p.homogeneous().cross(q.homogeneous());
-}
+/// The edge of one side of a marker: straight, or bent as the paper is.
+struct Side {
+  Eigen::Vector2d middle, along, across;
+  double half;         ///< length of the part that was fitted [px]
+  double first, last;  ///< offsets across at its ends [px]
+  double bow = 0;      ///< offset of the middle from the line between the ends [px]
 
-/// One side of a marker, from p to q: the line of its edge, as two points.
-std::optional<std::array<Eigen::Vector2d, 2>> fit_side(const GreyImage& image, const Rectifier& rectifier,
-                                                       const Eigen::Vector2d& p, const Eigen::Vector2d& q,
-                                                       double inside, double outside, double ends) {
-  using Vector = Eigen::Matrix<double, 7, 1>;
-  const Eigen::Vector2d middle = (p + q) / 2, along = (q - p).normalized(), across(-along.y(), along.x());
-  const double half = (q - p).norm() / 2 - ends;
-  if (half < 2) return std::nullopt;
+  /// The tangent where a point lies along the side, a x + b y + c = 0.
+  Eigen::Vector3d tangent(const Eigen::Vector2d& point) const {
+    const double t = (point - middle).dot(along) / half;
+    const double offset = (first * (1 - t) + last * (1 + t)) / 2 + bow * (1 - t * t);
+    const double slope = (last - first) / 2 - 2 * bow * t;
+    const Eigen::Vector2d place = middle + t * half * along + offset * across;
+    const Eigen::Vector2d direction = half * along + slope * across;
+    return place.homogeneous().cross((place + direction).homogeneous());
+  }
+};
+
+/// Of the side from p to q, with the inside of the marker on the right of it.
+std::optional<Side> fit_side(const GreyImage& image, const Rectifier& rectifier, const Eigen::Vector2d& p,
+                             const Eigen::Vector2d& q, double inside, double outside, double ends) {
+  using Vector = Eigen::Matrix<double, 8, 1>;
+  Side side;
+  side.middle = (p + q) / 2;
+  side.along = (q - p).normalized();
+  side.across = {-side.along.y(), side.along.x()};
+  side.half = (q - p).norm() / 2 - ends;
+  if (side.half < 2) return std::nullopt;
   const auto split = [&](const Eigen::Vector2d& place) {
-    const Eigen::Vector2d offset = place - middle;
-    return Eigen::Vector2d(offset.dot(along) / half, offset.dot(across));
+    const Eigen::Vector2d offset = place - side.middle;
+    return Eigen::Vector2d(offset.dot(side.along) / side.half, offset.dot(side.across));
   };
-  const std::vector<Sample> samples = samples_near(
-      image, rectifier, middle, half + std::max(inside, outside), [&](const Eigen::Vector2d& place) {
-        const Eigen::Vector2d t = split(place);
-        return std::abs(t[0]) <= 1 && t[1] >= -inside && t[1] <= outside;
-      });
-  // Offsets of the edge at both ends, blur, brightness on either side at both ends.
-  const auto model = [&](const Vector& x, const Eigen::Vector2d& place) {
+  const std::vector<Sample> samples =
+      samples_near(image, rectifier, side.middle, side.half + std::max(inside, outside),
+                   [&](const Eigen::Vector2d& place) {
+                     const Eigen::Vector2d t = split(place);
+                     return std::abs(t[0]) <= 1 && t[1] >= -inside && t[1] <= outside;
+                   });
+  // Offsets of the edge at both ends, blur, brightness on either side at both ends, bow.
+  const auto bent = [&](const Vector& x, const Eigen::Vector2d& place) {
     const Eigen::Vector2d t = split(place);
     const double u = (1 + t[0]) / 2;
-    const double edge = (1 - u) * x[0] + u * x[1];
+    const double edge = (1 - u) * x[0] + u * x[1] + x[7] * (1 - t[0] * t[0]);
     const double low = (1 - u) * x[3] + u * x[4], high = (1 - u) * x[5] + u * x[6];
     return 0.5 * (low + high) + 0.5 * (high - low) * erf_step(t[1] - edge, blur_of(x[2]));
+  };
+  const auto straight = [&](const Eigen::Matrix<double, 7, 1>& x, const Eigen::Vector2d& place) {
+    return bent((Vector() << x, 0).finished(), place);
   };
   double low = 0, high = 0;
   int lows = 0, highs = 0;
@@ -93,18 +114,28 @@ std::optional<std::array<Eigen::Vector2d, 2>> fit_side(const GreyImage& image, c
   if (lows < 8 || highs < 8) return std::nullopt;
   low /= lows;
   high /= highs;
-  Vector start, scales;
+  Eigen::Matrix<double, 7, 1> start, scales;
   start << 0, 0, 1, low, low, high, high;
   scales << 0.1, 0.1, 0.1, 5, 5, 5, 5;
-  const ShapeFit<7> fit = fit_shape<7>(model, start, scales, samples);
-  const Vector& x = fit.parameters;
+  const ShapeFit<7> line = fit_shape<7>(straight, start, scales, samples);
+  Vector x = (Vector() << line.parameters, 0).finished();
+  double rms = line.rms;
+  // Paper bends, but a bow that is not there makes the corners twice as unsure: only where it is plain.
+  const ShapeFit<8> curve = fit_shape<8>(bent, x, (Vector() << scales, 0.1).finished(), samples);
+  if (line.rms * line.rms >
+      curve.rms * curve.rms * (1 + kBowEvidence / static_cast<double>(samples.size()))) {
+    x = curve.parameters;
+    rms = curve.rms;
+  }
   const double contrast = std::abs((x[5] + x[6] - x[3] - x[4]) / 2);
   const double within = std::min(inside, outside);
-  if (contrast < kContrast || fit.rms > kMisfit * contrast || std::abs(x[0]) > within ||
-      std::abs(x[1]) > within)
+  if (!x.allFinite() || contrast < kContrast || rms > kMisfit * contrast || std::abs(x[0]) > within ||
+      std::abs(x[1]) > within || std::abs(x[7]) > within)
     return std::nullopt;
-  return std::array<Eigen::Vector2d, 2>{middle - half * along + x[0] * across,
-                                        middle + half * along + x[1] * across};
+  side.first = x[0];
+  side.last = x[1];
+  side.bow = x[7];
+  return side;
 }
 
 }  // namespace
@@ -161,26 +192,29 @@ std::optional<Quad> fit_quad(const GreyImage& image, const Rectifier& rectifier,
   for (int round = 0; round < 2; ++round) {
     Eigen::Vector2d middle = Eigen::Vector2d::Zero();
     for (const Eigen::Vector2d& corner : quad) middle += corner / 4;
-    std::array<Eigen::Vector3d, 4> lines;
+    std::array<Side, 4> sides;
     for (std::size_t i = 0; i < 4; ++i) {
       Eigen::Vector2d p = quad[i], q = quad[(i + 1) % 4];
-      // Across a side from p to q points left of it; `inside` is to count below zero.
       const Eigen::Vector2d along = (q - p).normalized(), across(-along.y(), along.x());
-      const bool outward = across.dot((p + q) / 2 - middle) > 0;
-      if (!outward) std::swap(p, q);
+      if (across.dot((p + q) / 2 - middle) < 0) std::swap(p, q);
       // Bands are a share of the side seen across, which a slanted view narrows.
       const double depth = 2 * std::abs(across.dot((p + q) / 2 - middle));
       const double in = std::clamp(inside * depth - 1, 1.5, 5.0),
                    out = std::clamp(outside * depth - 1, 1.5, 5.0);
-      const auto side = fit_side(image, rectifier, p, q, in, out, std::max(2.0, std::min(in, out)));
+      const std::optional<Side> side =
+          fit_side(image, rectifier, p, q, in, out, std::max(2.0, std::min(in, out)));
       if (!side) return std::nullopt;
-      lines[i] = line_through((*side)[0], (*side)[1]);
+      sides[i] = *side;
     }
     for (std::size_t i = 0; i < 4; ++i) {
-      const Eigen::Vector3d corner = lines[(i + 3) % 4].cross(lines[i]);
-      if (std::abs(corner.z()) < 1e-12) return std::nullopt;
-      quad[i] = corner.hnormalized();
-      if (!((quad[i] - seed[i]).norm() < 5)) return std::nullopt;
+      Eigen::Vector2d corner = quad[i];
+      for (int step = 0; step < 4; ++step) {
+        const Eigen::Vector3d crossing = sides[(i + 3) % 4].tangent(corner).cross(sides[i].tangent(corner));
+        if (std::abs(crossing.z()) < 1e-12) return std::nullopt;
+        corner = crossing.hnormalized();
+      }
+      if (!((corner - seed[i]).norm() < 5)) return std::nullopt;
+      quad[i] = corner;
     }
   }
   return quad;

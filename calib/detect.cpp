@@ -18,6 +18,8 @@
 namespace flash::calib {
 namespace {
 
+constexpr double kAlwaysGood = 2;  // small markers, seen aslant, vary by that much [px]
+
 Observation observe(const Frame& frame, const Sighting& sighting) {
   Observation observation;
   observation.image = frame.name;
@@ -88,7 +90,7 @@ void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detect
     if (!detection.readings.empty()) rms.push_back(detection.readings.front().observation.pose_rms);
   if (rms.empty()) return;
   std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
-  const double limit = std::max(1.0, settings.largest_ratio * rms[rms.size() / 2]);
+  const double limit = std::max(kAlwaysGood, settings.largest_ratio * rms[rms.size() / 2]);
   for (Detection& detection : detections) {
     if (detection.readings.empty()) continue;
     const double found = detection.readings.front().observation.pose_rms;

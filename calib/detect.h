@@ -26,7 +26,7 @@ struct DetectSettings {
   int threads = 0;           ///< 0: as many as there are processors
   std::string cache;         ///< folder that keeps what was found, by content; empty: none
   double largest_rms = 10;   ///< a view whose pose fits no better shows no target [px]
-  double largest_ratio = 6;  ///< nor one worse than that many times the usual view of the set, above 1 px
+  double largest_ratio = 6;  ///< nor one worse than that many times the usual view of the set, above 2 px
 };
 
 /// Looks for the target in every picture of a set; a detection for each frame, in their order. Without
