@@ -3,6 +3,7 @@
 #include <metis.h>
 
 #include <algorithm>
+#include <mutex>
 #include <numeric>
 
 #include "sim/dense_front.h"
@@ -49,6 +50,9 @@ std::vector<int> nested_dissection(const BlockPattern& pattern) {
     idx_t options[METIS_NOPTIONS];
     METIS_SetDefaultOptions(options);
     options[METIS_OPTION_SEED] = 1;
+    // METIS seeds and draws from the C library's one generator: two threads would disturb each other's order.
+    static std::mutex generator;
+    const std::lock_guard lock(generator);
     METIS_NodeND(&size, starts.data(), adjacency.data(), nullptr, options, order.data(), position.data());
   }
   return {order.begin(), order.end()};
