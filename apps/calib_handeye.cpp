@@ -114,6 +114,9 @@ int run_handeye(const HandEyeOptions& options) {
   calib::CalibrateSettings settings;
   constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
   if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
+  for (const calib::Frame& frame : dataset.frames)
+    if (frame.angles) settings.angles.push_back(*frame.angles);
+  if (settings.angles.size() != dataset.frames.size()) settings.angles.clear();
   const Solved solved = solve(setup, *dataset.camera, target, detections, settings);
 
   const calib::ExtrinsicsInputs inputs{

@@ -136,16 +136,17 @@ class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1> {
 
 class CorrectionPrior final : public ceres::SizedCostFunction<6, 7> {
  public:
-  CorrectionPrior(double translation, double rotation)
-      : translation_(1 / translation), rotation_(1 / rotation) {}
+  CorrectionPrior(double translation, double rotation, Eigen::Vector3d pivot)
+      : translation_(1 / translation), rotation_(1 / rotation), pivot_(std::move(pivot)) {}
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const Eigen::Isometry3d D = pose_of(x[0]);
     const Eigen::Vector3d angle = rotation_log(D.linear());
-    Eigen::Map<Vector6d>(residual, 6) << translation_ * D.translation(), rotation_ * angle;
+    Eigen::Map<Vector6d>(residual, 6) << translation_ * (D * pivot_ - pivot_), rotation_ * angle;
     if (!jacobians) return true;
     Matrix6d d = Matrix6d::Zero();
     d.topLeftCorner<3, 3>() = translation_ * D.linear();
+    d.topRightCorner<3, 3>() = -translation_ * D.linear() * skew(pivot_);
     d.bottomRightCorner<3, 3>() = rotation_ * right_jacobian_inverse(angle);
     set_pose_jacobian(jacobians[0], d);
     return true;
@@ -153,6 +154,7 @@ class CorrectionPrior final : public ceres::SizedCostFunction<6, 7> {
 
  private:
   double translation_, rotation_;
+  Eigen::Vector3d pivot_;
 };
 
 /// The bundle as blocks of numbers, as Ceres wants it.
@@ -221,8 +223,9 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     if (!problem.HasParameterBlock(correction)) continue;
     if (unknowns.corrections) {
       const auto arm = static_cast<std::size_t>(bundle.poses[i].arm);
-      problem.AddResidualBlock(new CorrectionPrior(noise.translation[arm], noise.rotation[arm]), nullptr,
-                               correction);
+      problem.AddResidualBlock(
+          new CorrectionPrior(noise.translation[arm], noise.rotation[arm], bundle.pivots[arm]), nullptr,
+          correction);
       order.AddElementToGroup(correction, 0);
     } else {
       hold(problem, correction);

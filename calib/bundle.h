@@ -36,6 +36,8 @@ struct Bundle {
   std::vector<Eigen::Isometry3d> targets;  ///< Z: in the world (eye-in-hand) or a gripper
   std::vector<double> scales;              ///< of each target: true size over stated size
   std::vector<double> time_offsets;        ///< tau of each arm [s]
+  std::vector<Eigen::Vector3d> pivots;     ///< of each arm, in its gripper: where errors of rotation and of
+                                           ///< translation are independent [m]
   std::vector<RobotPose> poses;
   std::vector<BundleView> views;
 };
@@ -70,8 +72,8 @@ struct BundleSummary {
 };
 
 /// Minimises the sum over all corners of rho(|pixel - project(q)|^2 / corner^2) and, with corrections D, the
-/// prior |dt|^2 / translation^2 + |dtheta|^2 / rotation^2 of each. Levenberg-Marquardt on the manifold; the
-/// corrections are eliminated first.
+/// prior |dt|^2 / translation^2 + |dtheta|^2 / rotation^2 of each, dt being the motion of the arm's pivot.
+/// Levenberg-Marquardt on the manifold; the corrections are eliminated first.
 BundleSummary solve_bundle(Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings = {});
 
 /// The closed chain through one view, with the correction of the robot's pose or without.

@@ -41,14 +41,35 @@ void expect_enough(std::size_t used, std::size_t all, int least) {
                          " are needed, and 12 or more for an answer to trust; add views");
 }
 
-/// Squared length of each correction in its own noise levels: near chi-square with six degrees of freedom.
+/// Refuses input that closes only when it is read otherwise than stated, or not at all.
+void expect_convention(Setup setup, const std::vector<Observation>& observations,
+                       const std::vector<Symmetry>& symmetries, const Consistency& stated,
+                       const CalibrateSettings& settings) {
+  const std::optional<Finding> finding =
+      diagnose(setup, observations, symmetries, stated, settings.angles, settings.doctor);
+  if (finding) throw data::InputError(finding->sentence);
+  if (stated.found && stated.score < settings.hopeless) return;
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "robot and camera do not tell of the same motion: most views close to no better than %.1f deg and "
+      "%.0f mm, and no other convention explains them; check that each image stands beside its pose",
+      stated.rotation / kDegree, 1e3 * stated.translation);
+  throw data::InputError(text);
+}
+
+/// Squared length of each correction in its own noise levels: near chi-square with six degrees of freedom. No
+/// robot is taken to be better than 0.1 mm and 0.1 mrad.
 std::vector<double> squared_corrections(const Refinement& refined) {
+  constexpr double kLeast = 1e-4;
   std::vector<double> squared;
   for (const RobotPose& pose : refined.bundle.poses) {
     const auto arm = static_cast<std::size_t>(pose.arm);
-    const Vector6d xi = motion_between(Eigen::Isometry3d::Identity(), pose.correction);
-    squared.push_back(xi.head<3>().squaredNorm() / std::pow(refined.noise.translation[arm], 2) +
-                      xi.tail<3>().squaredNorm() / std::pow(refined.noise.rotation[arm], 2));
+    const Eigen::Vector3d& pivot = refined.bundle.pivots[arm];
+    squared.push_back((pose.correction * pivot - pivot).squaredNorm() /
+                          std::pow(std::max(kLeast, refined.noise.translation[arm]), 2) +
+                      rotation_log(pose.correction.linear()).squaredNorm() /
+                          std::pow(std::max(kLeast, refined.noise.rotation[arm]), 2));
   }
   return squared;
 }
@@ -144,10 +165,10 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
   result.held_out = *result.comparison.back().held_out;
 }
 
-/// The target's size as one more unknown: its linear estimate from the final state, twice.
+/// The target's size as one more unknown.
 ScaleCheck check_scale(const Refinement& refined, const RefineSettings& settings) {
   RefineSettings with_scale = settings;
-  with_scale.estimate_noise = false;
+  with_scale.estimate_pivots = false;
   with_scale.noise = refined.noise;
   with_scale.bundle.unknowns.scales = true;
   const Refinement scaled = refine(refined.bundle, with_scale);
@@ -202,6 +223,7 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   if (!reason.empty()) throw data::InputError(reason);
 
   result.repair = repair_views(setup, all, symmetries, settings.repair);
+  expect_convention(setup, all, symmetries, result.repair.consistency, settings);
   std::vector<Observation> observations = used_observations(result.repair, &result.used);
   expect_enough(result.repair.consistency.found ? observations.size() : 0, all.size(), settings.least_views);
 

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/doctor.h"
 #include "calib/hand_eye.h"
 #include "calib/observability.h"
 #include "calib/reference_methods.h"
@@ -12,8 +13,11 @@ namespace flash::calib {
 
 struct CalibrateSettings {
   RepairSettings repair;
+  DoctorSettings doctor;
+  std::vector<Eigen::Vector3d> angles;  ///< of each view, where the robot's file gave angles [rad]
   RefineSettings refine;
   int least_views = 4;      ///< fewer are refused
+  double hopeless = 0.2;    ///< closing error of the majority beyond which nothing is solved, as `suspicious`
   double surprise = 35;     ///< squared size of a correction over that of most views, 6 degrees of freedom
   int folds = 10;           ///< of the held-out residuals
   bool check_scale = true;  ///< estimate the target's size too, for the warning

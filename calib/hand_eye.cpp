@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/linearization.h"
+#include "calib/projection.h"
 
 namespace flash::calib {
 namespace {
@@ -48,6 +49,47 @@ void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, 
   solve_bundle(bundle, noise, settings);
 }
 
+/// Middle of what each arm's gripper saw or held, in the gripper.
+std::vector<Eigen::Vector3d> target_places(const Bundle& bundle) {
+  std::vector<Eigen::Vector3d> places(bundle.bases.size(), Eigen::Vector3d::Zero());
+  std::vector<double> counts(places.size(), 0);
+  for (const BundleView& view : bundle.views) {
+    const RobotPose& pose = bundle.poses[static_cast<std::size_t>(view.pose)];
+    const auto arm = static_cast<std::size_t>(pose.arm), target = static_cast<std::size_t>(view.target),
+               camera = static_cast<std::size_t>(view.camera);
+    const Eigen::Vector3d centre = view.points.rowwise().mean();
+    places[arm] += bundle.setup == Setup::eye_to_hand
+                       ? bundle.targets[target] * centre
+                       : bundle.cameras[camera] * (predicted_pose(bundle, view) * centre);
+    ++counts[arm];
+  }
+  for (std::size_t arm = 0; arm < places.size(); ++arm) places[arm] /= std::max(1.0, counts[arm]);
+  return places;
+}
+
+/// Moves the pivots to the share of the way to the target that the restricted likelihood prefers, if it does
+/// so clearly. Errors of a lens turn the view about the target, those of a wrist about the gripper.
+bool choose_pivots(Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings,
+                   const std::vector<double>& floor) {
+  constexpr double kClearly = 2;  // of the deviance, for one more parameter (Akaike 1974)
+  if (!settings.unknowns.corrections) return false;
+  const std::vector<Eigen::Vector3d> places = target_places(bundle);
+  const std::vector<double> start = to_components(noise);
+  Bundle trial = bundle;
+  double least = 0, share_of_least = 0;
+  for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
+    for (std::size_t arm = 0; arm < places.size(); ++arm) trial.pivots[arm] = share * places[arm];
+    const LinearModel model = linearize(trial, noise, settings);
+    const VarianceComponents estimate = estimate_variance_components(model, start, floor);
+    const double deviance = solve_linear(model, estimate.sigmas).deviance + (share > 0 ? kClearly : 0);
+    if (share > 0 && deviance >= least) continue;
+    least = deviance;
+    share_of_least = share;
+  }
+  for (std::size_t arm = 0; arm < places.size(); ++arm) bundle.pivots[arm] = share_of_least * places[arm];
+  return share_of_least > 0;
+}
+
 }  // namespace
 
 NoiseLevels uniform_noise(const Bundle& bundle, double corner, double rotation, double translation,
@@ -64,6 +106,7 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
   const std::vector<double> floor = to_components(
       uniform_noise(result.bundle, kFloorPixels, kFloorRotation, kFloorTranslation, kFloorDepth));
   LinearModel model;
+  bool pivots_chosen = !settings.estimate_noise || !settings.estimate_pivots;
   for (; result.rounds < settings.rounds && !result.converged; ++result.rounds) {
     const BundleSummary summary = solve_bundle(result.bundle, result.noise, settings.bundle);
     model = linearize(result.bundle, result.noise, settings.bundle);
@@ -77,12 +120,35 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
     result.noise_log_sd = estimate.log_covariance.diagonal().cwiseSqrt();
     if (!result.converged) result.noise = to_noise(estimate.sigmas, result.noise);
     result.covariance = adjusted_covariance(model, estimate);
+    if (result.converged && !pivots_chosen) {
+      pivots_chosen = true;
+      result.converged = !choose_pivots(result.bundle, result.noise, settings.bundle, floor);
+    }
   }
   if (settings.estimate_noise) return result;
   const LinearSolution solution = solve_linear(model, to_components(result.noise));
   result.covariance = solution.information.ldlt().solve(
       Eigen::MatrixXd::Identity(solution.information.rows(), solution.information.cols()));
   return result;
+}
+
+Eigen::Isometry3d fitted_pose(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                              const Eigen::Matrix2Xd& pixels, Eigen::Isometry3d T_camera_target) {
+  const IntrinsicsVector intrinsics = to_vector(camera);
+  for (int iteration = 0; iteration < 10; ++iteration) {
+    Matrix6d H = Matrix6d::Zero();
+    Vector6d g = Vector6d::Zero();
+    for (Eigen::Index i = 0; i < points.cols(); ++i) {
+      Eigen::Matrix<double, 2, 3> d_q;
+      const Eigen::Vector2d r = project(intrinsics, T_camera_target * points.col(i), &d_q) - pixels.col(i);
+      Eigen::Matrix<double, 2, 6> J;
+      J << d_q * T_camera_target.linear(), -d_q * T_camera_target.linear() * skew(points.col(i));
+      H += J.transpose() * J;
+      g += J.transpose() * r;
+    }
+    T_camera_target = moved(T_camera_target, -H.ldlt().solve(g));
+  }
+  return T_camera_target;
 }
 
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
@@ -94,6 +160,7 @@ Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eige
                 .targets = {seed.Z},
                 .scales = {1.0},
                 .time_offsets = {0.0},
+                .pivots = {Eigen::Vector3d::Zero()},
                 .poses = {},
                 .views = {}};
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -137,7 +204,10 @@ HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_c
     const Bundle test = subset(bundle, result.fold, part, true);
     for (const BundleView& view : test.views) {
       const Eigen::Isometry3d predicted = predicted_pose(train, view, false);
-      const Eigen::Isometry3d& seen = T_camera_target[static_cast<std::size_t>(view.pose)];
+      // With the lens as it was solved for.
+      const Eigen::Isometry3d seen =
+          fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], view.points, view.pixels,
+                      T_camera_target[static_cast<std::size_t>(view.pose)]);
       const Eigen::Vector3d centre = view.points.rowwise().mean();
       const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
       result.px += residuals(train, view, false).squaredNorm();

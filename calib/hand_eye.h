@@ -12,8 +12,10 @@ struct RefineSettings {
   bool estimate_noise = true;  ///< from the data, by variance components; otherwise `noise` stands
   NoiseLevels noise;           ///< start, or the truth; empty: 0.5 px, 3 mrad, 3 mm, 3 mm of depth
   BundleSettings bundle;
-  int rounds = 15;          ///< of bundle and variance components in turn
-  double tolerance = 1e-3;  ///< stop when new noise levels would lower the deviance by less than this
+  bool estimate_pivots = true;  ///< where along the way from gripper to target rotation and translation
+                                ///< errors are independent; the frame a robot reports need not be that place
+  int rounds = 15;              ///< of bundle and variance components in turn
+  double tolerance = 1e-3;      ///< stop when new noise levels would lower the deviance by less than this
 };
 
 struct Refinement {
@@ -37,6 +39,10 @@ Refinement refine(Bundle bundle, const RefineSettings& settings = {});
 /// The bundle of one camera and one arm. points: the target's, 3 x N; poses: seed.
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
                    const std::vector<Observation>& observations, const HandEyePoses& seed);
+
+/// The pose that fits the pixels best, by Gauss and Newton from a pose nearby.
+Eigen::Isometry3d fitted_pose(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                              const Eigen::Matrix2Xd& pixels, Eigen::Isometry3d T_camera_target);
 
 /// Residuals of views that took no part in the solution, predicted without a correction.
 struct HeldOut {

@@ -69,14 +69,16 @@ Eigen::MatrixXd depth_gram(const Bundle& bundle, const BundleView& view, const U
 }
 
 /// The prior of a correction, linearised: its rotation and its translation.
-std::pair<Eigen::MatrixXd, Eigen::MatrixXd> prior_grams(const Eigen::Isometry3d& D, Eigen::Index width) {
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> prior_grams(const Eigen::Isometry3d& D,
+                                                        const Eigen::Vector3d& pivot, Eigen::Index width) {
   const Eigen::Vector3d angle = rotation_log(D.linear());
   Eigen::Matrix<double, 3, Eigen::Dynamic> rotation = Eigen::MatrixXd::Zero(3, width),
                                            translation = Eigen::MatrixXd::Zero(3, width);
   rotation.middleCols<3>(3) = right_jacobian_inverse(angle);
   rotation.col(width - 1) = angle;
   translation.leftCols<3>() = D.linear();
-  translation.col(width - 1) = D.translation();
+  translation.middleCols<3>(3) = -D.linear() * skew(pivot);
+  translation.col(width - 1) = D * pivot - pivot;
   return {rotation.transpose() * rotation, translation.transpose() * translation};
 }
 
@@ -168,7 +170,8 @@ LinearModel linearize(const Bundle& bundle, const NoiseLevels& noise, const Bund
   for (int i = 0; i < model.groups; ++i) {
     // A pose that nothing saw still needs its prior to be determined; it then tells nothing of the noise.
     const RobotPose& pose = bundle.poses[static_cast<std::size_t>(i)];
-    auto [rotation, translation] = prior_grams(pose.correction, model.own + model.shared + 1);
+    auto [rotation, translation] = prior_grams(
+        pose.correction, bundle.pivots[static_cast<std::size_t>(pose.arm)], model.own + model.shared + 1);
     const double count = 3;
     model.blocks.push_back({i, 2 * cameras + pose.arm, count, std::move(rotation)});
     model.blocks.push_back({i, 2 * cameras + arms + pose.arm, count, std::move(translation)});

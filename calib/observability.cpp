@@ -17,7 +17,8 @@ Vector upright(const Vector& v) {
 
 std::string text_of(const Eigen::Vector3d& v) {
   char text[64];
-  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", v.x(), v.y(), v.z());
+  const Eigen::Vector3d r = (100 * v).array().round() / 100 + 0.0;  // no minus zero
+  std::snprintf(text, sizeof text, "(%.2f, %.2f, %.2f)", r.x(), r.y(), r.z());
   return text;
 }
 

@@ -19,7 +19,7 @@ std::vector<Symmetry> grid_symmetries(const Eigen::Matrix3Xd& points);
 
 struct RepairSettings {
   ConsistencySettings consistency;
-  double outlier = 5;  ///< closing error, in rotation or translation, over the median of the set
+  double outlier = 8;  ///< closing error, in rotation or translation, over the median of the set
 };
 
 struct ViewVerdict {

@@ -1,5 +1,4 @@
 #pragma once
-#include <Eigen/Cholesky>
 #include <random>
 #include <vector>
 
@@ -61,26 +60,6 @@ inline Eigen::Matrix3Xd tag_points(double side = 0.09) {
   Eigen::Matrix3Xd points(3, 4);
   points << -1, 1, 1, -1, -1, -1, 1, 1, 0, 0, 0, 0;
   return 0.5 * side * points;
-}
-
-/// The pose that fits the pixels best, by Gauss and Newton from `start`.
-inline Eigen::Isometry3d fitted_pose(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
-                                     const Eigen::Matrix2Xd& pixels, Eigen::Isometry3d start) {
-  const IntrinsicsVector intrinsics = to_vector(camera);
-  for (int iteration = 0; iteration < 10; ++iteration) {
-    Matrix6d H = Matrix6d::Zero();
-    Vector6d g = Vector6d::Zero();
-    for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      Eigen::Matrix<double, 2, 3> d_q;
-      const Eigen::Vector2d r = project(intrinsics, start * points.col(i), &d_q) - pixels.col(i);
-      Eigen::Matrix<double, 2, 6> J;
-      J << d_q * start.linear(), -d_q * start.linear() * skew(points.col(i));
-      H += J.transpose() * J;
-      g += J.transpose() * r;
-    }
-    start = moved(start, -H.ldlt().solve(g));
-  }
-  return start;
 }
 
 inline HandEyeScene make_scene(const SceneSettings& settings, const Eigen::Matrix3Xd& points, unsigned seed) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 
@@ -53,6 +54,7 @@ TEST_P(BothSetups, ResidualsHaveTheDerivativesOfTheLinearisation) {
   Bundle bundle = seeded(scene);
   bundle.bases.push_back(make_pose({0.3, -0.2, 0.1}, {0.1, 0.2, -0.4}));
   bundle.time_offsets.push_back(0.02);
+  bundle.pivots.push_back({0.1, 0.2, 0.3});
   bundle.views.resize(1);
   bundle.poses.resize(1);
   bundle.poses[0].arm = 1;
