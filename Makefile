@@ -14,13 +14,14 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo build test validate reference fuzz configure-test format check-format tidy install clean
+.PHONY: help demo configure build test validate reference fuzz configure-test format check-format tidy install clean
 .PHONY: bench packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
-demo: build  ## Packages, build, then the main job on a recording it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
+demo: configure  ## Packages, build, then the main job on a recording it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(sysid) synth --asset examples/towel.json --set bending=1.5e-4 --kind corner_lift --seed 1 --force -o $(DEMO)/recording
 	$(sysid) grid $(DEMO)/recording --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
@@ -28,9 +29,11 @@ demo: build  ## Packages, build, then the main job on a recording it makes itsel
 	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \
 	  'Truth:       $(abspath $(DEMO)/recording/truth.json)'
 
-build: packages-build  ## Packages, then the release build in $(BUILD)
-	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=OFF $(CMAKE_ARGS)
+build: configure  ## Packages, then the release build in $(BUILD)
 	cmake --build $(BUILD) -j $(JOBS)
+
+configure: packages-build
+	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=OFF $(CMAKE_ARGS)
 
 test: configure-test  ## Packages, build, then all tests
 	cmake --build $(BUILD) -j $(JOBS)
@@ -62,12 +65,7 @@ fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s u
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i
 
-check-fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s under address and undefined-behaviour sanitizers
-	cmake --preset fuzz
-	cmake --build --preset fuzz -j $(JOBS)
-	scripts/fuzz build/fuzz $(FUZZ_SECONDS)
-
-format: packages-check  ## Name the sources that `make format` would change
+check-format: packages-check  ## Name the sources that `make format` would change
 	$(sources) | xargs -r clang-format --dry-run --Werror
 
 tidy: configure-test packages-check  ## Defects found by clang-tidy (.clang-tidy)
