@@ -124,8 +124,10 @@ Cells read_cells(Reader& reader, bool version_5, const std::string& source) {
     const std::vector<double> flat = reader.numbers(second, "int");
     cells.offsets.push_back(0);
     for (std::size_t i = 0; i < flat.size();) {
-      const std::size_t corners = static_cast<std::size_t>(std::max(0.0, flat[i]));
-      if (i + 1 + corners > flat.size()) throw InputError(source + ": a cell runs past the end of its list");
+      const double wanted = std::max(0.0, flat[i]);
+      if (!(wanted < static_cast<double>(flat.size() - i)))
+        throw InputError(source + ": a cell runs past the end of its list");
+      const std::size_t corners = static_cast<std::size_t>(wanted);
       cells.corners.insert(cells.corners.end(), flat.begin() + static_cast<long>(i) + 1,
                            flat.begin() + static_cast<long>(i + 1 + corners));
       cells.offsets.push_back(static_cast<double>(cells.corners.size()));
@@ -205,6 +207,7 @@ Geometry parse_vtk(std::string_view bytes, const std::string& source) {
       }
     }
   }
+  if (!is_grid) types.clear();  // polygons have none
   if (is_grid && types.size() != cells.size())
     throw InputError(source + ": found " + std::to_string(types.size()) + " cell types for " +
                      std::to_string(cells.size()) + " cells");

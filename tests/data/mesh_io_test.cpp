@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <random>
 
+#include "data/atomic_file.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
 #include "tests/data/temporary_folder.h"
@@ -161,6 +162,15 @@ TEST(MeshIo, BrokenMeshesAreNamed) {
             ": DATASET STRUCTURED_POINTS, expected POLYDATA or UNSTRUCTURED_GRID");
   EXPECT_EQ(message("a.fbx", ""),
             ": ending \".fbx\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
+}
+
+// Found by the fuzzer: the types of a grid in a file of polygons, fewer than it has of these.
+TEST(MeshIo, VtkPolygonsHaveNoCellTypes) {
+  const TemporaryFolder folder;
+  const TriangleMesh mesh = delaunay_rectangle(0.3, 0.2, 0.1, 3);
+  save_triangle_mesh(mesh, folder / "a.vtk");
+  const std::string path = folder.write("b.vtk", read_file(folder / "a.vtk") + "CELL_TYPES 1\n10\n");
+  EXPECT_EQ(load_triangle_mesh(path).triangles, mesh.triangles);
 }
 
 TEST(MeshIo, TruncatedBinaryFilesAreErrorsNotCrashes) {
