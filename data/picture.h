@@ -23,6 +23,9 @@ struct Picture {
   }
 };
 
+/// The bytes of a PNG file.
+std::string encode_png(const Picture& picture);
+
 /// Written atomically. Throws std::runtime_error naming the path.
 void save_png(const Picture& picture, const std::string& path);
 

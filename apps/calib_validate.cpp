@@ -1,0 +1,196 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/calib_options.h"
+#include "apps/calib_verbs.h"
+#include "apps/command_line.h"
+#include "calib/accumulation.h"
+#include "calib/extrinsics.h"
+#include "calib/overlay.h"
+#include "calib/validate.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ValidateOptions {
+  CalibCommonOptions common;
+  DatasetChoice dataset;
+  std::string extrinsics;
+  bool refit_target = false;
+  std::string out;
+};
+
+/// A picture, what was seen in it and where the chain puts it.
+struct ValidatedView {
+  const calib::Frame* frame;
+  calib::Observation observation;
+};
+
+std::vector<ValidatedView> views_of(const calib::Dataset& dataset, const calib::Target& target,
+                                    const ValidateOptions& options) {
+  std::vector<ValidatedView> views;
+  if (dataset.frames.front().T_camera_target) {
+    const std::vector<calib::Observation> pairs = calib::pair_observations(dataset);
+    for (std::size_t i = 0; i < pairs.size(); ++i) views.push_back({&dataset.frames[i], pairs[i]});
+    return views;
+  }
+  const std::vector<calib::Detection> detections =
+      detect_all(dataset, target, options.dataset, options.common);
+  const std::vector<calib::Observation> observations =
+      calib::observations_of(detections, calib::rank_refiners(detections).front().refiner);
+  auto next = observations.begin();
+  for (std::size_t i = 0; i < detections.size(); ++i)
+    if (!detections[i].readings.empty()) views.push_back({&dataset.frames[i], *next++});
+  return views;
+}
+
+std::string picture_name(const std::string& image) { return fs::path(image).stem().string() + ".png"; }
+
+void draw_views(const std::vector<ValidatedView>& views, const calib::ProjectionCheck& check,
+                const std::string& folder) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if (!views[i].frame->image.empty())
+      data::save_png(calib::corner_picture(calib::load_grey_image(views[i].frame->image),
+                                           views[i].observation.pixels, check.views[i].projected),
+                     (fs::path(folder) / "corners" / picture_name(views[i].frame->name)).string());
+}
+
+std::optional<calib::Accumulation> accumulate(const calib::Dataset& dataset,
+                                              const calib::Extrinsics& extrinsics,
+                                              const std::vector<ValidatedView>& views,
+                                              const calib::ProjectionCheck& check) {
+  std::vector<calib::TargetCloud> clouds;
+  std::vector<Eigen::Isometry3d> poses;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (views[i].frame->depth.empty()) continue;
+    calib::Observation observation = views[i].observation;
+    observation.points = check.views[i].points;
+    clouds.push_back(calib::target_cloud(data::load_depth_image(views[i].frame->depth), dataset.depth_scale,
+                                         calib::load_grey_image(views[i].frame->image), *dataset.camera,
+                                         observation));
+    poses.push_back(observation.T_base_gripper);
+  }
+  if (clouds.empty()) return std::nullopt;
+  return calib::accumulate(extrinsics.setup, extrinsics.transform.T, clouds, poses);
+}
+
+nlohmann::ordered_json cloud_json(const calib::Accumulation& clouds) {
+  nlohmann::ordered_json json = {{"thickness_mm", clouds.thickness_mm}, {"noise_mm", clouds.noise_mm},
+                                 {"offset_mm", clouds.offset_mm},       {"pattern_shift_mm", clouds.shift_mm},
+                                 {"trimmed", clouds.trimmed},           {"views", nlohmann::json::array()}};
+  for (const calib::CloudView& view : clouds.views)
+    json["views"].push_back({{"image", view.image},
+                             {"offset_mm", view.offset_mm},
+                             {"tilt_deg", view.tilt_deg},
+                             {"noise_mm", view.noise_mm},
+                             {"pattern_shift_mm", view.shift_mm},
+                             {"points", view.points}});
+  return json;
+}
+
+nlohmann::ordered_json result_json(const ValidateOptions& options, const calib::ProjectionCheck& check,
+                                   const std::optional<calib::Accumulation>& clouds) {
+  nlohmann::ordered_json json;
+  json["schema"] = "flash-validation/1";
+  json["extrinsics"] = options.extrinsics;
+  json["dataset"] = options.dataset.path;
+  json["target_pose"] = options.refit_target ? "from these views" : "of the calibration";
+  json["corner_rms_px"] = check.corner_rms;
+  json["centre_rms_px"] = check.centre_rms;
+  json["rms_mm"] = check.mm_rms;
+  json["rms_deg"] = check.deg_rms;
+  json["views"] = nlohmann::json::array();
+  for (const calib::ViewProjection& view : check.views)
+    json["views"].push_back({{"image", view.image},
+                             {"corner_px", view.corner_rms},
+                             {"centre_px", view.centre},
+                             {"mm", view.mm},
+                             {"deg", view.deg}});
+  if (clouds) json["clouds"] = cloud_json(*clouds);
+  return json;
+}
+
+void print_table(const calib::ProjectionCheck& check, const std::optional<calib::Accumulation>& clouds) {
+  std::printf("%-24s %10s %10s %9s %9s\n", "view", "corners px", "centre px", "mm", "deg");
+  for (const calib::ViewProjection& view : check.views)
+    std::printf("%-24s %10.2f %10.2f %9.2f %9.3f\n", view.image.c_str(), view.corner_rms, view.centre,
+                view.mm, view.deg);
+  std::printf("%-24s %10.2f %10.2f %9.2f %9.3f\n", "rms", check.corner_rms, check.centre_rms, check.mm_rms,
+              check.deg_rms);
+  if (!clouds) return;
+  std::printf(
+      "\nclouds of %zu views laid on each other: %.2f mm thick (rms; a single view %.2f), offsets %.2f mm, "
+      "pattern sharp to %.2f mm\n",
+      clouds->views.size(), clouds->thickness_mm, clouds->noise_mm, clouds->offset_mm, clouds->shift_mm);
+}
+
+int run_validate(const ValidateOptions& options) {
+  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics);
+  const calib::Dataset dataset = load_dataset(options.dataset);
+  const bool pairs = dataset.frames.front().T_camera_target.has_value();
+  const calib::Target target = pairs ? calib::Target() : target_of(options.dataset, dataset);
+  const std::vector<ValidatedView> views = views_of(dataset, target, options);
+
+  std::vector<calib::Observation> observations;
+  for (const ValidatedView& view : views) observations.push_back(view.observation);
+  calib::HandEyePoses poses{extrinsics.transform.T, extrinsics.target_pose.T};
+  const auto check_with = [&](const Eigen::Isometry3d& Z) {
+    return calib::check_projection(extrinsics.setup, {poses.X, Z},
+                                   dataset.camera.value_or(data::CameraIntrinsics{}), target, observations);
+  };
+  const Eigen::Isometry3d refitted = calib::target_pose_from(extrinsics.setup, poses.X, observations);
+  if (options.refit_target) poses.Z = refitted;
+  const calib::ProjectionCheck check = check_with(poses.Z);
+  // Ten times better at another place: it is the target that has moved, not the camera.
+  if (!options.refit_target && check.mm_rms > 5 && 10 * check_with(refitted).mm_rms < check.mm_rms)
+    warn_calib(
+        "the target is not where it was at the calibration; --refit-target takes its place from these views");
+
+  const std::optional<calib::Accumulation> clouds =
+      pairs ? std::nullopt : accumulate(dataset, extrinsics, views, check);
+  const std::string text = data::format_json(result_json(options, check, clouds)) + '\n';
+  if (!options.out.empty()) {
+    data::write_atomically((fs::path(options.out) / "validation.json").string(), text);
+    draw_views(views, check, options.out);
+    if (clouds) {
+      data::save_png(clouds->pattern, (fs::path(options.out) / "pattern.png").string());
+      data::save_png(clouds->profile, (fs::path(options.out) / "profile.png").string());
+    }
+  }
+  if (options.common.json)
+    std::cout << text;
+  else
+    print_table(check, clouds);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_validate_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<ValidateOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "validate",
+      "Project the target through robot and calibration; lay the clouds of all views on each other");
+  add_dataset_options(*verb, options->dataset);
+  verb->add_option("--extrinsics", options->extrinsics, "What flash-calib handeye has written")->required();
+  verb->add_flag("--refit-target", options->refit_target,
+                 "The target stands elsewhere than at the calibration");
+  verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");
+  add_calib_common_options(*verb, options->common);
+  verb->footer(
+      "Example:\n"
+      "  flash-calib validate another_recording --target chessboard:9x6:0.025 --extrinsics camera.json -o "
+      "checked");
+  verb->callback([options, &action] { action = [options] { return run_validate(*options); }; });
+}
+
+}  // namespace flash
