@@ -22,8 +22,8 @@ function(flash_minify_javascript file variable)
   set(${variable} ${minified} PARENT_SCOPE)
 endfunction()
 
-# What the report carries inside: its page and plotly.js with its licence.
-function(flash_embed_report target)
+# What a report carries inside: plotly.js with its licence, and its page, report_template.html, as <symbol>.
+function(flash_embed_report target symbol)
   find_file(PLOTLY_JS NAMES plotly.min.js plotly.js PATHS /usr/share/python3-plotly /usr/share/javascript/plotly
             REQUIRED DOC "plotly.js, drawn into reports (Debian: python3-plotly)")
   set(library ${PLOTLY_JS})
@@ -31,6 +31,6 @@ function(flash_embed_report target)
     flash_minify_javascript(${PLOTLY_JS} library)
   endif()
   flash_embed_file(${target} plotly ${library})
-  flash_embed_file(${target} plotly_licence ${CMAKE_CURRENT_SOURCE_DIR}/plotly_licence.txt)
-  flash_embed_file(${target} report_template ${CMAKE_CURRENT_SOURCE_DIR}/report_template.html)
+  flash_embed_file(${target} plotly_licence ${PROJECT_SOURCE_DIR}/cmake/plotly_licence.txt)
+  flash_embed_file(${target} ${symbol} ${CMAKE_CURRENT_SOURCE_DIR}/report_template.html)
 endfunction()

@@ -6,6 +6,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/html_page.h"
 #include "sysid/next_steps.h"
 #include "sysid/parameter_label.h"
 
@@ -152,25 +153,6 @@ Json map_axes(const Summary& summary, const std::array<std::string, 2>& names) {
   return axes;
 }
 
-// Inside a script element only "</" could end it; JSON may write it as "<\/".
-std::string inside_script(const Json& json) {
-  std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-  for (std::size_t at = text.find("</"); at != std::string::npos; at = text.find("</", at + 3))
-    text.insert(at + 1, 1, '\\');
-  return text;
-}
-
-std::string fill(std::string_view text,
-                 const std::vector<std::pair<std::string_view, std::string_view>>& values) {
-  std::string filled;
-  for (const auto& [key, value] : values) {
-    const std::size_t at = text.find(key);
-    filled.append(text.substr(0, at)).append(value);
-    text.remove_prefix(at + key.size());
-  }
-  return filled.append(text);
-}
-
 }  // namespace
 
 std::string render_report(const Summary& summary, const GridResults& results,
@@ -201,9 +183,10 @@ std::string render_report(const Summary& summary, const GridResults& results,
   std::snprintf(footer, sizeof footer, "flash-sysid %s · device %s · %.0f s", summary.tool_version.c_str(),
                 summary.device.c_str(), summary.wall_seconds);
   json["footer"] = footer;
-  return fill(embedded::report_template(), {{"@DATA@", inside_script(json)},
-                                            {"@PLOTLY_LICENCE@", embedded::plotly_licence()},
-                                            {"@PLOTLY@", embedded::plotly()}});
+  const std::string text = data::inside_script(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  return data::fill_page(
+      embedded::report_template(),
+      {{"@DATA@", text}, {"@PLOTLY_LICENCE@", embedded::plotly_licence()}, {"@PLOTLY@", embedded::plotly()}});
 }
 
 void write_report(const Summary& summary, const GridResults& results, const std::vector<Overlay>& overlays,
