@@ -12,6 +12,9 @@ using Action = std::function<int()>;
 
 /// Each adds one verb to `flash-calib`; parsing it sets `action`.
 void add_detect_verb(CLI::App& app, Action& action);
+void add_intrinsics_verb(CLI::App& app, Action& action);
+void add_validate_verb(CLI::App& app, Action& action);
 void add_handeye_verb(CLI::App& app, Action& action);
+void add_register_verb(CLI::App& app, Action& action);
 
 }  // namespace flash

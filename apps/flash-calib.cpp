@@ -18,7 +18,10 @@ int main(int argc, char** argv) {
       "Exit codes: 0 done; 1 failed; 2 bad usage or input; 3 finished, but the answer cannot be used.");
   flash::Action action;
   flash::add_detect_verb(app, action);
+  flash::add_intrinsics_verb(app, action);
+  flash::add_validate_verb(app, action);
   flash::add_handeye_verb(app, action);
+  flash::add_register_verb(app, action);
   // CLI11 would only say that a verb is missing.
   std::vector<std::string> verbs;
   for (const CLI::App* verb : app.get_subcommands(nullptr)) verbs.push_back(verb->get_name());

@@ -210,22 +210,41 @@ void warn(Calibration& result) {
 
 }  // namespace
 
-Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
-                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
-                      const CalibrateSettings& settings) {
-  Calibration result;
-  result.setup = setup;
+std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& all,
+                                 const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings) {
   std::vector<Eigen::Isometry3d> reported;
   for (const Observation& observation : all)
     if (!observation.T_camera_target.empty()) reported.push_back(observation.T_base_gripper);
   expect_enough(reported.size(), all.size(), settings.least_views);
   const std::string reason = degeneracy(rotation_diversity(reported));
   if (!reason.empty()) throw data::InputError(reason);
-
-  result.repair = repair_views(setup, all, symmetries, settings.repair);
-  expect_convention(setup, all, symmetries, result.repair.consistency, settings);
+  result.repair = repair_views(result.setup, all, symmetries, settings.repair);
+  expect_convention(result.setup, all, symmetries, result.repair.consistency, settings);
   std::vector<Observation> observations = used_observations(result.repair, &result.used);
-  expect_enough(result.repair.consistency.found ? observations.size() : 0, all.size(), settings.least_views);
+  expect_enough(observations.size(), all.size(), settings.least_views);
+  return observations;
+}
+
+void finish(Calibration& result, const std::vector<Observation>& used) {
+  report_views(result);
+  std::vector<Eigen::Isometry3d> robot;
+  std::vector<double> distances;
+  for (const Observation& observation : used) {
+    robot.push_back(observation.T_base_gripper);
+    distances.push_back(observation.T_camera_target.front().translation().norm());
+  }
+  result.diversity = rotation_diversity(robot);
+  result.weakest = weakest_direction(result.covariance, median(distances), "camera");
+  warn(result);
+  warn_of_scale(result);
+}
+
+Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                      const CalibrateSettings& settings) {
+  Calibration result;
+  result.setup = setup;
+  std::vector<Observation> observations = prepare(result, all, symmetries, settings);
 
   Bundle plain;
   for (;;) {
@@ -247,18 +266,8 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.chain_rms = reprojection_rms(bundle, false);
   result.centre_rms = centre_rms(bundle, target_poses(observations));
   compare_methods(result, observations, plain, settings);
-  report_views(result);
-  std::vector<Eigen::Isometry3d> robot;
-  std::vector<double> distances;
-  for (const Observation& observation : observations) {
-    robot.push_back(observation.T_base_gripper);
-    distances.push_back(observation.T_camera_target.front().translation().norm());
-  }
-  result.diversity = rotation_diversity(robot);
-  result.weakest = weakest_direction(result.covariance, median(distances), "camera");
   if (settings.check_scale) result.scale = check_scale(result.refined, settings.refine);
-  warn(result);
-  warn_of_scale(result);
+  finish(result, observations);
   return result;
 }
 

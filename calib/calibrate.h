@@ -66,6 +66,15 @@ struct Calibration {
   bool usable = true;
 };
 
+/// What all calibrations start with: enough views, enough axes, numbering and planar poses chosen, a
+/// convention that closes. Returns the observations in use and fills `result` so far. Throws
+/// data::InputError.
+std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& observations,
+                                 const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings);
+
+/// What all end with: views, observability, warnings.
+void finish(Calibration& result, const std::vector<Observation>& used);
+
 /// From observations to the answer: repair, seed, bundle, errors in variables, a second look for views that
 /// do not belong, held-out residuals, comparison. Throws data::InputError where too few views are left or
 /// nothing can be determined, with the one sentence that names the cause.

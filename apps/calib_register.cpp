@@ -1,0 +1,177 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/calib_options.h"
+#include "apps/calib_verbs.h"
+#include "apps/command_line.h"
+#include "calib/calibrate_images.h"
+#include "calib/register.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RegisterOptions {
+  CalibCommonOptions common;
+  std::vector<std::string> calibrations;
+  std::vector<std::string> cameras;
+  std::string target, setup, cache;
+  std::vector<double> workspace;
+  bool without_images = false;
+  bool refine_intrinsics = false;
+  std::string out;
+};
+
+constexpr int kRefinedIntrinsics = 9;  // fx fy cx cy k1 k2 p1 p2 k3
+
+calib::CellMember member_of(const std::string& arm, const std::string& camera, const DatasetChoice& choice,
+                            const std::string& setup, const RegisterOptions& options) {
+  const calib::Dataset dataset = load_dataset(choice);
+  const calib::Target target = target_of(choice, dataset);
+  if (setup.empty() && !dataset.setup)
+    throw data::InputError(choice.path +
+                           ": says nothing of the setup; add --setup eye-in-hand or eye-to-hand");
+  const calib::Setup kind =
+      setup.empty() ? *dataset.setup : calib::parse_setup(setup, "command line", "--setup");
+  const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
+  const calib::ImageCalibration solved = calib::calibrate_images(kind, dataset, target, detections);
+  if (!options.common.quiet) {
+    const std::size_t all = solved.calibration.views.size(), used = solved.calibration.used.size();
+    if (used < all)
+      warn_calib(choice.path + ": " + std::to_string(all - used) + " of " + std::to_string(all) +
+                 " views were not used; flash-calib handeye names them");
+  }
+  return calib::cell_member(arm, camera, dataset, target, solved.calibration);
+}
+
+std::string name_of(const std::string& path) {
+  const fs::path normal = fs::path(path).lexically_normal();
+  return normal.has_filename() ? normal.stem().string() : normal.parent_path().filename().string();
+}
+
+calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
+  calib::RefineSettings settings;
+  if (options.refine_intrinsics) settings.bundle.unknowns.intrinsics = kRefinedIntrinsics;
+  return calib::solve_cell(members, settings);
+}
+
+calib::Cell cell_of_arms(const RegisterOptions& options) {
+  std::vector<calib::Extrinsics> calibrations;
+  std::vector<std::string> arms;
+  bool images = !options.without_images;
+  for (const std::string& path : options.calibrations) {
+    calibrations.push_back(calib::load_extrinsics(path));
+    arms.push_back(name_of(path));
+    if (!images || fs::exists(calibrations.back().inputs.dataset)) continue;
+    images = false;
+    warn_calib(path + ": its dataset " + calibrations.back().inputs.dataset +
+               " is not there; composed from the transforms alone");
+  }
+  const calib::Cell composed = calib::compose_cell(arms, calibrations);
+  if (!images) return composed;
+  std::vector<calib::CellMember> members;
+  for (std::size_t i = 0; i < arms.size(); ++i) {
+    const calib::ExtrinsicsInputs& inputs = calibrations[i].inputs;
+    DatasetChoice choice;
+    choice.path = inputs.dataset;
+    choice.target = inputs.target;
+    choice.poses = inputs.poses;
+    choice.camera = inputs.camera;
+    choice.cache = options.cache;
+    members.push_back(member_of(arms[i], "camera", choice, calib::to_string(calibrations[i].setup), options));
+  }
+  return solved_cell(members, options);
+}
+
+calib::Cell cell_of_cameras(const RegisterOptions& options) {
+  std::vector<calib::CellMember> members;
+  for (const std::string& path : options.cameras) {
+    DatasetChoice choice;
+    choice.path = path;
+    choice.target = options.target;
+    choice.cache = options.cache;
+    members.push_back(member_of("base", name_of(path), choice, options.setup, options));
+  }
+  return solved_cell(members, options);
+}
+
+void print(const calib::Cell& cell, const RegisterOptions& options) {
+  const auto line = [&](const calib::CellFrame& frame) {
+    const Eigen::Matrix<double, 6, 1> sd = frame.covariance.diagonal().cwiseSqrt();
+    const Eigen::Vector3d t = frame.transform.T.translation();
+    std::printf("%s <- %s: (%.5f, %.5f, %.5f) m, +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n",
+                frame.transform.parent.c_str(), frame.transform.child.c_str(), t.x(), t.y(), t.z(),
+                1e3 * sd[0], 1e3 * sd[1], 1e3 * sd[2], sd[3] * 180 / M_PI, sd[4] * 180 / M_PI,
+                sd[5] * 180 / M_PI);
+  };
+  for (const calib::CellFrame& base : cell.bases) {
+    line(base);
+    if (options.workspace.empty()) continue;
+    const Eigen::Vector3d p(options.workspace[0], options.workspace[1], options.workspace[2]);
+    const Eigen::Vector3d sd =
+        calib::point_covariance(base, base.transform.T.inverse() * p).diagonal().cwiseSqrt();
+    std::printf("  at (%.3f, %.3f, %.3f) m: +- (%.2f, %.2f, %.2f) mm\n", p.x(), p.y(), p.z(), 1e3 * sd.x(),
+                1e3 * sd.y(), 1e3 * sd.z());
+  }
+  for (const calib::CellFrame& camera : cell.cameras) line(camera);
+  if (cell.joint)
+    std::printf("jointly: corners %.3f px, through the robots' chain %.3f px rms\n", cell.corner_rms,
+                cell.chain_rms);
+}
+
+int run_register(const RegisterOptions& options) {
+  if (options.calibrations.empty() == options.cameras.empty())
+    throw data::InputError(
+        "register: expected either two or more extrinsics files or --cameras with datasets");
+  if (options.calibrations.size() + options.cameras.size() < 2)
+    throw data::InputError("register: found one calibration, expected two or more");
+  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  const calib::Cell cell = options.cameras.empty() ? cell_of_arms(options) : cell_of_cameras(options);
+  std::optional<Eigen::Vector3d> workspace;
+  if (!options.workspace.empty())
+    workspace = Eigen::Vector3d(options.workspace[0], options.workspace[1], options.workspace[2]);
+  const std::string text = data::format_json(calib::to_json(cell, workspace));
+  if (!options.out.empty()) data::write_atomically(options.out, text);
+  for (const std::string& notice : cell.notices) warn_calib(notice);
+  if (options.common.json)
+    std::cout << text;
+  else
+    print(cell, options);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_register_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<RegisterOptions>();
+  CLI::App* verb =
+      app.add_subcommand("register", "Several arms on one camera, or several cameras, in one world");
+  verb->add_option("calibrations", options->calibrations,
+                   "Extrinsics of two or more arms, eye-to-hand on one camera that stands still");
+  verb->add_option("--cameras", options->cameras, "Datasets of one arm seen by several cameras");
+  verb->add_option("--target", options->target, "In place of what the datasets of --cameras say");
+  verb->add_option("--setup", options->setup, "Likewise")
+      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+  verb->add_option("--workspace", options->workspace,
+                   "Point in the first base where the uncertainty is stated [m]")
+      ->expected(3);
+  verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
+  verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
+  verb->add_option("--cache", options->cache, "Folder that keeps corners found, for the next run");
+  verb->add_option("-o,--out", options->out, "File for the cell, JSON");
+  add_calib_common_options(*verb, options->common);
+  verb->footer(
+      "Examples:\n"
+      "  flash-calib register left.json right.json --workspace 0.4 0 0.1 -o cell.json\n"
+      "  flash-calib register --cameras camera1 camera2 camera3 -o cell.json");
+  verb->callback([options, &action] { action = [options] { return run_register(*options); }; });
+}
+
+}  // namespace flash
