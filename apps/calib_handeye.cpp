@@ -1,5 +1,6 @@
+#include <algorithm>
 #include <cstdio>
-#include <fstream>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -7,7 +8,10 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "calib/calibrate_images.h"
 #include "calib/extrinsics.h"
+#include "calib/pose_space.h"
+#include "calib/report.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -22,7 +26,7 @@ struct HandEyeOptions {
   bool refine_intrinsics = false;
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2;
-  std::string out;
+  std::string out, report;
 };
 
 calib::Setup setup_of(const HandEyeOptions& options, const calib::Dataset& dataset) {
@@ -32,52 +36,19 @@ calib::Setup setup_of(const HandEyeOptions& options, const calib::Dataset& datas
                          ": says nothing of the setup; add --setup eye-in-hand or eye-to-hand");
 }
 
-/// Numberings that a detector may have confused: those of plain grids; markers say who they are.
-std::vector<calib::Symmetry> symmetries_of(const calib::Target& target) {
-  std::vector<calib::Symmetry> all = calib::grid_symmetries(calib::target_points(target));
-  const bool plain =
-      target.kind == calib::TargetKind::chessboard || target.kind == calib::TargetKind::circle_grid;
-  if (!plain) all.resize(1);
-  return all;
+/// Beside the extrinsics, unless it has a name of its own; empty: none.
+std::string report_path(const HandEyeOptions& options) {
+  if (!options.report.empty() || options.out.empty()) return options.report;
+  return std::filesystem::path(options.out).replace_extension(".html").string();
 }
 
-/// A view for each picture, without poses where the target was not found.
-std::vector<calib::Observation> views_of(const std::vector<calib::Detection>& detections,
-                                         const std::string& refiner) {
-  const std::vector<calib::Observation> found = calib::observations_of(detections, refiner);
-  std::vector<calib::Observation> views;
-  auto next = found.begin();
-  for (const calib::Detection& detection : detections) {
-    calib::Observation missing;
-    missing.image = detection.image;
-    views.push_back(detection.readings.empty() ? missing : *next++);
-  }
-  return views;
-}
-
-struct Solved {
-  calib::Calibration calibration;
-  std::string refiner;
-};
-
-/// Refiners that fit the corners alike are told apart by how the robot's chain closes on them.
-Solved solve(calib::Setup setup, const data::CameraIntrinsics& camera, const calib::Target& target,
-             const std::vector<calib::Detection>& detections, const calib::CalibrateSettings& settings) {
-  constexpr double kTie = 1.05;
-  const std::vector<calib::RefinerScore> ranking = calib::rank_refiners(detections);
-  const auto calibrated = [&](const std::string& refiner) {
-    return Solved{calib::calibrate(setup, camera, calib::target_points(target), symmetries_of(target),
-                                   views_of(detections, refiner), settings),
-                  refiner};
-  };
-  Solved best = calibrated(ranking.front().refiner);
-  for (std::size_t i = 1; i < ranking.size() && ranking[i].rms <= kTie * ranking.front().rms; ++i) {
-    Solved other = calibrated(ranking[i].refiner);
-    if (other.calibration.held_out.px < best.calibration.held_out.px) best = std::move(other);
-  }
-  for (std::size_t i = 0; i < detections.size(); ++i)
-    if (!detections[i].reason.empty()) best.calibration.views[i].reason = detections[i].reason;
-  return best;
+void write_report(const std::string& path, const calib::Calibration& calibration,
+                  const calib::Extrinsics& extrinsics, const nlohmann::ordered_json& json,
+                  const calib::Dataset& dataset, const DatasetChoice& choice) {
+  calib::ReportInputs inputs;
+  if (!extrinsics.inputs.refiner.empty()) inputs.points = calib::target_points(target_of(choice, dataset));
+  for (const calib::Frame& frame : dataset.frames) inputs.images.push_back(frame.image);
+  data::write_atomically(path, calib::render_report(calibration, extrinsics, json, inputs));
 }
 
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
@@ -104,20 +75,30 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   }
 }
 
-int run_handeye(const HandEyeOptions& options) {
-  if (!options.out.empty()) check_calib_output(options.out, options.common);
-  const calib::Dataset dataset = load_dataset(options.dataset);
-  const calib::Setup setup = setup_of(options, dataset);
+calib::ImageCalibration from_images(const HandEyeOptions& options, calib::Setup setup,
+                                    const calib::Dataset& dataset, const calib::CalibrateSettings& settings) {
   const calib::Target target = target_of(options.dataset, dataset);
   const std::vector<calib::Detection> detections =
       detect_all(dataset, target, options.dataset, options.common);
+  return calib::calibrate_images(setup, dataset, target, detections, settings);
+}
+
+int run_handeye(const HandEyeOptions& options) {
+  const std::string report = report_path(options);
+  for (const std::string& path : {options.out, report})
+    if (!path.empty()) check_calib_output(path, options.common);
+  const calib::Dataset dataset = load_dataset(options.dataset);
+  const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
   constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
   if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
-  for (const calib::Frame& frame : dataset.frames)
-    if (frame.angles) settings.angles.push_back(*frame.angles);
-  if (settings.angles.size() != dataset.frames.size()) settings.angles.clear();
-  const Solved solved = solve(setup, *dataset.camera, target, detections, settings);
+  const bool pairs = std::all_of(dataset.frames.begin(), dataset.frames.end(),
+                                 [](const calib::Frame& frame) { return frame.image.empty(); });
+  const calib::ImageCalibration solved =
+      pairs ? calib::ImageCalibration{calib::calibrate_pairs(setup, calib::pair_observations(dataset),
+                                                             settings),
+                                      ""}
+            : from_images(options, setup, dataset, settings);
 
   const calib::ExtrinsicsInputs inputs{
       dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
@@ -130,6 +111,7 @@ int run_handeye(const HandEyeOptions& options) {
   json["transform"] = calib::to_json(extrinsics.transform);
   const std::string text = data::format_json(json);
   if (!options.out.empty()) data::write_atomically(options.out, text);
+  if (!report.empty()) write_report(report, solved.calibration, extrinsics, json, dataset, options.dataset);
   if (!options.ros.empty())
     data::write_atomically(options.ros, calib::ros_static_transform(extrinsics.transform));
   if (!options.urdf.empty()) data::write_atomically(options.urdf, calib::urdf_joint(extrinsics.transform));
@@ -167,6 +149,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   verb->add_option("--urdf", options->urdf, "File for a fixed joint");
   verb->add_option("--easy-handeye2", options->easy_handeye2, "File for easy_handeye2's .calib");
   verb->add_option("-o,--out", options->out, "File for the extrinsics, JSON");
+  verb->add_option("--report", options->report, "File for the report, HTML (default: OUT with .html)");
   add_calib_common_options(*verb, options->common);
   verb->footer(
       "Examples:\n"
