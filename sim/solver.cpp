@@ -123,25 +123,60 @@ void restrict_matrix(const BlockPattern& pattern, const std::vector<VertexConstr
   }
 }
 
-/// One exchange of the active set of the linear problem: holds free vertices that `direction` drives into a
-/// surface and frees held ones that the surface would have to pull (`force`: what they would need at its
-/// end). Returns whether any.
+/// Frees a vertex from the touches that would have to pull. Returns whether from any.
+bool release(const Vector3d& force, VertexConstraint& c) {
+  const std::array<bool, 2> held = {c.touches[0].holds, c.touches[1].holds};
+  const std::array<double, 2> normal = normal_forces(c.touches, held, force);
+  bool any = false;
+  for (int k = 0; k < 2; ++k) {
+    any = any || (held[k] && normal[k] == 0);
+    c.touches[k].holds = held[k] && normal[k] > 0;
+  }
+  if (!any) return false;
+  const bool still_held = c.touches[0].holds || c.touches[1].holds;
+  c.hold = still_held ? Hold::slip : Hold::free;
+  c.free = still_held ? along_surfaces(c) : Matrix3d(Matrix3d::Identity());
+  c.correction -= c.free * c.correction;
+  return true;
+}
+
+/// Holds a vertex on the touches that `step` drives it into. Returns whether on any.
+bool hold(const Vector3d& step, VertexConstraint& c) {
+  bool any = false;
+  for (int k = 0; k < 2; ++k) {
+    Touch& touch = c.touches[k];
+    const Touch& other = c.touches[1 - k];
+    if (touch.obstacle < 0 || touch.holds || touch.gap + touch.normal.dot(step) >= -1e-12) continue;
+    const double missing = -touch.gap - touch.normal.dot(c.correction);
+    if (other.holds) {
+      // Within the surface that holds already, up to the edge.
+      const Vector3d inward = touch.normal - other.normal * other.normal.dot(touch.normal);
+      if (inward.squaredNorm() < 1e-6) continue;
+      c.correction += missing / inward.squaredNorm() * inward;
+    } else {
+      c.correction += missing * touch.normal;
+    }
+    touch.holds = true;
+    c.hold = Hold::slip;
+    c.free = along_surfaces(c);
+    any = true;
+  }
+  return any;
+}
+
+/// One exchange of the active set of the linear problem: holds vertices that `direction` drives into a
+/// surface and frees those that the surface would have to pull (`force`: what they would need at its end).
+/// Returns whether any.
 bool exchange_contacts(const Points& direction, const Points& force_before, const Points& force,
                        Points& gradient, std::vector<VertexConstraint>& constraints) {
   bool any = false;
   for (size_t i = 0; i < constraints.size(); ++i) {
     VertexConstraint& c = constraints[i];
-    if (c.hold == Hold::fixed || c.obstacle < 0) continue;
-    if (c.hold == Hold::free && c.gap + c.normal.dot(direction.row(i)) < -1e-12) {
-      c.hold = Hold::slip;
-      c.free = Matrix3d::Identity() - c.normal * c.normal.transpose();
-      c.correction = -c.gap * c.normal;
-      any = true;
-    } else if (c.hold != Hold::free && c.normal.dot(force.row(i)) < 0) {
-      c.hold = Hold::free;
-      c.free.setIdentity();
-      c.correction.setZero();
+    if (c.hold == Hold::fixed || c.touches[0].obstacle < 0) continue;
+    if (c.hold != Hold::free && release(force.row(i), c)) {
       gradient.row(i) = force_before.row(i);
+      any = true;
+    } else if (c.hold != Hold::stick && hold(direction.row(i), c)) {
       any = true;
     }
   }
@@ -266,15 +301,18 @@ StepReport Solver::step(Environment& environment) {
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
   for (size_t i = 0; i < now.constraints.size(); ++i) {
     const VertexConstraint& c = now.constraints[i];
-    report.penetration_max = std::max(report.penetration_max, -c.gap);
+    for (const Touch& touch : c.touches)
+      report.penetration_max = std::max(report.penetration_max, -touch.gap);
     if (c.hold == Hold::fixed) {
       if (c.grasp < 0) report.fixed_forces.push_back({int(i), c.reaction});
       if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
       continue;
     }
-    if (c.hold == Hold::free) continue;
-    report.complementarity = std::max(report.complementarity, std::abs(c.gap));
-    report.obstacle_forces[c.obstacle] += c.reaction;
+    for (const Touch& touch : c.touches) {
+      if (!touch.holds) continue;
+      report.complementarity = std::max(report.complementarity, std::abs(touch.gap));
+      report.obstacle_forces[touch.obstacle] += force_from(environment, c, touch);
+    }
   }
   environment.state.velocities = (now.positions - start.positions) / h;
   environment.state.positions = now.positions;

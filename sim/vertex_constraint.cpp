@@ -18,27 +18,87 @@ constexpr double resting = 1e-13;  ///< slip up to which a vertex has not moved:
 constexpr double smoothing =
     1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
 
-Gap nearest_gap(const Environment& environment, const Vector3d& point, double time, double time_step,
-                int& obstacle) {
-  Gap nearest{std::numeric_limits<double>::infinity(), Vector3d::Zero(), Vector3d::Zero()};
+/// The two obstacles nearest to a point.
+std::array<Touch, 2> nearest_touches(const Environment& environment, const Vector3d& point, double time,
+                                     double time_step) {
+  std::array<Touch, 2> touches;
   for (size_t k = 0; k < environment.obstacles.size(); ++k) {
     const Gap gap = gap_to(environment.obstacles[k], point, time, time_step);
-    if (gap.distance < nearest.distance) {
-      nearest = gap;
-      obstacle = static_cast<int>(k);
+    const Touch touch{static_cast<int>(k), false, gap.distance, 0, gap.normal};
+    if (touches[0].obstacle < 0 || touch.gap < touches[0].gap) {
+      touches[1] = touches[0];
+      touches[0] = touch;
+    } else if (touches[1].obstacle < 0 || touch.gap < touches[1].gap) {
+      touches[1] = touch;
     }
   }
-  return nearest;
+  return touches;
 }
 
-/// Tangential displacement since the start of the step against the surface [m].
-Vector3d slip_of(const Environment& environment, const Gap& gap, const data::Points& positions, int i) {
-  const Vector3d moved =
-      (positions.row(i) - environment.state.positions.row(i)).transpose() - gap.surface_moved;
-  return moved - gap.normal * gap.normal.dot(moved);
+double friction_of(const Environment& environment, const Touch& touch) {
+  const Obstacle& obstacle = environment.obstacles[touch.obstacle];
+  return obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
+}
+
+/// Displacement since the start of the step along the surfaces that hold the vertex, against them: against
+/// their mean by mu lambda_n where there are two [m].
+Vector3d slip_of(const Environment& environment, const VertexConstraint& constraint, double time,
+                 double time_step, const data::Points& positions, int i) {
+  VertexConstraint here = constraint;
+  Vector3d surface_moved = Vector3d::Zero();
+  double weights = 0;
+  for (Touch& touch : here.touches) {
+    if (!touch.holds) continue;
+    const Gap gap = gap_to(environment.obstacles[touch.obstacle], positions.row(i), time, time_step);
+    touch.normal = gap.normal;
+    const double weight = friction_of(environment, touch) * touch.normal_force + 1e-300;
+    surface_moved += weight * gap.surface_moved;
+    weights += weight;
+  }
+  const Vector3d moved = (positions.row(i) - environment.state.positions.row(i)).transpose();
+  return along_surfaces(here) * (moved - surface_moved / weights);
 }
 
 }  // namespace
+
+Matrix3d along_surfaces(const VertexConstraint& constraint) {
+  const auto& [first, second] = constraint.touches;
+  if (first.holds && second.holds) {
+    const Vector3d edge = first.normal.cross(second.normal).normalized();
+    return edge * edge.transpose();
+  }
+  const Vector3d& normal = first.holds ? first.normal : second.normal;
+  return Matrix3d::Identity() - normal * normal.transpose();
+}
+
+std::array<double, 2> normal_forces(const std::array<Touch, 2>& touches, const std::array<bool, 2>& eligible,
+                                    const Vector3d& needed) {
+  const double first = eligible[0] ? touches[0].normal.dot(needed) : 0.0;
+  const double second = eligible[1] ? touches[1].normal.dot(needed) : 0.0;
+  if (eligible[0] && eligible[1]) {
+    const double cosine = touches[0].normal.dot(touches[1].normal), regular = 1 - cosine * cosine;
+    // Faces that point the same way, or against each other, have no edge: one of them holds.
+    if (regular > 1e-6) {
+      const double both_first = (first - cosine * second) / regular,
+                   both_second = (second - cosine * first) / regular;
+      if (both_first > 0 && both_second > 0) return {both_first, both_second};
+      if (first > 0 && both_second <= 0) return {first, 0.0};
+      return {0.0, both_first <= 0 ? std::max(second, 0.0) : 0.0};
+    }
+  }
+  if (first > 0) return {first, 0.0};
+  return {0.0, std::max(second, 0.0)};
+}
+
+Vector3d force_from(const Environment& environment, const VertexConstraint& constraint, const Touch& touch) {
+  if (!touch.holds) return Vector3d::Zero();
+  Vector3d friction = constraint.reaction;
+  for (const Touch& each : constraint.touches) friction -= each.normal_force * each.normal;
+  const double share = constraint.friction_bound > 0
+                           ? friction_of(environment, touch) * touch.normal_force / constraint.friction_bound
+                           : 0.0;
+  return touch.normal_force * touch.normal + share * friction;
+}
 
 std::vector<VertexConstraint> begin_step(const Environment& environment, double time,
                                          data::Points& positions) {
@@ -84,33 +144,35 @@ void update_contacts(const Environment& environment, double time, double time_st
       constraint.reaction = needed - constraint.free * needed;
       // Not kept out of the obstacles, but seen there.
       if (!constraint.free.isZero())
-        constraint.gap =
-            nearest_gap(environment, positions.row(i), time, time_step, constraint.obstacle).distance;
+        constraint.touches = nearest_touches(environment, positions.row(i), time, time_step);
       continue;
     }
     constraint = VertexConstraint{};
-    const Gap gap = nearest_gap(environment, positions.row(i), time, time_step, constraint.obstacle);
-    const double normal_force = gap.normal.dot(needed);
-    constraint.gap = gap.distance;
-    constraint.normal = gap.normal;
-    if (gap.distance > touching || normal_force <= 0) continue;
+    auto& touches = constraint.touches;
+    touches = nearest_touches(environment, positions.row(i), time, time_step);
+    const auto on_surface = [&](const Touch& touch) { return touch.obstacle >= 0 && touch.gap <= touching; };
+    if (!on_surface(touches[0])) continue;
+    const std::array<double, 2> normal = normal_forces(touches, {true, on_surface(touches[1])}, needed);
+    for (int k = 0; k < 2; ++k) {
+      touches[k].holds = normal[k] > 0;
+      touches[k].normal_force = normal[k];
+      if (touches[k].holds) constraint.friction_bound += friction_of(environment, touches[k]) * normal[k];
+    }
+    if (!touches[0].holds && !touches[1].holds) continue;
 
-    const Obstacle& obstacle = environment.obstacles[constraint.obstacle];
-    const double friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
-    const double bound = friction * normal_force;
-    const Vector3d needed_tangential = needed - normal_force * gap.normal;
-    const Vector3d slip = slip_of(environment, gap, positions, static_cast<int>(i));
+    const double bound = constraint.friction_bound;
+    const Matrix3d along = along_surfaces(constraint);
+    const Vector3d needed_tangential = along * needed;
+    const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
     const double slip_length = slip.norm(), needed_length = needed_tangential.norm();
-    constraint.friction_bound = bound;
-    constraint.reaction = normal_force * gap.normal;
     if (slip_length <= resting && needed_length <= bound) {
       constraint.hold = Hold::stick;
       constraint.free.setZero();
-      constraint.reaction += needed_tangential;
+      constraint.reaction = needed;
       continue;
     }
     constraint.hold = Hold::slip;
-    constraint.free = Matrix3d::Identity() - gap.normal * gap.normal.transpose();
+    constraint.free = along;
     if (slip_length > resting) {
       const double smooth_length = std::hypot(slip_length, smoothing);
       constraint.slip_direction = slip / smooth_length;
@@ -118,24 +180,40 @@ void update_contacts(const Environment& environment, double time, double time_st
     } else {
       constraint.slip_direction = -needed_tangential / needed_length;
     }
-    constraint.reaction -= bound * constraint.slip_direction;
+    constraint.reaction = -bound * constraint.slip_direction;
+    for (const Touch& touch : touches) constraint.reaction += touch.normal_force * touch.normal;
   }
 }
 
 void project_to_feasible(const Environment& environment, double time, double time_step,
                          const std::vector<VertexConstraint>& constraints, data::Points& positions) {
   if (environment.obstacles.empty()) return;
+  // Exact for one obstacle; onto two at once by turns.
+  const int sweeps = environment.obstacles.size() > 1 ? 40 : 1;
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& constraint = constraints[i];
     if (constraint.hold == Hold::fixed) continue;
-    int obstacle = -1;
-    const Gap gap = nearest_gap(environment, positions.row(i), time, time_step, obstacle);
-    const bool held = constraint.hold != Hold::free && obstacle == constraint.obstacle;
-    // A vertex that is to land does so where the step is long enough to bring it down.
-    const bool lands = held && (constraint.correction.isZero(0) || gap.distance <= 0.01 * constraint.gap);
-    if (gap.distance < 0 || lands) positions.row(i) -= gap.distance * gap.normal.transpose();
-    if (held && constraint.hold == Hold::slip) {
-      const Vector3d slip = slip_of(environment, gap, positions, static_cast<int>(i));
+    const auto touch_of = [&](size_t obstacle) {
+      return std::find_if(constraint.touches.begin(), constraint.touches.end(), [&](const Touch& touch) {
+        return touch.holds && touch.obstacle == static_cast<int>(obstacle);
+      });
+    };
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
+      double moved = 0;
+      for (size_t k = 0; k < environment.obstacles.size(); ++k) {
+        const Gap gap = gap_to(environment.obstacles[k], positions.row(i), time, time_step);
+        const auto touch = touch_of(k);
+        // A vertex that is to land does so where the step is long enough to bring it down.
+        const bool lands = touch != constraint.touches.end() &&
+                           (constraint.correction.isZero(0) || gap.distance <= 0.01 * touch->gap);
+        if (!(gap.distance < 0 || lands)) continue;
+        positions.row(i) -= gap.distance * gap.normal.transpose();
+        moved = std::max(moved, std::abs(gap.distance));
+      }
+      if (moved <= resting) break;
+    }
+    if (constraint.hold == Hold::slip) {
+      const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
       if (slip.dot(constraint.slip_direction) < 0) positions.row(i) -= slip.transpose();
     }
   }
@@ -147,8 +225,7 @@ double friction_potential(const Environment& environment, double time, double ti
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& constraint = constraints[i];
     if (constraint.friction_bound == 0) continue;
-    const Gap gap = gap_to(environment.obstacles[constraint.obstacle], positions.row(i), time, time_step);
-    const Vector3d slip = slip_of(environment, gap, positions, static_cast<int>(i));
+    const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
     potential += constraint.friction_bound *
                  (constraint.slip_stiffness > 0 ? std::hypot(slip.norm(), smoothing) : slip.norm());
   }

@@ -1,9 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "sheet_scene.h"
 #include "sim/contact_geometry.h"
+#include "sim/vertex_constraint.h"
 
 namespace flash::sim {
 namespace {
@@ -152,6 +154,74 @@ TEST(Contact, AVertexOnRollersIsSeenBelowATable) {
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
     environment.fixed.push_back({i, {false, true, true}, Vector3d(0, sheet.rest.vertices(i, 1), 0)});
   EXPECT_NEAR(Solver(sheet, {}).step(environment).penetration_max, 0.002, 1e-12);
+}
+
+TEST(Contact, TwoSurfacesShareAForceByNonNegativeLeastSquares) {
+  for (int sample = 0; sample < 1000; ++sample) {
+    std::array<Touch, 2> touches;
+    for (Touch& touch : touches) touch.normal = Vector3d::Random().normalized();
+    const Vector3d needed = Vector3d::Random();
+    const auto forces = normal_forces(touches, {true, true}, needed);
+    // The conditions of the minimum of |needed - sum forces * normals|^2 over forces not below zero.
+    Vector3d rest = needed;
+    for (int k = 0; k < 2; ++k) rest -= forces[k] * touches[k].normal;
+    for (int k = 0; k < 2; ++k) {
+      EXPECT_GE(forces[k], 0);
+      EXPECT_LE(touches[k].normal.dot(rest), 1e-9);  // rounding over the smallest angle between the normals
+      EXPECT_NEAR(forces[k] * touches[k].normal.dot(rest), 0, 1e-9);
+    }
+  }
+}
+
+TEST(Contact, ASheetThatSlidIntoAWallRestsOnFloorAndWall) {
+  const Sheet sheet = small_sheet(6, 0.12);
+  for (const double friction : {0.0, 0.1}) {
+    Environment environment = environment_of(sheet);
+    environment.material.friction = friction;
+    environment.material.bending_rigidity = 1e-3;  // does not buckle under its own weight
+    environment.state.positions.col(0).array() += 0.02;
+    const double slope = 0.5;
+    environment.gravity = 9.81 * Vector3d(-std::sin(slope), 0, -std::cos(slope));
+    environment.obstacles = {{Plane{}}, {Plane{Vector3d::Zero(), Vector3d::UnitX()}}};
+    Solver solver(sheet, {.tolerance = 1e-7});
+    StepReport report;
+    int converged = 0;
+    for (int n = 0; n < 200; ++n) converged += (report = solver.step(environment)).converged;
+    EXPECT_EQ(converged, 200) << friction;
+    const double weight = weight_of(sheet, environment);
+    EXPECT_NEAR(report.obstacle_forces[0].z(), weight * std::cos(slope), 1e-5 * weight);
+    const double held = report.obstacle_forces[0].x() + report.obstacle_forces[1].x();
+    EXPECT_NEAR(held, weight * std::sin(slope), 1e-5 * weight);
+    if (friction == 0) {
+      EXPECT_NEAR(report.obstacle_forces[0].x(), 0, 1e-9);
+    }
+    EXPECT_LT(report.penetration_max, 1e-12);
+    EXPECT_NEAR(environment.state.positions.col(0).minCoeff(), 0, 1e-12);
+  }
+}
+
+TEST(Contact, AStripFallenIntoAGrooveIsCarriedByBothSides) {
+  const Sheet sheet =
+      make_sheet(data::rectangle({.width = 0.1, .height = 0.04, .cells_x = 10, .cells_y = 4}));
+  Environment environment = environment_of(sheet);
+  environment.material.friction = 0.3;
+  environment.material.bending_rigidity = 1e-6;
+  environment.material.air_drag = 5;
+  environment.state.positions.col(0).array() -= 0.05;
+  environment.state.positions.col(2).array() += 0.05;
+  environment.obstacles = {{Plane{Vector3d::Zero(), Vector3d(1, 0, 1).normalized()}},
+                           {Plane{Vector3d::Zero(), Vector3d(-1, 0, 1).normalized()}}};
+  Solver solver(sheet, {.tolerance = 1e-6});
+  StepReport report;
+  int converged = 0;
+  for (int n = 0; n < 300; ++n) converged += (report = solver.step(environment)).converged;
+  EXPECT_GE(converged, 297);
+  const double weight = weight_of(sheet, environment);
+  const Vector3d total = report.obstacle_forces[0] + report.obstacle_forces[1];
+  EXPECT_NEAR((total - Vector3d(0, 0, weight)).norm(), 0, 1e-3 * weight);
+  EXPECT_GT(report.obstacle_forces[0].norm(), 0.2 * weight);
+  EXPECT_GT(report.obstacle_forces[1].norm(), 0.2 * weight);
+  EXPECT_LT(report.penetration_max, 1e-9);
 }
 
 }  // namespace
