@@ -110,12 +110,12 @@ def fold(runs, data, asset, joint):
     recording = runs.import_clouds(
         "fold_recording", clip / "frames", "--trajectory", str(clip / "tcp.tum"), "--times", "rate:10", "--sheet",
         "0.278x0.278", "--cell", "0.02", "--grasp", "corner", "--within", "0.021", "--crop-z", "0.085:0.45",
-        "--crop-y", ":0.35", "--table-height", "0.07", "--offset", "0.06,0.08,0.06", "--yaw", "0.26", "--clock", "0.2",
+        "--crop-y", ":0.35", "--table-height", "0.07", "--offset", "0.08,0.12,0.06", "--yaw", "0.4", "--clock", "0.2",
         "--start-yaw", "0.35", "--kind", "free", "--name", "fold_paper")
     from_lifts = joint["best"]["parameters"]["bending"]
     values = sorted({MEDIAN_FABRIC, 1e-4, 2.5e-4, from_lifts})
     search = runs.grid("fold_paper", [recording], "--asset", asset, *window("fold_paper"), *GRASPS[joint["grasp"]],
-                       "--bending", ",".join(map(repr, values)), "--start-yaw=-0.15,0,0.1", "--no-solver-check")
+                       "--bending", ",".join(map(repr, values)), "--start-yaw=-0.3,-0.2,-0.1,0", "--no-solver-check")
     return {"search": search, "from_lifts": from_lifts,
             "by_bending": {value: best_row(search["rows"], bending=value) for value in values}}
 
