@@ -48,8 +48,10 @@ bench: packages-build packages-test packages-bench  ## Packages, build, then the
 configure-test: packages-build packages-test
 	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=ON $(CMAKE_ARGS)
 
-validate: reference  ## Fit the recordings in $(DATA) and renew docs/validation.md; ONLY=lift_navy: that clip alone
-	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --data $(DATA) --scenes $(REFERENCE)/scenes \
+validate: reference configure-test  ## Calibrate and fit what is in $(DATA), renew docs/validation.md; ONLY=handeye, lift_navy, ...
+	cmake --build $(BUILD) -j $(JOBS) --target hand_eye_study
+	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --calib $(BUILD)/bin/flash-calib \
+	  --hand-eye-study $(BUILD)/tests/hand_eye_study --data $(DATA) --scenes $(REFERENCE)/scenes \
 	  --results $(BUILD)/reference --out $(BUILD)/validation --document docs/validation.md $(if $(ONLY),--only $(ONLY))
 
 reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py

@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
-"""Runs flash-sysid on recorded lifts and on recordings of an independent simulator, and writes what came out into
-docs/validation.md. Finished runs are kept: called again, it goes on where it was."""
+"""Runs flash-calib on recorded hand-eye sets, flash-sysid on recorded lifts and on recordings of an independent
+simulator, and writes what came out into docs/validation.md. Finished runs are kept: called again, it goes on where it was."""
 import argparse
 import pathlib
 import shutil
 
+import handeye
+import convergence
 import lifts
 import limits
 import reference
@@ -16,13 +18,16 @@ from runs import Runs
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sysid", required=True, help="the program flash-sysid")
-    parser.add_argument("--data", required=True, type=pathlib.Path, help="folder with lift/ and twin/")
+    parser.add_argument("--calib", help="the program flash-calib")
+    parser.add_argument("--hand-eye-study", help="the program hand_eye_study")
+    parser.add_argument("--data", required=True, type=pathlib.Path, help="folder with handeye/, lift/ and twin/")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder of the runs")
     parser.add_argument("--document", required=True, type=pathlib.Path, help="where the tables go")
+    parser.add_argument("--sim", help="the program flash-sim")
     parser.add_argument("--scenes", type=pathlib.Path, help="folder of the reference scenes")
     parser.add_argument("--results", type=pathlib.Path, help="what make reference wrote of them")
-    parser.add_argument("--only", help="lifts, twins or reference: that part of the document; a recording: its fit "
-                                       "alone, printed")
+    parser.add_argument("--only", help="handeye, lifts, twins or reference: that part of the document; a recording: "
+                                       "its fit alone, printed")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     runs = Runs(options.sysid, options.out)
@@ -34,6 +39,11 @@ def main():
     document = {}
     if options.only in (None, "reference") and options.results:
         document |= reference.tables(options.scenes, options.results, tables.table)
+    if options.only in (None, "handeye") and options.calib:
+        results = handeye.run(options.calib, options.data / "handeye", options.out / "handeye", options.hand_eye_study)
+        document |= handeye.tables(results, tables.table)
+    if options.only in (None, "convergence") and options.sim:
+        document |= convergence.tables(options.sim, options.out, tables.table)
     if options.only in (None, "lifts"):
         results = run_lifts(runs, options.data)
         document |= tables.lift_tables(results)
