@@ -87,8 +87,9 @@ int run_synth(SynthOptions options) {
   choose_device(options.common);
   const data::Asset asset = data::load_asset(options.asset);
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
-  const data::TriangleMesh mesh = data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
-                                                                : data::load_triangle_mesh(mesh_spec);
+  const data::TriangleMesh mesh = options.mesh.empty()            ? data::load_rest_mesh(asset)
+                                  : data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
+                                                                  : data::load_triangle_mesh(mesh_spec);
   std::vector<std::string> notices;
   const sysid::MaterialBase base = material_base(asset, mesh, notices);
   std::vector<sysid::Axis> axes;

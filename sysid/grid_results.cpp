@@ -86,6 +86,7 @@ class Row {
   Row(const std::vector<std::string>& names, std::vector<std::string> fields, std::string place)
       : names_(names), fields_(std::move(fields)), place_(std::move(place)) {}
 
+  const std::string& place() const { return place_; }  ///< file and line
   const std::string& text(const std::string& name) const {
     const auto found = std::find(names_.begin(), names_.end(), name);
     const auto index = static_cast<std::size_t>(found - names_.begin());
@@ -163,11 +164,13 @@ std::string results_line(const CandidateResult& result) {
   return line + "\n";
 }
 
-CandidateStatus parse_status(const std::string& text) {
+CandidateStatus status_of(const Row& row) {
+  const std::string& text = row.text("status");
   for (const auto status : {CandidateStatus::ok, CandidateStatus::unconverged, CandidateStatus::diverged}) {
     if (text == to_string(status)) return status;
   }
-  throw data::InputError("status \"" + text + "\": expected ok, unconverged or diverged");
+  throw data::InputError(row.place() + ": status: found \"" + text +
+                         "\", expected ok, unconverged or diverged");
 }
 
 nlohmann::json load_grid(const std::string& folder) {
@@ -215,7 +218,7 @@ GridResults load_grid_results(const std::string& folder) {
     result.converged = row.text("converged") == "true";
     result.residual_max = row.number("residual_max");
     result.penetration_max = row.number("penetration_max_m");
-    result.status = parse_status(row.text("status"));
+    result.status = status_of(row);
     result.recordings.resize(results.recordings.size());
     found[result.id] = std::move(result);
   });
