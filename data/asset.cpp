@@ -322,9 +322,20 @@ Asset asset_from_sheet(const SheetMaterial& material, std::optional<double> thic
   return asset;
 }
 
-TriangleMesh load_asset_mesh(const Asset& asset) {
+TriangleMesh load_rest_mesh(const Asset& asset) {
+  constexpr double kLargestSize = 20.0;  // as of recordings: above it, lengths are taken for millimetres [m]
   TriangleMesh mesh = is_mesh_spec(asset.mesh) ? parse_mesh_spec(asset.mesh, asset.source, "mesh")
                                                : load_triangle_mesh(asset.mesh);
+  const double size = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).norm();
+  if (size > kLargestSize)
+    throw input_error(
+        asset.source, "mesh",
+        "is " + format_short(size) + " m across, expected metres (millimetres read as metres?)");
+  return mesh;
+}
+
+TriangleMesh load_asset_mesh(const Asset& asset) {
+  TriangleMesh mesh = load_rest_mesh(asset);
   mesh.vertices *= rotation_from_degrees(asset.rotation_degrees).transpose();
   mesh.vertices.rowwise() += asset.translation.transpose();
   return mesh;

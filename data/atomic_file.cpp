@@ -11,6 +11,7 @@
 #include <regex>
 #include <sstream>
 #include <system_error>
+#include <vector>
 
 #include "data/error.h"
 
@@ -56,8 +57,10 @@ void write_atomically(const std::string& path, std::string_view contents) {
 
 void remove_leftovers(const std::string& folder) {
   static const std::regex name(R"(.+\.\d+-\d+\.tmp)");  // path.PID-SERIAL.tmp, see above
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (std::regex_match(entry.path().filename().string(), name)) std::filesystem::remove(entry.path());
+  std::vector<std::filesystem::path> left;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (std::regex_match(entry.path().filename().string(), name)) left.push_back(entry.path());
+  for (const std::filesystem::path& path : left) std::filesystem::remove(path);
 }
 
 std::string read_file(const std::string& path) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <vector>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
@@ -72,6 +73,8 @@ void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source) {
   check_indices(mesh.triangles, mesh.vertices.rows(), "triangle", source);
   if (mesh.triangles.rows() == 0) throw InputError(source + ": found no triangles");
   std::map<std::array<int, 3>, Eigen::Index> seen;
+  std::map<std::array<int, 2>, Eigen::Index> sides;  // by the direction in which their triangle runs
+  std::vector<bool> used(static_cast<std::size_t>(mesh.vertices.rows()), false);
   for (Eigen::Index i = 0; i < mesh.triangles.rows(); ++i) {
     const Eigen::Vector3i t = mesh.triangles.row(i);
     const Eigen::Vector3d a = mesh.vertices.row(t[1]) - mesh.vertices.row(t[0]);
@@ -89,7 +92,20 @@ void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source) {
     if (!is_new)
       throw input_error(source, "triangle " + std::to_string(i),
                         "repeats triangle " + std::to_string(earlier->second));
+    for (int k = 0; k < 3; ++k) {
+      const std::array<int, 2> side = {t[k], t[(k + 1) % 3]};
+      const auto [other, is_free] = sides.emplace(side, i);
+      if (!is_free)
+        throw input_error(source, "triangle " + std::to_string(i),
+                          "runs from vertex " + std::to_string(side[0]) + " to " + std::to_string(side[1]) +
+                              " as triangle " + std::to_string(other->second) +
+                              " does: one of them is flipped, or more than two share the edge");
+      used[static_cast<std::size_t>(t[k])] = true;
+    }
   }
+  const auto lone = std::find(used.begin(), used.end(), false);
+  if (lone != used.end())
+    throw input_error(source, "vertex " + std::to_string(lone - used.begin()), "belongs to no triangle");
 }
 
 TriangleMesh load_triangle_mesh(const std::string& path) {
