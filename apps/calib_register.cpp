@@ -25,7 +25,7 @@ struct RegisterOptions {
   std::string target, setup, cache;
   std::vector<double> workspace;
   bool without_images = false;
-  bool refine_intrinsics = false;
+  bool refine_intrinsics = false, refine_scale = false;
   std::string out;
 };
 
@@ -59,6 +59,7 @@ std::string name_of(const std::string& path) {
 calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
   calib::RefineSettings settings;
   if (options.refine_intrinsics) settings.bundle.unknowns.intrinsics = kRefinedIntrinsics;
+  settings.bundle.unknowns.scales = options.refine_scale;
   return calib::solve_cell(members, settings);
 }
 
@@ -164,6 +165,7 @@ void add_register_verb(CLI::App& app, Action& action) {
       ->expected(3);
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
+  verb->add_flag("--refine-scale", options->refine_scale, "Solve for the size of the targets as well");
   verb->add_option("--cache", options->cache, "Folder that keeps corners found, for the next run");
   verb->add_option("-o,--out", options->out, "File for the cell, JSON");
   add_calib_common_options(*verb, options->common);

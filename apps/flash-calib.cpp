@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   flash::add_validate_verb(app, action);
   flash::add_handeye_verb(app, action);
   flash::add_register_verb(app, action);
+  flash::add_plan_verb(app, action);
   // CLI11 would only say that a verb is missing.
   std::vector<std::string> verbs;
   for (const CLI::App* verb : app.get_subcommands(nullptr)) verbs.push_back(verb->get_name());

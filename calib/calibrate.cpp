@@ -176,6 +176,24 @@ ScaleCheck check_scale(const Refinement& refined, const RefineSettings& settings
   return {scaled.bundle.scales.front(), std::sqrt(scaled.covariance(column, column))};
 }
 
+/// Halves of few views determine too little by themselves.
+void check_splits(Calibration& result, const CalibrateSettings& settings) {
+  if (result.used.size() < 4 * static_cast<std::size_t>(settings.least_views)) return;
+  result.interleaved = check_halves(result.refined, settings.refine.bundle, Split::interleaved);
+  result.consecutive = check_halves(result.refined, settings.refine.bundle, Split::consecutive);
+  const double inflation = split_inflation(*result.consecutive);
+  if (inflation == 1) return;
+  result.covariance *= inflation;
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "first and second half of the views differ by %.1f mm and %.2f deg, more than noise explains: drift, "
+      "or errors that depend on the pose; the stated standard deviations were raised by %.1f",
+      1e3 * result.consecutive->apart.head<3>().norm(), result.consecutive->apart.tail<3>().norm() / kDegree,
+      std::sqrt(inflation));
+  result.warnings.emplace_back(text);
+}
+
 void warn_of_scale(Calibration& result) {
   if (!result.scale) return;
   const double off = std::abs(result.scale->estimate - 1), sd = result.scale->sd;
@@ -266,6 +284,7 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.chain_rms = reprojection_rms(bundle, false);
   result.centre_rms = centre_rms(bundle, target_poses(observations));
   compare_methods(result, observations, plain, settings);
+  check_splits(result, settings);
   if (settings.check_scale) result.scale = check_scale(result.refined, settings.refine);
   finish(result, observations);
   return result;

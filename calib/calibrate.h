@@ -62,7 +62,8 @@ struct Calibration {
   RotationDiversity diversity;
   WeakestDirection weakest;
   std::optional<ScaleCheck> scale;
-  std::vector<std::string> warnings;  ///< worst first
+  std::optional<SplitCheck> interleaved, consecutive;  ///< of X; the latter may have widened its covariance
+  std::vector<std::string> warnings;                   ///< worst first
   bool usable = true;
 };
 

@@ -138,6 +138,17 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   json["scale"] = calibration.scale
                       ? Json{{"estimate", calibration.scale->estimate}, {"sd", calibration.scale->sd}}
                       : Json(nullptr);
+  json["splits"] = nullptr;
+  if (calibration.interleaved && calibration.consecutive) {
+    const auto split = [](const SplitCheck& check) {
+      return Json{{"apart_mm", 1e3 * check.apart.head<3>().norm()},
+                  {"apart_deg", kDegrees * check.apart.tail<3>().norm()},
+                  {"chi_square", check.chi_square}};
+    };
+    json["splits"] = {{"interleaved", split(*calibration.interleaved)},
+                      {"consecutive", split(*calibration.consecutive)},
+                      {"covariance_factor", split_inflation(*calibration.consecutive)}};
+  }
   json["warnings"] = calibration.warnings;
   json["exit_code"] = exit_code;
   json["provenance"] = {{"tool", "flash-calib"},    {"version", FLASH_VERSION}, {"dataset", inputs.dataset},
@@ -151,7 +162,7 @@ Extrinsics load_extrinsics(const std::string& path) {
   const data::JsonObject object(file, path);
   object.expect_fields({"schema", "setup", "method", "transform", "target_pose", "covariance", "predicted_sd",
                         "sigmas", "residuals", "comparison", "views", "observability", "convention_findings",
-                        "scale", "warnings", "exit_code", "provenance"});
+                        "scale", "splits", "warnings", "exit_code", "provenance"});
   if (object.string("schema") != "flash-extrinsics/1") throw object.error("schema", "flash-extrinsics/1");
   Extrinsics extrinsics;
   extrinsics.setup = parse_setup(object.string("setup"), path, "setup");

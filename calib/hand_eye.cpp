@@ -132,6 +132,41 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
   return result;
 }
 
+SplitCheck check_halves(const Refinement& refined, const BundleSettings& settings, Split split,
+                        std::size_t base) {
+  const Bundle& bundle = refined.bundle;
+  std::vector<int> half(bundle.poses.size());
+  std::vector<int> count(bundle.bases.size(), 0), seen(bundle.bases.size(), 0);
+  for (const RobotPose& pose : bundle.poses) ++count[static_cast<std::size_t>(pose.arm)];
+  for (std::size_t i = 0; i < half.size(); ++i) {
+    const auto arm = static_cast<std::size_t>(bundle.poses[i].arm);
+    half[i] = split == Split::interleaved ? seen[arm] % 2 : (2 * seen[arm] >= count[arm] ? 1 : 0);
+    ++seen[arm];
+  }
+  RefineSettings fixed;
+  fixed.bundle = settings;
+  fixed.estimate_noise = false;
+  fixed.noise = refined.noise;
+  const SharedColumns columns = shared_columns(bundle, settings.unknowns);
+  const int column = base == 0 ? columns.cameras.front() : columns.bases[base];
+  Eigen::Isometry3d T[2];
+  Matrix6d covariance = Matrix6d::Zero();
+  for (int part = 0; part < 2; ++part) {
+    const Refinement fit = refine(subset(bundle, half, part, true), fixed);
+    T[part] = base == 0 ? fit.bundle.cameras.front() : fit.bundle.bases[base];
+    covariance += fit.covariance.block<6, 6>(column, column);
+  }
+  SplitCheck check;
+  check.apart = motion_between(T[0], T[1]);
+  check.chi_square = check.apart.dot(covariance.ldlt().solve(check.apart));
+  return check;
+}
+
+double split_inflation(const SplitCheck& consecutive) {
+  constexpr double kQuantile95 = 12.592;  // chi-square, 6 degrees of freedom
+  return consecutive.chi_square > kQuantile95 ? consecutive.chi_square / 6 : 1;
+}
+
 Eigen::Isometry3d fitted_pose(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                               const Eigen::Matrix2Xd& pixels, Eigen::Isometry3d T_camera_target) {
   const IntrinsicsVector intrinsics = to_vector(camera);

@@ -36,6 +36,23 @@ NoiseLevels uniform_noise(const Bundle& bundle, double corner, double rotation, 
 /// covariance is the inverse of the information that is left for the shared unknowns.
 Refinement refine(Bundle bundle, const RefineSettings& settings = {});
 
+/// Two halves of the poses, each solved by itself, and how far apart they put one frame.
+struct SplitCheck {
+  Vector6d apart = Vector6d::Zero();  ///< (dt, dtheta) [m, rad]
+  double chi_square = 0;              ///< of it under the stated uncertainty; 95 % lie below 12.6
+};
+enum class Split {
+  interleaved,  ///< every other pose: shows whether noise alone is stated right
+  consecutive   ///< first and second half of each arm: shows drift, and errors that depend on the pose
+};
+/// base: of the arm whose base is compared; 0: the first camera.
+SplitCheck check_halves(const Refinement& refined, const BundleSettings& settings, Split split,
+                        std::size_t base = 0);
+
+/// By how much a covariance has to grow to be true to consecutive halves: 1 unless they disagree at the 95 %
+/// level, then their chi-square over its 6 degrees of freedom.
+double split_inflation(const SplitCheck& consecutive);
+
 /// The bundle of one camera and one arm. points: the target's, 3 x N; poses: seed.
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
                    const std::vector<Observation>& observations, const HandEyePoses& seed);

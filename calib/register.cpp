@@ -7,6 +7,7 @@
 
 #include "calib/linearization.h"
 #include "data/error.h"
+#include "data/text.h"
 
 namespace flash::calib {
 namespace {
@@ -141,11 +142,26 @@ Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& se
     return column < 0 ? Matrix6d(Matrix6d::Zero()) : Matrix6d(refined.covariance.block<6, 6>(column, column));
   };
   const std::string world = arms.front();
+  const auto widened = [&](std::size_t base) {
+    const double factor =
+        refined.bundle.poses.size() < 16
+            ? 1.0
+            : split_inflation(check_halves(refined, settings.bundle, Split::consecutive, base));
+    if (factor > 1)
+      cell.notices.push_back(
+          (base == 0 ? cameras.front() : arms[base]) +
+          ": first and second half of the views differ by more than noise explains; its standard "
+          "deviations were raised by " +
+          data::format_short(std::sqrt(factor)));
+    return factor;
+  };
   for (std::size_t a = 1; a < arms.size(); ++a)
-    cell.bases.push_back({{world, arms[a], refined.bundle.bases[a]}, block(columns.bases[a])});
+    cell.bases.push_back({{world, arms[a], refined.bundle.bases[a]}, widened(a) * block(columns.bases[a])});
   const std::string parent = refined.bundle.setup == Setup::eye_in_hand ? "gripper" : world;
+  const double camera_factor = widened(0);
   for (std::size_t c = 0; c < cameras.size(); ++c)
-    cell.cameras.push_back({{parent, cameras[c], refined.bundle.cameras[c]}, block(columns.cameras[c])});
+    cell.cameras.push_back(
+        {{parent, cameras[c], refined.bundle.cameras[c]}, camera_factor * block(columns.cameras[c])});
   cell.noise = refined.noise;
   cell.corner_rms = reprojection_rms(refined.bundle, true);
   cell.chain_rms = reprojection_rms(refined.bundle, false);

@@ -81,7 +81,8 @@ TEST(VarianceComponents, ComponentThatIsNotThereGoesToItsFloor) {
     model = one_way(0, 0.5, ++seed, y);
   }
   const VarianceComponents found = estimate_variance_components(model, {1, 1}, {1e-6, 1e-6});
-  EXPECT_LT(found.sigmas[1], 0.02);  // a tenth of what the mean of five repeats can show: the deviance is flat
+  EXPECT_LT(found.sigmas[1],
+            0.02);  // a tenth of what the mean of five repeats can show: the deviance is flat
   EXPECT_NEAR(found.sigmas[0], 0.5, 0.2);
 }
 

@@ -1,0 +1,116 @@
+#include "calib/plan.h"
+
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/calib_options.h"
+#include "apps/calib_verbs.h"
+#include "apps/command_line.h"
+#include "calib/calibrate_images.h"
+#include "calib/extrinsics.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+
+namespace flash {
+namespace {
+
+struct PlanOptions {
+  CalibCommonOptions common;
+  DatasetChoice dataset;
+  std::string setup, criterion = "trace";
+  std::vector<double> lower, upper;
+  calib::PlanSettings settings;
+  std::string out;
+};
+
+constexpr double kDegrees = 180 / M_PI;
+
+nlohmann::ordered_json plan_json(const calib::Plan& plan, const PlanOptions& options) {
+  nlohmann::ordered_json json = {
+      {"schema", "flash-calibration-plan/1"},
+      {"criterion", options.criterion},
+      {"candidates_seeing_the_target", plan.visible},
+      {"now",
+       {{"translation_sd_mm", 1e3 * plan.translation_sd}, {"rotation_sd_deg", kDegrees * plan.rotation_sd}}}};
+  json["poses"] = nlohmann::json::array();
+  for (const calib::PlannedPose& pose : plan.poses) {
+    nlohmann::ordered_json entry =
+        calib::to_json(calib::NamedTransform{"base", "gripper", pose.T_base_gripper});
+    entry["translation_sd_mm"] = 1e3 * pose.translation_sd;
+    entry["rotation_sd_deg"] = kDegrees * pose.rotation_sd;
+    json["poses"].push_back(std::move(entry));
+  }
+  return json;
+}
+
+void print(const calib::Plan& plan) {
+  std::printf("now: +- %.2f mm, %.3f deg an axis; of the candidates %d see the whole target\n",
+              1e3 * plan.translation_sd, kDegrees * plan.rotation_sd, plan.visible);
+  for (std::size_t i = 0; i < plan.poses.size(); ++i) {
+    const Eigen::Vector3d t = plan.poses[i].T_base_gripper.translation();
+    const Eigen::Quaterniond q(plan.poses[i].T_base_gripper.linear());
+    std::printf("%zu  (%.3f, %.3f, %.3f) m  xyzw (%.4f, %.4f, %.4f, %.4f)  then +- %.2f mm, %.3f deg\n",
+                i + 1, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), 1e3 * plan.poses[i].translation_sd,
+                kDegrees * plan.poses[i].rotation_sd);
+  }
+}
+
+int run_plan(const PlanOptions& options) {
+  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  const calib::Dataset dataset = load_dataset(options.dataset);
+  if (options.setup.empty() && !dataset.setup)
+    throw data::InputError(dataset.source +
+                           ": says nothing of the setup; add --setup eye-in-hand or eye-to-hand");
+  const calib::Setup setup =
+      options.setup.empty() ? *dataset.setup : calib::parse_setup(options.setup, "command line", "--setup");
+  const calib::Target target = target_of(options.dataset, dataset);
+  const calib::ImageCalibration solved = calib::calibrate_images(
+      setup, dataset, target, detect_all(dataset, target, options.dataset, options.common));
+  calib::PlanSettings settings = options.settings;
+  if (options.criterion == "determinant") settings.criterion = calib::PlanCriterion::determinant;
+  if (!options.lower.empty()) settings.lower = Eigen::Vector3d::Map(options.lower.data());
+  if (!options.upper.empty()) settings.upper = Eigen::Vector3d::Map(options.upper.data());
+  const calib::Plan plan = calib::plan_poses(solved.calibration, calib::target_points(target), settings);
+  const std::string text = data::format_json(plan_json(plan, options));
+  if (!options.out.empty()) data::write_atomically(options.out, text);
+  if (options.common.json)
+    std::cout << text;
+  else
+    print(plan);
+  return exit_done;
+}
+
+}  // namespace
+
+void add_plan_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<PlanOptions>();
+  CLI::App* verb = app.add_subcommand("plan", "The next robot poses that would help the calibration most");
+  add_dataset_options(*verb, options->dataset);
+  verb->add_option("--setup", options->setup, "Where the dataset does not say")
+      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+  verb->add_option("--poses", options->settings.poses, "How many")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  verb->add_option("--lower", options->lower, "Least x y z of the gripper in the base [m]")->expected(3);
+  verb->add_option("--upper", options->upper, "Greatest x y z of the gripper in the base [m]")->expected(3);
+  verb->add_option("--reach", options->settings.reach, "Beyond the poses used, where the bounds allow [m]")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  verb->add_option("--criterion", options->criterion,
+                   "trace: sum of variances; determinant: volume of the region")
+      ->check(CLI::IsMember({"trace", "determinant"}))
+      ->capture_default_str();
+  verb->add_option("--seed", options->settings.seed, "Of the candidates")->capture_default_str();
+  verb->add_option("-o,--out", options->out, "File for the plan, JSON");
+  add_calib_common_options(*verb, options->common);
+  verb->footer(
+      "Example:\n"
+      "  flash-calib plan wrist --target chessboard:9x6:0.025 --lower 0.2 -0.4 0.1 --upper 0.7 0.4 0.6 -o "
+      "next.json");
+  verb->callback([options, &action] { action = [options] { return run_plan(*options); }; });
+}
+
+}  // namespace flash
