@@ -131,6 +131,20 @@ Sighting fit_crossings(const GreyImage& image, const Rectifier& rectifier, const
   return sighting;
 }
 
+/// A board with a row or a column less than stated shows an outer one that has no crossings.
+bool lacks_a_side(const Sighting& sighting, const Target& target) {
+  int first_row = 0, last_row = 0, first_column = 0, last_column = 0;
+  for (const int point : sighting.points) {
+    const int c = point % target.columns, r = point / target.columns;
+    first_row += r == 0;
+    last_row += r == target.rows - 1;
+    first_column += c == 0;
+    last_column += c == target.columns - 1;
+  }
+  return 2 * std::min(first_row, last_row) < target.columns ||
+         2 * std::min(first_column, last_column) < target.rows;
+}
+
 }  // namespace
 
 Finder chessboard_finder(const Target& target, const Rectifier& rectifier) {
@@ -156,7 +170,7 @@ Finder chessboard_finder(const Target& target, const Rectifier& rectifier) {
                      std::to_string(target.rows) + " inner corners";
       return found;
     }
-    if (static_cast<double>(fitted.points.size()) < kLeastShare * count) {
+    if (static_cast<double>(fitted.points.size()) < kLeastShare * count || lacks_a_side(fitted, target)) {
       found.sightings.clear();
       found.reason = "a chessboard was found, but only " + std::to_string(fitted.points.size()) + " of its " +
                      std::to_string(count) + " corners show a crossing";

@@ -49,8 +49,8 @@ data::Picture corner_picture(const GreyImage& image, const Eigen::Matrix2Xd& det
     low = detected.rowwise().minCoeff();
     high = detected.rowwise().maxCoeff();
     const Eigen::Vector2d margin = Eigen::Vector2d::Constant(settings.margin * (high - low).maxCoeff() + 4);
-    low -= margin;
-    high += margin;
+    low = (low - margin).cwiseMax(0);
+    high = (high + margin).cwiseMin(Eigen::Vector2d(image.width, image.height));
   }
   const double scale = settings.width / (high.x() - low.x());
   const int height = std::clamp(static_cast<int>(scale * (high.y() - low.y())), 1, 4 * settings.width);

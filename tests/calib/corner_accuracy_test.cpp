@@ -56,7 +56,7 @@ std::ostream& operator<<(std::ostream& stream, const Series& series) { return st
 
 int view_count() {
   const char* const text = std::getenv("FLASH_RENDERED_VIEWS");  // more for the table in the documentation
-  return text ? std::atoi(text) : 8;
+  return text ? std::atoi(text) : 6;
 }
 
 /// Errors of each refiner over random views, against where the camera model projects the target's points.
