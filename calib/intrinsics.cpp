@@ -14,6 +14,7 @@ namespace flash::calib {
 namespace {
 
 constexpr int kLeastViews = 3;
+constexpr double kFarOff = 100;  // [px]
 
 struct Solution {
   data::CameraIntrinsics camera;
@@ -114,18 +115,22 @@ Eigen::MatrixXd covariance(const Solution& solution, const Eigen::Matrix3Xd& poi
   return variance * reduced.ldlt().solve(Eigen::MatrixXd::Identity(count, count));
 }
 
-/// Of the projection of the rays that now meet the corners of the picture; the worst [px].
+/// Of the projection of the rays that now meet the corners of the picture; the worst, kFarOff at most [px].
 double corner_deviation(const data::CameraIntrinsics& camera, const Eigen::MatrixXd& covariance) {
   const std::vector<int> used = unknowns(camera.model);
   double worst = 0;
   for (const double x : {0.0, camera.width - 1.0})
     for (const double y : {0.0, camera.height - 1.0}) {
       Eigen::Matrix<double, 2, kIntrinsics> by_all;
-      project(to_vector(camera), data::unproject(camera, {x, y}, 1), nullptr, &by_all);
+      const Eigen::Vector3d ray = data::unproject(camera, {x, y}, 1);
+      const Eigen::Vector2d met = project(to_vector(camera), ray, nullptr, &by_all);
+      // Coefficients that the corners do not hold may fold the picture before its edge: no ray meets it
+      // there.
+      if (!((met - Eigen::Vector2d(x, y)).norm() < 1)) return kFarOff;
       const Eigen::MatrixXd by_used = by_all(Eigen::all, used);
       worst = std::max(worst, std::sqrt((by_used * covariance * by_used.transpose()).trace()));
     }
-  return worst;
+  return std::min(worst, kFarOff);
 }
 
 double coverage(const std::vector<const Observation*>& views, int width, int height) {

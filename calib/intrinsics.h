@@ -26,9 +26,10 @@ struct IntrinsicsEstimate {
   IntrinsicsVector sd =
       IntrinsicsVector::Zero();  ///< standard deviations, from the residuals; poses marginalised
   double rms = 0;                ///< reprojection, 2-D rms per corner [px]
-  double corner_sd = 0;  ///< of where the worst corner of the picture is projected, for a fixed ray [px]
-  double coverage = 0;   ///< share of the picture within the outline of all corners
-  double tilt = 0;       ///< largest angle between the target's normals of two views [rad]
+  double corner_sd =
+      0;  ///< of where the worst corner of the picture is projected, for a fixed ray; 100 at most [px]
+  double coverage = 0;  ///< share of the picture within the outline of all corners
+  double tilt = 0;      ///< largest angle between the target's normals of two views [rad]
   std::vector<IntrinsicsView> views;
   std::vector<std::string> warnings;  ///< what these pictures do not determine
 };
