@@ -34,6 +34,7 @@ struct GridOptions {
   bool no_solver_check = false;
   bool no_horizon = false;
   bool resume = false;
+  std::string rollouts;
   std::vector<std::string> map;
   std::string out;
 };
@@ -50,6 +51,7 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   settings.score = score_settings(options.replay);
   settings.envs = options.envs;
   settings.threads = threads;
+  settings.rollouts = options.rollouts;
   for (const auto& [name, text] : options.axes) settings.axes.push_back(sysid::parse_axis(name, text));
   if (settings.axes.empty())
     throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
@@ -216,6 +218,8 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_flag("--no-solver-check", options->no_solver_check,
                  "Do not solve the best candidate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
+  verb->add_option("--rollouts", options->rollouts,
+                   "Folder that keeps the motions, to score them again without simulating");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);

@@ -13,6 +13,8 @@ using Action = std::function<int()>;
 /// Each adds one verb to `flash-sysid`; parsing it sets `action`.
 void add_grid_verb(CLI::App& app, Action& action);
 void add_replay_verb(CLI::App& app, Action& action);
+void add_fit_verb(CLI::App& app, Action& action);
+void add_plan_verb(CLI::App& app, Action& action);
 void add_synth_verb(CLI::App& app, Action& action);
 void add_import_verb(CLI::App& app, Action& action);
 void add_segment_verb(CLI::App& app, Action& action);

@@ -7,7 +7,10 @@
 #include <limits>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <thread>
+
+#include "sysid/rollout_store.h"
 
 namespace flash::sysid {
 
@@ -56,10 +59,12 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
 namespace {
 
 CandidateResult score_candidate(const std::vector<Replay>& replays, const GridSettings& settings,
-                                const std::vector<Axis>& axes, const std::vector<double>& values) {
+                                const std::vector<Axis>& axes, const std::vector<double>& values,
+                                const std::optional<RolloutStore>& kept) {
   const ReplayCandidate candidate = make_candidate(settings.base, axes, values);
   std::vector<ReplayResult> motions;
-  for (const Replay& replay : replays) motions.push_back(std::move(run(replay, {candidate}).front()));
+  for (const Replay& replay : replays)
+    motions.push_back(kept ? kept->run(replay, candidate) : std::move(run(replay, {candidate}).front()));
   CandidateResult result = score_motions(replays, motions, settings.score);
   result.values.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(settings.axes.size()));
   return result;
@@ -91,6 +96,8 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
   std::vector<Replay> single =
       replays;  // one candidate a thread: the solver is not to spawn threads of its own
   for (Replay& replay : single) replay.settings.threads = 1;
+  const std::optional<RolloutStore> kept =
+      settings.rollouts.empty() ? std::nullopt : std::optional<RolloutStore>(settings.rollouts);
   const Clock::time_point begin = Clock::now();
   std::mutex mutex;  // of all below
   std::condition_variable written;
@@ -109,7 +116,7 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
         if (failure || next >= wanted.size() || (stop != nullptr && stop->load())) return;
         const std::size_t i = next++;
         lock.unlock();
-        CandidateResult result = score_candidate(single, settings, axes, grid[wanted[i]]);
+        CandidateResult result = score_candidate(single, settings, axes, grid[wanted[i]], kept);
         result.id = wanted[i];
         lock.lock();
 

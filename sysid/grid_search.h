@@ -22,8 +22,9 @@ struct GridSettings {
   std::vector<Axis> axes;   ///< searched; the last runs fastest
   std::vector<Axis> fixed;  ///< one value each
   ScoreSettings score;
-  int envs = 64;    ///< candidates in work at the same time, at most
-  int threads = 1;  ///< each takes one candidate at a time
+  int envs = 64;         ///< candidates in work at the same time, at most
+  int threads = 1;       ///< each takes one candidate at a time
+  std::string rollouts;  ///< folder that keeps the motions (RolloutStore); empty: none are kept
 };
 
 struct Progress {

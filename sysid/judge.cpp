@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/text.h"
 #include "sysid/predictability.h"
 #include "sysid/profile.h"
+#include "sysid/sensitivity.h"
 #include "sysid/solver_check.h"
 #include "sysid/summarize.h"
 
@@ -15,26 +17,37 @@ Summary judge(GridResults& results, std::vector<Replay>& replays, const GridSett
   GridVerdict verdict = profile_grid(results, settings.repeatability);
   if (verdict.best < 0) return summarize(results, verdict, replays, grid);
 
+  const auto values = [&] {
+    return std::vector<double>(verdict.estimate.data(), verdict.estimate.data() + verdict.estimate.size());
+  };
   std::vector<std::optional<double>> horizons(replays.size());
   if (settings.horizon) {
-    const ReplayCandidate best =
-        candidate_of(results.candidates[static_cast<std::size_t>(verdict.best)], grid);
+    const ReplayCandidate best = candidate_at(values(), grid);
     for (std::size_t r = 0; r < replays.size(); ++r) horizons[r] = predictability_horizon(replays[r], best);
     drop_beyond_horizons(horizons, results);
     for (std::size_t r = 0; r < replays.size(); ++r) drop_beyond_horizon(horizons[r], replays[r]);
     verdict = profile_grid(results, settings.repeatability);
   }
   std::vector<SolverCheck> checks;
+  SolverError error;
   if (settings.solver_check) {
-    const CandidateResult& best = results.candidates[static_cast<std::size_t>(verdict.best)];
-    checks = check_solver(replays, candidate_of(best, grid), grid.score);
-    double score_error = 0;
-    for (const SolverCheck& check : checks)
-      if (std::isfinite(check.score)) score_error = std::max(score_error, std::abs(check.score - best.score));
-    verdict = profile_grid(results, settings.repeatability, score_error);
+    checks = check_solver(replays, grid, values());
+    if (!checks.empty()) error.interpolation = std::abs(checks.front().score - verdict.estimate_score);
+    for (const SolverCheck& check : checks) {
+      error.score = std::max(error.score, std::hypot(verdict.score, check.surface_change_m) - verdict.score);
+      SolverShift& shift = error.shifts.emplace_back(static_cast<Eigen::Index>(grid.axes.size()));
+      for (std::size_t k = 0; k < grid.axes.size(); ++k)
+        shift[static_cast<Eigen::Index>(k)] = check.shift.at(grid.axes[k].name);
+    }
+    verdict = profile_grid(results, settings.repeatability, error);
   }
   Summary summary = summarize(results, verdict, replays, grid);
   summary.solver_check = std::move(checks);
+  constexpr double kCoarse = 0.05;  // of the score
+  if (error.interpolation > kCoarse * verdict.score)
+    summary.warnings.push_back("between the values of the grid the score is known to " +
+                               data::format_short(1000 * error.interpolation) +
+                               " mm only, which widens the intervals: search more values or narrower ranges");
   for (std::size_t r = 0; r < replays.size(); ++r) summary.recordings[r].horizon_s = horizons[r];
   return summary;
 }

@@ -14,8 +14,8 @@ struct JudgeSettings {
 };
 
 /// From the results of a search to its answer: measures how long the best candidate's motion can be predicted
-/// and takes the weight from later keyframes (in `results` and `replays`), solves the best candidate under
-/// finer settings, lets the change of its score widen the intervals, and sums up.
+/// and takes the weight from later keyframes (in `results` and `replays`), solves the estimate under finer
+/// settings, lets what these shift widen the intervals, and sums up.
 Summary judge(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
               const JudgeSettings& settings);
 

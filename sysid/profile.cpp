@@ -1,205 +1,371 @@
 #include "sysid/profile.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "data/text.h"
+#include "sysid/score_surface.h"
 
 namespace flash::sysid {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kNormalQuantile = 1.959964;
+constexpr double kLimit = kNormalQuantile * kNormalQuantile;  // chi^2, one degree of freedom
+constexpr int kPointsPerCell = 8;                             // of a profile, between two values of the grid
 
 /// 95 % quantiles of chi^2 for 1 to 8 degrees of freedom.
 constexpr std::array<double, 8> kQuantile95 = {3.841, 5.991, 7.815, 9.488, 11.070, 12.592, 14.067, 15.507};
 
-double coordinate(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
-double value_at(const Axis& axis, double coordinate) {
-  return axis.logarithmic ? std::exp(coordinate) : coordinate;
+/// One point of a profile: coordinates that minimise the score at one coordinate held.
+struct ProfilePoint {
+  Eigen::VectorXd x;
+  double score = 0;  ///< [m]
+  double chi2 = 0;
+};
+
+struct Sampling {
+  const ScoreSurface& surface;
+  std::optional<double> repeatability;
+  Eigen::VectorXd best;         ///< coordinates of the estimate
+  double best_score = 0;        ///< [m]
+  Eigen::VectorXd best_scores;  ///< of the samples [m]
+  Eigen::MatrixXd gradients;    ///< of the samples at the estimate
+  double quantile = 0;          ///< Student's
+  double interpolation = 0;     ///< error of a score [m]
+
+  int recordings() const { return surface.recordings().empty() ? 0 : 1 + surface.recordings().back(); }
+};
+
+/// Variance of the weighted mean of `values`, recordings being strata; their weighted means go to `means` and
+/// the variances of those to `variances`.
+double variance_of_mean(const Sampling& sampling, const Eigen::VectorXd& values, std::vector<double>& means,
+                        std::vector<double>& variances) {
+  const Eigen::VectorXd& weights = sampling.surface.weights();
+  const double mean = weights.dot(values);
+  double sum = 0;
+  means.clear();
+  variances.clear();
+  for (int r = 0; r < sampling.recordings(); ++r) {
+    double total = 0, stratum = 0, squares = 0;
+    int count = 0;
+    const auto for_each = [&](const auto& use) {
+      for (Eigen::Index k = 0; k < values.size(); ++k)
+        if (sampling.surface.recordings()[static_cast<std::size_t>(k)] == r) use(k);
+    };
+    for_each([&](Eigen::Index k) {
+      total += weights[k];
+      stratum += weights[k] * values[k];
+      ++count;
+    });
+    if (count == 0) continue;
+    // A single keyframe has no scatter of its own: it is taken with the rest.
+    const double centre = count > 1 ? stratum / total : mean;
+    for_each([&](Eigen::Index k) { squares += std::pow(weights[k] * (values[k] - centre), 2); });
+    if (count > 1) squares *= count / (count - 1.0);
+    sum += squares;
+    means.push_back(stratum / total);
+    variances.push_back(squares / (total * total));
+  }
+  return sum;
 }
 
-/// chi^2 of a score over the best one; a score is known to `score_error` only.
-double misfit(double score, const GridVerdict& verdict) {
-  const double least = std::max(score - verdict.score_error, verdict.score);
-  return verdict.keyframes * (least * least - verdict.score * verdict.score) /
-         (verdict.sigma * verdict.sigma);
+/// By how much recordings disagree about the direction beyond the scatter of their keyframes (Birge 1932): at
+/// the estimate the mean slope along it is zero over all, not in each.
+double birge_ratio(const Sampling& sampling, const Eigen::VectorXd& direction) {
+  std::vector<double> means, variances;
+  variance_of_mean(sampling, sampling.gradients * direction, means, variances);
+  if (means.size() < 2) return 1;
+  double sum = 0;
+  for (std::size_t r = 0; r < means.size(); ++r)
+    sum += variances[r] > 0 ? means[r] * means[r] / variances[r] : 0;
+  return std::max(1.0, sum / static_cast<double>(means.size() - 1));
 }
 
-std::size_t index_of(const Axis& axis, double value) {
-  const auto nearer = [&](double a, double b) { return std::abs(a - value) < std::abs(b - value); };
-  return static_cast<std::size_t>(std::min_element(axis.values.begin(), axis.values.end(), nearer) -
-                                  axis.values.begin());
+double chi_squared(const Sampling& sampling, const ProfilePoint& point) {
+  const Eigen::VectorXd rises = sampling.surface.scores(point.x) - sampling.best_scores;
+  const double rise = std::max(0.0, sampling.surface.weights().dot(rises) - sampling.interpolation);
+  std::vector<double> means, variances;
+  const double variance =
+      variance_of_mean(sampling, rises, means, variances) * birge_ratio(sampling, point.x - sampling.best);
+  const double scaled = kNormalQuantile / sampling.quantile;
+  double chi2 = 0;
+  if (rise > 0) chi2 = variance > 0 ? 4 * rise * rise / variance * scaled * scaled : kInfinity;
+  if (sampling.repeatability) {
+    const double squares = point.score * point.score - sampling.best_score * sampling.best_score;
+    const double samples = static_cast<double>(rises.size());
+    chi2 = std::min(chi2, samples * std::max(0.0, squares) / std::pow(*sampling.repeatability, 2));
+  }
+  return chi2;
 }
 
-/// Vertex of the parabola through the best value and its neighbours, kept between them.
-double refined_estimate(const Axis& axis, const std::vector<double>& scores, std::size_t best) {
-  const double here = axis.values[best];
-  if (best == 0 || best + 1 == axis.values.size()) return here;
-  const double x0 = coordinate(axis, axis.values[best - 1]), x1 = coordinate(axis, here),
-               x2 = coordinate(axis, axis.values[best + 1]);
-  const double y0 = scores[best - 1], y1 = scores[best], y2 = scores[best + 1];
-  if (!std::isfinite(y0) || !std::isfinite(y2)) return here;
-  const double left = (y1 - y0) / (x1 - x0), right = (y2 - y1) / (x2 - x1);
-  const double curvature = (right - left) / (x2 - x0);
-  if (curvature <= 0) return here;
-  const double vertex = 0.5 * (x0 + x1) - left / (2 * curvature);
-  return value_at(axis, std::clamp(vertex, 0.5 * (x0 + x1), 0.5 * (x1 + x2)));
+Eigen::VectorXd coordinates_of(const ScoreSurface& surface, const CandidateResult& candidate) {
+  Eigen::VectorXd x(surface.parameters());
+  for (std::size_t k = 0; k < candidate.values.size(); ++k)
+    x[static_cast<Eigen::Index>(k)] = surface.coordinate(k, candidate.values[k]);
+  return x;
 }
 
-/// Where chi^2 passes `limit` between an included and an excluded value.
-double crossing(const Axis& axis, const std::vector<double>& chi2, std::size_t inside, std::size_t outside,
-                double limit) {
-  const double a = coordinate(axis, axis.values[inside]), b = coordinate(axis, axis.values[outside]);
-  // The root of chi^2 is straight where chi^2 is a parabola.
-  const double from = std::sqrt(chi2[inside]), to = std::sqrt(chi2[outside]);
-  const double s = std::isfinite(to) ? (std::sqrt(limit) - from) / (to - from) : 0.5;
-  return value_at(axis, a + s * (b - a));
+/// Best candidates first, diverged ones left out.
+std::vector<const CandidateResult*> ranked(const GridResults& results) {
+  std::vector<const CandidateResult*> order;
+  for (const CandidateResult& candidate : results.candidates)
+    if (std::isfinite(candidate.score)) order.push_back(&candidate);
+  std::stable_sort(order.begin(), order.end(),
+                   [](const auto* a, const auto* b) { return a->score < b->score; });
+  return order;
 }
 
-std::string note_of(const ParameterFinding& finding, bool touched_unconverged) {
+/// Coordinates at which a profile is wanted: those of the grid, some between, and the estimate's.
+std::vector<double> profile_coordinates(const Eigen::VectorXd& knots, double best) {
+  std::vector<double> coordinates;
+  for (Eigen::Index i = 0; i + 1 < knots.size(); ++i)
+    for (int j = 0; j < kPointsPerCell; ++j)
+      coordinates.push_back(knots[i] + (knots[i + 1] - knots[i]) * j / kPointsPerCell);
+  coordinates.push_back(knots[knots.size() - 1]);
+  const auto place = std::lower_bound(coordinates.begin(), coordinates.end(), best);
+  if (place == coordinates.end() || *place != best) coordinates.insert(place, best);
+  return coordinates;
+}
+
+/// The profile along axis k, from the estimate outwards, each point from its neighbour and from the best
+/// candidate of the nearest slice of the grid.
+std::vector<ProfilePoint> profile_along(const ScoreSurface& surface, std::size_t k,
+                                        const Eigen::VectorXd& best,
+                                        const std::vector<const CandidateResult*>& order) {
+  const auto axis = static_cast<Eigen::Index>(k);
+  const std::vector<double> coordinates = profile_coordinates(surface.knots(k), best[axis]);
+  std::vector<bool> free(static_cast<std::size_t>(surface.parameters()), true);
+  free[k] = false;
+  std::vector<Eigen::VectorXd> slices;
+  for (const double knot : surface.knots(k)) {
+    const auto found = std::find_if(order.begin(), order.end(), [&](const CandidateResult* candidate) {
+      return surface.coordinate(k, candidate->values[k]) == knot;
+    });
+    slices.push_back(found == order.end() ? best : coordinates_of(surface, **found));
+  }
+  std::vector<ProfilePoint> profile(coordinates.size());
+  const auto visit = [&](std::size_t i, const Eigen::VectorXd& neighbour) {
+    Eigen::Index slice;
+    (surface.knots(k).array() - coordinates[i]).abs().minCoeff(&slice);
+    profile[i].score = kInfinity;
+    for (Eigen::VectorXd x : {neighbour, slices[static_cast<std::size_t>(slice)]}) {
+      x[axis] = coordinates[i];
+      const double score = surface.minimize(free, x);
+      if (score < profile[i].score) profile[i] = {x, score, 0};
+    }
+  };
+  const auto middle = static_cast<std::size_t>(
+      std::lower_bound(coordinates.begin(), coordinates.end(), best[axis]) - coordinates.begin());
+  for (std::size_t i = middle; i < profile.size(); ++i) visit(i, i == middle ? best : profile[i - 1].x);
+  for (std::size_t i = middle; i-- > 0;) visit(i, profile[i + 1].x);
+  return profile;
+}
+
+/// Where chi^2 passes the limit between an included and an excluded coordinate; its root is straight where
+/// chi^2 is a parabola.
+double crossing(const ProfilePoint& inside, const ProfilePoint& outside, Eigen::Index axis) {
+  const double from = std::sqrt(inside.chi2), to = std::sqrt(outside.chi2);
+  const double s = std::isfinite(to) ? (kNormalQuantile - from) / (to - from) : 0.5;
+  return inside.x[axis] + s * (outside.x[axis] - inside.x[axis]);
+}
+
+std::string millimetres(double metres) { return data::format_short(1000 * metres) + " mm"; }
+
+std::string note_of(const ParameterFinding& finding, const std::vector<ProfilePoint>& profile,
+                    const Sampling& sampling, bool unconverged) {
   std::string note;
   const auto add = [&](const std::string& sentence) { note += (note.empty() ? "" : "; ") + sentence; };
-  switch (finding.identifiable) {
-    case Identifiable::no:
-      add("no value searched is excluded: not identifiable from these recordings");
-      break;
-    case Identifiable::lower_bound:
-      add("only values below " + data::format_short((*finding.interval95)[0]) + " are excluded");
-      break;
-    case Identifiable::upper_bound:
-      add("only values above " + data::format_short((*finding.interval95)[1]) + " are excluded");
-      break;
-    case Identifiable::yes:
-      break;
+  if (finding.identifiable == Identifiable::no) {
+    const auto highest = std::max_element(profile.begin(), profile.end(),
+                                          [](const auto& a, const auto& b) { return a.score < b.score; });
+    add("no value searched is excluded: over the whole range the best score rises by " +
+        millimetres(highest->score - sampling.best_score) +
+        ", less than scatter of the keyframes and error of the solver explain: not identifiable");
   }
+  if (finding.identifiable == Identifiable::lower_bound)
+    add("only values below " + data::format_short((*finding.interval95)[0]) + " are excluded");
+  if (finding.identifiable == Identifiable::upper_bound)
+    add("only values above " + data::format_short((*finding.interval95)[1]) + " are excluded");
   if (finding.edge == RangeEdge::low) add("the best value is the lowest searched: search lower");
   if (finding.edge == RangeEdge::high) add("the best value is the highest searched: search higher");
-  if (touched_unconverged) add("the profile rests on candidates whose simulation did not converge");
+  if (unconverged) add("the profile rests on candidates whose simulation did not converge");
   return note;
 }
 
-ParameterFinding find_parameter(const GridResults& results, std::size_t k, const GridVerdict& verdict,
-                                double limit) {
-  const Axis& axis = results.axes[k];
+ParameterFinding find_parameter(const GridResults& results, std::size_t k, const Sampling& sampling,
+                                std::vector<ProfilePoint> profile, const SolverError& solver) {
+  const ScoreSurface& surface = sampling.surface;
+  const auto axis = static_cast<Eigen::Index>(k);
+  const Eigen::VectorXd& knots = surface.knots(k);
+  const double first = knots[0], end = knots[knots.size() - 1], best = sampling.best[axis];
   ParameterFinding finding;
-  finding.name = axis.name;
-  finding.logarithmic = axis.logarithmic;
-  finding.values = axis.values;
-  finding.scores.assign(axis.values.size(), kInfinity);
-  std::vector<bool> unconverged(axis.values.size(), false);
-  for (const CandidateResult& candidate : results.candidates) {
-    const std::size_t i = index_of(axis, candidate.values[k]);
-    if (!(candidate.score < finding.scores[i])) continue;
-    finding.scores[i] = candidate.score;
-    unconverged[i] = candidate.status != CandidateStatus::ok;
+  finding.name = results.axes[k].name;
+  finding.logarithmic = results.axes[k].logarithmic;
+  std::size_t low = 0, high = 0;  // the outermost points inside; the estimate is one of them
+  bool found = false;
+  for (std::size_t i = 0; i < profile.size(); ++i) {
+    profile[i].chi2 = profile[i].x[axis] == best ? 0 : chi_squared(sampling, profile[i]);
+    finding.values.push_back(surface.value(k, profile[i].x[axis]));
+    finding.scores.push_back(profile[i].score);
+    if (profile[i].chi2 > kLimit) continue;
+    if (!found) low = i;
+    high = i;
+    found = true;
   }
-  std::vector<double> chi2;
-  for (const double score : finding.scores) {
-    chi2.push_back(std::isfinite(score) ? misfit(score, verdict) : kInfinity);
-  }
+  finding.values.front() = results.axes[k].values.front();
+  finding.values.back() = results.axes[k].values.back();
+  finding.estimate = std::clamp(surface.value(k, best), finding.values.front(), finding.values.back());
 
-  const std::size_t last = axis.values.size() - 1;
-  const std::size_t best = index_of(axis, results.candidates[verdict.best].values[k]);
-  std::size_t low = best, high = best;
-  for (std::size_t i = 0; i <= last; ++i) {
-    if (chi2[i] > limit) continue;
-    low = std::min(low, i);
-    high = std::max(high, i);
+  double below = low > 0 ? crossing(profile[low], profile[low - 1], axis) : first;
+  double above = high + 1 < profile.size() ? crossing(profile[high], profile[high + 1], axis) : end;
+  for (const SolverShift& shift : solver.shifts) {
+    below -= std::max(0.0, shift[axis]);
+    above += std::max(0.0, -shift[axis]);
   }
-  const bool closed_below = low > 0, closed_above = high < last;
-  finding.estimate = refined_estimate(axis, finding.scores, best);
-  finding.interval95 = {closed_below ? crossing(axis, chi2, low, low - 1, limit) : axis.values.front(),
-                        closed_above ? crossing(axis, chi2, high, high + 1, limit) : axis.values.back()};
-  // On a coarse grid the vertex may lie where no candidate stands: it belongs to the interval all the same.
-  finding.interval95 = {std::min((*finding.interval95)[0], *finding.estimate),
-                        std::max((*finding.interval95)[1], *finding.estimate)};
-  if (axis.values.size() > 1) {
+  const auto rises = [&](std::size_t from, std::size_t to) {
+    const auto begin = profile.begin();
+    return std::any_of(begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(to),
+                       [&](const auto& point) { return point.score - sampling.best_score > solver.score; });
+  };
+  const bool closed_below = low > 0 && below > first && rises(0, low);
+  const bool closed_above = high + 1 < profile.size() && above < end && rises(high + 1, profile.size());
+  finding.interval95 = {closed_below ? surface.value(k, below) : finding.values.front(),
+                        closed_above ? surface.value(k, above) : finding.values.back()};
+  bool unconverged = false;
+  if (profile.size() > 1) {
     finding.identifiable = closed_below && closed_above ? Identifiable::yes
                            : closed_above               ? Identifiable::upper_bound
                            : closed_below               ? Identifiable::lower_bound
                                                         : Identifiable::no;
-    finding.edge = best == 0 ? RangeEdge::low : best == last ? RangeEdge::high : RangeEdge::none;
+    finding.edge = best <= first ? RangeEdge::low : best >= end ? RangeEdge::high : RangeEdge::none;
+    const auto least = std::min_element(results.candidates.begin(), results.candidates.end(),
+                                        [](const auto& a, const auto& b) { return a.score < b.score; });
+    unconverged = least->status != CandidateStatus::ok;
   }
-  finding.note = note_of(finding, unconverged[best]);
+  finding.note = note_of(finding, profile, sampling, unconverged);
   return finding;
 }
 
-/// Least squares of chi^2 = c + g.x + x.H x / 2 over candidates near the best, x the log of the parameters;
-/// covariance = 2 H^-1 because chi^2 of a Gaussian is (x - m)^T C^-1 (x - m).
-Eigen::MatrixXd covariance_of(const GridResults& results, const GridVerdict& verdict) {
-  constexpr double kReach = 12;
-  const auto parameters = static_cast<Eigen::Index>(results.axes.size());
-  for (const Axis& axis : results.axes) {
+/// H^-1 J H^-1, H the Hessian of the score at the estimate and J the covariance of its gradient by the
+/// scatter of the keyframes; of the logarithms of the parameters.
+Eigen::MatrixXd covariance_of(const GridResults& results, const Sampling& sampling) {
+  const Eigen::Index parameters = sampling.surface.parameters();
+  Eigen::VectorXd per_log(parameters);  // d coordinate / d log(parameter)
+  for (Eigen::Index k = 0; k < parameters; ++k) {
+    const Axis& axis = results.axes[static_cast<std::size_t>(k)];
     if (axis.values.front() <= 0 || axis.values.size() < 3) return {};
+    per_log[k] = axis.logarithmic ? 1 : sampling.best[k];
   }
-  const Eigen::Index unknowns = 1 + parameters + parameters * (parameters + 1) / 2;
-  std::vector<Eigen::VectorXd> rows;
-  std::vector<double> rises;
-  const CandidateResult& best = results.candidates[verdict.best];
-  for (const CandidateResult& candidate : results.candidates) {
-    const double rise = misfit(candidate.score, verdict);
-    if (!(rise < kReach)) continue;
-    Eigen::VectorXd row(unknowns);
-    Eigen::Index column = 0;
-    row[column++] = 1;
-    const auto x = [&](Eigen::Index i) { return std::log(candidate.values[i] / best.values[i]); };
-    for (Eigen::Index i = 0; i < parameters; ++i) row[column++] = x(i);
-    for (Eigen::Index i = 0; i < parameters; ++i) {
-      for (Eigen::Index j = i; j < parameters; ++j) row[column++] = i == j ? 0.5 * x(i) * x(i) : x(i) * x(j);
-    }
-    rows.push_back(row);
-    rises.push_back(rise);
-  }
-  const auto count = static_cast<Eigen::Index>(rows.size());
-  if (count <= unknowns) return {};
-  Eigen::MatrixXd matrix(count, unknowns);
-  for (Eigen::Index i = 0; i < count; ++i) matrix.row(i) = rows[i].transpose();
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(matrix);
-  if (qr.rank() < unknowns) return {};
-  const Eigen::VectorXd solution = qr.solve(Eigen::Map<const Eigen::VectorXd>(rises.data(), count));
-  Eigen::MatrixXd hessian(parameters, parameters);
-  Eigen::Index column = 1 + parameters;
-  for (Eigen::Index i = 0; i < parameters; ++i) {
-    for (Eigen::Index j = i; j < parameters; ++j) hessian(i, j) = hessian(j, i) = solution[column++];
-  }
+  Eigen::VectorXd gradient;
+  Eigen::MatrixXd hessian;
+  sampling.surface.score(sampling.best, gradient, hessian);
   const Eigen::LLT<Eigen::MatrixXd> llt(hessian);
   if (llt.info() != Eigen::Success) return {};
-  return 2 * llt.solve(Eigen::MatrixXd::Identity(parameters, parameters));
+  Eigen::MatrixXd scatter(parameters, parameters);
+  std::vector<double> means, variances;
+  const auto variance = [&](const Eigen::VectorXd& direction) {
+    return variance_of_mean(sampling, sampling.gradients * direction, means, variances);
+  };
+  for (Eigen::Index i = 0; i < parameters; ++i)
+    for (Eigen::Index j = 0; j <= i; ++j) {
+      const Eigen::VectorXd a = Eigen::VectorXd::Unit(parameters, i),
+                            b = Eigen::VectorXd::Unit(parameters, j);
+      scatter(i, j) = scatter(j, i) = 0.25 * (variance(a + b) - variance(a - b));
+    }
+  const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(parameters, parameters));
+  const Eigen::MatrixXd covariance = inverse * scatter * inverse;
+  const Eigen::VectorXd per_coordinate = per_log.cwiseInverse();
+  return per_coordinate.asDiagonal() * covariance * per_coordinate.asDiagonal();
+}
+
+/// The spread that makes the Gaussian region n (s^2 - s_best^2) / sigma^2 end where the sampled one does.
+double equivalent_sigma(const GridResults& results, const Sampling& sampling) {
+  const double samples = static_cast<double>(sampling.best_scores.size());
+  double sigma = 0, nearest = kInfinity;
+  for (const CandidateResult& candidate : results.candidates) {
+    if (!std::isfinite(candidate.score)) continue;
+    ProfilePoint point{coordinates_of(sampling.surface, candidate), candidate.score, 0};
+    const double chi2 = chi_squared(sampling, point);
+    const double squares = candidate.score * candidate.score - sampling.best_score * sampling.best_score;
+    if (!(chi2 > 0) || squares <= 0 || std::abs(std::log(chi2 / kLimit)) >= nearest) continue;
+    nearest = std::abs(std::log(chi2 / kLimit));
+    sigma = std::sqrt(samples * squares / chi2);
+  }
+  return sigma;
 }
 
 }  // namespace
 
-GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability,
-                         double score_error) {
-  GridVerdict verdict;
-  verdict.score_error = score_error;
-  verdict.score = kInfinity;
-  for (std::size_t i = 0; i < results.candidates.size(); ++i) {
-    if (!(results.candidates[i].score < verdict.score)) continue;
-    verdict.score = results.candidates[i].score;
-    verdict.best = static_cast<int>(i);
-  }
-  if (verdict.best < 0) return verdict;
+double student_quantile(int freedom) {
+  constexpr std::array<double, 4> kFew = {12.706, 4.303, 3.182, 2.776};
+  if (freedom < 1) return kInfinity;
+  if (freedom <= 4) return kFew[static_cast<std::size_t>(freedom) - 1];
+  const double z = kNormalQuantile, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z, n = freedom;
+  return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) +
+         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
+}
 
-  for (const RecordingScore& recording : results.candidates[verdict.best].recordings) {
-    for (const KeyframeScore& keyframe : recording.keyframes) {
-      verdict.keyframes += keyframe.points > 0 && keyframe.weight > 0;
+GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability,
+                         const SolverError& solver) {
+  GridVerdict verdict;
+  const std::vector<const CandidateResult*> order = ranked(results);
+  verdict.score = kInfinity;
+  if (order.empty()) return verdict;
+  verdict.best = static_cast<int>(order.front() - results.candidates.data());
+  verdict.score = order.front()->score;
+
+  const ScoreSurface surface(results);
+  const std::vector<bool> all(results.axes.size(), true);
+  Sampling sampling{surface, repeatability, {}, kInfinity, {}, {}, 0, solver.interpolation};
+  constexpr std::size_t kStarts = 5;
+  const auto try_from = [&](Eigen::VectorXd x) {
+    const double score = surface.minimize(all, x);
+    if (score < sampling.best_score) {
+      sampling.best_score = score;
+      sampling.best = x;
+      return true;
     }
+    return false;
+  };
+  for (std::size_t i = 0; i < std::min(kStarts, order.size()); ++i)
+    try_from(coordinates_of(surface, *order[i]));
+
+  std::vector<std::vector<ProfilePoint>> profiles;
+  for (std::size_t k = 0; k < results.axes.size(); ++k) {
+    profiles.push_back(profile_along(surface, k, sampling.best, order));
+    // A profile may come by a lower valley: all begin again from there.
+    bool lower = false;
+    for (const ProfilePoint& point : profiles.back())
+      if (point.score < sampling.best_score - 1e-9) lower = try_from(point.x) || lower;
+    if (!lower) continue;
+    profiles.clear();
+    k = static_cast<std::size_t>(-1);
   }
-  verdict.sigma = std::max(repeatability.value_or(0.0), verdict.score);
-  verdict.sigma_source = repeatability && *repeatability >= verdict.score ? "repeatability" : "residual";
+  sampling.best_scores = surface.scores(sampling.best);
+  sampling.gradients = surface.gradients(sampling.best);
+  verdict.keyframes = static_cast<int>(surface.weights().size());
+  const auto searched = std::count_if(results.axes.begin(), results.axes.end(),
+                                      [](const Axis& axis) { return axis.values.size() > 1; });
+  sampling.quantile = student_quantile(verdict.keyframes - static_cast<int>(searched));
+
+  verdict.estimate_score = sampling.best_score;
+  verdict.estimate.resize(surface.parameters());
+  for (std::size_t k = 0; k < results.axes.size(); ++k) {
+    verdict.parameters.push_back(find_parameter(results, k, sampling, std::move(profiles[k]), solver));
+    verdict.estimate[static_cast<Eigen::Index>(k)] = *verdict.parameters.back().estimate;
+  }
+  verdict.covariance_log = covariance_of(results, sampling);
+  verdict.sigma = equivalent_sigma(results, sampling);
+  verdict.sigma_source = "residual";
+  if (repeatability && verdict.sigma >= *repeatability * (1 - 1e-9)) verdict.sigma_source = "repeatability";
   const std::size_t freedom = std::clamp<std::size_t>(results.axes.size(), 1, kQuantile95.size());
   const double variance_share = kQuantile95[freedom - 1] / std::max(verdict.keyframes, 1);
-  verdict.level95 =
-      score_error + std::sqrt(verdict.score * verdict.score + variance_share * verdict.sigma * verdict.sigma);
-  for (std::size_t k = 0; k < results.axes.size(); ++k) {
-    verdict.parameters.push_back(find_parameter(results, k, verdict, kQuantile95[0]));
-  }
-  verdict.covariance_log = covariance_of(results, verdict);
+  verdict.level95 = std::sqrt(verdict.score * verdict.score + variance_share * verdict.sigma * verdict.sigma);
   return verdict;
 }
 

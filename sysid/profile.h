@@ -11,33 +11,56 @@ namespace flash::sysid {
 
 /// What a grid search says about its parameters.
 struct GridVerdict {
-  int best = -1;             ///< index into GridResults::candidates; -1: no candidate was usable
-  double score = 0;          ///< of the best [m]
-  double sigma = 0;          ///< spread of a keyframe's score used [m]
-  std::string sigma_source;  ///< "residual" or "repeatability"
-  int keyframes = 0;         ///< sample count: keyframes that weighed, over all recordings
-  double score_error = 0;    ///< what a score is known to [m]
-  double level95 = 0;        ///< candidates that score below are inside the joint 95 % region [m]
+  int best = -1;              ///< index into GridResults::candidates; -1: no candidate was usable
+  double score = 0;           ///< of the best [m]
+  Eigen::VectorXd estimate;   ///< where the interpolated score is least, one value an axis
+  double estimate_score = 0;  ///< interpolated, there [m]
+  double sigma = 0;           ///< spread of a keyframe's score that the region comes to [m]
+  std::string sigma_source;   ///< "residual" or "repeatability"
+  int keyframes = 0;          ///< sample count: keyframes that weighed, over all recordings
+  double level95 = 0;         ///< candidates that score below are inside the joint 95 % region [m]
   std::vector<ParameterFinding> parameters;  ///< one an axis, in order
   Eigen::MatrixXd
       covariance_log;  ///< of log(parameter), in order of the axes; empty where the region gives none
 };
 
-/// Gaussian model with the keyframe, not the point, as the sample: n keyframes of score s and spread sigma =
-/// max(repeatability, s_best). A candidate's misfit rises over the best by chi^2 = n (s^2 - s_best^2) /
-/// sigma^2. `repeatability`: trial-to-trial distance of a keyframe [m]; absent: the best residual stands for
-/// it. `score_error`: how far finer solver settings move a score [m]; candidates count as better by as much
-/// before they are excluded.
+/// How far a better solution moves the estimate, one an axis: along the logarithm of a logarithmic axis, else
+/// in the parameter's unit. The search's own settings at estimate + shift move as the better ones at the
+/// estimate.
+using SolverShift = Eigen::VectorXd;
+
+/// What finer solutions say of the search's own.
+struct SolverError {
+  std::vector<SolverShift> shifts{};
+  double score = 0;          ///< by which the displacement between two solutions raises a score [m]
+  double interpolation = 0;  ///< by which the interpolated score is off at the estimate [m]
+};
+
+/// Profile likelihood with the keyframe, not the point, as the sample. The score is interpolated between the
+/// points of the grid (ScoreSurface), so that nothing below depends on where these stand.
 ///
-/// The profile of a parameter is the lowest score over all others at each of its values. Its 95 % interval is
-/// where chi^2 of the profile stays below 3.84, crossings interpolated along the axis (along its logarithm
-/// where it is logarithmic) and cut at the searched range. The estimate is the vertex of the parabola through
-/// the best value and its neighbours. Verdict: excluded values on both sides "yes", on neither "no", only
-/// above "upper_bound", only below "lower_bound".
+/// The profile of a parameter is the lowest score over all others at each of its values. How sure a
+/// difference of scores is, the keyframes tell: with d_k the difference of keyframe k between a point of the
+/// profile and the estimate, and D their weighted mean, a point stays inside while
 ///
-/// The covariance is that of the paraboloid fitted to chi^2 over the candidates within chi^2 < 12 of the
-/// best; empty where an axis is not positive, there are too few candidates, or the paraboloid is not convex.
+///     chi^2 = 4 D^2 / var(D) < t^2,     var(D) = sum_r n_r / (n_r - 1) sum_k w_k^2 (d_k - d_r)^2
+///
+/// t being Student's 97.5 % quantile at n - p degrees of freedom, d_r the mean over recording r. For a
+/// quadratic score this is the interval of the robust (sandwich) covariance H^-1 J H^-1 / n (White 1982); the
+/// factor 4 is there because D is half the squared distance while its spread is linear in it. Where several
+/// recordings contradict each other beyond their keyframes' scatter, var(D) grows by their Birge ratio.
+/// `repeatability`, the trial-to-trial distance of a keyframe [m], caps chi^2 at n (s^2 - s_best^2) /
+/// repeatability^2.
+///
+/// The interpolation is checked where it matters: D counts only by what it exceeds its error at the estimate.
+/// Each shift widens the interval to the side on which the better solution would have found the parameter. A
+/// side on which the profile nowhere rises by more than the solver's own error of the score excludes nothing.
+/// Verdict: excluded values on both sides "yes", on neither "no", only above "upper_bound", only
+/// below "lower_bound".
 GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability = {},
-                         double score_error = 0);
+                         const SolverError& solver = {});
+
+/// 97.5 % quantile of Student's distribution (Abramowitz and Stegun 26.7.5 beyond 4 degrees of freedom).
+double student_quantile(int freedom);
 
 }  // namespace flash::sysid

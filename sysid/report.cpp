@@ -174,7 +174,8 @@ std::string render_report(const Summary& summary, const GridResults& results,
   for (const SolverCheck& check : summary.solver_check)
     json["solver_check"].push_back({{"what", check.what},
                                     {"score", number(check.score)},
-                                    {"surface_change_m", number(check.surface_change_m)}});
+                                    {"surface_change_m", number(check.surface_change_m)},
+                                    {"shift", check.shift}});
   json["settings"] = summary.settings;
   json["table"] = table_of(summary, results);
   json["map_axes"] = map_axes(summary, settings.map_axes);

@@ -195,7 +195,8 @@ std::string summary_text(const Summary& summary) {
   for (const SolverCheck& check : summary.solver_check)
     json["solver_check"].push_back({{"what", check.what},
                                     {"score", number(check.score)},
-                                    {"surface_change_m", number(check.surface_change_m)}});
+                                    {"surface_change_m", number(check.surface_change_m)},
+                                    {"shift", check.shift}});
   json["settings"] = summary.settings;
   json["asset"] = summary.asset;
   json["candidates"] = summary.candidates;
@@ -235,7 +236,9 @@ Summary load_summary(const std::string& path) {
     summary.recordings.push_back(read_recording(recording));
   for (const data::JsonObject& check : json.objects("solver_check"))
     summary.solver_check.push_back(
-        {check.string("what"), score_of(check, "score"), score_of(check, "surface_change_m")});
+        {check.string("what"), score_of(check, "score"), score_of(check, "surface_change_m"),
+         check.has("shift") ? typed<std::map<std::string, double>>(check, "shift", "numbers by name")
+                            : std::map<std::string, double>{}});
   summary.settings = typed<std::map<std::string, std::string>>(json, "settings", "texts by name");
   summary.asset = json.string("asset");
   summary.candidates = json.integer("candidates");

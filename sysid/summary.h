@@ -56,9 +56,11 @@ struct SummaryRecording {
 
 /// The best candidate solved once more under finer settings.
 struct SolverCheck {
-  std::string what;             ///< "half_step", "double_mesh", "four_times_iterations"
-  double score = 0;             ///< [m]
-  double surface_change_m = 0;  ///< mean distance between the two surfaces [m]
+  std::string what;                       ///< "half_step", "double_mesh", "four_times_iterations"
+  double score = 0;                       ///< [m]
+  double surface_change_m = 0;            ///< mean distance between the two surfaces [m]
+  std::map<std::string, double> shift{};  ///< error that the search's own settings cause in each parameter:
+                                          ///< of its logarithm where it was searched so, else in its unit
 };
 
 /// All that a search found: the file summary.json (schema "flash-sysid-summary/1").

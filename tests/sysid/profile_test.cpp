@@ -4,97 +4,218 @@
 
 #include <cmath>
 #include <functional>
+#include <random>
+
+#include "sysid/score_surface.h"
 
 namespace flash::sysid {
 namespace {
 
-/// A grid whose squared score is a function of the parameters; 20 keyframes.
-GridResults grid_of(const std::vector<Axis>& axes,
-                    const std::function<double(const std::vector<double>&)>& squared) {
-  GridResults results{axes, {"lift"}, {}};
+constexpr double kFloor = 0.005;  // m
+
+/// Squared score of keyframe k at given coordinates.
+using KeyframeScoreAt = std::function<double(std::size_t, const std::vector<double>&)>;
+
+GridResults grid_of(const std::vector<Axis>& axes, std::size_t keyframes, const KeyframeScoreAt& score,
+                    std::size_t recordings = 1) {
+  GridResults results{axes, std::vector<std::string>(recordings, "lift"), {}};
   for (const std::vector<double>& values : cartesian_product(axes)) {
     CandidateResult result;
     result.id = static_cast<int>(results.candidates.size());
     result.values = values;
-    result.score = std::sqrt(squared(values));
     result.converged = true;
-    result.recordings.resize(1);
-    result.recordings[0].keyframes.assign(20, {0, result.score, 100, 1});
-    result.recordings[0].keyframes.push_back({9, 0, 100, 0});  // no weight: not a sample
+    result.recordings.resize(recordings);
+    std::vector<double> x = values;
+    for (std::size_t i = 0; i < axes.size(); ++i)
+      if (axes[i].logarithmic) x[i] = std::log(values[i]);
+    for (std::size_t k = 0; k < keyframes; ++k) {
+      RecordingScore& recording = result.recordings[k * recordings / keyframes];
+      recording.keyframes.push_back({static_cast<double>(k), score(k, x), 100, 1});
+    }
+    for (RecordingScore& recording : result.recordings) {
+      for (const KeyframeScore& keyframe : recording.keyframes)
+        recording.score += keyframe.score / static_cast<double>(recording.keyframes.size());
+      recording.keyframes.push_back({99, 0, 100, 0});  // no weight: not a sample
+      result.score += recording.score / static_cast<double>(recordings);
+    }
     results.candidates.push_back(result);
   }
   return results;
 }
 
-constexpr double kFloor = 0.005;  // m
+/// What each keyframe alone would answer: scattered about a common mean.
+std::vector<double> scattered(std::size_t count, double mean, double spread, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(mean, spread);
+  std::vector<double> values(count);
+  for (double& value : values) value = normal(random);
+  return values;
+}
 
-TEST(Profile, IntervalOfAParaboloidIsThatOfTheGaussianItStandsFor) {
-  // s^2 = s0^2 (1 + x^T P x / n) gives chi^2 = x^T P x, covariance P^-1, x = log(p / truth).
-  const Axis young = parse_axis("young", "1:1e4:41:log"), bending = parse_axis("bending", "1e-6:1e-2:41:log");
-  const double a = 8, b = 12, c = 5;
-  const auto squared = [&](const std::vector<double>& v) {
-    const double x = std::log(v[0] / 100), y = std::log(v[1] / 1.2e-4);
-    return kFloor * kFloor * (1 + (a * x * x + b * y * y + 2 * c * x * y) / 20);
+double mean_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+double standard_error(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double value : values) sum += std::pow(value - mean_of(values), 2);
+  const auto count = static_cast<double>(values.size());
+  return std::sqrt(sum / (count - 1) / count);
+}
+
+TEST(Profile, IntervalIsStudentsForTheMeanOfWhatEachKeyframeWouldAnswer) {
+  // With equal parabolas 4 D^2 / var(D) is ((x - mean) / standard error)^2 without approximation.
+  const std::vector<double> own = scattered(20, std::log(1.2e-4), 0.3, 1);
+  const auto score = [&](std::size_t k, const std::vector<double>& x) {
+    return kFloor + 1e-3 * std::pow(x[0] - own[k], 2);
   };
-  const GridVerdict verdict = profile_grid(grid_of({young, bending}, squared));
-  EXPECT_EQ(verdict.keyframes, 20);
-  EXPECT_EQ(verdict.sigma_source, "residual");
-  const Eigen::Matrix2d covariance = (Eigen::Matrix2d() << a, c, c, b).finished().inverse();
-  for (int k = 0; k < 2; ++k) {
-    const ParameterFinding& finding = verdict.parameters[k];
-    const double truth = k == 0 ? 100 : 1.2e-4, half = 1.96 * std::sqrt(covariance(k, k));
+  // 2.093: 97.5 % of Student's t at 19 degrees of freedom (tabulated).
+  const double half = 2.093 * standard_error(own);
+  for (const char* values : {"1e-5:1e-3:41:log", "1e-5:1e-3:9:log", "1.2e-5:0.9e-3:8:log"}) {
+    const GridVerdict verdict = profile_grid(grid_of({parse_axis("bending", values)}, 20, score));
+    EXPECT_EQ(verdict.keyframes, 20);
+    EXPECT_EQ(verdict.sigma_source, "residual");
+    const ParameterFinding& finding = verdict.parameters[0];
     EXPECT_EQ(finding.identifiable, Identifiable::yes);
-    EXPECT_EQ(finding.edge, RangeEdge::none);
-    // Grid step 0.23 in the logarithm: chords of the parabola and the other axis' grid cost a tenth of it.
-    EXPECT_NEAR(std::log(*finding.estimate / truth), 0, 0.03);
-    EXPECT_NEAR(std::log((*finding.interval95)[0] / truth), -half, 0.06);
-    EXPECT_NEAR(std::log((*finding.interval95)[1] / truth), half, 0.06);
+    // A square of a parabola between values 0.6 apart: cubic splines leave a few per cent of the interval.
+    EXPECT_NEAR(std::log(*finding.estimate), mean_of(own), 0.03 * half) << values;
+    EXPECT_NEAR(std::log((*finding.interval95)[0]), mean_of(own) - half, 0.05 * half) << values;
+    EXPECT_NEAR(std::log((*finding.interval95)[1]), mean_of(own) + half, 0.05 * half) << values;
   }
+}
+
+TEST(Profile, IntervalsAndCovarianceOfCorrelatedParameters) {
+  const std::vector<double> first = scattered(24, std::log(100), 0.4, 2),
+                            second = scattered(24, std::log(1.2e-4), 0.2, 3);
+  const auto score = [&](std::size_t k, const std::vector<double>& x) {
+    const double a = x[0] - first[k], b = x[1] - second[k];
+    return kFloor + 1e-3 * (a * a + 2 * b * b + 1.6 * a * b);
+  };
+  const GridVerdict verdict = profile_grid(
+      grid_of({parse_axis("young", "10:1e3:9:log"), parse_axis("bending", "3e-5:5e-4:9:log")}, 24, score));
+  const std::vector<double>* own[] = {&first, &second};
   ASSERT_EQ(verdict.covariance_log.rows(), 2);
-  // The grid's best is not the truth itself: chi^2 is measured from it, which scales the paraboloid by under
-  // 2 %.
-  EXPECT_NEAR((verdict.covariance_log - covariance).norm(), 0, 0.03 * covariance.norm());
+  for (int k = 0; k < 2; ++k) {
+    const double half = 2.074 * standard_error(*own[k]);  // 22 degrees of freedom
+    const ParameterFinding& finding = verdict.parameters[k];
+    EXPECT_NEAR(std::log(*finding.estimate), mean_of(*own[k]), 0.05 * half);
+    EXPECT_NEAR(std::log((*finding.interval95)[1] / (*finding.interval95)[0]), 2 * half, 0.1 * half);
+    EXPECT_NEAR(verdict.covariance_log(k, k), std::pow(standard_error(*own[k]), 2),
+                0.1 * verdict.covariance_log(k, k));
+  }
 }
 
 TEST(Profile, FlatOneSidedAndEdgeAreSaid) {
-  const Axis poisson = parse_axis("poisson", "0:0.4:5"), friction = parse_axis("friction", "0.1:1:10"),
-             bending = parse_axis("bending", "1e-6:1e-3:7:log"), young = parse_axis("young", "1:1e3:7:log");
-  const auto squared = [&](const std::vector<double>& v) {
-    double rise = 1e-3 * v[0];                                  // flat
-    rise += std::pow(std::max(0.0, 0.5 - v[1]) / 0.1, 2);       // only small friction is excluded
-    rise += std::pow(std::max(0.0, std::log(v[2] / 1e-5)), 2);  // only large bending is excluded
-    rise += std::pow(std::log(v[3] / 1e5), 2);                  // the best lies beyond the range
-    return kFloor * kFloor * (1 + rise);
+  const std::vector<double> own = scattered(20, 0, 1, 4);
+  const auto score = [&](std::size_t k, const std::vector<double>& x) {
+    double sum = kFloor + 1e-6 * std::pow(x[0] - 50 * own[k], 2);              // flat
+    sum += 1e-3 * std::exp(-8 * (x[1] - 0.5) + 0.3 * own[k]);                  // only small is excluded
+    sum += 1e-3 * std::log1p(std::exp(x[2] - std::log(1e-5) + 0.3 * own[k]));  // only large is excluded
+    return sum + 1e-5 * std::pow(x[3] - std::log(1e5) + 0.1 * own[k], 2);      // the best lies beyond
   };
-  const GridVerdict verdict = profile_grid(grid_of({poisson, friction, bending, young}, squared));
+  const GridVerdict verdict =
+      profile_grid(grid_of({parse_axis("poisson", "0:0.4:5"), parse_axis("friction", "0.1:1:10"),
+                            parse_axis("bending", "1e-6:1e-3:7:log"), parse_axis("young", "1:1e3:7:log")},
+                           20, score));
   EXPECT_EQ(verdict.parameters[0].identifiable, Identifiable::no);
   EXPECT_NE(verdict.parameters[0].note.find("not identifiable"), std::string::npos);
   EXPECT_EQ(verdict.parameters[1].identifiable, Identifiable::lower_bound);
-  EXPECT_LT((*verdict.parameters[1].interval95)[0], 0.5);
+  EXPECT_LT((*verdict.parameters[1].interval95)[0], 1);
   EXPECT_EQ((*verdict.parameters[1].interval95)[1], 1);
   EXPECT_EQ(verdict.parameters[2].identifiable, Identifiable::upper_bound);
   EXPECT_EQ(verdict.parameters[3].identifiable, Identifiable::lower_bound);
   EXPECT_EQ(verdict.parameters[3].edge, RangeEdge::high);
 }
 
-TEST(Profile, RepeatabilityAboveTheResidualWidensTheInterval) {
-  const Axis bending = parse_axis("bending", "1e-6:1e-3:31:log");
-  const auto squared = [](const std::vector<double>& v) {
-    return kFloor * kFloor * (1 + std::pow(std::log(v[0] / 3e-5), 2));
+TEST(Profile, RepeatabilityWidensTheIntervalAndIsSaid) {
+  const std::vector<double> own = scattered(20, std::log(3e-5), 0.2, 5);
+  const GridResults results = grid_of({parse_axis("bending", "1e-6:1e-3:31:log")}, 20,
+                                      [&](std::size_t k, const std::vector<double>& x) {
+                                        return std::sqrt(kFloor * kFloor * (1 + std::pow(x[0] - own[k], 2)));
+                                      });
+  const GridVerdict without = profile_grid(results), with = profile_grid(results, 0.010);
+  EXPECT_EQ(without.sigma_source, "residual");
+  EXPECT_EQ(with.sigma_source, "repeatability");
+  EXPECT_NEAR(with.sigma, 0.010, 1e-9);
+  // 20 (s^2 - s0^2) / 0.01^2 = 3.84, s^2 = 0.005^2 (1 + x^2 + ...): x = 1.96 * 0.01 / (0.005 sqrt(20)).
+  const auto interval = *with.parameters[0].interval95;
+  EXPECT_NEAR(0.5 * std::log(interval[1] / interval[0]), 1.96 * 2 / std::sqrt(20), 0.03);
+}
+
+TEST(Profile, AFinerSolutionWidensTheIntervalToItsSideOnly) {
+  const std::vector<double> own = scattered(20, std::log(3e-5), 0.2, 6);
+  const GridResults results = grid_of({parse_axis("bending", "1e-6:1e-3:15:log")}, 20,
+                                      [&](std::size_t k, const std::vector<double>& x) {
+                                        return kFloor + 1e-3 * std::pow(x[0] - own[k], 2);
+                                      });
+  const auto plain = *profile_grid(results).parameters[0].interval95;
+  // The search's own settings move at 1.2 D as the finer ones do at D: the truth is the lower one.
+  const auto wide =
+      *profile_grid(results, {}, {{SolverShift::Constant(1, std::log(1.2))}}).parameters[0].interval95;
+  EXPECT_NEAR(wide[0], plain[0] / 1.2, 1e-12);
+  EXPECT_EQ(wide[1], plain[1]);
+  const GridVerdict lost = profile_grid(results, {}, {{SolverShift::Constant(1, 9)}});
+  EXPECT_EQ(lost.parameters[0].identifiable, Identifiable::upper_bound);
+  // Where the whole range changes the score by less than a finer solution does, nothing is excluded.
+  EXPECT_EQ(profile_grid(results, {}, {{}, 1.0}).parameters[0].identifiable, Identifiable::no);
+}
+
+TEST(Profile, RecordingsThatContradictEachOtherWidenTheInterval) {
+  std::vector<double> own = scattered(20, std::log(3e-5), 0.05, 7);
+  const auto score = [&](std::size_t k, const std::vector<double>& x) {
+    return kFloor + 1e-3 * std::pow(x[0] - own[k], 2);
   };
-  const GridResults results = grid_of({bending}, squared);
-  const auto width = [&](std::optional<double> repeatability) {
-    const auto interval = *profile_grid(results, repeatability).parameters[0].interval95;
+  const auto width = [&] {
+    const auto interval = *profile_grid(grid_of({parse_axis("bending", "1e-6:1e-3:31:log")}, 20, score, 2))
+                               .parameters[0]
+                               .interval95;
     return std::log(interval[1] / interval[0]);
   };
-  EXPECT_NEAR(width(0.010) / width({}), 2, 0.02);  // sigma is twice the residual; 1 % of a cell a side
-  EXPECT_EQ(width(0.001), width({}));
-  EXPECT_EQ(profile_grid(results, 0.010).sigma_source, "repeatability");
+  const double agreeing = width();
+  for (std::size_t k = 10; k < own.size(); ++k) own[k] += 0.4;  // the second recording wants another value
+  EXPECT_GT(width(), 5 * agreeing);
+  EXPECT_GT(width(), 0.4);  // both answers are inside
 }
 
 TEST(Profile, WithoutAUsableCandidateThereIsNoVerdict) {
-  const auto none = [](const std::vector<double>&) { return std::numeric_limits<double>::infinity(); };
-  EXPECT_EQ(profile_grid(grid_of({parse_axis("young", "1,2")}, none)).best, -1);
+  const auto none = [](std::size_t, const std::vector<double>&) {
+    return std::numeric_limits<double>::infinity();
+  };
+  EXPECT_EQ(profile_grid(grid_of({parse_axis("young", "1,2")}, 5, none)).best, -1);
+}
+
+TEST(ScoreSurface, DerivativesAreThoseOfFiniteDifferencesAndValuesThoseOfTheGrid) {
+  const GridResults results = grid_of(
+      {parse_axis("young", "1,2,5,9,20"), parse_axis("bending", "1e-6:1e-4:6:log"),
+       parse_axis("poisson", "0.1,0.4")},
+      4, [](std::size_t k, const std::vector<double>& x) {
+        return 0.01 + 1e-3 * (std::sin(0.3 * x[0] + static_cast<double>(k)) + std::cos(x[1]) * (1 + x[2]));
+      });
+  const ScoreSurface surface(results);
+  Eigen::VectorXd x(3);
+  x << 5, std::log(1e-6), 0.4;
+  const CandidateResult& there = results.candidates[2 * 12 + 1];
+  for (int k = 0; k < 4; ++k)
+    EXPECT_NEAR(surface.scores(x)[k], there.recordings[0].keyframes[static_cast<std::size_t>(k)].score,
+                1e-12);
+  x << 3.3, std::log(7e-6), 0.22;
+  Eigen::VectorXd gradient, other;
+  Eigen::MatrixXd hessian, unused;
+  surface.score(x, gradient, hessian);
+  for (int i = 0; i < 3; ++i) {
+    const double h = 1e-5;
+    Eigen::VectorXd low = x, high = x;
+    low[i] -= h;
+    high[i] += h;
+    Eigen::VectorXd gradient_low, gradient_high;
+    const double slope =
+        (surface.score(high, gradient_high, unused) - surface.score(low, gradient_low, unused)) / (2 * h);
+    EXPECT_NEAR(gradient[i], slope, 1e-9);
+    EXPECT_NEAR((hessian.col(i) - (gradient_high - gradient_low) / (2 * h)).norm(), 0, 1e-8);
+    EXPECT_NEAR(surface.weights().dot(surface.gradients(x).col(i)), gradient[i], 1e-12);
+  }
 }
 
 }  // namespace

@@ -134,12 +134,13 @@ TEST(Judge, FindsTheTruthOfASyntheticLift) {
   EXPECT_EQ(summary.exit_code, 0);
   ASSERT_EQ(summary.parameters.size(), 1u);
   const ParameterFinding& bending = summary.parameters[0];
-  EXPECT_EQ(bending.identifiable, Identifiable::yes);
+  // On cells of 50 mm the solver's own error may leave a side open.
+  EXPECT_NE(bending.identifiable, Identifiable::no);
   EXPECT_LE((*bending.interval95)[0], 2e-4);
   EXPECT_GE((*bending.interval95)[1], 2e-4);
   EXPECT_NEAR(std::log(*bending.estimate / 2e-4), 0, std::log(2));  // one step of the grid
   EXPECT_EQ(summary.fixed.at("friction").source, "measured");
-  EXPECT_EQ(summary.solver_check.size(), 3u);
+  EXPECT_EQ(summary.solver_check.size(), 4u);  // the estimate itself, step, mesh, iterations
   EXPECT_EQ(summary.recordings[0].sha256.size(), 64u);
 }
 

@@ -14,11 +14,12 @@ class Runs:
         self.sysid = str(sysid)
         self.out = pathlib.Path(out)
 
-    def grid(self, name, recordings, *options):
+    def grid(self, name, recordings, *options, horizon=False):
         """The summary of a search, with the rows of results.csv as `rows`. Exit code 3 (finished, but nothing is
         identifiable or the best candidate missed a step) is an answer too."""
         folder = self.out / name
-        command = ["grid", *map(str, recordings), *options, "--no-horizon", "--quiet", "-o", str(folder)]
+        command = ["grid", *map(str, recordings), *options, *([] if horizon else ["--no-horizon"]), "--quiet", "-o",
+                   str(folder)]
         if not self._done(folder, command, "summary.json"):
             begun = self._same(folder, command) and (folder / "results.csv").exists()
             self._call(folder, command, ["--resume"] if begun else ["--force"])
@@ -38,6 +39,14 @@ class Runs:
             text = self._call(folder, command, ["--force"])
             (folder / "score.json").write_text(text)
         return json.loads((folder / "score.json").read_text())
+
+    def synth(self, name, asset, *options):
+        """The folder of a recording made with known truth."""
+        folder = self.out / name
+        command = ["synth", "--asset", asset, *options, "--quiet", "-o", str(folder)]
+        if not self._done(folder, command, "recording.json"):
+            self._call(folder, command, ["--force"])
+        return folder
 
     def import_clouds(self, name, clouds, *options):
         folder = self.out / name

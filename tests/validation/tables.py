@@ -143,3 +143,13 @@ def twin_tables(fits, membrane):
                               stiffness),
             "membrane": table(["E t N/m", *(f"{value / 1000:g}" for value, _ in young)],
                               [["residual mm", *(mm(score) for _, score in young)]])}
+
+
+def synthetic_tables(experiments, coverage):
+    rows = [[what, name, f"{right}", f"{held}", "-" if math.isnan(error) else f"{100 * error:.1f}"]
+            for what, name, right, held, error in experiments]
+    twins_rows = [[row["name"], str(row["twins"]), str(row["held"]), str(row["one_sided"]), str(row["no"]),
+                   f"{row['factor']:.2f}", f"{100 * row['error']:.0f}"] for row in coverage]
+    return {"experiments": table(["experiment", "asked", "right of 20", "inside their interval", "largest error %"], rows),
+            "coverage": table(["parameter", "twins", "intervals that hold the truth", "one-sided", "not identifiable",
+                               "median half width, factor", "median error %"], twins_rows)}

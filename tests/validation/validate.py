@@ -10,6 +10,7 @@ import convergence
 import lifts
 import limits
 import reference
+import synthetic
 import tables
 import twins
 from runs import Runs
@@ -26,8 +27,8 @@ def main():
     parser.add_argument("--sim", help="the program flash-sim")
     parser.add_argument("--scenes", type=pathlib.Path, help="folder of the reference scenes")
     parser.add_argument("--results", type=pathlib.Path, help="what make reference wrote of them")
-    parser.add_argument("--only", help="handeye, lifts, twins or reference: that part of the document; a recording: "
-                                       "its fit alone, printed")
+    parser.add_argument("--only", help="handeye, lifts, twins or reference: that part of the document; synthetic or a "
+                                       "recording: its fits alone, printed")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     runs = Runs(options.sysid, options.out)
@@ -36,6 +37,9 @@ def main():
         return print(tables.clip_table({options.only: fit}), end="")
     if options.only in twins.TWINS:
         return print(tables.twin_table(run_twins(runs, options.data, options.only)), end="")
+    if options.only == "synthetic":
+        rows = synthetic.experiment_rows(runs), synthetic.coverage_rows(synthetic.coverage(runs))
+        return print(*tables.synthetic_tables(*rows).values(), sep="\n")
     document = {}
     if options.only in (None, "reference") and options.results:
         document |= reference.tables(options.scenes, options.results, tables.table)

@@ -1,0 +1,181 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command_line.h"
+#include "apps/sysid_options.h"
+#include "apps/sysid_verbs.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/text.h"
+#include "sysid/fit.h"
+#include "sysid/parameter_label.h"
+#include "sysid/summary.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct FitOptions {
+  CommonOptions common;
+  ReplayOptions replay;
+  std::vector<std::string> recordings;
+  std::string asset;
+  std::string start;
+  std::vector<std::string> freeze, priors, fixed;
+  int iterations = 15;
+  std::string out;
+};
+
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// What the search looked for, over the range it searched; frozen ones stay where it found them.
+sysid::FitSettings fit_settings(const FitOptions& options, const sysid::Summary& found) {
+  sysid::FitSettings settings;
+  for (const std::string& assignment : options.fixed)
+    settings.grid.fixed.push_back(sysid::parse_fixed(assignment));
+  const auto is_fixed = [&](const std::string& name) {
+    return std::any_of(settings.grid.fixed.begin(), settings.grid.fixed.end(),
+                       [&](const sysid::Axis& axis) { return axis.name == name; });
+  };
+  for (const auto& [name, fixed] : found.fixed)
+    if (!is_fixed(name) && fixed.source == "measured")
+      settings.grid.fixed.push_back({name, {fixed.value}, false});
+  std::vector<std::string> searched;
+  for (const sysid::ParameterFinding& finding : found.parameters) {
+    searched.push_back(finding.name);
+    if (is_fixed(finding.name)) continue;
+    const double value = finding.estimate.value_or(found.best.at(finding.name));
+    if (contains(options.freeze, finding.name)) {
+      settings.grid.fixed.push_back({finding.name, {value}, false});
+      continue;
+    }
+    settings.grid.axes.push_back(
+        {finding.name, {finding.values.front(), finding.values.back()}, finding.logarithmic});
+    settings.start.push_back(value);
+  }
+  for (const std::string& name : options.freeze)
+    if (!contains(searched, name))
+      throw data::InputError("--freeze: " + name + ": the search in " + options.start + " did not search it");
+  if (settings.grid.axes.empty()) throw data::InputError("--freeze, --fix: no parameter is left to fit");
+  for (const std::string& text : options.priors) {
+    settings.priors.push_back(sysid::parse_prior(text));
+    const std::string& name = settings.priors.back().name;
+    if (std::none_of(settings.grid.axes.begin(), settings.grid.axes.end(),
+                     [&](const sysid::Axis& axis) { return axis.name == name; }))
+      throw data::InputError("--prior: " + name + ": is not among the parameters fitted");
+  }
+  settings.iterations = options.iterations;
+  settings.grid.score = score_settings(options.replay);
+  return settings;
+}
+
+nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::FitSettings& settings) {
+  nlohmann::ordered_json json;
+  json["schema"] = "flash-sysid-fit/1";
+  const std::vector<sysid::Axis>& axes = settings.grid.axes;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    nlohmann::ordered_json parameter;
+    parameter["estimate"] = result.values[k];
+    parameter["start"] = settings.start[k];
+    if (result.covariance.size() > 0) {
+      const auto i = static_cast<Eigen::Index>(k);
+      parameter["spread"] = std::sqrt(result.covariance(i, i));
+      parameter["spread_of"] = axes[k].logarithmic ? "logarithm" : "value";
+    } else {
+      parameter["spread"] = nullptr;
+    }
+    json["parameters"][axes[k].name] = parameter;
+  }
+  for (const sysid::Axis& axis : settings.grid.fixed) json["fixed"][axis.name] = axis.values.front();
+  json["score"] = result.best.score;
+  json["converged"] = result.best.converged;
+  json["termination"] = result.termination;
+  json["path"] = nlohmann::ordered_json::array();
+  for (const sysid::FitStep& step : result.path) {
+    nlohmann::ordered_json entry;
+    for (std::size_t k = 0; k < axes.size(); ++k) entry[axes[k].name] = step.values[k];
+    entry["cost"] = step.cost;
+    entry["accepted"] = step.accepted;
+    json["path"].push_back(entry);
+  }
+  return json;
+}
+
+int run_fit(const CLI::App& verb, const FitOptions& options) {
+  choose_device(options.common);
+  std::vector<data::Recording> recordings;
+  for (const std::string& path : options.recordings) recordings.push_back(data::load_recording(path));
+  const sysid::Summary found = sysid::load_summary((fs::path(options.start) / "summary.json").string());
+  const data::Asset asset =
+      load_asset_for(options.asset.empty() ? found.asset : options.asset, recordings.front());
+  sysid::FitSettings settings = fit_settings(options, found);
+  std::vector<sysid::Replay> replays;
+  for (const data::Recording& recording : recordings)
+    replays.push_back(
+        sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common))));
+  std::vector<std::string> notices;
+  settings.grid.base = material_base(asset, replays.front().sheet.rest, notices);
+  check_output(options.out, options.common);
+  for (const std::string& notice : notices) say(options.common, notice);
+
+  const std::vector<sysid::Axis>& axes = settings.grid.axes;
+  const sysid::FitResult result = sysid::fit(replays, settings, [&](const sysid::FitStep& step) {
+    std::string line = "cost " + data::format_short(step.cost);
+    for (std::size_t k = 0; k < axes.size(); ++k)
+      line += "  " + axes[k].name + " " + data::format_short(step.values[k]);
+    say(options.common, line + (step.accepted ? "" : "  (left)"));
+  });
+  const std::string text = data::format_json(fit_json(result, settings));
+  data::write_atomically((fs::path(options.out) / "fit.json").string(), text);
+  if (options.common.json) {
+    std::cout << text;
+  } else {
+    for (std::size_t k = 0; k < axes.size(); ++k) {
+      const std::string unit = sysid::parameter_label(axes[k].name, asset.thickness.has_value()).unit;
+      std::printf("%-16s %s %s\n", axes[k].name.c_str(), data::format_short(result.values[k]).c_str(),
+                  unit.c_str());
+    }
+    std::printf("%.3f mm from the observed points; %s\n%s\n", 1000 * result.best.score,
+                result.termination.c_str(), (fs::path(options.out) / "fit.json").c_str());
+  }
+  if (!result.best.converged)
+    warn("the fitted candidate missed a step: raise --iterations or lower --time-step");
+  return result.best.converged ? exit_done : exit_unusable;
+}
+
+}  // namespace
+
+void add_fit_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<FitOptions>();
+  CLI::App* verb =
+      app.add_subcommand("fit", "Refine what a grid found, by Levenberg-Marquardt, between its values");
+  verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
+  verb->add_option("--start", options->start, "Folder of the search to start from")->required();
+  verb->add_option("--asset", options->asset, "The object; without one, that of the search");
+  verb->add_option("--freeze", options->freeze, "Parameters that stay where the search found them")
+      ->delimiter(',');
+  verb->add_option("--prior", options->priors,
+                   "What is known beforehand, as bending=1e-5:2 (factor, one sigma)")
+      ->allow_extra_args(false);
+  verb->add_option("--fix", options->fixed, "A measured constant, as friction=0.3")->allow_extra_args(false);
+  verb->add_option("--steps", options->iterations, "Of the optimizer at most")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("-o,--out", options->out, "Folder for fit.json")->required();
+  add_replay_options(*verb, options->replay);
+  add_common_options(*verb, options->common);
+  verb->footer(
+      "Example:\n  flash-sysid fit lift --start run --freeze poisson --prior bending=1e-5:2 -o fitted");
+  verb->callback([verb, options, &action] { action = [verb, options] { return run_fit(*verb, *options); }; });
+}
+
+}  // namespace flash

@@ -1,0 +1,188 @@
+#include "sysid/fit.h"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "data/error.h"
+#include "sysid/sensitivity.h"
+
+namespace flash::sysid {
+namespace {
+
+double coordinate(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
+
+std::vector<double> values_at(const std::vector<Axis>& axes, const double* x) {
+  std::vector<double> values;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const double value = axes[k].logarithmic ? std::exp(x[k]) : x[k];
+    values.push_back(std::clamp(value, axes[k].values.front(), axes[k].values.back()));
+  }
+  return values;
+}
+
+Eigen::VectorXd residuals_of(const Sensitivity& sensitivity) {
+  Eigen::VectorXd rows(sensitivity.parameters.rows());
+  const double share = 1 / std::sqrt(static_cast<double>(sensitivity.places.size()));
+  Eigen::Index row = 0;
+  for (const ObservedPlaces& places : sensitivity.places) {
+    rows.segment(row, places.rows()) = share * places.residuals();
+    row += places.rows();
+  }
+  return rows;
+}
+
+double median_of(Eigen::VectorXd values) {
+  double* middle = values.data() + values.size() / 2;
+  std::nth_element(values.data(), middle, values.data() + values.size());
+  return *middle;
+}
+
+/// All residuals of all recordings, with derivatives where they are asked for.
+class Residuals : public ceres::CostFunction {
+ public:
+  Residuals(const std::vector<Replay>& replays, const FitSettings& settings)
+      : replays_(replays), settings_(settings) {
+    const Sensitivity start = measure_sensitivity(replays, settings.grid, settings.start, false);
+    if (start.places.empty()) throw data::InputError("--start: the simulation diverges there");
+    const Eigen::VectorXd rows = residuals_of(start);
+    limit_ = std::max(median_of(rows.cwiseAbs()), 1e-12);
+    double squares = 0;
+    for (const double row : rows) squares += std::pow(tamed(row), 2);
+    int keyframes = 0;
+    for (const Replay& replay : replays)
+      for (const Observation& observation : replay.observations)
+        keyframes += observation.seen() && observation.weight > 0;
+    scale_ = std::sqrt(keyframes / std::max(squares, 1e-24));
+    rows_ = rows.size();
+    set_num_residuals(static_cast<int>(rows_ + static_cast<Eigen::Index>(settings.priors.size())));
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(settings.grid.axes.size()));
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const std::vector<Axis>& axes = settings_.grid.axes;
+    const auto count = static_cast<Eigen::Index>(axes.size());
+    const std::vector<double> values = values_at(axes, parameters[0]);
+    const bool differentiate = jacobians != nullptr && jacobians[0] != nullptr;
+    const Sensitivity here = measure_sensitivity(replays_, settings_.grid, values, differentiate);
+    for (const ReplayResult& motion : here.motions)
+      if (!motion.finite) return false;
+    const Eigen::VectorXd rows = residuals_of(here);
+    if (rows.size() != rows_) return false;
+    for (Eigen::Index i = 0; i < rows_; ++i) residuals[i] = scale_ * tamed(rows[i]);
+    for (std::size_t p = 0; p < settings_.priors.size(); ++p) {
+      const auto [axis, weight] = prior_row(p);
+      residuals[rows_ + static_cast<Eigen::Index>(p)] =
+          weight * (parameters[0][axis] - coordinate(axes[axis], settings_.priors[p].value));
+    }
+    if (!differentiate) return true;
+    using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Index all = num_residuals();
+    Eigen::MatrixXd rates = here.parameters;
+    if (here.nuisance.cols() > 0)
+      rates -= here.nuisance * here.nuisance.colPivHouseholderQr().solve(here.parameters);
+    Jacobian jacobian = Jacobian::Zero(all, count);
+    for (Eigen::Index i = 0; i < rows_; ++i) jacobian.row(i) = -scale_ * slope(rows[i]) * rates.row(i);
+    for (std::size_t p = 0; p < settings_.priors.size(); ++p) {
+      const auto [axis, weight] = prior_row(p);
+      jacobian(rows_ + static_cast<Eigen::Index>(p), static_cast<Eigen::Index>(axis)) = weight;
+    }
+    Eigen::Map<Jacobian>(jacobians[0], all, count) = jacobian;
+    return true;
+  }
+
+ private:
+  /// r up to the limit, beyond it sqrt(limit (2 |r| - limit)): Huber's cost is its square.
+  double tamed(double r) const {
+    const double size = std::abs(r);
+    return size <= limit_ ? r : std::copysign(std::sqrt(limit_ * (2 * size - limit_)), r);
+  }
+  double slope(double r) const { return std::abs(r) <= limit_ ? 1 : limit_ / std::abs(tamed(r)); }
+
+  std::pair<std::size_t, double> prior_row(std::size_t p) const {
+    const std::vector<Axis>& axes = settings_.grid.axes;
+    const Prior& prior = settings_.priors[p];
+    const auto axis = static_cast<std::size_t>(
+        std::find_if(axes.begin(), axes.end(), [&](const Axis& a) { return a.name == prior.name; }) -
+        axes.begin());
+    const double spread = axes[axis].logarithmic ? std::log(prior.spread)
+                          : prior.value > 0      ? prior.value * (prior.spread - 1)
+                                                 : prior.spread;
+    return {axis, 1 / spread};
+  }
+
+  const std::vector<Replay>& replays_;
+  const FitSettings& settings_;
+  Eigen::Index rows_ = 0;
+  double limit_ = 0, scale_ = 1;
+};
+
+class Path : public ceres::IterationCallback {
+ public:
+  Path(const std::vector<Axis>& axes, const std::vector<double>& x,
+       const std::function<void(const FitStep&)>& report)
+      : axes_(axes), x_(x), report_(report) {}
+  ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    steps.push_back({values_at(axes_, x_.data()), summary.cost, summary.step_is_successful});
+    if (report_) report_(steps.back());
+    return ceres::SOLVER_CONTINUE;
+  }
+  std::vector<FitStep> steps;
+
+ private:
+  const std::vector<Axis>& axes_;
+  const std::vector<double>& x_;
+  const std::function<void(const FitStep&)>& report_;
+};
+
+}  // namespace
+
+FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
+              const std::function<void(const FitStep&)>& report) {
+  const std::vector<Axis>& axes = settings.grid.axes;
+  std::vector<double> x;
+  for (std::size_t k = 0; k < axes.size(); ++k) x.push_back(coordinate(axes[k], settings.start[k]));
+  ceres::Problem problem;
+  problem.AddResidualBlock(new Residuals(replays, settings), nullptr, x.data());  // the problem owns it
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    problem.SetParameterLowerBound(x.data(), static_cast<int>(k),
+                                   coordinate(axes[k], axes[k].values.front()));
+    problem.SetParameterUpperBound(x.data(), static_cast<int>(k), coordinate(axes[k], axes[k].values.back()));
+  }
+  ceres::Solver::Options options;
+  options.max_num_iterations = settings.iterations;
+  options.function_tolerance = settings.tolerance;
+  options.parameter_tolerance = 1e-5;
+  options.linear_solver_type = ceres::DENSE_QR;
+  options.logging_type = ceres::SILENT;
+  options.update_state_every_iteration = true;
+  Path path(axes, x, report);
+  options.callbacks.push_back(&path);
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+
+  FitResult result;
+  result.values = values_at(axes, x.data());
+  result.path = std::move(path.steps);
+  result.termination = summary.message;
+  ceres::Covariance::Options with;
+  with.algorithm_type = ceres::DENSE_SVD;
+  with.null_space_rank = 0;
+  ceres::Covariance covariance(with);
+  const auto count = static_cast<Eigen::Index>(axes.size());
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block(count, count);
+  if (covariance.Compute(std::vector<std::pair<const double*, const double*>>{{x.data(), x.data()}},
+                         &problem) &&
+      covariance.GetCovarianceBlock(x.data(), x.data(), block.data()))
+    result.covariance = block;
+  std::vector<ReplayResult> motions;
+  for (const Replay& replay : replays)
+    motions.push_back(std::move(run(replay, {candidate_at(result.values, settings.grid)}).front()));
+  result.best = score_motions(replays, motions, settings.grid.score);
+  result.best.values = result.values;
+  return result;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,43 @@
+#pragma once
+#include <functional>
+#include <vector>
+
+#include "sysid/grid_search.h"
+#include "sysid/prior.h"
+
+namespace flash::sysid {
+
+struct FitSettings {
+  GridSettings grid;  ///< axes: the parameters fitted, with the range each may take; fixed ones as there
+  std::vector<double> start;  ///< one an axis
+  std::vector<Prior> priors;
+  int iterations = 15;      ///< of Levenberg-Marquardt at most
+  double tolerance = 1e-4;  ///< stops when a step gains less than this share of the cost
+};
+
+/// One iterate.
+struct FitStep {
+  std::vector<double> values;  ///< one an axis
+  double cost = 0;             ///< chi^2 / 2, priors included
+  bool accepted = true;        ///< otherwise tried and left
+};
+
+struct FitResult {
+  std::vector<double> values;  ///< one an axis
+  CandidateResult best;        ///< scored there; values as above
+  Eigen::MatrixXd covariance;  ///< of the axes' coordinates; empty where a direction is not determined
+  std::vector<FitStep> path;   ///< in order
+  std::string termination;     ///< in words, of the optimizer
+};
+
+/// Levenberg-Marquardt (Ceres, trust region, box) over the logarithms of logarithmic axes, from `start`, on
+/// the signed distances of what was observed (ObservedPlaces), thinned, registration fitted at every point
+/// and projected out of the derivatives (variable projection, Kaufman 1975). Large distances count by their
+/// size, not their square, from the median of those at the start. Derivatives are finite differences, all
+/// parameters in one batch of environments. With sigma^2 the mean square at the start and n keyframes the
+/// cost is n / 2 mean square / sigma^2 plus half the squared deviations from the priors. `report` is called
+/// after each step.
+FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
+              const std::function<void(const FitStep&)>& report = {});
+
+}  // namespace flash::sysid

@@ -1,0 +1,43 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "sysid/grid_search.h"
+#include "sysid/observed_places.h"
+
+namespace flash::sysid {
+
+/// How what is observed moves with the parameters, to first order, at one set of values. Rows: those of
+/// `places`, recording after recording, divided by the root of their number, so that a sum of squares is the
+/// mean over recordings.
+struct Sensitivity {
+  std::vector<ReplayResult> motions;   ///< at the values themselves, one a recording
+  std::vector<ObservedPlaces> places;  ///< one a recording
+  Eigen::MatrixXd parameters;          ///< columns: the searched axes; a row's change by the logarithm of a
+                                       ///< logarithmic axis, else by its unit [m]
+  Eigen::MatrixXd nuisance;  ///< columns: offset, yaw and time of each recording that have room, per half
+                             ///< width of their bounds [m]
+};
+
+/// Central differences over one batch of environments a recording, one-sided at the end of a parameter's
+/// range: two rollouts a parameter and one at the values. `values`: one an axis of `grid.axes`; places are
+/// those of the registration fitted there. Without `differentiate` the motions and places alone; the columns
+/// are zero.
+Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSettings& grid,
+                                const std::vector<double>& values, bool differentiate = true);
+
+/// Candidate of a search at values that need not be on the grid, one an axis.
+ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettings& grid);
+
+/// Displacements of the places towards other motions, in rows as above. `replays` may differ in mesh and step
+/// from those of the sensitivity, not in their keyframes.
+Eigen::VectorXd displacements(const Sensitivity& sensitivity, const std::vector<Replay>& replays,
+                              const std::vector<ReplayResult>& motions);
+
+/// The change of the parameters that comes nearest to given displacements in least squares, nuisance fitted
+/// beside it, both held near zero by a floor of a micrometre over their ranges. `ranges`: of the parameters,
+/// in the units of the columns; no change is larger.
+Eigen::VectorXd explain(const Sensitivity& sensitivity, const Eigen::VectorXd& displacement,
+                        const Eigen::VectorXd& ranges);
+
+}  // namespace flash::sysid
