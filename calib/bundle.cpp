@@ -73,7 +73,7 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
     const Chain chain(setup_, pose_of(x[0]), pose_of(x[1]), pose_.T_base_gripper, pose_of(x[3]),
                       pose_of(x[2]), *x[6], pose_.velocity);
     const Eigen::Vector3d p = *x[5] * point_;
-    const Eigen::Vector3d q = chain.T_camera_target() * p;
+    const Eigen::Vector3d q = chain.target_in_camera() * p;
     if (!(q.z() > 1e-6)) return false;
     Eigen::Matrix<double, 2, 3> d_point;
     Eigen::Matrix<double, 2, kIntrinsics> d_intrinsics;

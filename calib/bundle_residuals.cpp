@@ -7,7 +7,7 @@
 namespace flash::calib {
 
 Eigen::Isometry3d predicted_pose(const Bundle& bundle, const BundleView& view, bool corrected) {
-  return chain_of(bundle, view, corrected).T_camera_target();
+  return chain_of(bundle, view, corrected).target_in_camera();
 }
 
 Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected) {

@@ -43,8 +43,8 @@ Chain::Derivative Chain::d_correction(const Eigen::Vector3d& p) const {
 
 DepthResidual depth_residual(const Chain& chain, const Eigen::Vector3d& P) {
   DepthResidual residual;
-  residual.material = chain.T_camera_target().inverse() * P;
-  const Eigen::Vector3d normal = chain.T_camera_target().linear().col(2);
+  residual.material = chain.target_in_camera().inverse() * P;
+  const Eigen::Vector3d normal = chain.target_in_camera().linear().col(2);
   const double along_ray = normal.dot(P / P.z());
   residual.value = residual.material.z() / along_ray;
   residual.d_material = normal.transpose() / along_ray;

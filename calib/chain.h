@@ -18,7 +18,7 @@ class Chain {
         const Eigen::Isometry3d& D, const Eigen::Isometry3d& Z, double tau = 0,
         const Vector6d& v = Vector6d::Zero());
 
-  const Eigen::Isometry3d& T_camera_target() const { return T_camera_target_; }
+  const Eigen::Isometry3d& target_in_camera() const { return T_camera_target_; }
 
   using Derivative = Eigen::Matrix<double, 3, 6>;
   /// Derivatives of q with respect to right perturbations of each link; p in the target, q in the camera

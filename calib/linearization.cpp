@@ -129,7 +129,7 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
   Eigen::Matrix<double, 2, kIntrinsics> d_intrinsics;
   for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
     const Eigen::Vector3d p = scale * view.points.col(i);
-    const Eigen::Vector3d q = builder.chain().T_camera_target() * p;
+    const Eigen::Vector3d q = builder.chain().target_in_camera() * p;
     const Eigen::Vector2d residual = project(intrinsics, q, &d_q, &d_intrinsics) - view.pixels.col(i);
     builder.fill<2>(d_q, p, q, rows);
     if (columns.intrinsics[camera] >= 0)

@@ -68,7 +68,7 @@ Eigen::Matrix2Xd projected_by_chain(const Calibration& calibration, const Observ
   for (Eigen::Index k = 0; k < projected.cols(); ++k) {
     const std::optional<Eigen::Vector2d> pixel =
         data::project(camera_of(calibration),
-                      chain.T_camera_target() * points.col(view.points[static_cast<std::size_t>(k)]));
+                      chain.target_in_camera() * points.col(view.points[static_cast<std::size_t>(k)]));
     if (!pixel) return {};
     projected.col(k) = *pixel;
   }

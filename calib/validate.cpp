@@ -79,7 +79,7 @@ ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const d
                       Eigen::Isometry3d::Identity(), poses.Z);
     ViewProjection best;
     for (std::size_t k = 0; k < numberings.size(); ++k) {
-      ViewProjection projection = project_view(chain.T_camera_target(), camera, points, numberings[k], view);
+      ViewProjection projection = project_view(chain.target_in_camera(), camera, points, numberings[k], view);
       const bool better =
           view.pixels.cols() > 0 ? projection.corner_rms < best.corner_rms : projection.deg < best.deg;
       if (k == 0 || better) best = std::move(projection);
