@@ -9,15 +9,18 @@ namespace {
 using Eigen::Vector3d;
 
 Gap gap_of(const Plane& plane, const Vector3d& point, double, double) {
-  return {plane.normal.dot(point - plane.point), plane.normal, Vector3d::Zero()};
+  return {plane.normal.dot(point - plane.point), plane.normal, Vector3d::Zero(), Vector3d::Zero()};
 }
 
 Gap gap_of(const Cylinder& cylinder, const Vector3d& point, double, double) {
   Vector3d radial = point - cylinder.point;
   radial -= cylinder.axis * cylinder.axis.dot(radial);
   const double length = radial.norm();
-  return {length - cylinder.radius, length > 0 ? Vector3d(radial / length) : cylinder.axis.unitOrthogonal(),
-          Vector3d::Zero()};
+  if (length == 0)
+    return {-cylinder.radius, cylinder.axis.unitOrthogonal(), Vector3d::Zero(), Vector3d::Zero()};
+  const Vector3d normal = radial / length;
+  return {length - cylinder.radius, normal, Vector3d::Zero(),
+          cylinder.axis.cross(normal) / std::sqrt(length)};
 }
 
 Gap gap_of(const Box& box, const Vector3d& point, double time, double time_step) {
@@ -35,7 +38,7 @@ Gap gap_of(const Box& box, const Vector3d& point, double time, double time_step)
     gap.distance = outside.norm();
     gap.normal = pose.linear() * (outside / gap.distance);
   }
-  gap.surface_moved = Vector3d::Zero();
+  gap.surface_moved = gap.curved = Vector3d::Zero();
   if (!box.trajectory.times.empty())
     gap.surface_moved = point - data::pose_at(box.trajectory, time - time_step) * local;
   return gap;

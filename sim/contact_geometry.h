@@ -10,6 +10,7 @@ struct Gap {
   double distance;                ///< to the surface, negative inside [m]
   Eigen::Vector3d normal;         ///< unit, out of the obstacle
   Eigen::Vector3d surface_moved;  ///< by the obstacle's material at the contact, over the step [m]
+  Eigen::Vector3d curved;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
 };
 
 /// Signed distance of `point` [m] to the obstacle at `time` [s], the end of a step of `time_step`. Exact

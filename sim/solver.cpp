@@ -105,6 +105,14 @@ void add_slip_stiffness(const std::vector<VertexConstraint>& constraints, BlockV
   }
 }
 
+/// A vertex that slides over a round surface turns its normal force: the Hessian of the gap times -lambda_n.
+void add_surface_curvature(const std::vector<VertexConstraint>& constraints, BlockValues<double>& values) {
+  for (size_t i = 0; i < constraints.size(); ++i)
+    for (const Touch& touch : constraints[i].touches)
+      if (touch.holds)
+        Map<Matrix3d>(values.data() + 9 * i) -= touch.normal_force * touch.curved * touch.curved.transpose();
+}
+
 /// P B P + (I - P) scaled to its neighbours: the matrix of the free directions.
 void restrict_matrix(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints,
                      BlockValues<double>& values) {
@@ -243,6 +251,7 @@ StepReport Solver::step(Environment& environment) {
     }
     problem.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, sparse, w.values);
     add_slip_stiffness(now.constraints, w.values);
+    if (!stuck) add_surface_curvature(now.constraints, w.values);
     w.matrix.assign(w.values, sparse, bending, rigidity, problem.mass().minCoeff() / (h * h));
     std::vector<VertexConstraint> linear = now.constraints;
     Points gradient = now.residual, force;

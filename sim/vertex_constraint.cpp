@@ -24,7 +24,7 @@ std::array<Touch, 2> nearest_touches(const Environment& environment, const Vecto
   std::array<Touch, 2> touches;
   for (size_t k = 0; k < environment.obstacles.size(); ++k) {
     const Gap gap = gap_to(environment.obstacles[k], point, time, time_step);
-    const Touch touch{static_cast<int>(k), false, gap.distance, 0, gap.normal};
+    const Touch touch{static_cast<int>(k), false, gap.distance, 0, gap.normal, gap.curved};
     if (touches[0].obstacle < 0 || touch.gap < touches[0].gap) {
       touches[1] = touches[0];
       touches[0] = touch;
@@ -205,7 +205,7 @@ void project_to_feasible(const Environment& environment, double time, double tim
         const auto touch = touch_of(k);
         // A vertex that is to land does so where the step is long enough to bring it down.
         const bool lands = touch != constraint.touches.end() &&
-                           (constraint.correction.isZero(0) || gap.distance <= 0.01 * touch->gap);
+                           (touch->gap <= touching || gap.distance <= 0.01 * touch->gap);
         if (!(gap.distance < 0 || lands)) continue;
         positions.row(i) -= gap.distance * gap.normal.transpose();
         moved = std::max(moved, std::abs(gap.distance));

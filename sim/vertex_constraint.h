@@ -22,6 +22,7 @@ struct Touch {
   double gap = 0.0;         ///< [m]
   double normal_force = 0;  ///< lambda_n of an obstacle that holds [N]
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  Eigen::Vector3d curved = Eigen::Vector3d::Zero();  ///< as in Gap
 };
 
 /// The constraint on one vertex at the current iterate of a step. Two obstacles at most touch a vertex at

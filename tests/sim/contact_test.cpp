@@ -33,6 +33,18 @@ TEST(Contact, GapsAreDistancesWithUnitNormalsOutward) {
   }
 }
 
+TEST(Contact, TheCurvatureOfAGapIsItsSecondDerivative) {
+  const Obstacle cylinder{Cylinder{{0, 0, 0.2}, Vector3d::UnitY(), 0.05}};
+  const double step = 1e-4;
+  for (int k = 0; k < 50; ++k) {
+    const Vector3d point = Vector3d::Random(), along = Vector3d::Random().normalized();
+    const auto distance = [&](double s) { return gap_to(cylinder, point + s * along, 0, 0).distance; };
+    const double second = (distance(step) - 2 * distance(0) + distance(-step)) / (step * step);
+    const Gap gap = gap_to(cylinder, point, 0, 0);
+    EXPECT_NEAR(std::pow(gap.curved.dot(along), 2), second, 1e-4 * (1 + std::pow(gap.curved.norm(), 6)));
+  }
+}
+
 TEST(Contact, NormalForcesSumToTheWeight) {
   const Sheet sheet = small_sheet();
   Environment environment = environment_of(sheet);
