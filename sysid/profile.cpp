@@ -230,7 +230,9 @@ ParameterFinding find_parameter(const GridResults& results, std::size_t k, const
   const auto rises = [&](std::size_t from, std::size_t to) {
     const auto begin = profile.begin();
     return std::any_of(begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(to),
-                       [&](const auto& point) { return point.score - sampling.best_score > solver.score; });
+                       [&](const auto& point) {
+                         return point.score - sampling.best_score > solver.score + solver.interpolation;
+                       });
   };
   const bool closed_below = low > 0 && below > first && rises(0, low);
   const bool closed_above = high + 1 < profile.size() && above < end && rises(high + 1, profile.size());

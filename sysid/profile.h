@@ -54,7 +54,7 @@ struct SolverError {
 ///
 /// The interpolation is checked where it matters: D counts only by what it exceeds its error at the estimate.
 /// Each shift widens the interval to the side on which the better solution would have found the parameter. A
-/// side on which the profile nowhere rises by more than the solver's own error of the score excludes nothing.
+/// side on which the profile nowhere rises by more than these errors excludes nothing.
 /// Verdict: excluded values on both sides "yes", on neither "no", only above "upper_bound", only
 /// below "lower_bound".
 GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability = {},
