@@ -72,6 +72,24 @@ void drop_outliers(const Consistency& consistency, double factor, std::vector<Vi
   }
 }
 
+std::size_t most_common(const std::vector<ViewVerdict>& views, std::size_t symmetries) {
+  std::vector<int> votes(symmetries, 0);
+  for (const ViewVerdict& view : views) votes[static_cast<std::size_t>(view.symmetry)] += view.used ? 1 : 0;
+  return static_cast<std::size_t>(std::max_element(votes.begin(), votes.end()) - votes.begin());
+}
+
+/// The symmetry that turns as the one of that index, followed by the inverse of `common`.
+int quotient(const std::vector<Symmetry>& symmetries, std::size_t index, const Symmetry& common) {
+  const auto found = std::find_if(symmetries.begin(), symmetries.end(), [&](const Symmetry& symmetry) {
+    for (std::size_t i = 0; i < common.permutation.size(); ++i)
+      if (common.permutation[static_cast<std::size_t>(symmetry.permutation[i])] !=
+          symmetries[index].permutation[i])
+        return false;
+    return true;
+  });
+  return static_cast<int>(found - symmetries.begin());
+}
+
 }  // namespace
 
 std::vector<Symmetry> grid_symmetries(const Eigen::Matrix3Xd& points) {
@@ -114,24 +132,29 @@ Repair repair_views(Setup setup, const std::vector<Observation>& observations,
   repair.consistency = find_consistency(robot, candidates, settings.consistency);
   if (!repair.consistency.found) return repair;
 
-  std::vector<int> votes(symmetries.size(), 0);
   for (std::size_t i = 0; i < observations.size(); ++i) {
     if (!repair.views[i].used) continue;
     const auto choice = static_cast<std::size_t>(repair.consistency.choice[i]);
     repair.views[i].symmetry = static_cast<int>(choice / observations[i].T_camera_target.size());
-    const Symmetry& symmetry = symmetries[static_cast<std::size_t>(repair.views[i].symmetry)];
+  }
+  // All views turned alike close as well: most keep the numbering of their detector.
+  const Symmetry& common = symmetries[most_common(repair.views, symmetries.size())];
+  repair.consistency.poses.Z = repair.consistency.poses.Z * common.turn;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    ViewVerdict& view = repair.views[i];
+    if (!view.used) continue;
+    view.symmetry = quotient(symmetries, static_cast<std::size_t>(view.symmetry), common);
+    const Symmetry& symmetry = symmetries[static_cast<std::size_t>(view.symmetry)];
     for (int& point : repair.observations[i].points)
       point = symmetry.permutation[static_cast<std::size_t>(point)];
-    repair.observations[i].T_camera_target = {candidates[i][choice]};
+    const auto choice = static_cast<std::size_t>(repair.consistency.choice[i]);
+    repair.observations[i].T_camera_target = {candidates[i][choice] * common.turn};
   }
   drop_outliers(repair.consistency, settings.outlier, repair.views);
-  int used = 0;
-  for (const ViewVerdict& view : repair.views) {
-    if (!view.used) continue;
-    ++votes[static_cast<std::size_t>(view.symmetry)];
-    ++used;
-  }
-  repair.renumbered = used - *std::max_element(votes.begin(), votes.end());
+  repair.renumbered =
+      static_cast<int>(std::count_if(repair.views.begin(), repair.views.end(), [](const ViewVerdict& view) {
+        return view.used && view.symmetry != 0;
+      }));
   return repair;
 }
 

@@ -33,7 +33,7 @@ struct Repair {
   std::vector<ViewVerdict> views;
   std::vector<Observation> observations;  ///< of all views, renumbered, T_camera_target the chosen pose alone
   Consistency consistency;
-  int renumbered = 0;  ///< used views whose numbering differs from that of most
+  int renumbered = 0;  ///< used views whose numbering was changed to that of most
 };
 
 /// Chooses numbering and planar pose of all views jointly, so that the chain closes best, and names the views
