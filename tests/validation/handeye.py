@@ -149,10 +149,10 @@ def sets_table(sets, table):
 def verdict(result):
     """Held-out mm and px of the answer over the least of the other methods."""
     *others, answer = [method for method in result["comparison"].values() if "heldout_mm" in method]
-    ratios = {unit: answer[key] / min(method[key] for method in others)
+    ratios = {unit: round(answer[key] / min(method[key] for method in others), 3)
               for unit, key in (("px", "heldout_px"), ("mm", "heldout_mm")) if has_pixels(result) or unit == "mm"}
-    worse = all(ratio > 1.005 for ratio in ratios.values())  # half a percent: less than any table shows
-    return ", ".join(f"{unit} x {ratio:.2f}" for unit, ratio in ratios.items()) + (": worse" if worse else "")
+    worse = all(ratio > 1 for ratio in ratios.values())
+    return ", ".join(f"{unit} x {ratio:.3f}" for unit, ratio in ratios.items()) + (": worse" if worse else "")
 
 
 def arms_table(arms, table):
