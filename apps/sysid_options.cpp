@@ -107,8 +107,8 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
 sysid::ScoreSettings score_settings(const ReplayOptions& options) {
   sysid::ScoreSettings settings;
   settings.objective.robust.kind = options.distance == "mean"    ? sysid::RobustKind::plain
-                         : options.distance == "huber" ? sysid::RobustKind::huber
-                                                       : sysid::RobustKind::trimmed;
+                                   : options.distance == "huber" ? sysid::RobustKind::huber
+                                                                 : sysid::RobustKind::trimmed;
   settings.objective.robust.trim_fraction = options.trim;
   settings.objective.robust.huber_delta = options.huber;
   const auto shares = [&](const char* name) {
