@@ -90,10 +90,10 @@ TEST(MeshIo, BinaryVtkIsBigEndian) {
   };
   std::string file = "# vtk DataFile Version 3.0\nx\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n";
   for (const float value : {0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.f, 0.f, 0.f, 0.f, 1.5f}) file += big(value);
-  file += "\nCELLS 2 9\n";
-  for (const int value : {4, 0, 2, 1, 3, 3, 0, 1, 2}) file += big(value);
-  file += "\nCELL_TYPES 2\n";
-  for (const int value : {10, 5}) file += big(value);
+  file += "\nCELLS 3 13\n";
+  for (const int value : {4, 0, 2, 1, 3, 3, 0, 1, 2, 3, 0, 3, 1}) file += big(value);
+  file += "\nCELL_TYPES 3\n";
+  for (const int value : {10, 5, 5}) file += big(value);
   file += "\n";
   const std::string path = folder.write("a.vtk", file);
   const TetMesh tets = load_tet_mesh(path);
