@@ -40,6 +40,11 @@ Summary judge(GridResults& results, std::vector<Replay>& replays, const GridSett
         shift[static_cast<Eigen::Index>(k)] = check.shift.at(grid.axes[k].name);
     }
     verdict = profile_grid(results, settings.repeatability, error);
+  } else {
+    // Nothing was simulated at the estimate: where the interpolation lies below every simulated score, that
+    // is not known to be more than its own error.
+    error.interpolation = verdict.score - verdict.estimate_score;
+    verdict = profile_grid(results, settings.repeatability, error);
   }
   Summary summary = summarize(results, verdict, replays, grid);
   summary.solver_check = std::move(checks);
