@@ -12,6 +12,19 @@
 
 namespace flash::sysid {
 
+namespace {
+
+/// The interpolation promised less than what was simulated at its minimum: the best candidate stands.
+void fall_back_on_best(const GridResults& results, GridVerdict& verdict) {
+  const std::vector<double>& best = results.candidates[static_cast<std::size_t>(verdict.best)].values;
+  for (std::size_t k = 0; k < best.size(); ++k) {
+    verdict.estimate[static_cast<Eigen::Index>(k)] = best[k];
+    verdict.parameters[k].estimate = best[k];
+  }
+}
+
+}  // namespace
+
 Summary judge(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
               const JudgeSettings& settings) {
   GridVerdict verdict = profile_grid(results, settings.repeatability);
@@ -40,6 +53,7 @@ Summary judge(GridResults& results, std::vector<Replay>& replays, const GridSett
         shift[static_cast<Eigen::Index>(k)] = check.shift.at(grid.axes[k].name);
     }
     verdict = profile_grid(results, settings.repeatability, error);
+    if (!checks.empty() && checks.front().score > verdict.score) fall_back_on_best(results, verdict);
   } else {
     // Nothing was simulated at the estimate: where the interpolation lies below every simulated score, that
     // is not known to be more than its own error.
