@@ -50,7 +50,7 @@ configure-test: packages-build packages-test
 
 validate: reference configure-test  ## Calibrate and fit what is in $(DATA), renew docs/validation.md; ONLY=handeye, lift_navy, ...
 	cmake --build $(BUILD) -j $(JOBS) --target hand_eye_study
-	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --calib $(BUILD)/bin/flash-calib \
+	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --calib $(BUILD)/bin/flash-calib --sim $(BUILD)/bin/flash-sim \
 	  --hand-eye-study $(BUILD)/tests/hand_eye_study --data $(DATA) --scenes $(REFERENCE)/scenes \
 	  --results $(BUILD)/reference --out $(BUILD)/validation --document docs/validation.md $(if $(ONLY),--only $(ONLY))
 
