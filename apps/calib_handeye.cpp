@@ -24,6 +24,7 @@ struct HandEyeOptions {
   DatasetChoice dataset;
   std::string setup;
   bool refine_intrinsics = false;
+  calib::TargetSize target_size = calib::TargetSize::automatic;
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2;
   std::string out, report;
@@ -92,6 +93,7 @@ int run_handeye(const HandEyeOptions& options) {
   calib::CalibrateSettings settings;
   constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
   if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
+  settings.target_size = options.target_size;
   const bool pairs = std::all_of(dataset.frames.begin(), dataset.frames.end(),
                                  [](const calib::Frame& frame) { return frame.image.empty(); });
   const calib::ImageCalibration solved =
@@ -143,6 +145,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
+  add_target_size_option(*verb, options->target_size);
   verb->add_option("--parent-frame", options->parent, "Name of the gripper's or the base's frame");
   verb->add_option("--child-frame", options->child, "Name of the camera's frame")->capture_default_str();
   verb->add_option("--ros", options->ros, "File for a static_transform_publisher line");

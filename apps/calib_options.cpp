@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <iostream>
+#include <map>
 
 #include "data/error.h"
 #include "data/text.h"
@@ -36,6 +37,18 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");
+}
+
+void add_target_size_option(CLI::App& verb, calib::TargetSize& size) {
+  verb.add_option(
+          "--target-size", size,
+          "stated; solved for with the rest; or automatic: solved for where the data say clearly that "
+          "the print is off")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, calib::TargetSize>{{"automatic", calib::TargetSize::automatic},
+                                                   {"stated", calib::TargetSize::stated},
+                                                   {"solved", calib::TargetSize::solved}}))
+      ->default_str("automatic");
 }
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {

@@ -6,6 +6,7 @@
 #include "calib/dataset.h"
 #include "calib/detect.h"
 #include "calib/target.h"
+#include "calib/target_size.h"
 
 namespace flash {
 
@@ -29,6 +30,9 @@ struct DatasetChoice {
   double depth_scale = 0.001;
 };
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
+
+/// --target-size automatic|stated|solved
+void add_target_size_option(CLI::App& verb, calib::TargetSize& size);
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
 

@@ -25,7 +25,8 @@ struct RegisterOptions {
   std::string target, setup, cache;
   std::vector<double> workspace;
   bool without_images = false;
-  bool refine_intrinsics = false, refine_scale = false;
+  bool refine_intrinsics = false;
+  calib::TargetSize target_size = calib::TargetSize::automatic;
   std::string out;
 };
 
@@ -41,7 +42,9 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   const calib::Setup kind =
       setup.empty() ? *dataset.setup : calib::parse_setup(setup, "command line", "--setup");
   const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
-  const calib::ImageCalibration solved = calib::calibrate_images(kind, dataset, target, detections);
+  calib::CalibrateSettings settings;
+  settings.target_size = options.target_size;
+  const calib::ImageCalibration solved = calib::calibrate_images(kind, dataset, target, detections, settings);
   if (!options.common.quiet) {
     const std::size_t all = solved.calibration.views.size(), used = solved.calibration.used.size();
     if (used < all)
@@ -59,8 +62,7 @@ std::string name_of(const std::string& path) {
 calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
   calib::RefineSettings settings;
   if (options.refine_intrinsics) settings.bundle.unknowns.intrinsics = kRefinedIntrinsics;
-  settings.bundle.unknowns.scales = options.refine_scale;
-  return calib::solve_cell(members, settings);
+  return calib::solve_cell(members, settings, options.target_size);
 }
 
 calib::Cell cell_of_arms(const RegisterOptions& options) {
@@ -165,7 +167,7 @@ void add_register_verb(CLI::App& app, Action& action) {
       ->expected(3);
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
-  verb->add_flag("--refine-scale", options->refine_scale, "Solve for the size of the targets as well");
+  add_target_size_option(*verb, options->target_size);
   verb->add_option("--cache", options->cache, "Folder that keeps corners found, for the next run");
   verb->add_option("-o,--out", options->out, "File for the cell, JSON");
   add_calib_common_options(*verb, options->common);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <tuple>
 
 #include "calib/linearization.h"
 #include "calib/projection.h"
@@ -125,7 +126,8 @@ double centre_rms(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_
   for (const BundleView& view : bundle.views) {
     const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics.front());
     const Eigen::Vector3d centre = view.points.rowwise().mean();
-    sum += (project(intrinsics, predicted_pose(bundle, view, false) * centre) -
+    const double scale = bundle.scales[static_cast<std::size_t>(view.target)];
+    sum += (project(intrinsics, predicted_pose(bundle, view, false) * (scale * centre)) -
             project(intrinsics, T_camera_target[static_cast<std::size_t>(view.pose)] * centre))
                .squaredNorm();
   }
@@ -133,13 +135,13 @@ double centre_rms(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_
 }
 
 void compare_methods(Calibration& result, const std::vector<Observation>& observations, const Bundle& plain,
-                     const CalibrateSettings& settings) {
+                     RefineSettings settings, int folds) {
   const std::vector<PoseLoop> loops = loops_of(result.setup, observations);
   const std::vector<Eigen::Isometry3d> poses = target_poses(observations);
   Bundle bundle = plain;
+  settings.noise = result.refined.noise;
   const auto hold = [&](Method method) {
-    return hold_out(result.refined.bundle, poses, method, result.refined.noise, settings.refine.bundle,
-                    settings.folds);
+    return hold_out(result.refined.bundle, poses, method, settings, folds);
   };
   for (const ReferenceMethod& reference : reference_methods(loops)) {
     ComparedMethod& method = result.comparison.emplace_back();
@@ -165,44 +167,53 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
   result.held_out = *result.comparison.back().held_out;
 }
 
-/// The target's size as one more unknown.
-ScaleCheck check_scale(const Refinement& refined, const RefineSettings& settings) {
-  RefineSettings with_scale = settings;
-  with_scale.estimate_pivots = false;
-  with_scale.noise = refined.noise;
-  with_scale.bundle.unknowns.scales = true;
-  const Refinement scaled = refine(refined.bundle, with_scale);
-  const int column = shared_columns(scaled.bundle, with_scale.bundle.unknowns).scales.front();
-  return {scaled.bundle.scales.front(), std::sqrt(scaled.covariance(column, column))};
+/// Errors in variables again and again, without the view that no longer looks like the rest, until all do.
+/// Returns the bundle at its seed.
+Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observations,
+                       const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                       const RefineSettings& refine_settings, const CalibrateSettings& settings) {
+  for (;;) {
+    const HandEyePoses seed = shah(loops_of(result.setup, observations));
+    Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
+    result.refined = refine(plain, refine_settings);
+    const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
+    if (few || !drop_worst(result, observations, settings.surprise)) return plain;
+  }
 }
 
 /// Halves of few views determine too little by themselves.
-void check_splits(Calibration& result, const CalibrateSettings& settings) {
-  if (result.used.size() < 4 * static_cast<std::size_t>(settings.least_views)) return;
-  result.interleaved = check_halves(result.refined, settings.refine.bundle, Split::interleaved);
-  result.consecutive = check_halves(result.refined, settings.refine.bundle, Split::consecutive);
-  const double inflation = split_inflation(*result.consecutive);
-  if (inflation == 1) return;
-  result.covariance *= inflation;
+void check_splits(Calibration& result, const BundleSettings& settings, int least_views) {
+  if (result.used.size() < 4 * static_cast<std::size_t>(least_views)) return;
+  const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings);
+  result.splits = {check_halves(result.refined, settings, Split::interleaved)};
+  result.splits.insert(result.splits.end(), systematic.begin(), systematic.end());
+  const SplitCheck* worst = nullptr;
+  result.covariance_factor = split_inflation(systematic, &worst);
+  if (worst == nullptr) return;
+  result.covariance *= result.covariance_factor;
   char text[240];
   std::snprintf(
       text, sizeof text,
-      "first and second half of the views differ by %.1f mm and %.2f deg, more than noise explains: drift, "
-      "or errors that depend on the pose; the stated standard deviations were raised by %.1f",
-      1e3 * result.consecutive->apart.head<3>().norm(), result.consecutive->apart.tail<3>().norm() / kDegree,
-      std::sqrt(inflation));
+      "%s differ by %.1f mm and %.2f deg, more than noise explains: drift, or errors that depend on "
+      "the pose; the stated standard deviations were raised by %.1f",
+      describe(worst->split).c_str(), 1e3 * worst->apart.head<3>().norm(),
+      worst->apart.tail<3>().norm() / kDegree, std::sqrt(result.covariance_factor));
   result.warnings.emplace_back(text);
 }
 
 void warn_of_scale(Calibration& result) {
   if (!result.scale) return;
   const double off = std::abs(result.scale->estimate - 1), sd = result.scale->sd;
-  if (off < 0.01 || off < 5 * sd) return;
-  char text[240];
+  if (!result.scale->solved && (off < 0.01 || off < 5 * sd)) return;
+  char text[280];
   std::snprintf(text, sizeof text,
                 "the data want a target %.4f +- %.4f times as large as stated: measure its squares, or the "
-                "intrinsics or the robot's unit are wrong",
-                result.scale->estimate, 2 * sd);
+                "intrinsics or the robot's unit are wrong%s",
+                result.scale->estimate, 2 * sd,
+                result.scale->solved
+                    ? "; the answer is for a target of that size (--target-size stated keeps "
+                      "the stated one)"
+                    : "");
   result.warnings.insert(result.warnings.begin(), text);
   if (off > 0.03) result.usable = false;
 }
@@ -264,14 +275,19 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.setup = setup;
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
 
-  Bundle plain;
-  for (;;) {
-    const HandEyePoses seed = shah(loops_of(setup, observations));
-    plain = make_bundle(setup, camera, points, observations, seed);
-    result.refined = refine(plain, settings.refine);
-    if (observations.size() <= static_cast<std::size_t>(settings.least_views)) break;
-    if (!drop_worst(result, observations, settings.surprise)) break;
+  RefineSettings refine_settings = settings.refine;
+  refine_settings.bundle.unknowns.scales = settings.target_size == TargetSize::solved;
+  const auto start = std::tuple(observations, result.used, result.repair);
+  Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
+  result.scale = check_scales(result.refined, refine_settings).front();
+  if (settings.target_size == TargetSize::automatic && clearly_off(*result.scale)) {
+    // Views that a wrong size made look wrong come back.
+    std::tie(observations, result.used, result.repair) = start;
+    refine_settings.bundle.unknowns.scales = true;
+    plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
+    result.scale = check_scales(result.refined, refine_settings).front();
   }
+  result.scale->solved = refine_settings.bundle.unknowns.scales;
   BundleSettings exact_robot = settings.refine.bundle;
   exact_robot.unknowns.corrections = false;
   exact_robot.huber = 0;
@@ -283,9 +299,8 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.corner_rms = reprojection_rms(bundle, true);
   result.chain_rms = reprojection_rms(bundle, false);
   result.centre_rms = centre_rms(bundle, target_poses(observations));
-  compare_methods(result, observations, plain, settings);
-  check_splits(result, settings);
-  if (settings.check_scale) result.scale = check_scale(result.refined, settings.refine);
+  compare_methods(result, observations, plain, refine_settings, settings.folds);
+  check_splits(result, refine_settings.bundle, settings.least_views);
   finish(result, observations);
   return result;
 }

@@ -8,6 +8,8 @@
 #include "calib/observability.h"
 #include "calib/reference_methods.h"
 #include "calib/repair.h"
+#include "calib/split_check.h"
+#include "calib/target_size.h"
 
 namespace flash::calib {
 
@@ -16,11 +18,11 @@ struct CalibrateSettings {
   DoctorSettings doctor;
   std::vector<Eigen::Vector3d> angles;  ///< of each view, where the robot's file gave angles [rad]
   RefineSettings refine;
-  int least_views = 4;      ///< fewer are refused
-  double hopeless = 0.2;    ///< closing error of the majority beyond which nothing is solved, as `suspicious`
-  double surprise = 35;     ///< squared size of a correction over that of most views, 6 degrees of freedom
-  int folds = 10;           ///< of the held-out residuals
-  bool check_scale = true;  ///< estimate the target's size too, for the warning
+  int least_views = 4;    ///< fewer are refused
+  double hopeless = 0.2;  ///< closing error of the majority beyond which nothing is solved, as `suspicious`
+  double surprise = 35;   ///< squared size of a correction over that of most views, 6 degrees of freedom
+  int folds = 10;         ///< of the held-out residuals
+  TargetSize target_size = TargetSize::automatic;
 };
 
 /// A method of the comparison table.
@@ -31,11 +33,6 @@ struct ComparedMethod {
   double px = 0;          ///< reprojection through the chain, robot poses as reported, 2-D rms per corner
   std::optional<HeldOut> held_out;
   bool wild = false;
-};
-
-struct ScaleCheck {
-  double estimate = 1;  ///< true size of the target over the size stated
-  double sd = 0;
 };
 
 struct ViewResult {
@@ -62,8 +59,9 @@ struct Calibration {
   RotationDiversity diversity;
   WeakestDirection weakest;
   std::optional<ScaleCheck> scale;
-  std::optional<SplitCheck> interleaved, consecutive;  ///< of X; the latter may have widened its covariance
-  std::vector<std::string> warnings;                   ///< worst first
+  std::vector<SplitCheck> splits;     ///< of X, interleaved first; none where there are too few views
+  double covariance_factor = 1;       ///< by which the splits have widened the covariance
+  std::vector<std::string> warnings;  ///< worst first
   bool usable = true;
 };
 

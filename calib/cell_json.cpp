@@ -41,6 +41,9 @@ Json to_json(const Cell& cell, const std::optional<Eigen::Vector3d>& workspace) 
     json["sigmas"] = {{"corner_px", cell.noise.corner},
                       {"robot_rotation_rad", cell.noise.rotation},
                       {"robot_translation_m", cell.noise.translation}};
+    json["scales"] = Json::array();
+    for (const ScaleCheck& scale : cell.scales)
+      json["scales"].push_back({{"estimate", scale.estimate}, {"sd", scale.sd}, {"solved", scale.solved}});
     json["residuals"] = {{"reprojection_rms_px", cell.chain_rms}, {"corner_rms_px", cell.corner_rms}};
   }
   json["notices"] = cell.notices;

@@ -135,19 +135,17 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"weakest_mm", 1e3 * calibration.weakest.translation},
       {"weakest_deg", kDegrees * calibration.weakest.rotation}};
   json["convention_findings"] = Json::array();
-  json["scale"] = calibration.scale
-                      ? Json{{"estimate", calibration.scale->estimate}, {"sd", calibration.scale->sd}}
-                      : Json(nullptr);
+  json["scale"] = calibration.scale ? Json{{"estimate", calibration.scale->estimate},
+                                           {"sd", calibration.scale->sd},
+                                           {"solved", calibration.scale->solved}}
+                                    : Json(nullptr);
   json["splits"] = nullptr;
-  if (calibration.interleaved && calibration.consecutive) {
-    const auto split = [](const SplitCheck& check) {
-      return Json{{"apart_mm", 1e3 * check.apart.head<3>().norm()},
-                  {"apart_deg", kDegrees * check.apart.tail<3>().norm()},
-                  {"chi_square", check.chi_square}};
-    };
-    json["splits"] = {{"interleaved", split(*calibration.interleaved)},
-                      {"consecutive", split(*calibration.consecutive)},
-                      {"covariance_factor", split_inflation(*calibration.consecutive)}};
+  if (!calibration.splits.empty()) {
+    json["splits"] = {{"covariance_factor", calibration.covariance_factor}};
+    for (const SplitCheck& check : calibration.splits)
+      json["splits"][to_string(check.split)] = {{"apart_mm", 1e3 * check.apart.head<3>().norm()},
+                                                {"apart_deg", kDegrees * check.apart.tail<3>().norm()},
+                                                {"chi_square", check.chi_square}};
   }
   json["warnings"] = calibration.warnings;
   json["exit_code"] = exit_code;

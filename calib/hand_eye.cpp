@@ -13,14 +13,6 @@ namespace {
 // Below these a noise level means an exact robot or an exact corner; smaller ones only cost digits.
 constexpr double kFloorPixels = 1e-4, kFloorRotation = 1e-6, kFloorTranslation = 1e-6, kFloorDepth = 1e-5;
 
-Bundle subset(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside) {
-  Bundle result = bundle;
-  std::erase_if(result.views, [&](const BundleView& view) {
-    return (fold[static_cast<std::size_t>(view.pose)] == part) != inside;
-  });
-  return result;
-}
-
 std::vector<PoseLoop> loops_of(const Bundle& bundle, const std::vector<BundleView>& views,
                                const std::vector<Eigen::Isometry3d>& T_camera_target) {
   std::vector<PoseLoop> loops;
@@ -33,20 +25,23 @@ std::vector<PoseLoop> loops_of(const Bundle& bundle, const std::vector<BundleVie
 }
 
 void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-         const NoiseLevels& noise, BundleSettings settings) {
-  if (method == Method::park || method == Method::shah) {
-    const std::vector<PoseLoop> loops = loops_of(bundle, bundle.views, T_camera_target);
-    const HandEyePoses poses = method == Method::park ? park(loops) : shah(loops);
-    bundle.cameras.front() = poses.X;
-    bundle.targets.front() = poses.Z;
+         const RefineSettings& settings) {
+  if (method == Method::errors_in_variables) {
+    RefineSettings anew = settings;
+    anew.estimate_pivots = false;
+    bundle = refine(std::move(bundle), anew).bundle;
     return;
   }
-  settings.unknowns.corrections = method == Method::errors_in_variables;
+  bundle.scales.assign(bundle.scales.size(), 1.0);
   if (method == Method::bundle) {
-    settings.huber = 0;
     for (RobotPose& pose : bundle.poses) pose.correction.setIdentity();
+    solve_bundle(bundle, settings.noise, {.unknowns = {.corrections = false}, .huber = 0});
+    return;
   }
-  solve_bundle(bundle, noise, settings);
+  const std::vector<PoseLoop> loops = loops_of(bundle, bundle.views, T_camera_target);
+  const HandEyePoses poses = method == Method::park ? park(loops) : shah(loops);
+  bundle.cameras.front() = poses.X;
+  bundle.targets.front() = poses.Z;
 }
 
 /// Middle of what each arm's gripper saw or held, in the gripper.
@@ -92,6 +87,14 @@ bool choose_pivots(Bundle& bundle, const NoiseLevels& noise, const BundleSetting
 
 }  // namespace
 
+Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside) {
+  Bundle result = bundle;
+  std::erase_if(result.views, [&](const BundleView& view) {
+    return (fold[static_cast<std::size_t>(view.pose)] == part) != inside;
+  });
+  return result;
+}
+
 NoiseLevels uniform_noise(const Bundle& bundle, double corner, double rotation, double translation,
                           double depth) {
   const std::size_t cameras = bundle.cameras.size(), arms = bundle.bases.size();
@@ -130,41 +133,6 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
   result.covariance = solution.information.ldlt().solve(
       Eigen::MatrixXd::Identity(solution.information.rows(), solution.information.cols()));
   return result;
-}
-
-SplitCheck check_halves(const Refinement& refined, const BundleSettings& settings, Split split,
-                        std::size_t base) {
-  const Bundle& bundle = refined.bundle;
-  std::vector<int> half(bundle.poses.size());
-  std::vector<int> count(bundle.bases.size(), 0), seen(bundle.bases.size(), 0);
-  for (const RobotPose& pose : bundle.poses) ++count[static_cast<std::size_t>(pose.arm)];
-  for (std::size_t i = 0; i < half.size(); ++i) {
-    const auto arm = static_cast<std::size_t>(bundle.poses[i].arm);
-    half[i] = split == Split::interleaved ? seen[arm] % 2 : (2 * seen[arm] >= count[arm] ? 1 : 0);
-    ++seen[arm];
-  }
-  RefineSettings fixed;
-  fixed.bundle = settings;
-  fixed.estimate_noise = false;
-  fixed.noise = refined.noise;
-  const SharedColumns columns = shared_columns(bundle, settings.unknowns);
-  const int column = base == 0 ? columns.cameras.front() : columns.bases[base];
-  Eigen::Isometry3d T[2];
-  Matrix6d covariance = Matrix6d::Zero();
-  for (int part = 0; part < 2; ++part) {
-    const Refinement fit = refine(subset(bundle, half, part, true), fixed);
-    T[part] = base == 0 ? fit.bundle.cameras.front() : fit.bundle.bases[base];
-    covariance += fit.covariance.block<6, 6>(column, column);
-  }
-  SplitCheck check;
-  check.apart = motion_between(T[0], T[1]);
-  check.chi_square = check.apart.dot(covariance.ldlt().solve(check.apart));
-  return check;
-}
-
-double split_inflation(const SplitCheck& consecutive) {
-  constexpr double kQuantile95 = 12.592;  // chi-square, 6 degrees of freedom
-  return consecutive.chi_square > kQuantile95 ? consecutive.chi_square / 6 : 1;
 }
 
 Eigen::Isometry3d fitted_pose(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
@@ -227,23 +195,24 @@ const char* to_string(Method method) {
 }
 
 HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-                 const NoiseLevels& noise, const BundleSettings& settings, int folds) {
+                 const RefineSettings& settings, int folds) {
   const int count = static_cast<int>(bundle.poses.size());
   const int parts = std::min(folds, count);
   HeldOut result;
   for (int i = 0; i < count; ++i) result.fold.push_back(i % parts);
   double corners = 0, views = 0;
   for (int part = 0; part < parts; ++part) {
-    Bundle train = subset(bundle, result.fold, part, false);
-    fit(train, T_camera_target, method, noise, settings);
-    const Bundle test = subset(bundle, result.fold, part, true);
+    Bundle train = views_of(bundle, result.fold, part, false);
+    fit(train, T_camera_target, method, settings);
+    const Bundle test = views_of(bundle, result.fold, part, true);
     for (const BundleView& view : test.views) {
       const Eigen::Isometry3d predicted = predicted_pose(train, view, false);
-      // With the lens as it was solved for.
+      // With lens and size of the target as they were solved for.
+      const Eigen::Matrix3Xd points = train.scales[static_cast<std::size_t>(view.target)] * view.points;
       const Eigen::Isometry3d seen =
-          fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], view.points, view.pixels,
+          fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], points, view.pixels,
                       T_camera_target[static_cast<std::size_t>(view.pose)]);
-      const Eigen::Vector3d centre = view.points.rowwise().mean();
+      const Eigen::Vector3d centre = points.rowwise().mean();
       const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
       result.px += residuals(train, view, false).squaredNorm();
       result.mm += (1e3 * (predicted * centre - seen * centre)).squaredNorm();

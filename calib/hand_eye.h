@@ -36,22 +36,8 @@ NoiseLevels uniform_noise(const Bundle& bundle, double corner, double rotation, 
 /// covariance is the inverse of the information that is left for the shared unknowns.
 Refinement refine(Bundle bundle, const RefineSettings& settings = {});
 
-/// Two halves of the poses, each solved by itself, and how far apart they put one frame.
-struct SplitCheck {
-  Vector6d apart = Vector6d::Zero();  ///< (dt, dtheta) [m, rad]
-  double chi_square = 0;              ///< of it under the stated uncertainty; 95 % lie below 12.6
-};
-enum class Split {
-  interleaved,  ///< every other pose: shows whether noise alone is stated right
-  consecutive   ///< first and second half of each arm: shows drift, and errors that depend on the pose
-};
-/// base: of the arm whose base is compared; 0: the first camera.
-SplitCheck check_halves(const Refinement& refined, const BundleSettings& settings, Split split,
-                        std::size_t base = 0);
-
-/// By how much a covariance has to grow to be true to consecutive halves: 1 unless they disagree at the 95 %
-/// level, then their chi-square over its 6 degrees of freedom.
-double split_inflation(const SplitCheck& consecutive);
+/// The bundle with the views of the poses whose `fold` is `part`, or of all others.
+Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside);
 
 /// The bundle of one camera and one arm. points: the target's, 3 x N; poses: seed.
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
@@ -72,9 +58,10 @@ struct HeldOut {
 enum class Method { park, shah, bundle, errors_in_variables };
 const char* to_string(Method method);
 
-/// Every view left out once, in `folds` interleaved parts (a pose each when there are no more than that);
-/// noise levels stay at `noise`.
+/// Every view left out once, in `folds` interleaved parts (a pose each when there are no more than that).
+/// Nothing of it stays in the solution: errors in variables estimates the noise levels anew, from those of
+/// `settings`; only the pivots are kept.
 HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-                 const NoiseLevels& noise, const BundleSettings& settings = {}, int folds = 10);
+                 const RefineSettings& settings, int folds = 10);
 
 }  // namespace flash::calib

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <map>
 
@@ -71,6 +72,15 @@ void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout
   }
 }
 
+std::string size_notice(const ScaleCheck& scale) {
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "a target is taken to be %.4f +- %.4f times as large as stated, as the data want it: measure it",
+      scale.estimate, 2 * scale.sd);
+  return text;
+}
+
 }  // namespace
 
 Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::string>* notices) {
@@ -131,10 +141,23 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   return bundle;
 }
 
-Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& settings) {
+Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& given, TargetSize size) {
   Cell cell{.joint = true};
-  const Refinement refined = refine(cell_bundle(members, &cell.notices), settings);
+  RefineSettings settings = given;
+  settings.bundle.unknowns.scales = size == TargetSize::solved;
+  const Bundle start = cell_bundle(members, &cell.notices);
+  Refinement refined = refine(start, settings);
+  cell.scales = check_scales(refined, settings);
+  if (size == TargetSize::automatic && std::any_of(cell.scales.begin(), cell.scales.end(), clearly_off)) {
+    settings.bundle.unknowns.scales = true;
+    refined = refine(start, settings);
+    cell.scales = check_scales(refined, settings);
+  }
   if (!refined.converged) cell.notices.emplace_back("the joint refinement did not converge");
+  for (ScaleCheck& scale : cell.scales) {
+    scale.solved = settings.bundle.unknowns.scales;
+    if (scale.solved) cell.notices.push_back(size_notice(scale));
+  }
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
   const std::vector<std::string> arms = names_of(members, &CellMember::arm);
   const std::vector<std::string> cameras = names_of(members, &CellMember::camera);
@@ -143,16 +166,14 @@ Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& se
   };
   const std::string world = arms.front();
   const auto widened = [&](std::size_t base) {
-    const double factor =
-        refined.bundle.poses.size() < 16
-            ? 1.0
-            : split_inflation(check_halves(refined, settings.bundle, Split::consecutive, base));
-    if (factor > 1)
-      cell.notices.push_back(
-          (base == 0 ? cameras.front() : arms[base]) +
-          ": first and second half of the views differ by more than noise explains; its standard "
-          "deviations were raised by " +
-          data::format_short(std::sqrt(factor)));
+    if (refined.bundle.poses.size() < 16) return 1.0;
+    const std::vector<SplitCheck> checks = check_systematic(refined, settings.bundle, base);
+    const SplitCheck* worst = nullptr;
+    const double factor = split_inflation(checks, &worst);
+    if (worst != nullptr)
+      cell.notices.push_back((base == 0 ? cameras.front() : arms[base]) + ": " + describe(worst->split) +
+                             " differ by more than noise explains; its standard deviations were raised by " +
+                             data::format_short(std::sqrt(factor)));
     return factor;
   };
   for (std::size_t a = 1; a < arms.size(); ++a)

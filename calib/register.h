@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "calib/extrinsics.h"
+#include "calib/target_size.h"
 
 namespace flash::calib {
 
@@ -31,6 +32,7 @@ struct Cell {
   bool joint = false;  ///< one solution from all images; otherwise composed of single calibrations
   std::vector<CellFrame> bases = {}, cameras = {};
   NoiseLevels noise = {};
+  std::vector<ScaleCheck> scales = {};   ///< of the targets; none where composed
   double corner_rms = 0, chain_rms = 0;  ///< with and without corrections, 2-D rms per corner [px]
   std::vector<std::string> notices = {};
 };
@@ -45,7 +47,8 @@ Cell compose_cell(const std::vector<std::string>& arms, const std::vector<Extrin
 Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::string>* notices = nullptr);
 
 /// Solved by errors in variables. Intrinsics: how many of fx fy cx cy ... of each camera are solved for.
-Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& settings = {});
+Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& settings = {},
+                TargetSize size = TargetSize::automatic);
 
 /// Covariance of where a point lies, p in the frame's child, seen from its parent [m^2].
 Eigen::Matrix3d point_covariance(const CellFrame& frame, const Eigen::Vector3d& p);
