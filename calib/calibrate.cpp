@@ -1,5 +1,6 @@
 #include "calib/calibrate.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -165,15 +166,22 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
   result.held_out = *result.comparison.back().held_out;
 }
 
-/// The target's size as one more unknown.
-ScaleCheck check_scale(const Refinement& refined, const RefineSettings& settings) {
+/// The target's size as one more unknown; none where nothing tells it, as of a robot that turns and never
+/// moves along, without depth.
+std::optional<ScaleCheck> check_scale(const Refinement& refined, const RefineSettings& settings) {
+  constexpr double kUnknown = 0.1;
   RefineSettings with_scale = settings;
   with_scale.estimate_pivots = false;
   with_scale.noise = refined.noise;
   with_scale.bundle.unknowns.scales = true;
+  const int column = shared_columns(refined.bundle, with_scale.bundle.unknowns).scales.front();
+  const Eigen::MatrixXd information =
+      solve_linear(linearize(refined.bundle, refined.noise, with_scale.bundle), to_components(refined.noise))
+          .information;
+  const double variance = information.ldlt().solve(Eigen::VectorXd::Unit(information.rows(), column))[column];
+  if (!(variance > 0 && variance < kUnknown * kUnknown)) return std::nullopt;
   const Refinement scaled = refine(refined.bundle, with_scale);
-  const int column = shared_columns(scaled.bundle, with_scale.bundle.unknowns).scales.front();
-  return {scaled.bundle.scales.front(), std::sqrt(scaled.covariance(column, column))};
+  return ScaleCheck{scaled.bundle.scales.front(), std::sqrt(scaled.covariance(column, column))};
 }
 
 /// Halves of few views determine too little by themselves.
