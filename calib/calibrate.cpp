@@ -169,7 +169,9 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
 /// The target's size as one more unknown; none where nothing tells it, as of a robot that turns and never
 /// moves along, without depth.
 std::optional<ScaleCheck> check_scale(const Refinement& refined, const RefineSettings& settings) {
-  constexpr double kUnknown = 0.1;
+  // Lengths that the robot only seems to move, three a view with the size of its noise, look like knowledge
+  // of the scale, and pull it down by their share. Below a hundredth of the whole that is of no account.
+  constexpr double kClear = 100;
   RefineSettings with_scale = settings;
   with_scale.estimate_pivots = false;
   with_scale.noise = refined.noise;
@@ -179,7 +181,8 @@ std::optional<ScaleCheck> check_scale(const Refinement& refined, const RefineSet
       solve_linear(linearize(refined.bundle, refined.noise, with_scale.bundle), to_components(refined.noise))
           .information;
   const double variance = information.ldlt().solve(Eigen::VectorXd::Unit(information.rows(), column))[column];
-  if (!(variance > 0 && variance < kUnknown * kUnknown)) return std::nullopt;
+  const double seeming = 3 * static_cast<double>(refined.bundle.poses.size());
+  if (!(variance > 0 && variance * kClear * seeming < 1)) return std::nullopt;
   const Refinement scaled = refine(refined.bundle, with_scale);
   return ScaleCheck{scaled.bundle.scales.front(), std::sqrt(scaled.covariance(column, column))};
 }

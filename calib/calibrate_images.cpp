@@ -82,7 +82,6 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
   offset.estimate = coarse_offset(problem.setup, *dataset.stream, stamps, views, problem.symmetries);
   CalibrateSettings quick = settings;
   quick.folds = 2;
-  quick.check_scale = false;
   for (int round = 0;; ++round) {
     std::vector<std::size_t> beyond;
     const std::vector<Observation> moved_views =
@@ -104,7 +103,9 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
                     1e3 * speed, 1e3 * offset.sd));
     if (last) {
       offset.estimate += left.estimate;
-      if (result.consecutive) offset.sd *= std::sqrt(split_inflation(*result.consecutive));
+      // Widened as much as the transform's was.
+      offset.sd *=
+          std::sqrt(result.covariance.trace() / result.refined.covariance.topLeftCorner<6, 6>().trace());
       for (const std::size_t i : beyond)
         result.repair.views[i].reason = result.views[i].reason =
             "its time lies beyond the poses of " + dataset.poses_path;
@@ -115,6 +116,30 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
     else
       offset.estimate += left.estimate;
   }
+}
+
+/// What the solution says of the depth that took part, and what people should know of it.
+void report_depth(const DepthUse& use, const Unknowns& unknowns, ImageCalibration& result) {
+  DepthUse& depth = result.depth.emplace(use);
+  Calibration& calibration = result.calibration;
+  for (const std::string& reason : depth.unreadable)
+    calibration.warnings.push_back(reason + "; the view was used without depth");
+  if (!depth.used) {
+    calibration.warnings.push_back("depth was not used: " + depth.reason);
+    return;
+  }
+  const Refinement& refined = calibration.refined;
+  const int column = shared_columns(refined.bundle, unknowns).depth_scales.front();
+  if (column < 0) return;
+  depth.sigma = refined.noise.depth.front();
+  depth.over_corners = refined.bundle.depth_scales.front();
+  depth.over_corners_sd = std::sqrt(refined.covariance(column, column));
+  const double off = std::abs(depth.over_corners - 1);
+  if (off > 0.01 && off > 5 * depth.over_corners_sd)
+    calibration.warnings.push_back(
+        formatted("depth puts the target at %.4f +- %.4f times the distance that its corners say: depth, the "
+                  "target's size or the lens is wrong by that much",
+                  depth.over_corners, 2 * depth.over_corners_sd));
 }
 
 }  // namespace
@@ -161,12 +186,7 @@ ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Tar
   for (std::size_t i = 0; i < detections.size(); ++i)
     if (!detections[i].reason.empty()) best.calibration.views[i].reason = detections[i].reason;
   if (dataset.stream && !timed) check_time(dataset, settings, best.calibration);
-  if (!depth) return best;
-  best.depth = depth->use;
-  if (depth->use.used) best.depth->sigma = best.calibration.refined.noise.depth.front();
-  for (const std::string& reason : depth->use.unreadable)
-    best.calibration.warnings.push_back(reason + "; the view was used without depth");
-  if (!depth->use.used) best.calibration.warnings.push_back("depth was not used: " + depth->use.reason);
+  if (depth) report_depth(depth->use, settings.refine.bundle.unknowns, best);
   return best;
 }
 

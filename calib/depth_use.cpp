@@ -16,15 +16,6 @@ double median_of(std::vector<double> values) {
   return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
-/// Distance by depth over distance by corners: median over the views and its standard deviation.
-void compare(const std::vector<double>& ratios, DepthUse& use) {
-  use.over_corners = median_of(ratios);
-  std::vector<double> off;
-  for (const double ratio : ratios) off.push_back(std::abs(ratio - use.over_corners));
-  // Of normal errors: sqrt(pi / 2) for a median, 1.4826 for a median absolute deviation.
-  use.over_corners_sd = 1.2533 * 1.4826 * median_of(off) / std::sqrt(static_cast<double>(ratios.size()));
-}
-
 template <class... Values>
 std::string formatted(const char* format, const Values&... values) {
   char text[320];
@@ -64,22 +55,15 @@ DepthViews read_depth(const Dataset& dataset, const std::vector<Detection>& dete
     use.reason = "no depth picture has depth on the target";
     return views;
   }
+  use.used = true;
   use.pixel_noise = std::sqrt(squares / pixels);
-  compare(ratios, use);
-  const double off = std::abs(use.over_corners - 1);
-  if (off > 0.1)
+  use.over_corners = median_of(ratios);
+  if (std::abs(use.over_corners - 1) > 0.1)
     throw data::InputError(formatted(
         "%s: depth puts the target at %.4g times the distance that its corners say: expected --depth-scale "
         "%.3g instead of %.3g, or another size of the target (--no-depth leaves depth out)",
         dataset.source.c_str(), use.over_corners, dataset.depth_scale / use.over_corners,
         dataset.depth_scale));
-  use.used = off < 0.005 || off < 5 * use.over_corners_sd;
-  if (use.used) return views;
-  use.reason = formatted(
-      "depth puts the target at %.4f +- %.4f times the distance that its corners say: depth, the target's "
-      "size or the lens is wrong by that much",
-      use.over_corners, use.over_corners_sd);
-  for (Eigen::Matrix3Xd& points : views.points) points.resize(3, 0);
   return views;
 }
 

@@ -10,13 +10,13 @@ namespace flash::calib {
 /// How depth pictures take part in a calibration.
 struct DepthUse {
   bool used = false;
-  int views = 0;               ///< with depth on the target
-  double scale = 0.001;        ///< metres a count
-  double pixel_noise = 0;      ///< of a single pixel, rms from the view's plane [m]
-  double over_corners = 1;     ///< distance by depth over distance by corners, median over the views
-  double over_corners_sd = 0;  ///< of that median
-  double sigma = 0;            ///< noise of the plane's depth at one of three places, as estimated [m]
-  std::string reason = {};     ///< why it was not used
+  int views = 0;            ///< with depth on the target
+  double scale = 0.001;     ///< metres a count
+  double pixel_noise = 0;   ///< of a single pixel, rms from the view's plane [m]
+  double over_corners = 1;  ///< distance by depth over distance by corners, as estimated
+  double over_corners_sd = 0;
+  double sigma = 0;         ///< noise of the plane's depth at one of three places, as estimated [m]
+  std::string reason = {};  ///< why it was not used
   std::vector<std::string> unreadable = {};  ///< pictures without depth, with the reason
 };
 
@@ -26,10 +26,9 @@ struct DepthViews {
   std::vector<Eigen::Matrix3Xd> points;  ///< of each frame
 };
 
-/// Reads the depth pictures of all frames that show the target. Not used where depth and corners differ about
-/// its distance by more than 0.5 % and five standard deviations: then one of the two is wrong, and depth
-/// would pull. Throws data::InputError where they differ by more than a tenth (another unit), or where depth
-/// is not registered to the pictures.
+/// Reads the depth pictures of all frames that show the target. Throws data::InputError where depth and
+/// corners differ about its distance by more than a tenth (another unit), or where depth is not registered to
+/// the pictures.
 DepthViews read_depth(const Dataset& dataset, const std::vector<Detection>& detections);
 
 }  // namespace flash::calib

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "calib/calibrate_images.h"
+#include "calib/linearization.h"
 #include "data/depth_image.h"
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/calib/rendered_set.h"
@@ -77,6 +78,44 @@ TEST(DepthInTheBundle, StatedUncertaintyIsTrueAndSmaller) {
   EXPECT_NEAR(noise, kNoise, 0.05 * kNoise);  // 30 x 60 residuals, less what corners leave open: 2 to 3 %
 }
 
+// The residual is z / s minus the distance predicted: its derivative with respect to the scale s is -z / s^2.
+TEST(DepthInTheBundle, ScaleOfTheDepthHasItsDerivative) {
+  const HandEyeScene scene = scene_with_depth(1, 5e-4);
+  Bundle bundle =
+      make_bundle(scene.settings.setup, scene.camera, scene.points, scene.observations, scene.truth);
+  bundle.depth_scales = {1.3};
+  const NoiseLevels noise = uniform_noise(bundle, 1, 1, 1, 1);
+  const Unknowns unknowns;
+  const LinearModel model = linearize(bundle, noise, {.unknowns = unknowns, .huber = 0});
+  const int column = shared_columns(bundle, unknowns).depth_scales.front();
+  ASSERT_GE(column, 0);
+  int blocks = 0;
+  for (const GramBlock& block : model.blocks) {
+    if (block.component != 1) continue;  // depth of the one camera
+    const Eigen::Matrix3Xd& points = bundle.views[static_cast<std::size_t>(block.group)].depth_points;
+    EXPECT_NEAR(block.gram(model.own + column, model.own + column),
+                (points.row(2) / (1.3 * 1.3)).squaredNorm(), 1e-12);
+    // Times the residual: 0.3 / 1.3 of the distance too near.
+    EXPECT_NEAR(block.gram(model.own + column, model.own + model.shared),
+                (points.row(2) / (1.3 * 1.3)).dot((1 - 1 / 1.3) * points.row(2)), 0.01);
+    ++blocks;
+  }
+  EXPECT_EQ(blocks, static_cast<int>(scene.observations.size()));
+}
+
+TEST(DepthInTheBundle, AnotherMetreMovesNothing) {
+  HandEyeScene scene = scene_with_depth(2, 5e-4);
+  const auto solved = [&] {
+    return refine(
+        make_bundle(scene.settings.setup, scene.camera, scene.points, scene.observations, scene.truth));
+  };
+  const Refinement right = solved();
+  for (Observation& o : scene.observations) o.depth_points *= 1.015;
+  const Refinement other = solved();
+  EXPECT_NEAR(other.bundle.depth_scales.front() / right.bundle.depth_scales.front(), 1.015, 1e-5);
+  EXPECT_LT(motion_between(right.bundle.cameras.front(), other.bundle.cameras.front()).norm(), 1e-5);
+}
+
 /// A tag of 60 mm seen by a noisy RGB-D camera at 0.6 to 1 m, a robot of 0.02 deg and 0.2 mm.
 RenderedSetSettings tag_settings() {
   RenderedSetSettings settings{.setup = Setup::eye_to_hand, .target = "apriltag:36h11:0:0.06", .views = 14};
@@ -144,17 +183,17 @@ TEST_F(RenderedDepth, PicturesWithDepthGiveABetterAnswerThatIsTrue) {
   EXPECT_LT(error(rgbd.calibration), error(rgb.calibration));
 }
 
-TEST_F(RenderedDepth, AnotherUnitIsRefusedAndAnotherScaleIsNotUsed) {
+TEST_F(RenderedDepth, AnotherUnitIsRefusedAndAnotherScaleIsEstimated) {
   const std::string message = data::input_error_of([&] { solved({.depth_scale = 0.01}); });
   EXPECT_NE(message.find("expected --depth-scale 0.001 instead of 0.01"), std::string::npos) << message;
   const ImageCalibration other = solved({.depth_scale = 0.00102});
-  ASSERT_TRUE(other.depth);
-  EXPECT_FALSE(other.depth->used);
-  EXPECT_NEAR(other.depth->over_corners, 1.02, 0.005);
-  EXPECT_NE(other.calibration.warnings.back().find("depth was not used: depth puts the target at 1.0"),
-            std::string::npos);
-  const ImageCalibration without = solved({.depth = false});
-  EXPECT_LT(motion_between(other.calibration.poses.X, without.calibration.poses.X).norm(), 1e-12);
+  ASSERT_TRUE(other.depth && other.depth->used);
+  EXPECT_NEAR(other.depth->over_corners, 1.02, 4 * other.depth->over_corners_sd);
+  EXPECT_NE(other.calibration.warnings.back().find("depth puts the target at 1.0"), std::string::npos);
+  // A depth camera whose metre is 2 % long moves nothing: all of it goes into its scale.
+  const ImageCalibration right = solved({});
+  EXPECT_LT(motion_between(other.calibration.poses.X, right.calibration.poses.X).head<3>().norm(),
+            0.02 * std::sqrt(right.calibration.covariance.topLeftCorner<3, 3>().trace()));
 }
 
 TEST_F(RenderedDepth, ViewsWhoseDepthCannotBeReadDoWithout) {

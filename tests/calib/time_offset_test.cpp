@@ -106,7 +106,6 @@ struct StreamScene {
   ImageCalibration solved(bool time_offset = true) const {
     CalibrateSettings settings;
     settings.folds = 2;
-    settings.check_scale = false;
     settings.refine.bundle.unknowns.time_offsets = time_offset;
     return calibrate_images(Setup::eye_in_hand, dataset, target, detections, settings);
   }

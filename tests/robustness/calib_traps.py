@@ -81,7 +81,7 @@ def swapped_setup(folder):
 
 
 def shifted(poses):
-    return [[later[0], *earlier[1:]] for earlier, later in zip(poses, poses[1:])] + [[poses[0][0], *poses[0][1:]]]
+    return [poses[0]] + [[later[0], *earlier[1:]] for earlier, later in zip(poses, poses[1:])]
 
 
 def millimetres(poses):
