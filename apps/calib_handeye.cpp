@@ -23,7 +23,7 @@ struct HandEyeOptions {
   CalibCommonOptions common;
   DatasetChoice dataset;
   std::string setup;
-  bool refine_intrinsics = false;
+  bool refine_intrinsics = false, time_offset = false;
   calib::TargetSize target_size = calib::TargetSize::automatic;
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2;
@@ -52,6 +52,12 @@ void write_report(const std::string& path, const calib::Calibration& calibration
   data::write_atomically(path, calib::render_report(calibration, extrinsics, json, inputs));
 }
 
+std::string fixed(double value, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*f", digits, value);
+  return text;
+}
+
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   const Eigen::Vector3d t = extrinsics.transform.T.translation();
   const calib::Vector6d sd = c.covariance.diagonal().cwiseSqrt();
@@ -59,18 +65,28 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   std::printf("%s <- %s: (%.5f, %.5f, %.5f) m, +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n",
               extrinsics.transform.parent.c_str(), extrinsics.transform.child.c_str(), t.x(), t.y(), t.z(),
               1e3 * sd[0], 1e3 * sd[1], 1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
-  std::printf("%zu of %zu views; corners %.3f px, robot %.3f deg %.2f mm an axis\n", c.used.size(),
-              c.views.size(), extrinsics.corner_px, kDegrees * extrinsics.robot_rotation_rad,
+  const std::string corners =
+      extrinsics.pixels ? "corners " + fixed(extrinsics.corner_px, 3) + " px, robot" : "robot and camera";
+  std::printf("%zu of %zu views; %s %.3f deg %.2f mm an axis\n", c.used.size(), c.views.size(),
+              corners.c_str(), kDegrees * extrinsics.robot_rotation_rad,
               1e3 * extrinsics.robot_translation_m);
+  const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
+  if (depth && depth->used)
+    std::printf("depth of %d views: plane of the target known to %.2f mm, a pixel to %.2f mm\n", depth->views,
+                1e3 * depth->sigma, 1e3 * depth->pixel_noise);
+  if (extrinsics.inputs.time_offset)
+    std::printf("pictures were taken %.2f +- %.2f ms later than their stamps say by the clock of the poses\n",
+                1e3 * extrinsics.inputs.time_offset->estimate, 1e3 * extrinsics.inputs.time_offset->sd);
   std::printf("weakest: %s, %.2f mm, %.3f deg\n\n", c.weakest.name.c_str(), 1e3 * c.weakest.translation,
               kDegrees * c.weakest.rotation);
   std::printf("%-20s %10s %10s %8s   held out: %8s %8s %8s\n", "method", "AX=XB deg", "mm", "px", "px", "mm",
               "deg");
   for (const calib::ComparedMethod& method : c.comparison) {
-    std::printf("%-20s %10.3f %10.2f %8.3f", method.name.c_str(), kDegrees * method.relative.rotation,
-                1e3 * method.relative.translation, method.px);
+    const auto px = [&](double value) { return extrinsics.pixels ? fixed(value, 3) : std::string("-"); };
+    std::printf("%-20s %10.3f %10.2f %8s", method.name.c_str(), kDegrees * method.relative.rotation,
+                1e3 * method.relative.translation, px(method.px).c_str());
     if (method.held_out)
-      std::printf("             %8.3f %8.2f %8.3f", method.held_out->px, method.held_out->mm,
+      std::printf("             %8s %8.2f %8.3f", px(method.held_out->px).c_str(), method.held_out->mm,
                   method.held_out->deg);
     std::printf("%s\n", method.wild ? "  wild" : "");
   }
@@ -94,17 +110,21 @@ int run_handeye(const HandEyeOptions& options) {
   constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
   if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
   settings.target_size = options.target_size;
+  settings.refine.bundle.unknowns.time_offsets = options.time_offset;
   const bool pairs = std::all_of(dataset.frames.begin(), dataset.frames.end(),
                                  [](const calib::Frame& frame) { return frame.image.empty(); });
+  if (pairs && options.time_offset)
+    throw data::InputError(dataset.source + ": pairs of poses have no time; leave --time-offset out");
   const calib::ImageCalibration solved =
-      pairs ? calib::ImageCalibration{calib::calibrate_pairs(setup, calib::pair_observations(dataset),
-                                                             settings),
-                                      ""}
+      pairs ? calib::ImageCalibration{.calibration = calib::calibrate_pairs(
+                                          setup, calib::pair_observations(dataset), settings),
+                                      .refiner = ""}
             : from_images(options, setup, dataset, settings);
 
-  const calib::ExtrinsicsInputs inputs{
-      dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
-      dataset.poses_path, dataset.camera_path, solved.refiner};
+  const calib::ExtrinsicsInputs inputs = calib::relative_to(
+      {dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
+       dataset.poses_path, dataset.camera_path, solved.refiner, solved.depth, solved.time_offset},
+      options.out);
   calib::Extrinsics extrinsics = calib::extrinsics_of(solved.calibration, inputs);
   const int exit_code = solved.calibration.usable ? exit_done : exit_unusable;
   nlohmann::ordered_json json = calib::to_json(solved.calibration, inputs, exit_code);
@@ -146,6 +166,11 @@ void add_handeye_verb(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
   add_target_size_option(*verb, options->target_size);
+  verb->add_flag(
+      "--time-offset", options->time_offset,
+      "Solve for a constant time between pictures and poses, where the poses are a stream over time "
+      "and pictures are named by their time");
+  verb->add_flag("--no-depth", options->dataset.no_depth, "Leave depth pictures out");
   verb->add_option("--parent-frame", options->parent, "Name of the gripper's or the base's frame");
   verb->add_option("--child-frame", options->child, "Name of the camera's frame")->capture_default_str();
   verb->add_option("--ros", options->ros, "File for a static_transform_publisher line");

@@ -58,6 +58,7 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool 
   options.needs_poses = needs_poses;
   options.needs_camera = needs_camera;
   options.depth_scale = choice.depth_scale;
+  options.depth = !choice.no_depth;
   return calib::load_dataset(choice.path, options);
 }
 

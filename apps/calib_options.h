@@ -28,6 +28,7 @@ struct DatasetChoice {
   std::string camera;
   std::string cache;
   double depth_scale = 0.001;
+  bool no_depth = false;
 };
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
 

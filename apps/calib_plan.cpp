@@ -104,6 +104,7 @@ void add_plan_verb(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"trace", "determinant"}))
       ->capture_default_str();
   verb->add_option("--seed", options->settings.seed, "Of the candidates")->capture_default_str();
+  verb->add_flag("--no-depth", options->dataset.no_depth, "Leave depth pictures out");
   verb->add_option("-o,--out", options->out, "File for the plan, JSON");
   add_calib_common_options(*verb, options->common);
   verb->footer(

@@ -24,7 +24,8 @@ struct RegisterOptions {
   std::vector<std::string> cameras;
   std::string target, setup, cache;
   std::vector<double> workspace;
-  bool without_images = false;
+  double depth_scale = 0.001;
+  bool without_images = false, no_depth = false;
   bool refine_intrinsics = false;
   calib::TargetSize target_size = calib::TargetSize::automatic;
   std::string out;
@@ -32,8 +33,15 @@ struct RegisterOptions {
 
 constexpr int kRefinedIntrinsics = 9;  // fx fy cx cy k1 k2 p1 p2 k3
 
+/// What the provenance says of the target: words, or a file.
+std::string target_text(const std::string& target, const std::string& calibration) {
+  const fs::path beside = fs::absolute(calibration).parent_path() / target;
+  return fs::is_regular_file(beside) ? beside.string() : target;
+}
+
 calib::CellMember member_of(const std::string& arm, const std::string& camera, const DatasetChoice& choice,
-                            const std::string& setup, const RegisterOptions& options) {
+                            const std::string& setup, const RegisterOptions& options,
+                            bool time_offset = false) {
   const calib::Dataset dataset = load_dataset(choice);
   const calib::Target target = target_of(choice, dataset);
   if (setup.empty() && !dataset.setup)
@@ -44,6 +52,7 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
   calib::CalibrateSettings settings;
   settings.target_size = options.target_size;
+  settings.refine.bundle.unknowns.time_offsets = time_offset;
   const calib::ImageCalibration solved = calib::calibrate_images(kind, dataset, target, detections, settings);
   if (!options.common.quiet) {
     const std::size_t all = solved.calibration.views.size(), used = solved.calibration.used.size();
@@ -68,27 +77,34 @@ calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const Reg
 calib::Cell cell_of_arms(const RegisterOptions& options) {
   std::vector<calib::Extrinsics> calibrations;
   std::vector<std::string> arms;
-  bool images = !options.without_images;
   for (const std::string& path : options.calibrations) {
     calibrations.push_back(calib::load_extrinsics(path));
     arms.push_back(name_of(path));
-    if (!images || fs::exists(calibrations.back().inputs.dataset)) continue;
-    images = false;
-    warn_calib(path + ": its dataset " + calibrations.back().inputs.dataset +
-               " is not there; composed from the transforms alone");
   }
   const calib::Cell composed = calib::compose_cell(arms, calibrations);
-  if (!images) return composed;
+  if (options.without_images) return composed;
   std::vector<calib::CellMember> members;
   for (std::size_t i = 0; i < arms.size(); ++i) {
     const calib::ExtrinsicsInputs& inputs = calibrations[i].inputs;
     DatasetChoice choice;
-    choice.path = inputs.dataset;
-    choice.target = inputs.target;
-    choice.poses = inputs.poses;
-    choice.camera = inputs.camera;
+    const std::string& file = options.calibrations[i];
+    if (!calibrations[i].pixels)
+      throw data::InputError(file +
+                             ": found pairs of poses, expected pictures; --without-images composes the "
+                             "transforms alone");
+    try {
+      choice.path = calib::resolved(inputs.dataset, file);
+      choice.poses = calib::resolved(inputs.poses, file);
+      choice.camera = calib::resolved(inputs.camera, file);
+    } catch (const data::InputError& error) {
+      throw data::InputError(std::string(error.what()) + "; --without-images composes the transforms alone");
+    }
+    choice.target = target_text(inputs.target, file);
     choice.cache = options.cache;
-    members.push_back(member_of(arms[i], "camera", choice, calib::to_string(calibrations[i].setup), options));
+    choice.no_depth = options.no_depth || !inputs.depth;
+    if (inputs.depth) choice.depth_scale = inputs.depth->scale;
+    members.push_back(member_of(arms[i], "camera", choice, calib::to_string(calibrations[i].setup), options,
+                                inputs.time_offset.has_value()));
   }
   return solved_cell(members, options);
 }
@@ -100,6 +116,8 @@ calib::Cell cell_of_cameras(const RegisterOptions& options) {
     choice.path = path;
     choice.target = options.target;
     choice.cache = options.cache;
+    choice.depth_scale = options.depth_scale;
+    choice.no_depth = options.no_depth;
     members.push_back(member_of("base", name_of(path), choice, options.setup, options));
   }
   return solved_cell(members, options);
@@ -168,6 +186,10 @@ void add_register_verb(CLI::App& app, Action& action) {
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
   add_target_size_option(*verb, options->target_size);
+  verb->add_option("--depth-scale", options->depth_scale, "Metres a count of the depth pictures of --cameras")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_flag("--no-depth", options->no_depth, "Leave depth pictures out");
   verb->add_option("--cache", options->cache, "Folder that keeps corners found, for the next run");
   verb->add_option("-o,--out", options->out, "File for the cell, JSON");
   add_calib_common_options(*verb, options->common);

@@ -97,21 +97,22 @@ nlohmann::ordered_json cloud_json(const calib::Accumulation& clouds) {
 }
 
 nlohmann::ordered_json result_json(const ValidateOptions& options, const calib::ProjectionCheck& check,
-                                   const std::optional<calib::Accumulation>& clouds) {
+                                   bool pixels, const std::optional<calib::Accumulation>& clouds) {
   nlohmann::ordered_json json;
   json["schema"] = "flash-validation/1";
   json["extrinsics"] = options.extrinsics;
   json["dataset"] = options.dataset.path;
   json["target_pose"] = options.refit_target ? "from these views" : "of the calibration";
-  json["corner_rms_px"] = check.corner_rms;
-  json["centre_rms_px"] = check.centre_rms;
+  const auto px = [&](double value) { return pixels ? nlohmann::json(value) : nlohmann::json(nullptr); };
+  json["corner_rms_px"] = px(check.corner_rms);
+  json["centre_rms_px"] = px(check.centre_rms);
   json["rms_mm"] = check.mm_rms;
   json["rms_deg"] = check.deg_rms;
   json["views"] = nlohmann::json::array();
   for (const calib::ViewProjection& view : check.views)
     json["views"].push_back({{"image", view.image},
-                             {"corner_px", view.corner_rms},
-                             {"centre_px", view.centre},
+                             {"corner_px", px(view.corner_rms)},
+                             {"centre_px", px(view.centre)},
                              {"mm", view.mm},
                              {"deg", view.deg}});
   if (clouds) json["clouds"] = cloud_json(*clouds);
@@ -157,7 +158,7 @@ int run_validate(const ValidateOptions& options) {
 
   const std::optional<calib::Accumulation> clouds =
       pairs ? std::nullopt : accumulate(dataset, extrinsics, views, check);
-  const std::string text = data::format_json(result_json(options, check, clouds)) + '\n';
+  const std::string text = data::format_json(result_json(options, check, !pairs, clouds)) + '\n';
   if (!options.out.empty()) {
     data::write_atomically((fs::path(options.out) / "validation.json").string(), text);
     draw_views(views, check, options.out);

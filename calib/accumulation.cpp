@@ -5,9 +5,8 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <opencv2/imgproc.hpp>
 
-#include "calib/opencv_image.h"
+#include "calib/board_depth.h"
 #include "data/error.h"
 
 namespace flash::calib {
@@ -118,31 +117,16 @@ data::Picture draw_profile(const Plane& plane, const std::vector<Resting>& views
 
 TargetCloud target_cloud(const data::DepthImage& depth, double depth_scale, const GreyImage& image,
                          const data::CameraIntrinsics& camera, const Observation& view) {
-  const auto size = [](int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  };
-  if (depth.width != camera.width || depth.height != camera.height)
-    throw data::InputError(view.image + ": its depth picture is " + size(depth.width, depth.height) +
-                           ", the camera " + size(camera.width, camera.height) +
-                           " (depth must be registered to it)");
+  expect_registered(depth, camera, view.image);
   TargetCloud cloud;
   cloud.image = view.image;
-  if (view.pixels.cols() < 3) return cloud;
-  std::vector<cv::Point2f> seen, outline;
-  for (Eigen::Index i = 0; i < view.pixels.cols(); ++i)
-    seen.emplace_back(static_cast<float>(view.pixels(0, i)), static_cast<float>(view.pixels(1, i)));
-  cv::convexHull(seen, outline);
-  const cv::Rect box = cv::boundingRect(outline) & cv::Rect(0, 0, depth.width, depth.height);
   std::vector<Eigen::Vector3d> points;
-  for (int y = box.y; y < box.y + box.height; ++y)
-    for (int x = box.x; x < box.x + box.width; ++x) {
-      const int count = depth.at(x, y);
-      if (count == 0) continue;
-      if (cv::pointPolygonTest(outline, cv::Point2f(static_cast<float>(x), static_cast<float>(y)), false) < 0)
-        continue;
-      points.push_back(data::unproject(camera, Eigen::Vector2d(x, y), depth_scale * count));
-      cloud.colour.push_back(image.at(x, y));
-    }
+  for (const Eigen::Vector2i& pixel : pixels_within(view.pixels, depth.width, depth.height)) {
+    const int count = depth.at(pixel.x(), pixel.y());
+    if (count == 0) continue;
+    points.push_back(data::unproject(camera, pixel.cast<double>(), depth_scale * count));
+    cloud.colour.push_back(image.at(pixel.x(), pixel.y()));
+  }
   if (static_cast<int>(points.size()) < kLeastPoints) {
     cloud.colour.clear();
     return cloud;

@@ -105,8 +105,9 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
   double weight_;
 };
 
-/// A depth along its ray against the target's plane. Blocks: camera, base, target, correction, time offset.
-class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1> {
+/// A depth along its ray against the target's plane. Blocks: camera, base, target, correction, time offset,
+/// scale of the depth.
+class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1, 1> {
  public:
   DepthCost(Setup setup, const RobotPose& pose, const Eigen::Vector3d& point, double sigma)
       : setup_(setup), pose_(pose), point_(point), weight_(1 / sigma) {}
@@ -114,16 +115,18 @@ class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1> {
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const Chain chain(setup_, pose_of(x[0]), pose_of(x[1]), pose_.T_base_gripper, pose_of(x[3]),
                       pose_of(x[2]), *x[4], pose_.velocity);
-    const DepthResidual depth = depth_residual(chain, point_);
+    const Eigen::Vector3d point = point_ / *x[5];
+    const DepthResidual depth = depth_residual(chain, point);
     *residual = weight_ * depth.value;
     if (!jacobians) return true;
     const Eigen::RowVector3d d_point = -weight_ * depth.d_material;
     const Chain::Derivative d_correction = chain.d_correction(depth.material);
-    set_pose_jacobian(jacobians[0], d_point * chain.d_camera(point_));
+    set_pose_jacobian(jacobians[0], d_point * chain.d_camera(point));
     set_pose_jacobian(jacobians[1], d_point * chain.d_base(d_correction));
     set_pose_jacobian(jacobians[2], d_point * chain.d_target(depth.material));
     set_pose_jacobian(jacobians[3], d_point * d_correction);
     if (jacobians[4]) *jacobians[4] = d_point.dot(chain.d_time(d_correction));
+    if (jacobians[5]) *jacobians[5] = -weight_ * point.z() / *x[5];
     return true;
   }
 
@@ -161,9 +164,11 @@ class CorrectionPrior final : public ceres::SizedCostFunction<6, 7> {
 struct Blocks {
   std::vector<PoseBlock> cameras, bases, targets, corrections;
   std::vector<IntrinsicsVector> intrinsics;
-  std::vector<double> scales, time_offsets;
+  std::vector<double> scales, time_offsets, depth_scales;
 
-  explicit Blocks(const Bundle& bundle) : scales(bundle.scales), time_offsets(bundle.time_offsets) {
+  explicit Blocks(const Bundle& bundle)
+      : scales(bundle.scales), time_offsets(bundle.time_offsets), depth_scales(bundle.depth_scales) {
+    depth_scales.resize(bundle.cameras.size(), 1);
     for (const Eigen::Isometry3d& T : bundle.cameras) cameras.push_back(block_of(T));
     for (const Eigen::Isometry3d& T : bundle.bases) bases.push_back(block_of(T));
     for (const Eigen::Isometry3d& T : bundle.targets) targets.push_back(block_of(T));
@@ -181,6 +186,7 @@ struct Blocks {
       bundle.intrinsics[i] = with_vector(bundle.intrinsics[i], intrinsics[i]);
     bundle.scales = scales;
     bundle.time_offsets = time_offsets;
+    bundle.depth_scales = depth_scales;
   }
 };
 
@@ -202,7 +208,8 @@ void add_views(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, co
       problem.AddResidualBlock(
           new DepthCost(bundle.setup, pose, view.depth_points.col(i), noise.depth[camera]),
           settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr, blocks.cameras[camera].data(),
-          blocks.bases[arm].data(), blocks.targets[target].data(), correction, &blocks.time_offsets[arm]);
+          blocks.bases[arm].data(), blocks.targets[target].data(), correction, &blocks.time_offsets[arm],
+          &blocks.depth_scales[camera]);
     }
   }
 }
@@ -244,6 +251,8 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     if (!unknowns.scales) hold(problem, &scale);
   for (double& tau : blocks.time_offsets)
     if (!unknowns.time_offsets) hold(problem, &tau);
+  for (double& scale : blocks.depth_scales)
+    if (!unknowns.depth_scales) hold(problem, &scale);
 
   std::vector<double*> all;
   problem.GetParameterBlocks(&all);

@@ -36,6 +36,7 @@ struct Bundle {
   std::vector<Eigen::Isometry3d> targets;  ///< Z: in the world (eye-in-hand) or a gripper
   std::vector<double> scales;              ///< of each target: true size over stated size
   std::vector<double> time_offsets;        ///< tau of each arm [s]
+  std::vector<double> depth_scales = {};   ///< of each camera: depth over distance; empty: 1
   std::vector<Eigen::Vector3d> pivots;     ///< of each arm, in its gripper: where errors of rotation and of
                                            ///< translation are independent [m]
   std::vector<RobotPose> poses;
@@ -56,6 +57,7 @@ struct Unknowns {
   int intrinsics = 0;       ///< how many of fx fy cx cy k1 k2 p1 p2 k3 ...
   bool scales = false;
   bool time_offsets = false;
+  bool depth_scales = true;  ///< of cameras with depth: it tells shape and tilt, not how long a metre is
 };
 
 struct BundleSettings {
@@ -75,6 +77,11 @@ struct BundleSummary {
 /// prior |dt|^2 / translation^2 + |dtheta|^2 / rotation^2 of each, dt being the motion of the arm's pivot.
 /// Levenberg-Marquardt on the manifold; the corrections are eliminated first.
 BundleSummary solve_bundle(Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings = {});
+
+/// Depth over distance of a camera.
+inline double depth_scale(const Bundle& bundle, std::size_t camera) {
+  return bundle.depth_scales.empty() ? 1 : bundle.depth_scales[camera];
+}
 
 /// The closed chain through one view, with the correction of the robot's pose or without.
 Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected = true);

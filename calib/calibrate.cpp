@@ -1,5 +1,6 @@
 #include "calib/calibrate.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -279,15 +280,19 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   refine_settings.bundle.unknowns.scales = settings.target_size == TargetSize::solved;
   const auto start = std::tuple(observations, result.used, result.repair);
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
-  result.scale = check_scales(result.refined, refine_settings).front();
-  if (settings.target_size == TargetSize::automatic && clearly_off(*result.scale)) {
+  const auto check_scale = [&] {
+    const std::vector<ScaleCheck> checks = check_scales(result.refined, refine_settings);
+    if (!checks.empty()) result.scale = checks.front();
+  };
+  check_scale();
+  if (settings.target_size == TargetSize::automatic && result.scale && clearly_off(*result.scale)) {
     // Views that a wrong size made look wrong come back.
     std::tie(observations, result.used, result.repair) = start;
     refine_settings.bundle.unknowns.scales = true;
     plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
-    result.scale = check_scales(result.refined, refine_settings).front();
+    check_scale();
   }
-  result.scale->solved = refine_settings.bundle.unknowns.scales;
+  if (result.scale) result.scale->solved = refine_settings.bundle.unknowns.scales;
   BundleSettings exact_robot = settings.refine.bundle;
   exact_robot.unknowns.corrections = false;
   exact_robot.huber = 0;

@@ -10,8 +10,8 @@ namespace flash::calib {
 ///     q = C^-1 W^s Z p,   W = B A(tau) D,   A(tau) = moved(A, tau v)
 /// with s = +1 for eye-to-hand (C = T_world_camera, Z = T_gripper_target) and s = -1 for eye-in-hand
 /// (C = T_gripper_camera, Z = T_world_target). B = T_world_base tells several arms apart, D corrects the pose
-/// that the robot reported, tau [s] is how much later than its image that pose was read, v the gripper's
-/// velocity.
+/// that the robot reported, tau [s] is how much later than that pose its image was taken, v the
+/// gripper's velocity.
 class Chain {
  public:
   Chain(Setup setup, const Eigen::Isometry3d& C, const Eigen::Isometry3d& B, const Eigen::Isometry3d& A,

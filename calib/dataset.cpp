@@ -247,7 +247,7 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
     frame.stamp =
         static_cast<double>(number_in_name(frame.image).value_or(static_cast<long>(dataset.frames.size())));
     const fs::path depth = folder / "depth" / (image.stem().string() + ".png");
-    if (fs::exists(depth)) frame.depth = depth.string();
+    if (options.depth && fs::exists(depth)) frame.depth = depth.string();
     if (pairing) pairing->pair(frame, image);
     dataset.frames.push_back(std::move(frame));
   }

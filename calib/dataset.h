@@ -35,11 +35,12 @@ struct Dataset {
 };
 
 struct DatasetOptions {
-  std::string poses;         ///< file or folder; empty: found by name in the dataset
-  std::string camera;        ///< intrinsics file; empty: found by name in the dataset
+  std::string poses = {};    ///< file or folder; empty: found by name in the dataset
+  std::string camera = {};   ///< intrinsics file; empty: found by name in the dataset
   bool needs_poses = true;   ///< without: pictures alone, as for intrinsics
   bool needs_camera = true;  ///< of sets with pictures
   double depth_scale = 0.001;
+  bool depth = true;  ///< look for depth pictures
 };
 
 /// A folder with images/ (or rgb/, color/, or the pictures themselves; jpg or png, sorted), poses.tum |

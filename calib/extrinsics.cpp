@@ -1,14 +1,17 @@
 #include "calib/extrinsics.h"
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "data/error.h"
 #include "data/json_reader.h"
 #include "data/trajectory.h"
 
 namespace flash::calib {
 namespace {
 
+namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 constexpr double kDegrees = 180 / M_PI;
@@ -27,14 +30,18 @@ Json rows(const Matrix& m) {
   return values;
 }
 
+/// Pose pairs are seen by no camera.
+bool has_pixels(const Calibration& calibration) { return !calibration.refined.bundle.cameras.empty(); }
+
 Json comparison_json(const Calibration& calibration) {
+  const bool pixels = has_pixels(calibration);
   Json methods = Json::object();
   for (const ComparedMethod& method : calibration.comparison) {
     Json entry = {{"relative_deg", method.relative.rotation * kDegrees},
                   {"relative_mm", 1e3 * method.relative.translation},
-                  {"reprojection_rms_px", method.px}};
+                  {"reprojection_rms_px", pixels ? Json(method.px) : Json(nullptr)}};
     if (method.held_out) {
-      entry["heldout_px"] = method.held_out->px;
+      entry["heldout_px"] = pixels ? Json(method.held_out->px) : Json(nullptr);
       entry["heldout_mm"] = method.held_out->mm;
       entry["heldout_deg"] = method.held_out->deg;
     }
@@ -47,21 +54,31 @@ Json comparison_json(const Calibration& calibration) {
 }
 
 Json views_json(const Calibration& calibration) {
+  const bool pixels = has_pixels(calibration);
   Json views = Json::array();
   for (std::size_t i = 0; i < calibration.views.size(); ++i) {
     const ViewResult& view = calibration.views[i];
     Json entry = {{"image", calibration.repair.observations[i].image}, {"used", view.used}};
     entry["reason"] = view.used ? Json(nullptr) : Json(view.reason);
-    entry["px"] = view.used ? Json(view.px) : Json(nullptr);
-    if (view.used) {
+    entry["px"] = view.used && pixels ? Json(view.px) : Json(nullptr);
+    if (view.used && pixels) {
       entry["chain_px"] = view.chain_px;
       entry["correction_mm"] = 1e3 * view.correction.head<3>().norm();
       entry["correction_deg"] = view.correction.tail<3>().norm() * kDegrees;
-      entry["renumbered"] = calibration.repair.views[i].symmetry != 0;
     }
+    if (view.used) entry["renumbered"] = calibration.repair.views[i].symmetry != 0;
     views.push_back(std::move(entry));
   }
   return views;
+}
+
+Json depth_json(const DepthUse& depth) {
+  return {{"used", depth.used},
+          {"reason", depth.used ? Json(nullptr) : Json(depth.reason)},
+          {"views", depth.views},
+          {"pixel_noise_m", depth.pixel_noise},
+          {"over_corners", depth.over_corners},
+          {"over_corners_sd", depth.over_corners_sd}};
 }
 
 NamedTransform transform_from(const data::JsonObject& object) {
@@ -84,11 +101,31 @@ Setup parse_setup(const std::string& text, const std::string& source, const std:
   throw data::input_error(source, field, "found \"" + text + "\", expected eye-in-hand or eye-to-hand");
 }
 
+ExtrinsicsInputs relative_to(ExtrinsicsInputs inputs, const std::string& out) {
+  if (out.empty()) return inputs;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(out)).parent_path();
+  for (std::string* path : {&inputs.dataset, &inputs.target, &inputs.poses, &inputs.camera})
+    if (!path->empty() && fs::exists(*path))  // a target may be words
+      *path = fs::weakly_canonical(fs::absolute(*path)).lexically_relative(folder).string();
+  return inputs;
+}
+
+std::string resolved(const std::string& path, const std::string& calibration) {
+  const fs::path beside = fs::weakly_canonical(fs::absolute(calibration).parent_path() / path);
+  if (fs::exists(beside)) return beside.string();
+  if (fs::exists(path)) return path;
+  throw data::input_error(calibration, "provenance",
+                          "found " + path + ", which is neither " + beside.string() + " nor " +
+                              fs::weakly_canonical(fs::absolute(path)).string() +
+                              ", expected where it was when the file was written");
+}
+
 Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs) {
   const bool in_hand = calibration.setup == Setup::eye_in_hand;
   Extrinsics extrinsics;
   extrinsics.setup = calibration.setup;
-  extrinsics.method = to_string(Method::errors_in_variables);
+  extrinsics.pixels = has_pixels(calibration);
+  extrinsics.method = extrinsics.pixels ? to_string(Method::errors_in_variables) : "pose_space";
   extrinsics.transform = {in_hand ? "gripper" : "base", "camera", calibration.poses.X};
   extrinsics.target_pose = {in_hand ? "base" : "gripper", "target", calibration.poses.Z};
   extrinsics.covariance = calibration.covariance;
@@ -118,13 +155,22 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                {"covariance", rows(calibration.covariance)}};
   json["predicted_sd"] = {{"translation_mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
                           {"rotation_deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
-  json["sigmas"] = {{"corner_px", extrinsics.corner_px},
-                    {"robot_rotation_rad", extrinsics.robot_rotation_rad},
-                    {"robot_translation_m", extrinsics.robot_translation_m}};
-  json["residuals"] = {
-      {"reprojection_rms_px", calibration.chain_rms}, {"corner_rms_px", calibration.corner_rms},
-      {"centre_rms_px", calibration.centre_rms},      {"heldout_px", calibration.held_out.px},
-      {"heldout_mm", calibration.held_out.mm},        {"heldout_deg", calibration.held_out.deg}};
+  const auto px = [&](double value) { return extrinsics.pixels ? Json(value) : Json(nullptr); };
+  json["sigmas"] = {
+      {"corner_px", px(extrinsics.corner_px)},
+      {"robot_rotation_rad", extrinsics.robot_rotation_rad},
+      {"robot_translation_m", extrinsics.robot_translation_m},
+      {"depth_m", inputs.depth && inputs.depth->used ? Json(inputs.depth->sigma) : Json(nullptr)}};
+  json["residuals"] = {{"reprojection_rms_px", px(calibration.chain_rms)},
+                       {"corner_rms_px", px(calibration.corner_rms)},
+                       {"centre_rms_px", px(calibration.centre_rms)},
+                       {"heldout_px", px(calibration.held_out.px)},
+                       {"heldout_mm", calibration.held_out.mm},
+                       {"heldout_deg", calibration.held_out.deg}};
+  json["depth"] = inputs.depth ? depth_json(*inputs.depth) : Json(nullptr);
+  json["time_offset"] = inputs.time_offset ? Json{{"estimate_s", inputs.time_offset->estimate},
+                                                  {"sd_s", inputs.time_offset->sd}}
+                                           : Json(nullptr);
   json["comparison"] = comparison_json(calibration);
   json["views"] = views_json(calibration);
   json["observability"] = {
@@ -152,15 +198,18 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   json["provenance"] = {{"tool", "flash-calib"},    {"version", FLASH_VERSION}, {"dataset", inputs.dataset},
                         {"target", inputs.target},  {"poses", inputs.poses},    {"camera", inputs.camera},
                         {"refiner", inputs.refiner}};
+  json["provenance"]["depth_scale"] =
+      inputs.depth && inputs.depth->used ? Json(inputs.depth->scale) : Json(nullptr);
   return json;
 }
 
 Extrinsics load_extrinsics(const std::string& path) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject object(file, path);
-  object.expect_fields({"schema", "setup", "method", "transform", "target_pose", "covariance", "predicted_sd",
-                        "sigmas", "residuals", "comparison", "views", "observability", "convention_findings",
-                        "scale", "splits", "warnings", "exit_code", "provenance"});
+  object.expect_fields({"schema",      "setup",        "method",   "transform",     "target_pose",
+                        "covariance",  "predicted_sd", "sigmas",   "residuals",     "depth",
+                        "time_offset", "comparison",   "views",    "observability", "convention_findings",
+                        "scale",       "splits",       "warnings", "exit_code",     "provenance"});
   if (object.string("schema") != "flash-extrinsics/1") throw object.error("schema", "flash-extrinsics/1");
   Extrinsics extrinsics;
   extrinsics.setup = parse_setup(object.string("setup"), path, "setup");
@@ -183,7 +232,8 @@ Extrinsics load_extrinsics(const std::string& path) {
     throw object.error("covariance", "a symmetric matrix");
   if (object.has("sigmas")) {
     const data::JsonObject sigmas = object.object("sigmas");
-    extrinsics.corner_px = sigmas.not_negative("corner_px");
+    extrinsics.pixels = sigmas.has("corner_px");
+    extrinsics.corner_px = sigmas.not_negative("corner_px", 0);
     extrinsics.robot_rotation_rad = sigmas.not_negative("robot_rotation_rad");
     extrinsics.robot_translation_m = sigmas.not_negative("robot_translation_m");
   }
@@ -191,6 +241,15 @@ Extrinsics load_extrinsics(const std::string& path) {
     const data::JsonObject from = object.object("provenance");
     extrinsics.inputs = {from.string("dataset", ""), from.string("target", ""), from.string("poses", ""),
                          from.string("camera", ""), from.string("refiner", "")};
+    if (from.has("depth_scale")) {
+      DepthUse& depth = extrinsics.inputs.depth.emplace();
+      depth.used = true;
+      depth.scale = from.positive("depth_scale");
+    }
+  }
+  if (object.has("time_offset")) {
+    const data::JsonObject offset = object.object("time_offset");
+    extrinsics.inputs.time_offset = {offset.number("estimate_s"), offset.not_negative("sd_s")};
   }
   return extrinsics;
 }

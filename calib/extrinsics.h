@@ -1,9 +1,12 @@
 #pragma once
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/calibrate.h"
+#include "calib/depth_use.h"
+#include "calib/time_offset.h"
 
 namespace flash::calib {
 
@@ -13,10 +16,20 @@ struct NamedTransform {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();  ///< maps points of the child into the parent
 };
 
-/// What a calibration was made from, so that it can be made again.
+/// What a calibration was made from, so that it can be made again, and what took part beside the corners.
 struct ExtrinsicsInputs {
   std::string dataset, target, poses, camera, refiner;
+  std::optional<DepthUse> depth = {};
+  std::optional<TimeOffset> time_offset = {};
 };
+
+/// The same with paths as a reader of the file `out` needs them: relative to its folder, so that file and
+/// dataset can be moved together. Nothing changes where `out` is empty.
+ExtrinsicsInputs relative_to(ExtrinsicsInputs inputs, const std::string& out);
+
+/// A path of the provenance: from the folder of the calibration, else from the current one. Throws
+/// data::InputError where it is at neither.
+std::string resolved(const std::string& path, const std::string& calibration);
 
 /// "flash-extrinsics/1", as far as other programs need it.
 struct Extrinsics {
@@ -26,6 +39,7 @@ struct Extrinsics {
   NamedTransform target_pose;              ///< base <- target (eye-in-hand) or gripper <- target
   Matrix6d covariance = Matrix6d::Zero();  ///< of the transform, right perturbation (dt, dtheta) [m, rad]
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
+  bool pixels = true;  ///< false: of pose pairs, which have no corners
   ExtrinsicsInputs inputs;
 };
 

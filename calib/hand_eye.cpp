@@ -170,11 +170,13 @@ Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eige
     const Observation& observation = observations[i];
     RobotPose pose;
     pose.T_base_gripper = observation.T_base_gripper;
+    pose.velocity = observation.velocity;
     bundle.poses.push_back(pose);
     BundleView view;
     view.pose = static_cast<int>(i);
     view.points = target_points(Eigen::all, observation.points);
     view.pixels = observation.pixels;
+    view.depth_points = observation.depth_points;
     bundle.views.push_back(std::move(view));
   }
   return bundle;

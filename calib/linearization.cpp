@@ -57,9 +57,14 @@ Eigen::MatrixXd depth_gram(const Bundle& bundle, const BundleView& view, const U
   const RowBuilder builder(bundle, view, unknowns, columns);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(builder.width(), builder.width());
   Eigen::Matrix<double, 1, Eigen::Dynamic> row;
+  const auto camera = static_cast<std::size_t>(view.camera);
+  const double scale = depth_scale(bundle, camera);
   for (Eigen::Index i = 0; i < view.depth_points.cols(); ++i) {
-    const DepthResidual depth = depth_residual(builder.chain(), view.depth_points.col(i));
-    builder.fill<1>(-depth.d_material, depth.material, view.depth_points.col(i), row);
+    const Eigen::Vector3d point = view.depth_points.col(i) / scale;
+    const DepthResidual depth = depth_residual(builder.chain(), point);
+    builder.fill<1>(-depth.d_material, depth.material, point, row);
+    if (columns.depth_scales[camera] >= 0)
+      row[builder.first_shared() + columns.depth_scales[camera]] = -point.z() / scale;
     row[builder.width() - 1] = depth.value;
     const double weight = huber_weight(std::abs(depth.value), sigma, huber);
     gram += weight * row.transpose() * row;
@@ -99,6 +104,11 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
   take(columns.intrinsics, bundle.cameras.size(), unknowns.intrinsics);
   take(columns.scales, bundle.targets.size(), unknowns.scales ? 1 : 0);
   take(columns.time_offsets, bundle.bases.size(), unknowns.time_offsets ? 1 : 0);
+  columns.depth_scales.assign(bundle.cameras.size(), -1);
+  for (const BundleView& view : bundle.views) {
+    int& column = columns.depth_scales[static_cast<std::size_t>(view.camera)];
+    if (unknowns.depth_scales && view.depth_points.cols() > 0 && column < 0) column = columns.count++;
+  }
   return columns;
 }
 

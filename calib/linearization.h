@@ -11,7 +11,7 @@ namespace flash::calib {
 struct SharedColumns {
   std::vector<int> cameras, bases, targets;  ///< first of six, a right perturbation (dt, dtheta) each
   std::vector<int> intrinsics;               ///< first of Unknowns::intrinsics
-  std::vector<int> scales, time_offsets;
+  std::vector<int> scales, time_offsets, depth_scales;
   int count = 0;
 };
 SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns);

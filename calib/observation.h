@@ -19,7 +19,10 @@ struct Observation {
   std::vector<int> points;                         ///< columns of target_points that were seen
   Eigen::Matrix2Xd pixels;                         ///< where [px], distorted; pixel centres are whole numbers
   std::vector<Eigen::Isometry3d> T_camera_target;  ///< poses that fit, best first: a flat target may have two
-  double pose_rms = 0;  ///< reprojection of the first of them, 2-D rms per point [px]
+  double pose_rms = 0;                 ///< reprojection of the first of them, 2-D rms per point [px]
+  Eigen::Matrix3Xd depth_points = {};  ///< on the target's plane by depth, camera frame [m]; or none
+  Eigen::Matrix<double, 6, 1> velocity =
+      Eigen::Matrix<double, 6, 1>::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; of a stream
 };
 
 }  // namespace flash::calib

@@ -129,6 +129,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
       view.target = static_cast<int>(target);
       view.points = member.points(Eigen::all, observation.points);
       view.pixels = observation.pixels;
+      view.depth_points = observation.depth_points;
       bundle.views.push_back(std::move(view));
     }
   }

@@ -1,5 +1,7 @@
 #include "calib/target_size.h"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "calib/linearization.h"
@@ -12,14 +14,35 @@ bool clearly_off(const ScaleCheck& scale) {
   return off > kClearly * scale.sd && off <= kPrint;
 }
 
+namespace {
+
+/// Lengths that the robot only seems to move, three a view with the size of its noise, look like knowledge of
+/// the scale, and pull it down by their share. Below a hundredth of the whole that is of no account.
+bool told(const Refinement& refined, const BundleSettings& settings, const std::vector<int>& columns) {
+  constexpr double kClear = 100;
+  const double seeming = 3 * static_cast<double>(refined.bundle.poses.size());
+  const Eigen::MatrixXd information =
+      solve_linear(linearize(refined.bundle, refined.noise, settings), to_components(refined.noise))
+          .information;
+  const Eigen::LDLT<Eigen::MatrixXd> factor(information);
+  return std::all_of(columns.begin(), columns.end(), [&](int column) {
+    const double variance = factor.solve(Eigen::VectorXd::Unit(information.rows(), column))[column];
+    return variance > 0 && variance * kClear * seeming < 1;
+  });
+}
+
+}  // namespace
+
 std::vector<ScaleCheck> check_scales(const Refinement& refined, const RefineSettings& settings) {
   RefineSettings with_scale = settings;
   with_scale.estimate_pivots = false;
   with_scale.noise = refined.noise;
   with_scale.bundle.unknowns.scales = true;
+  const std::vector<int> columns = shared_columns(refined.bundle, with_scale.bundle.unknowns).scales;
+  if (!told(refined, with_scale.bundle, columns)) return {};
   const Refinement scaled = refine(refined.bundle, with_scale);
   std::vector<ScaleCheck> checks;
-  for (const int column : shared_columns(scaled.bundle, with_scale.bundle.unknowns).scales)
+  for (const int column : columns)
     checks.push_back({scaled.bundle.scales[checks.size()], std::sqrt(scaled.covariance(column, column))});
   return checks;
 }

@@ -22,8 +22,8 @@ struct ScaleCheck {
 /// Off by more than three standard deviations, and by no more than 3 %: what is further off is not a print.
 bool clearly_off(const ScaleCheck& scale);
 
-/// The size of every target as one more unknown, from a solution for the sizes as stated. One solution for
-/// all, as `refined` is.
+/// The size of every target as one more unknown, one solution for all. None where the data do not tell them,
+/// as those of a robot that turns and never moves along, without depth.
 std::vector<ScaleCheck> check_scales(const Refinement& refined, const RefineSettings& settings);
 
 }  // namespace flash::calib

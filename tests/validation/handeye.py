@@ -221,7 +221,7 @@ def mean_band(freedom, trials):
 
 
 def has_pixels(result):
-    return result["sigmas"]["corner_px"] > 0
+    return result["sigmas"]["corner_px"] is not None
 
 
 def pixels_of(result, source, key):

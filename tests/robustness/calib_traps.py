@@ -1,0 +1,250 @@
+#!/usr/bin/env python3
+"""Spoils a drawn recording in the ways in which people spoil them, and calibrates it with the program: each must be
+handled, with the right answer and a warning that says what was done, or be refused with exit code 2 or 3 and one
+sentence that names the cause."""
+import argparse
+import json
+import math
+import pathlib
+import random
+import shutil
+import sys
+import tempfile
+
+import program
+
+BOARD, PLAIN = "chessboard:9x6:0.025", "chessboard:8x6:0.025"  # 8 x 6 looks the same after half a turn
+SIGMAS = 4.5  # of six components: beyond it one correct answer in 25,000
+
+
+# Poses as the lines of a TUM file: stamp, x y z, qx qy qz qw.
+
+def read_poses(path):
+    return [[float(word) for word in line.split()] for line in path.read_text().splitlines() if line[:1] not in "#"]
+
+
+def write_poses(path, poses):
+    path.write_text("".join(" ".join(f"{value:.12g}" for value in pose) + "\n" for pose in poses))
+
+
+def multiply(a, b):
+    (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+    return [aw * bx + ax * bw + ay * bz - az * by, aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw, aw * bw - ax * bx - ay * by - az * bz]
+
+
+def conjugate(q):
+    return [-q[0], -q[1], -q[2], q[3]]
+
+
+def rotate(q, v):
+    return multiply(multiply(q, [*v, 0]), conjugate(q))[:3]
+
+
+def inverted(pose):
+    q = conjugate(pose[4:])
+    return [pose[0], *(-x for x in rotate(q, pose[1:4])), *q]
+
+
+def jolted(pose, rng):
+    """5 cm and 6 degrees off."""
+    axis = [rng.gauss(0, 1) for _ in range(3)]
+    length = math.sqrt(sum(a * a for a in axis))
+    q = [*(math.sin(0.05) * a / length for a in axis), math.cos(0.05)]
+    return [pose[0], *(x + rng.choice((-0.05, 0.05)) for x in pose[1:4]), *multiply(pose[4:], q)]
+
+
+def roll_pitch_yaw(q):
+    x, y, z, w = q
+    return (math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+            math.asin(max(-1, min(1, 2 * (w * y - z * x)))),
+            math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+
+
+def angle_between(a, b):
+    return 2 * math.acos(min(1, abs(multiply(conjugate(a), b)[3])))
+
+
+# Ways to spoil a recording. Each changes the folder and returns options for the command line.
+
+def poses_changed(change):
+    def spoil(folder):
+        path = folder / "poses.tum"
+        write_poses(path, change(read_poses(path)))
+        return []
+    return spoil
+
+
+def swapped_setup(folder):
+    said = json.loads((folder / "target.json").read_text())["setup"]
+    return ["--setup", "eye-to-hand" if said == "eye-in-hand" else "eye-in-hand"]
+
+
+def shifted(poses):
+    return [poses[0]] + [[later[0], *earlier[1:]] for earlier, later in zip(poses, poses[1:])]
+
+
+def millimetres(poses):
+    return [[p[0], *(1000 * x for x in p[1:4]), *p[4:]] for p in poses]
+
+
+def some_jolted(poses):
+    rng = random.Random(7)
+    return [jolted(pose, rng) if i % 3 == 1 and i < 15 else pose for i, pose in enumerate(poses)]
+
+
+def as_angles(columns, unit):
+    """Poses as roll, pitch and yaw under the given names, multiplied by `unit`."""
+    def spoil(folder):
+        rows = [f"index,tx,ty,tz,{columns}"]
+        for pose in read_poses(folder / "poses.tum"):
+            turn = [unit * angle for angle in roll_pitch_yaw(pose[4:])]
+            rows.append(",".join(f"{value:.10g}" for value in (int(pose[0]), *pose[1:4], *turn)))
+        (folder / "poses.tum").unlink()
+        (folder / "poses.csv").write_text("\n".join(rows) + "\n")
+        return []
+    return spoil
+
+
+def first_views(count):
+    def spoil(folder):
+        for image in sorted((folder / "images").iterdir())[count:]:
+            image.unlink()
+        return []
+    return spoil
+
+
+def copied(folder):
+    poses = read_poses(folder / "poses.tum")
+    for i, pose in enumerate(poses[:6]):
+        shutil.copy(folder / f"images/{i:03d}.png", folder / f"images/{100 + i:03d}.png")
+        poses.append([100 + i, *pose[1:]])
+    write_poses(folder / "poses.tum", poses)
+    return []
+
+
+def cut_picture(folder):
+    path = folder / "images/004.png"
+    path.write_bytes(path.read_bytes()[:2000])
+    return []
+
+
+def all_pictures_cut(folder):
+    for path in (folder / "images").iterdir():
+        path.write_bytes(path.read_bytes()[:500])
+    return []
+
+
+def option(*words):
+    return lambda folder: list(words)
+
+
+def nothing(folder):
+    return []
+
+
+class Trap:
+    """`spoil` a copy of the set; the program must end with `code`. Refused: one line with all `words`. Handled: the
+    right answer from `used` views, and warnings with all `words`."""
+
+    def __init__(self, name, sound, spoil, code, *words, used=None):
+        self.name, self.sound, self.spoil, self.code, self.words, self.used = name, sound, spoil, code, words, used
+
+
+def traps():
+    for setup, other in (("in", "eye-in-hand"), ("to", "eye-to-hand")):
+        sound = f"{setup}_hand"
+        yield Trap(f"{other}: nothing wrong", sound, nothing, 0, used=16)
+        yield Trap(f"{other}: inverted poses", sound, poses_changed(lambda p: [inverted(x) for x in p]), 2, "inverted")
+        yield Trap(f"{other}: swapped setup", sound, swapped_setup, 2, f"the setup is {other}")
+        yield Trap(f"{other}: pairing off by one", sound, poses_changed(shifted), 2, "paired off by one")
+        yield Trap(f"{other}: angles as they should be", sound, as_angles("rx,ry,rz", 1), 0, used=16)
+        yield Trap(f"{other}: degrees for radians", sound, as_angles("rx,ry,rz", math.degrees(1)), 2, "degrees?")
+        yield Trap(f"{other}: radians for degrees", sound, as_angles("rx_deg,ry_deg,rz_deg", 1), 2,
+                   "radians where degrees were expected")
+        yield Trap(f"{other}: millimetres", sound, poses_changed(millimetres), 2, "millimetres")
+        yield Trap(f"{other}: squares 8 % too small", sound, option("--target", "chessboard:9x6:0.02315"), 3,
+                   "the data want a target 1.0")
+        yield Trap(f"{other}: three views", sound, first_views(3), 2, "3 of 3 views", "at least 4")
+        yield Trap(f"{other}: 30 % outliers", sound, poses_changed(some_jolted), 0, "5 of 16 views were not used",
+                   used=11)
+        yield Trap(f"{other}: copies", sound, copied, 0, "100.png: not used: a copy of 000.png",
+                   "6 of 22 views were not used", used=16)
+        yield Trap(f"{other}: a picture cut off", sound, cut_picture, 0, "004.png: left out", used=15)
+    yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
+    yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")
+    yield Trap("one axis", "one_axis", nothing, 2, "rotations turn about one axis only", "cannot be determined")
+    yield Trap("flipped boards", "flipped", nothing, 0, "numbered from its other end", used=16)
+
+
+def draw(tool, work):
+    common = ("640x480", "0.02", "0.2")
+    program.must(tool, work / "in_hand", "eye-in-hand", BOARD, 16, *common, 1)
+    program.must(tool, work / "to_hand", "eye-to-hand", BOARD, 16, *common, 2)
+    program.must(tool, work / "one_axis", "eye-in-hand", BOARD, 8, *common, 3, "motion=one-axis")
+    program.must(tool, work / "flipped", "eye-in-hand", PLAIN, 16, *common, 4)
+
+
+def far_off(result, truth):
+    """The largest error in its stated standard deviations, over translation and over rotation."""
+    t, q = result["transform"]["translation"], result["transform"]["rotation_xyzw"]
+    sd = result["predicted_sd"]
+    away = rotate(conjugate(q), [b - a for a, b in zip(t, truth[1:4])])
+    turn = [2 * x for x in multiply(conjugate(q), truth[4:])]
+    turn = turn[:3] if turn[3] > 0 else [-x for x in turn[:3]]
+    return max([abs(1000 * a) / s for a, s in zip(away, sd["translation_mm"])] +
+               [abs(math.degrees(a)) / s for a, s in zip(turn, sd["rotation_deg"])])
+
+
+def complaint(trap, calib, work):
+    """What is wrong with how the program took it; empty where nothing is."""
+    folder, out = work / "spoilt", work / "camera.json"
+    for path in (folder, out, out.with_suffix(".html")):
+        shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(missing_ok=True)
+    shutil.copytree(work / trap.sound, folder)
+    options = trap.spoil(folder)
+    done = program.call(calib, "handeye", folder, *options, "--cache", work / "cache", "-o", out)
+    if done.returncode != trap.code:
+        return f"exit code {done.returncode}, expected {trap.code}: {done.stderr[-2000:]}"
+    missing = [word for word in trap.words if word not in done.stderr]
+    if missing:
+        return f"does not say {missing}: {done.stderr[-2000:]}"
+    if trap.code == 2:
+        refusals = [line for line in done.stderr.splitlines() if not line.startswith("flash-calib: warning:")]
+        if len(refusals) != 1:
+            return f"not one sentence: {refusals}"
+        return "left a file behind" if out.exists() else ""
+    result = json.loads(out.read_text())
+    if result["exit_code"] != trap.code:
+        return f"the file says exit code {result['exit_code']}"
+    if trap.code == 3:
+        return ""
+    used = sum(view["used"] for view in result["views"])
+    if used != trap.used:
+        return f"used {used} views, expected {trap.used}: {[v['reason'] for v in result['views'] if not v['used']]}"
+    off = far_off(result, read_poses(folder / "truth/X_and_Z.tum")[0])
+    return f"off by {off:.1f} standard deviations" if off > SIGMAS else ""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--calib", required=True, help="the program flash-calib")
+    parser.add_argument("--draw", required=True, help="the program rendered_dataset")
+    parser.add_argument("--only", default="", help="traps whose name has this")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as temporary:
+        work = pathlib.Path(temporary)
+        draw(options.draw, work)
+        chosen = [trap for trap in traps() if options.only in trap.name]
+        failed = 0
+        for trap in chosen:
+            wrong = complaint(trap, options.calib, work)
+            failed += bool(wrong)
+            if wrong:
+                print(f"{trap.name}: {wrong}", flush=True)
+        print(f"{len(chosen) - failed} of {len(chosen)} traps handled, or refused in one sentence that names the cause")
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
