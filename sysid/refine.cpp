@@ -82,6 +82,24 @@ double share_of_interval(const SolverShift& shift, const GridVerdict& verdict,
   return share;
 }
 
+/// How far the intervals reach into the cells of the grid around the estimate: 1 where one of them fills half
+/// its cell, over which an error of interpolation can be another.
+double share_of_cell(const GridVerdict& verdict, const std::vector<Axis>& axes) {
+  double share = 0;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const std::vector<double>& values = axes[k].values;
+    if (values.size() < 2) continue;
+    const auto above =
+        std::upper_bound(values.begin() + 1, values.end() - 1, *verdict.parameters[k].estimate);
+    const auto [low, high] = *verdict.parameters[k].interval95;
+    const auto width = [&](double from, double to) {
+      return axes[k].logarithmic ? std::log(to / from) : to - from;
+    };
+    share = std::max(share, width(low, high) / width(*(above - 1), *above));
+  }
+  return std::min(1.0, share);
+}
+
 }  // namespace
 
 std::optional<Refined> refine(const GridResults& results, const GridVerdict& whole,
@@ -130,13 +148,16 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
     const SolverCheck itself = compare_solutions("estimate_itself", sensitivity, on_model,
                                                  sensitivity.motions, on_model, simulated, grid);
     refined.interpolation = std::abs(itself.score - found.verdict.estimate_score);
-    error.remainders = {shift_of(itself, grid.axes)};
+    error.remainders.resize(round == 0 ? 1 : 2);
+    error.remainders.back() = shift_of(itself, grid.axes);
     refined.checks = {itself};
     if (share_of_interval(error.remainders.front(), found.verdict, grid.axes) < kEnough) break;
     if (round + 1 < kRounds)
       for (std::size_t r = 0; r < replays.size(); ++r) (*models)[r].model.correct(differences[r]);
   }
   if (refined.checks.front().score > whole.score) return std::nullopt;
+  // Away from the estimate the correction wears off.
+  if (error.remainders.size() > 1) error.remainders.front() *= share_of_cell(found.verdict, grid.axes);
 
   if (solver_check) {
     std::vector<SolverCheck> steps =

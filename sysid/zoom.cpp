@@ -57,7 +57,8 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
       const double edge = extent[k][static_cast<std::size_t>(side)];
       const bool open = std::abs(end - edge) < 1e-9 * width;
       const bool more = std::abs(edge - range[static_cast<std::size_t>(side)]) > 1e-9 * width;
-      reach = std::max(reach, open && more ? width : std::abs(end - best));
+      // An open end: half as much again; more would lose what the last extents told.
+      reach = std::max(reach, open && more ? 0.75 * width / kRoom : std::abs(end - best));
       fits = fits && !(open && more);
     }
     const double half = std::max(kRoom * reach, spacing);
@@ -110,7 +111,7 @@ GridResults score_models(const std::vector<ModelledReplay>& models, const std::v
 Zoomed zoom(const std::vector<ModelledReplay>& models, double share,
             const std::vector<std::array<double, 2>>& start, const GridSettings& settings,
             std::optional<double> repeatability) {
-  constexpr int kRounds = 12;
+  constexpr int kRounds = 16;
   Extent extent;
   for (std::size_t k = 0; k < settings.axes.size(); ++k)
     extent.push_back({coordinate(settings.axes[k], start[k][0]), coordinate(settings.axes[k], start[k][1])});

@@ -102,5 +102,17 @@ TEST(MotionModel, IsTheFinerSimulationWhereThatWasMade) {
     }
 }
 
+TEST(MotionModel, ACorrectionMovesEveryMotionAndAddsUp) {
+  const std::vector<Axis> axes = {parse_axis("friction", "0.1,0.5,0.9")};
+  const Motion still{0, 0.1, {data::Points::Zero(3, 3)}, {}};
+  MotionModel model(MotionSurface(axes, {still, still, still}));
+  Motion shift = still;
+  shift.positions[0].setConstant(0.25);
+  model.correct(shift);
+  model.correct(shift);
+  for (const Motion& motion : {model.at({0.2}, 0), model.slice(0.7).at({}, 1)})
+    EXPECT_EQ(motion.positions[0], data::Points::Constant(3, 3, 0.5));
+}
+
 }  // namespace
 }  // namespace flash::sysid
