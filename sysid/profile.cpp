@@ -195,16 +195,14 @@ WholeProfile whole_profile(const ParameterFinding& part, const GridVerdict* whol
                            double least) {
   if (whole == nullptr) return {part.values, part.scores, least};
   const ParameterFinding& all = whole->parameters[k];
-  WholeProfile profile{{}, {}, whole->estimate_score};
-  // Scores of the whole and of the part are not of the same mesh: each rises from its own least.
-  const double raise = whole->estimate_score - least;
+  WholeProfile profile{{}, {}, least};
   const auto add = [&](double value, double score) {
     profile.values.push_back(value);
     profile.scores.push_back(score);
   };
   std::size_t i = 0;
   for (; i < all.values.size() && all.values[i] < part.values.front(); ++i) add(all.values[i], all.scores[i]);
-  for (std::size_t j = 0; j < part.values.size(); ++j) add(part.values[j], part.scores[j] + raise);
+  for (std::size_t j = 0; j < part.values.size(); ++j) add(part.values[j], part.scores[j]);
   for (; i < all.values.size(); ++i)
     if (all.values[i] > part.values.back()) add(all.values[i], all.scores[i]);
   return profile;

@@ -43,7 +43,8 @@ struct ProfileSettings {
   SolverError solver;
   std::vector<Eigen::MatrixXd> information{};  ///< of each weighing keyframe (keyframe_information); empty:
                                                ///< all count alike
-  const GridVerdict* whole = nullptr;  ///< over the whole range searched, where the grid is a part of it
+  const GridVerdict* whole =
+      nullptr;  ///< profiles up to the ends of the range, where the grid is a part of it
 };
 
 /// Profile likelihood with the keyframe, not the point, as the sample. The score is interpolated between the

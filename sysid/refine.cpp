@@ -100,6 +100,28 @@ double share_of_cell(const GridVerdict& verdict, const std::vector<Axis>& axes) 
   return std::min(1.0, share);
 }
 
+/// The profile of every parameter at the two ends of its range: the rest searched anew with it held there.
+GridVerdict verdict_at_ends(const std::vector<ModelledReplay>& models, double share, const Zoomed& found,
+                            const GridSettings& grid, std::optional<double> repeatability) {
+  GridVerdict verdict = found.verdict;
+  for (std::size_t k = 0; k < grid.axes.size(); ++k) {
+    ParameterFinding& finding = verdict.parameters[k];
+    finding.values = grid.axes[k].values;
+    finding.scores.assign(finding.values.size(), found.verdict.estimate_score);
+    if (finding.values.size() < 2) continue;
+    finding.values = {grid.axes[k].values.front(), grid.axes[k].values.back()};
+    finding.scores.clear();
+    for (const double end : finding.values) {
+      GridSettings held = grid;
+      held.axes[k].values = {end};
+      Extent extent = extent_of(found.results);
+      extent[k] = {end, end};
+      finding.scores.push_back(zoom(models, share, extent, held, repeatability).verdict.estimate_score);
+    }
+  }
+  return verdict;
+}
+
 }  // namespace
 
 std::optional<Refined> refine(const GridResults& results, const GridVerdict& whole,
@@ -114,8 +136,6 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
 
   const CandidateResult& best = results.candidates[static_cast<std::size_t>(whole.best)];
   Zoomed found = zoom(*models, kOwn, cells_around(best, grid.axes), grid, repeatability);
-  GridVerdict own = whole;
-  own.estimate_score = found.verdict.estimate_score;
   const double share = finer ? kLimit : kOwn;
   std::vector<Replay> on_model;
   for (const ModelledReplay& model : *models) on_model.push_back(model.replay);
@@ -167,22 +187,20 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
       refined.checks.push_back(std::move(check));
     }
   }
-  const auto raises = [&](const SolverCheck& check) {
-    error.score = std::max(error.score, std::hypot(whole.score, check.surface_change_m) - whole.score);
-  };
-  for (const SolverCheck& check : refined.checks) raises(check);
   if (finer) {
     const std::vector<ReplayResult> own_motions = modelled(*models, estimate, kOwn),
                                     finer_motions = modelled(*models, estimate, kFiner);
     const SolverCheck left =
         compare_solutions("", sensitivity, on_model, finer_motions, on_model, sensitivity.motions, grid);
     error.remainders.push_back(shift_of(left, grid.axes));
-    raises(left);
     refined.checks.push_back(
         compare_solutions("double_mesh", sensitivity, on_model, own_motions, on_model, finer_motions, grid));
   }
 
-  const GridVerdict verdict = profile_grid(found.results, {repeatability, error, found.information, &own});
+  for (const SolverCheck& check : refined.checks)
+    error.score = std::max(error.score, std::hypot(whole.score, check.surface_change_m) - whole.score);
+  const GridVerdict ends = verdict_at_ends(*models, share, found, grid, repeatability);
+  const GridVerdict verdict = profile_grid(found.results, {repeatability, error, found.information, &ends});
   refined.verdict = whole;
   refined.verdict.parameters = verdict.parameters;
   refined.verdict.estimate = verdict.estimate;

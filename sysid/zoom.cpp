@@ -20,7 +20,7 @@ std::array<double, 2> range_of(const Axis& axis) {
 int points_per_axis(const std::vector<Axis>& axes) {
   const auto searched =
       std::count_if(axes.begin(), axes.end(), [](const Axis& axis) { return axis.values.size() > 1; });
-  constexpr std::array<int, 5> kPoints = {1, 17, 7, 5, 5};
+  constexpr std::array<int, 5> kPoints = {1, 17, 9, 7, 5};
   return kPoints[static_cast<std::size_t>(std::min<std::ptrdiff_t>(searched, 4))];
 }
 
@@ -43,6 +43,7 @@ std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searc
 /// The next extent; the same where the last one fits.
 Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::vector<Axis>& axes) {
   constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most
+  constexpr double kSmallest = 1e-4;      // half extent over the range
   Extent next = extent;
   bool fits = true;
   for (std::size_t k = 0; k < axes.size(); ++k) {
@@ -61,7 +62,7 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
       reach = std::max(reach, open && more ? 0.75 * width / kRoom : std::abs(end - best));
       fits = fits && !(open && more);
     }
-    const double half = std::max(kRoom * reach, spacing);
+    const double half = std::max({kRoom * reach, spacing, kSmallest * (range[1] - range[0])});
     next[k] = {std::max(range[0], best - half), std::min(range[1], best + half)};
     fits = fits && width < 1.001 * kMost / kRoom * (next[k][1] - next[k][0]);
   }
