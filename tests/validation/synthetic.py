@@ -5,7 +5,7 @@ import math
 import random
 
 # A strip lifted by its end: it bends to a cylinder, so that halving the cell quarters the error. (A towel held by a square
-# patch at its corner bends to a cone at the patch's corner, whose core no mesh resolves: see docs/validation.md.)
+# patch at its corner bends to a cone at the patch's corner, whose core no mesh resolves: see docs/theory.md.)
 ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.05:0.00625", "element_type": "TRIANGLE",
          "mechanical_props": {"areal_density": 0.2, "young": 10.0, "poisson": 0.3, "constitutive": "TRI_COROTATED",
                               "bending_rigidity": 2e-4, "friction": 0.3}}
