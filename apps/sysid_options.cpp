@@ -72,6 +72,8 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
       .add_option("--grasp-within", options.grasp_within,
                   "Size of the grasped patch in place of the recording's [m]")
       ->check(CLI::PositiveNumber);
+  group.add_flag("--clamp-slopes", options.clamp_slopes,
+                 "A clamped patch does not bend: it holds the sheet's slope as well as its place");
   group.add_option("--from", options.from, "Keyframes before do not count [s]");
   group.add_option("--to", options.to, "Keyframes after do not count [s]");
   group.add_option("--distance", options.distance, "How point distances become one number")
@@ -95,6 +97,7 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
   settings.solver.tolerance = options.tolerance;
   settings.mesh = options.mesh;
   settings.threads = threads;
+  settings.clamp_slopes = options.clamp_slopes;
   if (options.grasp_within > 0) settings.grasp_within = options.grasp_within;
   if (options.grasp_shape == "clamp") settings.grasp_shape = data::GraspShape::clamp;
   if (options.grasp_shape == "point") settings.grasp_shape = data::GraspShape::point;

@@ -30,6 +30,7 @@ struct ReplayOptions {
   double tolerance = 1e-3;
   std::string grasp_shape;
   double grasp_within = 0;  ///< 0: the recording's
+  bool clamp_slopes = false;
   double from = 0, to = 0;
   std::string distance = "trimmed";
   double trim = 0.05, huber = 0.02;

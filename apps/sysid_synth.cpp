@@ -179,6 +179,8 @@ void add_synth_verb(CLI::App& app, Action& action) {
       ->expected(3);
   verb->add_option("--time-offset", synth.time_offset, "Error of the camera's clock [s]")
       ->capture_default_str();
+  verb->add_flag("--clamp-slopes", synth.clamp_slopes,
+                 "The grasped patch does not bend: it holds the sheet's slope as well as its place");
   verb->add_flag("--forces", synth.forces, "Record the gripper's force too");
   verb->add_flag("--no-gripper", options->no_gripper, "The gripper hides nothing");
   verb->add_option("--time-step", options->solver.time_step, "[s]")

@@ -145,8 +145,10 @@ MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio) {
   Eigen::Matrix3d rigidity;  // on (k11, k22, k12)
   rigidity << 1, poissons_ratio, 0, poissons_ratio, 1, 0, 0, 0, 2 * (1 - poissons_ratio);
   Triplets xx, xe, ee;
+  constexpr double kStiff = 1e4;  // times the rigidity: its slopes follow its vertices to that share
   for (std::size_t t = 0; t < sheet.triangles.size(); ++t) {
     const RestTriangle& triangle = sheet.triangles[t];
+    const double area = triangle.area / (triangle.stiff ? kStiff : 1.0);
     Eigen::Matrix3d by_vertex = Eigen::Matrix3d::Zero(),
                     by_edge;  // A times the curvature: columns are unknowns
     for (int i = 0; i < 3; ++i) {
@@ -163,9 +165,9 @@ MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio) {
           sign * length *
           Eigen::Vector3d(outward.x() * outward.x(), outward.y() * outward.y(), outward.x() * outward.y());
     }
-    const Eigen::Matrix3d element_xx = by_vertex.transpose() * rigidity * by_vertex / triangle.area;
-    const Eigen::Matrix3d element_xe = by_vertex.transpose() * rigidity * by_edge / triangle.area;
-    const Eigen::Matrix3d element_ee = by_edge.transpose() * rigidity * by_edge / triangle.area;
+    const Eigen::Matrix3d element_xx = by_vertex.transpose() * rigidity * by_vertex / area;
+    const Eigen::Matrix3d element_xe = by_vertex.transpose() * rigidity * by_edge / area;
+    const Eigen::Matrix3d element_ee = by_edge.transpose() * rigidity * by_edge / area;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         xx.emplace_back(triangle.vertices[i], triangle.vertices[j], element_xx(i, j));

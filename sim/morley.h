@@ -20,6 +20,8 @@ struct MorleyPlate {
 
 /// Morley 1968; quadratic per triangle with constant curvature
 /// k = 1/A sum_e n (l_e n theta_e + t (x_b - x_a))^T, energy A/2 [nu |k11 + k22|^2 + (1 - nu) |k|^2].
+/// Where a clamp holds all vertices of stiff triangles, its border keeps its slope too; with the places of
+/// the vertices alone it would turn within a cell, an error of first order.
 /// Throws data::InputError unless the rest shape is flat to 1e-6 of its size and -1 < nu < 1.
 MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio);
 

@@ -11,6 +11,7 @@ struct RestTriangle {
   Eigen::Vector3i vertices;
   Eigen::Matrix2d inverse_edges;  ///< inverse of the 2 x 2 matrix of rest edges (x1 - x0, x2 - x0) [1/m]
   double area;                    ///< [m^2]
+  bool stiff = false;             ///< inside a clamp: does not bend (plate only)
 };
 
 /// What all environments of one mesh share: the rest shape, never a material.

@@ -93,6 +93,7 @@ std::string grasps_hash(const Replay& replay) {
       hash.add(value);
     }
     hash.add_matrix(grasp.direction);
+    if (replay.settings.clamp_slopes) hash.add("slopes");
   }
   return hash.text();
 }

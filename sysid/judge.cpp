@@ -6,6 +6,7 @@
 #include "data/text.h"
 #include "sysid/predictability.h"
 #include "sysid/profile.h"
+#include "sysid/refine.h"
 #include "sysid/sensitivity.h"
 #include "sysid/solver_check.h"
 #include "sysid/summarize.h"
@@ -43,7 +44,14 @@ Summary judge(GridResults& results, std::vector<Replay>& replays, const GridSett
   }
   std::vector<SolverCheck> checks;
   SolverError error;
-  if (settings.solver_check) {
+  std::optional<Refined> refined;
+  if (!grid.rollouts.empty())
+    refined = refine(results, verdict, replays, grid, settings.repeatability, settings.solver_check);
+  if (refined) {
+    verdict = refined->verdict;
+    checks = std::move(refined->checks);
+    error.interpolation = refined->interpolation;
+  } else if (settings.solver_check) {
     checks = check_solver(replays, grid, values());
     if (!checks.empty()) error.interpolation = std::abs(checks.front().score - verdict.estimate_score);
     for (const SolverCheck& check : checks) {

@@ -109,6 +109,15 @@ ObservedPlaces::ObservedPlaces(const Replay& replay, const Motion& motion, const
   }
 }
 
+std::vector<Eigen::Index> ObservedPlaces::rows_of_keyframes() const {
+  std::vector<Eigen::Index> counts;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (i == 0 || places_[i].observation != places_[i - 1].observation) counts.push_back(0);
+    ++counts.back();
+  }
+  return counts;
+}
+
 Eigen::VectorXd ObservedPlaces::residuals() const {
   Eigen::VectorXd rows(this->rows());
   for (Eigen::Index i = 0; i < rows.size(); ++i) {

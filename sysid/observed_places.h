@@ -22,6 +22,9 @@ class ObservedPlaces {
 
   Eigen::Index rows() const { return static_cast<Eigen::Index>(places_.size()); }
 
+  /// Rows of each weighing keyframe, in order.
+  std::vector<Eigen::Index> rows_of_keyframes() const;
+
   /// How far each observation stands from its place, along the direction [m].
   Eigen::VectorXd residuals() const;
 

@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "data/text.h"
+#include "sysid/few_samples.h"
 #include "sysid/score_surface.h"
 
 namespace flash::sysid {
@@ -31,12 +32,13 @@ struct ProfilePoint {
 struct Sampling {
   const ScoreSurface& surface;
   std::optional<double> repeatability;
-  Eigen::VectorXd best;         ///< coordinates of the estimate
-  double best_score = 0;        ///< [m]
-  Eigen::VectorXd best_scores;  ///< of the samples [m]
-  Eigen::MatrixXd gradients;    ///< of the samples at the estimate
-  double quantile = 0;          ///< Student's
-  double interpolation = 0;     ///< error of a score [m]
+  Eigen::VectorXd best;           ///< coordinates of the estimate
+  double best_score = 0;          ///< [m]
+  Eigen::VectorXd best_scores;    ///< of the samples [m]
+  Eigen::MatrixXd gradients;      ///< of the samples at the estimate
+  double quantile = 0;            ///< Student's, all keyframes counting alike
+  double interpolation = 0;       ///< error of a score [m]
+  std::vector<FewSamples> few{};  ///< one an axis; empty: all keyframes count alike
 
   int recordings() const { return surface.recordings().empty() ? 0 : 1 + surface.recordings().back(); }
 };
@@ -66,7 +68,7 @@ double variance_of_mean(const Sampling& sampling, const Eigen::VectorXd& values,
     // A single keyframe has no scatter of its own: it is taken with the rest.
     const double centre = count > 1 ? stratum / total : mean;
     for_each([&](Eigen::Index k) { squares += std::pow(weights[k] * (values[k] - centre), 2); });
-    if (count > 1) squares *= count / (count - 1.0);
+    if (count > 1 && sampling.few.empty()) squares *= count / (count - 1.0);
     sum += squares;
     means.push_back(stratum / total);
     variances.push_back(squares / (total * total));
@@ -86,13 +88,19 @@ double birge_ratio(const Sampling& sampling, const Eigen::VectorXd& direction) {
   return std::max(1.0, sum / static_cast<double>(means.size() - 1));
 }
 
-double chi_squared(const Sampling& sampling, const ProfilePoint& point) {
+/// `axis`: whose profile the point is of; none: of no one's.
+double chi_squared(const Sampling& sampling, const ProfilePoint& point, std::optional<std::size_t> axis) {
   const Eigen::VectorXd rises = sampling.surface.scores(point.x) - sampling.best_scores;
   const double rise = std::max(0.0, sampling.surface.weights().dot(rises) - sampling.interpolation);
   std::vector<double> means, variances;
-  const double variance =
+  double variance =
       variance_of_mean(sampling, rises, means, variances) * birge_ratio(sampling, point.x - sampling.best);
-  const double scaled = kNormalQuantile / sampling.quantile;
+  double quantile = sampling.quantile;
+  if (axis && !sampling.few.empty()) {
+    variance *= sampling.few[*axis].variance;
+    quantile = student_quantile(std::max(1.0, sampling.few[*axis].freedom));
+  }
+  const double scaled = kNormalQuantile / quantile;
   double chi2 = 0;
   if (rise > 0) chi2 = variance > 0 ? 4 * rise * rise / variance * scaled * scaled : kInfinity;
   if (sampling.repeatability) {
@@ -176,15 +184,37 @@ double crossing(const ProfilePoint& inside, const ProfilePoint& outside, Eigen::
 
 std::string millimetres(double metres) { return data::format_short(1000 * metres) + " mm"; }
 
-std::string note_of(const ParameterFinding& finding, const std::vector<ProfilePoint>& profile,
-                    const Sampling& sampling, bool unconverged) {
+/// The profile over the whole range searched.
+struct WholeProfile {
+  std::vector<double> values, scores;  // [m]
+  double least = 0;                    // score [m]
+};
+
+/// `part` itself or, where it is one, its points and around it those of the whole.
+WholeProfile whole_profile(const ParameterFinding& part, const GridVerdict* whole, std::size_t k,
+                           double least) {
+  if (whole == nullptr) return {part.values, part.scores, least};
+  const ParameterFinding& all = whole->parameters[k];
+  WholeProfile profile{{}, {}, least};
+  const auto add = [&](double value, double score) {
+    profile.values.push_back(value);
+    profile.scores.push_back(score);
+  };
+  std::size_t i = 0;
+  for (; i < all.values.size() && all.values[i] < part.values.front(); ++i) add(all.values[i], all.scores[i]);
+  for (std::size_t j = 0; j < part.values.size(); ++j) add(part.values[j], part.scores[j]);
+  for (; i < all.values.size(); ++i)
+    if (all.values[i] > part.values.back()) add(all.values[i], all.scores[i]);
+  return profile;
+}
+
+std::string note_of(const ParameterFinding& finding, double least, bool unconverged) {
   std::string note;
   const auto add = [&](const std::string& sentence) { note += (note.empty() ? "" : "; ") + sentence; };
   if (finding.identifiable == Identifiable::no) {
-    const auto highest = std::max_element(profile.begin(), profile.end(),
-                                          [](const auto& a, const auto& b) { return a.score < b.score; });
+    const double highest = *std::max_element(finding.scores.begin(), finding.scores.end());
     add("no value searched is excluded: over the whole range the best score rises by " +
-        millimetres(highest->score - sampling.best_score) +
+        millimetres(highest - least) +
         ", less than scatter of the keyframes and error of the solver explain: not identifiable");
   }
   if (finding.identifiable == Identifiable::lower_bound)
@@ -198,18 +228,19 @@ std::string note_of(const ParameterFinding& finding, const std::vector<ProfilePo
 }
 
 ParameterFinding find_parameter(const GridResults& results, std::size_t k, const Sampling& sampling,
-                                std::vector<ProfilePoint> profile, const SolverError& solver) {
+                                std::vector<ProfilePoint> profile, const ProfileSettings& settings) {
   const ScoreSurface& surface = sampling.surface;
+  const SolverError& solver = settings.solver;
   const auto axis = static_cast<Eigen::Index>(k);
   const Eigen::VectorXd& knots = surface.knots(k);
-  const double first = knots[0], end = knots[knots.size() - 1], best = sampling.best[axis];
+  const double best = sampling.best[axis];
   ParameterFinding finding;
   finding.name = results.axes[k].name;
   finding.logarithmic = results.axes[k].logarithmic;
   std::size_t low = 0, high = 0;  // the outermost points inside; the estimate is one of them
   bool found = false;
   for (std::size_t i = 0; i < profile.size(); ++i) {
-    profile[i].chi2 = profile[i].x[axis] == best ? 0 : chi_squared(sampling, profile[i]);
+    profile[i].chi2 = profile[i].x[axis] == best ? 0 : chi_squared(sampling, profile[i], k);
     finding.values.push_back(surface.value(k, profile[i].x[axis]));
     finding.scores.push_back(profile[i].score);
     if (profile[i].chi2 > kLimit) continue;
@@ -221,35 +252,48 @@ ParameterFinding find_parameter(const GridResults& results, std::size_t k, const
   finding.values.back() = results.axes[k].values.back();
   finding.estimate = std::clamp(surface.value(k, best), finding.values.front(), finding.values.back());
 
-  double below = low > 0 ? crossing(profile[low], profile[low - 1], axis) : first;
-  double above = high + 1 < profile.size() ? crossing(profile[high], profile[high + 1], axis) : end;
+  double below = low > 0 ? crossing(profile[low], profile[low - 1], axis) : knots[0];
+  double above =
+      high + 1 < profile.size() ? crossing(profile[high], profile[high + 1], axis) : knots[knots.size() - 1];
+  double squares = 0;
+  for (const SolverShift& remainder : solver.remainders) squares += remainder[axis] * remainder[axis];
+  below = best - std::sqrt(std::pow(best - below, 2) + squares);
+  above = best + std::sqrt(std::pow(above - best, 2) + squares);
   for (const SolverShift& shift : solver.shifts) {
     below -= std::max(0.0, shift[axis]);
     above += std::max(0.0, -shift[axis]);
   }
-  const auto rises = [&](std::size_t from, std::size_t to) {
-    const auto begin = profile.begin();
-    return std::any_of(begin + static_cast<std::ptrdiff_t>(from), begin + static_cast<std::ptrdiff_t>(to),
-                       [&](const auto& point) {
-                         return point.score - sampling.best_score > solver.score + solver.interpolation;
-                       });
+  const double error = solver.score + solver.interpolation;
+  const WholeProfile whole = whole_profile(finding, settings.whole, k, sampling.best_score);
+  const auto rises = [&](double from, double to) {
+    for (std::size_t i = 0; i < whole.values.size(); ++i)
+      if (whole.values[i] >= from && whole.values[i] <= to && whole.scores[i] - whole.least > error)
+        return true;
+    return false;
   };
-  const bool closed_below = low > 0 && below > first && rises(0, low);
-  const bool closed_above = high + 1 < profile.size() && above < end && rises(high + 1, profile.size());
-  finding.interval95 = {closed_below ? surface.value(k, below) : finding.values.front(),
-                        closed_above ? surface.value(k, above) : finding.values.back()};
+  const double first = whole.values.front(), end = whole.values.back();
+  const bool closed_below =
+      low > 0 && below > surface.coordinate(k, first) && rises(first, finding.values[low - 1]);
+  const bool closed_above =
+      high + 1 < profile.size() && above < surface.coordinate(k, end) && rises(finding.values[high + 1], end);
+  finding.interval95 = {closed_below ? surface.value(k, below) : first,
+                        closed_above ? surface.value(k, above) : end};
+  finding.values = whole.values;
+  finding.scores = whole.scores;
   bool unconverged = false;
   if (profile.size() > 1) {
     finding.identifiable = closed_below && closed_above ? Identifiable::yes
                            : closed_above               ? Identifiable::upper_bound
                            : closed_below               ? Identifiable::lower_bound
                                                         : Identifiable::no;
-    finding.edge = best <= first ? RangeEdge::low : best >= end ? RangeEdge::high : RangeEdge::none;
+    finding.edge = best <= surface.coordinate(k, first) ? RangeEdge::low
+                   : best >= surface.coordinate(k, end) ? RangeEdge::high
+                                                        : RangeEdge::none;
     const auto least = std::min_element(results.candidates.begin(), results.candidates.end(),
                                         [](const auto& a, const auto& b) { return a.score < b.score; });
     unconverged = least->status != CandidateStatus::ok;
   }
-  finding.note = note_of(finding, profile, sampling, unconverged);
+  finding.note = note_of(finding, whole.least, unconverged);
   return finding;
 }
 
@@ -292,7 +336,7 @@ double equivalent_sigma(const GridResults& results, const Sampling& sampling) {
   for (const CandidateResult& candidate : results.candidates) {
     if (!std::isfinite(candidate.score)) continue;
     ProfilePoint point{coordinates_of(sampling.surface, candidate), candidate.score, 0};
-    const double chi2 = chi_squared(sampling, point);
+    const double chi2 = chi_squared(sampling, point, std::nullopt);
     const double squares = candidate.score * candidate.score - sampling.best_score * sampling.best_score;
     if (!(chi2 > 0) || squares <= 0 || std::abs(std::log(chi2 / kLimit)) >= nearest) continue;
     nearest = std::abs(std::log(chi2 / kLimit));
@@ -303,10 +347,15 @@ double equivalent_sigma(const GridResults& results, const Sampling& sampling) {
 
 }  // namespace
 
-double student_quantile(int freedom) {
+double student_quantile(double freedom) {
   constexpr std::array<double, 4> kFew = {12.706, 4.303, 3.182, 2.776};
   if (freedom < 1) return kInfinity;
-  if (freedom <= 4) return kFew[static_cast<std::size_t>(freedom) - 1];
+  if (freedom <= 4) {
+    const double below = std::min(std::floor(freedom), 3.0), above = below + 1;
+    const auto at = static_cast<std::size_t>(below);
+    const double share = (1 / below - 1 / freedom) / (1 / below - 1 / above);
+    return std::pow(kFew[at - 1], 1 - share) * std::pow(kFew[at], share);
+  }
   const double z = kNormalQuantile, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z, n = freedom;
   return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) +
          (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
@@ -314,6 +363,11 @@ double student_quantile(int freedom) {
 
 GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability,
                          const SolverError& solver) {
+  return profile_grid(results, {repeatability, solver});
+}
+
+GridVerdict profile_grid(const GridResults& results, const ProfileSettings& settings) {
+  const std::optional<double> repeatability = settings.repeatability;
   GridVerdict verdict;
   const std::vector<const CandidateResult*> order = ranked(results);
   verdict.score = kInfinity;
@@ -323,7 +377,7 @@ GridVerdict profile_grid(const GridResults& results, std::optional<double> repea
 
   const ScoreSurface surface(results);
   const std::vector<bool> all(results.axes.size(), true);
-  Sampling sampling{surface, repeatability, {}, kInfinity, {}, {}, 0, solver.interpolation};
+  Sampling sampling{surface, repeatability, {}, kInfinity, {}, {}, 0, settings.solver.interpolation};
   constexpr std::size_t kStarts = 5;
   const auto try_from = [&](Eigen::VectorXd x) {
     const double score = surface.minimize(all, x);
@@ -350,6 +404,8 @@ GridVerdict profile_grid(const GridResults& results, std::optional<double> repea
   }
   sampling.best_scores = surface.scores(sampling.best);
   sampling.gradients = surface.gradients(sampling.best);
+  if (!settings.information.empty())
+    sampling.few = few_samples(surface.weights().asDiagonal() * sampling.gradients, settings.information);
   verdict.keyframes = static_cast<int>(surface.weights().size());
   const auto searched = std::count_if(results.axes.begin(), results.axes.end(),
                                       [](const Axis& axis) { return axis.values.size() > 1; });
@@ -358,7 +414,7 @@ GridVerdict profile_grid(const GridResults& results, std::optional<double> repea
   verdict.estimate_score = sampling.best_score;
   verdict.estimate.resize(surface.parameters());
   for (std::size_t k = 0; k < results.axes.size(); ++k) {
-    verdict.parameters.push_back(find_parameter(results, k, sampling, std::move(profiles[k]), solver));
+    verdict.parameters.push_back(find_parameter(results, k, sampling, std::move(profiles[k]), settings));
     verdict.estimate[static_cast<Eigen::Index>(k)] = *verdict.parameters.back().estimate;
   }
   verdict.covariance_log = covariance_of(results, sampling);

@@ -34,6 +34,17 @@ struct SolverError {
   std::vector<SolverShift> shifts{};
   double score = 0;          ///< by which the displacement between two solutions raises a score [m]
   double interpolation = 0;  ///< by which the interpolated score is off at the estimate [m]
+  std::vector<SolverShift> remainders{};  ///< of which the size is known, not the sign
+};
+
+/// How a grid is judged.
+struct ProfileSettings {
+  std::optional<double> repeatability;  ///< trial-to-trial distance of a keyframe [m]
+  SolverError solver;
+  std::vector<Eigen::MatrixXd> information{};  ///< of each weighing keyframe (keyframe_information); empty:
+                                               ///< all count alike
+  const GridVerdict* whole =
+      nullptr;  ///< profiles up to the ends of the range, where the grid is a part of it
 };
 
 /// Profile likelihood with the keyframe, not the point, as the sample. The score is interpolated between the
@@ -53,14 +64,17 @@ struct SolverError {
 /// repeatability^2.
 ///
 /// The interpolation is checked where it matters: D counts only by what it exceeds its error at the estimate.
-/// Each shift widens the interval to the side on which the better solution would have found the parameter. A
-/// side on which the profile nowhere rises by more than these errors excludes nothing.
-/// Verdict: excluded values on both sides "yes", on neither "no", only above "upper_bound", only
-/// below "lower_bound".
+/// `information` says how unequally keyframes tell a parameter; var(D) and t are then those of few_samples.
+/// Each shift widens the interval to the side on which the better solution would have found the parameter,
+/// each remainder to both, in quadrature. A side on which the profile nowhere rises by more than these errors
+/// excludes nothing. Verdict: excluded values on both sides "yes", on neither "no", only above "upper_bound",
+/// only below "lower_bound".
+GridVerdict profile_grid(const GridResults& results, const ProfileSettings& settings);
 GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability = {},
                          const SolverError& solver = {});
 
-/// 97.5 % quantile of Student's distribution (Abramowitz and Stegun 26.7.5 beyond 4 degrees of freedom).
-double student_quantile(int freedom);
+/// 97.5 % quantile of Student's distribution: Abramowitz and Stegun 26.7.5 beyond 4 degrees of freedom, below
+/// between tabulated ones, its logarithm linear in 1 / freedom. Infinite below one.
+double student_quantile(double freedom);
 
 }  // namespace flash::sysid

@@ -127,6 +127,20 @@ data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridg
   return targets;
 }
 
+void stiffen_clamped(Replay& replay) {
+  for (const data::RecordedGrasp& grasp : replay.recording.grasps) {
+    if (shape_of(grasp, replay.settings) != data::GraspShape::clamp || grasp.from > replay.beginning ||
+        !std::isinf(grasp.to))
+      continue;
+    std::vector<bool> held(static_cast<std::size_t>(replay.recording.mesh.vertices.rows()), false);
+    for (const int vertex : patch_of(replay, grasp, {})) held[static_cast<std::size_t>(vertex)] = true;
+    for (sim::RestTriangle& triangle : replay.sheet.triangles)
+      if (std::all_of(triangle.vertices.begin(), triangle.vertices.end(),
+                      [&](int vertex) { return held[static_cast<std::size_t>(vertex)]; }))
+        triangle.stiff = true;
+  }
+}
+
 Replay make_replay(const data::Recording& recording, const ReplaySettings& settings) {
   Replay replay;
   replay.recording = recording;
@@ -160,6 +174,7 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
     replay.beginning = std::min(replay.beginning, grasp.from);
     closes = closes || shape_of(grasp, settings) == data::GraspShape::pinch;
   }
+  if (settings.clamp_slopes) stiffen_clamped(replay);
   const double pre_roll = settings.pre_roll.value_or(closes ? 0.4 : 0.0);
   const double step = settings.solver.time_step;
   replay.start = replay.beginning - std::ceil(pre_roll / step - 1e-9) * step;

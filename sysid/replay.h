@@ -18,8 +18,9 @@ struct ReplaySettings {
   std::optional<double> pre_roll;  ///< simulated before the recording starts, gripper at its first pose;
                                    ///< absent: 0.4 where a grasp needs time to close, else 0 [s]
   double closing_time = 0.25;      ///< the fingers', within the pre-roll [s]
-  std::optional<data::GraspShape> grasp_shape;                   ///< in place of the recording's
-  std::optional<double> grasp_within;                            ///< in place of the recording's [m]
+  std::optional<data::GraspShape> grasp_shape;  ///< in place of the recording's
+  std::optional<double> grasp_within;           ///< in place of the recording's [m]
+  bool clamp_slopes = false;  ///< clamp, from the beginning to the end: the patch does not bend either
   double score_from = -std::numeric_limits<double>::infinity();  ///< keyframes before carry no weight [s]
   double score_to = std::numeric_limits<double>::infinity();     ///< keyframes after carry no weight [s]
   int min_points = 20;  ///< keyframes of fewer points carry no weight
@@ -68,6 +69,9 @@ struct Replay {
 
 /// Throws data::InputError where mesh, grasps or clouds cannot be used.
 Replay make_replay(const data::Recording& recording, const ReplaySettings& settings);
+
+/// Makes stiff the triangles inside patches that a clamp takes at the beginning and never lets go.
+void stiffen_clamped(Replay& replay);
 
 /// The simulated world of one candidate, before its first step.
 sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate);

@@ -121,6 +121,8 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
       bytes.add_matrix(grasp.gripper.poses[i].matrix());
     }
   }
+  for (const sim::RestTriangle& triangle : replay.sheet.triangles)
+    if (triangle.stiff) bytes.add_matrix(triangle.vertices);
   for (const bool step : wanted) bytes.add(static_cast<char>(step));
   return data::sha256(bytes.text());
 }

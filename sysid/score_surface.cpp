@@ -1,7 +1,6 @@
 #include "sysid/score_surface.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -9,63 +8,6 @@ namespace flash::sysid {
 namespace {
 
 constexpr double kLeastSquare = 1e-18;  // a nanometre squared: keeps the root's derivative finite
-
-/// The matrix that maps values at the knots to second derivatives there: cubic spline whose third derivative
-/// is continuous at the second and the last knot but one; a parabola through three knots, a line through two.
-Eigen::MatrixXd second_derivatives(const Eigen::VectorXd& x) {
-  const Eigen::Index n = x.size();
-  if (n < 3) return Eigen::MatrixXd::Zero(n, n);
-  Eigen::MatrixXd left = Eigen::MatrixXd::Zero(n, n), right = Eigen::MatrixXd::Zero(n, n);
-  for (Eigen::Index i = 1; i + 1 < n; ++i) {
-    const double below = x[i] - x[i - 1], above = x[i + 1] - x[i];
-    left(i, i - 1) = below / 6;
-    left(i, i) = (below + above) / 3;
-    left(i, i + 1) = above / 6;
-    right(i, i - 1) = 1 / below;
-    right(i, i) = -1 / below - 1 / above;
-    right(i, i + 1) = 1 / above;
-  }
-  if (n == 3) {
-    left(0, 0) = left(2, 2) = 1;
-    left(0, 1) = left(2, 1) = -1;
-  } else {
-    const auto no_knot = [&](Eigen::Index row, Eigen::Index i) {  // third derivative continuous at knot i
-      const double below = x[i] - x[i - 1], above = x[i + 1] - x[i];
-      left(row, i - 1) = above;
-      left(row, i) = -(below + above);
-      left(row, i + 1) = below;
-    };
-    no_knot(0, 1);
-    no_knot(n - 1, n - 2);
-  }
-  return left.partialPivLu().solve(right);
-}
-
-/// Weights of the values at the knots in the spline's value (derivative 0), slope (1) or curvature (2) at t.
-Eigen::RowVectorXd spline_weights(const Eigen::VectorXd& x, const Eigen::MatrixXd& second, double t,
-                                  int derivative) {
-  const Eigen::Index n = x.size();
-  Eigen::RowVectorXd weights = Eigen::RowVectorXd::Zero(n);
-  if (n == 1) {
-    weights[0] = derivative == 0 ? 1 : 0;
-    return weights;
-  }
-  const Eigen::Index i =
-      std::clamp<Eigen::Index>(std::upper_bound(x.data(), x.data() + n, t) - x.data() - 1, 0, n - 2);
-  const double h = x[i + 1] - x[i], b = (t - x[i]) / h, a = 1 - b;
-  if (derivative == 0) {
-    weights[i] = a;
-    weights[i + 1] = b;
-    weights += h * h / 6 * ((a * a * a - a) * second.row(i) + (b * b * b - b) * second.row(i + 1));
-  } else if (derivative == 1) {
-    weights[i] = -1 / h;
-    weights[i + 1] = 1 / h;
-    weights += h / 6 * ((1 - 3 * a * a) * second.row(i) + (3 * b * b - 1) * second.row(i + 1));
-  } else {
-    weights = a * second.row(i) + b * second.row(i + 1);
-  }
-  return weights;
-}
 
 }  // namespace
 
@@ -75,8 +17,7 @@ ScoreSurface::ScoreSurface(const GridResults& results) {
     Eigen::VectorXd knots(static_cast<Eigen::Index>(axis.values.size()));
     for (std::size_t i = 0; i < axis.values.size(); ++i)
       knots[static_cast<Eigen::Index>(i)] = axis.logarithmic ? std::log(axis.values[i]) : axis.values[i];
-    second_.push_back(second_derivatives(knots));
-    knots_.push_back(std::move(knots));
+    splines_.emplace_back(std::move(knots));
   }
   const auto candidates = static_cast<Eigen::Index>(results.candidates.size());
   const auto scored = std::find_if(results.candidates.begin(), results.candidates.end(),
@@ -123,10 +64,9 @@ double ScoreSurface::value(std::size_t k, double coordinate) const {
 
 Eigen::VectorXd ScoreSurface::contract(const Eigen::VectorXd& x, const std::vector<int>& derivatives) const {
   Eigen::VectorXd tensor = squares_;
-  for (std::size_t k = knots_.size(); k-- > 0;) {
-    const Eigen::Index size = knots_[k].size();
-    const Eigen::RowVectorXd weights =
-        spline_weights(knots_[k], second_[k], x[static_cast<Eigen::Index>(k)], derivatives[k]);
+  for (std::size_t k = splines_.size(); k-- > 0;) {
+    const Eigen::Index size = splines_[k].knots().size();
+    const Eigen::RowVectorXd weights = splines_[k].weights(x[static_cast<Eigen::Index>(k)], derivatives[k]);
     tensor = (weights * Eigen::Map<const Eigen::MatrixXd>(tensor.data(), size, tensor.size() / size))
                  .transpose()
                  .eval();
@@ -135,12 +75,12 @@ Eigen::VectorXd ScoreSurface::contract(const Eigen::VectorXd& x, const std::vect
 }
 
 Eigen::VectorXd ScoreSurface::scores(const Eigen::VectorXd& x) const {
-  const std::vector<int> none(knots_.size(), 0);
+  const std::vector<int> none(splines_.size(), 0);
   return contract(x, none).cwiseMax(0).cwiseSqrt();
 }
 
 Eigen::MatrixXd ScoreSurface::gradients(const Eigen::VectorXd& x) const {
-  std::vector<int> derivatives(knots_.size(), 0);
+  std::vector<int> derivatives(splines_.size(), 0);
   const Eigen::ArrayXd twice = 2 * contract(x, derivatives).cwiseMax(kLeastSquare).array().sqrt();
   Eigen::MatrixXd rows(weights_.size(), parameters());
   for (Eigen::Index i = 0; i < parameters(); ++i) {
@@ -154,7 +94,7 @@ Eigen::MatrixXd ScoreSurface::gradients(const Eigen::VectorXd& x) const {
 double ScoreSurface::score(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
                            Eigen::MatrixXd& hessian) const {
   const Eigen::Index n = parameters();
-  std::vector<int> derivatives(knots_.size(), 0);
+  std::vector<int> derivatives(splines_.size(), 0);
   const Eigen::ArrayXd squares = contract(x, derivatives).cwiseMax(kLeastSquare).array();
   const Eigen::ArrayXd roots = squares.sqrt();
   const Eigen::ArrayXd slope = 0.5 * weights_.array() / roots;
@@ -172,7 +112,7 @@ double ScoreSurface::score(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
       ++derivatives[static_cast<std::size_t>(i)];
       ++derivatives[static_cast<std::size_t>(j)];
       const Eigen::ArrayXd mixed = contract(x, derivatives).array();
-      derivatives.assign(knots_.size(), 0);
+      derivatives.assign(splines_.size(), 0);
       const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
       hessian(i, j) = hessian(j, i) = (slope * (mixed - 0.5 * first[a] * first[b] / squares)).sum();
     }
@@ -189,7 +129,7 @@ double ScoreSurface::minimize(const std::vector<bool>& free, Eigen::VectorXd& x)
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     std::vector<Eigen::Index> moving;
     for (Eigen::Index i = 0; i < x.size(); ++i) {
-      const Eigen::VectorXd& knots = knots_[static_cast<std::size_t>(i)];
+      const Eigen::VectorXd& knots = this->knots(static_cast<std::size_t>(i));
       const bool held =
           (x[i] <= knots[0] && gradient[i] > 0) || (x[i] >= knots[knots.size() - 1] && gradient[i] < 0);
       if (free[static_cast<std::size_t>(i)] && knots.size() > 1 && !held) moving.push_back(i);
@@ -207,7 +147,7 @@ double ScoreSurface::minimize(const std::vector<bool>& free, Eigen::VectorXd& x)
     const Eigen::VectorXd step = -factor.solve(Eigen::VectorXd(gradient(moving)));
     Eigen::VectorXd trial = x;
     for (std::size_t m = 0; m < moving.size(); ++m) {
-      const Eigen::VectorXd& knots = knots_[static_cast<std::size_t>(moving[m])];
+      const Eigen::VectorXd& knots = this->knots(static_cast<std::size_t>(moving[m]));
       trial[moving[m]] =
           std::clamp(x[moving[m]] + step[static_cast<Eigen::Index>(m)], knots[0], knots[knots.size() - 1]);
     }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sysid/grid_results.h"
+#include "sysid/spline.h"
 
 namespace flash::sysid {
 
@@ -18,8 +19,10 @@ class ScoreSurface {
   double coordinate(std::size_t k, double value) const;
   double value(std::size_t k, double coordinate) const;
 
-  Eigen::Index parameters() const { return static_cast<Eigen::Index>(knots_.size()); }
-  const Eigen::VectorXd& knots(std::size_t k) const { return knots_[k]; }  ///< coordinates of the axis
+  Eigen::Index parameters() const { return static_cast<Eigen::Index>(splines_.size()); }
+  const Eigen::VectorXd& knots(std::size_t k) const {
+    return splines_[k].knots();
+  }  ///< coordinates of the axis
 
   /// One sample a weighing keyframe of a recording: its share in the score and whose it is.
   const Eigen::VectorXd& weights() const { return weights_; }
@@ -42,9 +45,8 @@ class ScoreSurface {
   Eigen::VectorXd contract(const Eigen::VectorXd& x, const std::vector<int>& derivatives) const;
 
   std::vector<bool> logarithmic_;
-  std::vector<Eigen::VectorXd> knots_;
-  std::vector<Eigen::MatrixXd> second_;  // second derivatives of the spline at the knots, of the values there
-  Eigen::VectorXd squares_;              // last axis fastest, then the other axes, then samples
+  std::vector<Spline> splines_;
+  Eigen::VectorXd squares_;  // last axis fastest, then the other axes, then samples
   Eigen::VectorXd weights_;
   std::vector<int> recordings_;
 };

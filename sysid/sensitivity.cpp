@@ -1,6 +1,7 @@
 #include "sysid/sensitivity.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -40,9 +41,10 @@ ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettin
 }
 
 Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSettings& grid,
-                                const std::vector<double>& values, bool differentiate) {
+                                const std::vector<double>& values, bool differentiate,
+                                const MotionsAt& motions) {
   const std::size_t parameters = grid.axes.size();
-  std::vector<ReplayCandidate> candidates = {candidate_at(values, grid)};
+  std::vector<std::vector<double>> wanted = {values};
   std::vector<double> spacing(parameters);
   for (std::size_t k = 0; k < parameters && differentiate; ++k) {
     const Axis& axis = grid.axes[k];
@@ -51,13 +53,19 @@ Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSe
     low[k] = moved(axis, values[k], -step);
     high[k] = moved(axis, values[k], step);
     spacing[k] = coordinate(axis, high[k]) - coordinate(axis, low[k]);
-    candidates.push_back(candidate_at(low, grid));
-    candidates.push_back(candidate_at(high, grid));
+    wanted.push_back(low);
+    wanted.push_back(high);
   }
   std::vector<std::vector<ReplayResult>> runs;
   Sensitivity result;
-  for (const Replay& replay : replays) {
-    runs.push_back(run(replay, candidates));
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    if (motions) {
+      runs.push_back(motions(r, wanted));
+    } else {
+      std::vector<ReplayCandidate> candidates;
+      for (const std::vector<double>& each : wanted) candidates.push_back(candidate_at(each, grid));
+      runs.push_back(run(replays[r], candidates));
+    }
     result.motions.push_back(runs.back().front());
   }
   if (std::any_of(result.motions.begin(), result.motions.end(), [](const auto& m) { return !m.finite; }))
@@ -92,6 +100,21 @@ Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSe
   }
   result.nuisance.conservativeResize(Eigen::NoChange, columns);
   return result;
+}
+
+std::vector<Eigen::MatrixXd> keyframe_information(const Sensitivity& sensitivity) {
+  Eigen::MatrixXd rates = sensitivity.parameters;
+  if (sensitivity.nuisance.cols() > 0)
+    rates -= sensitivity.nuisance * sensitivity.nuisance.colPivHouseholderQr().solve(sensitivity.parameters);
+  std::vector<Eigen::MatrixXd> information;
+  Eigen::Index row = 0;
+  for (const ObservedPlaces& places : sensitivity.places)
+    for (const Eigen::Index count : places.rows_of_keyframes()) {
+      const auto rows = rates.middleRows(row, count);
+      information.emplace_back(rows.transpose() * rows);
+      row += count;
+    }
+  return information;
 }
 
 Eigen::VectorXd displacements(const Sensitivity& sensitivity, const std::vector<Replay>& replays,

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "sysid/grid_search.h"
@@ -19,12 +20,21 @@ struct Sensitivity {
                              ///< width of their bounds [m]
 };
 
+/// The motions of recording r at several sets of values, each one an axis.
+using MotionsAt =
+    std::function<std::vector<ReplayResult>(std::size_t r, const std::vector<std::vector<double>>& values)>;
+
 /// Central differences over one batch of environments a recording, one-sided at the end of a parameter's
 /// range: two rollouts a parameter and one at the values. `values`: one an axis of `grid.axes`; places are
 /// those of the registration fitted there. Without `differentiate` the motions and places alone; the columns
-/// are zero.
+/// are zero. `motions`: where they come from; without one they are simulated.
 Sensitivity measure_sensitivity(const std::vector<Replay>& replays, const GridSettings& grid,
-                                const std::vector<double>& values, bool differentiate = true);
+                                const std::vector<double>& values, bool differentiate = true,
+                                const MotionsAt& motions = {});
+
+/// By how much each keyframe tells the parameters: J^T J over its rows, what the registration explains taken
+/// out of J, for the weighing keyframes, recording after recording [m^2].
+std::vector<Eigen::MatrixXd> keyframe_information(const Sensitivity& sensitivity);
 
 /// Candidate of a search at values that need not be on the grid, one an axis.
 ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettings& grid);

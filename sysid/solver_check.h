@@ -1,7 +1,8 @@
 #pragma once
 #include <vector>
 
-#include "sysid/grid_search.h"
+#include "sysid/rollout_store.h"
+#include "sysid/sensitivity.h"
 #include "sysid/summary.h"
 
 namespace flash::sysid {
@@ -15,5 +16,20 @@ namespace flash::sysid {
 /// the finer ones do (see explain); a search of a recording made by the finer solver errs by as much.
 std::vector<SolverCheck> check_solver(const std::vector<Replay>& replays, const GridSettings& grid,
                                       const std::vector<double>& values);
+
+/// Half the step and four times the iterations at a candidate of the grid, from the store where it has them.
+/// `sensitivity` may be of another mesh and of values nearby.
+std::vector<SolverCheck> check_steps(const std::vector<Replay>& replays, const Sensitivity& sensitivity,
+                                     const GridSettings& grid, const std::vector<double>& values,
+                                     const RolloutStore& store);
+
+/// One entry: how far `finer_motions` are from `motions`, and the change of the parameters that explains it.
+SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensitivity,
+                              const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
+                              const std::vector<Replay>& finer,
+                              const std::vector<ReplayResult>& finer_motions, const GridSettings& grid);
+
+/// Extent of each axis, in the units of Sensitivity.
+Eigen::VectorXd ranges_of(const std::vector<Axis>& axes);
 
 }  // namespace flash::sysid

@@ -225,6 +225,8 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   replay.recording = synthetic.recording;
   replay.sheet = sim::make_sheet(mesh);
   replay.settings.solver = solver;
+  replay.settings.clamp_slopes = settings.clamp_slopes;
+  if (settings.clamp_slopes) stiffen_clamped(replay);
   replay.steps = static_cast<int>(std::ceil((settings.duration + settings.rest) / solver.time_step - 1e-9));
   const sim::Rollout rollout = std::move(
       sim::simulate(replay.sheet, {make_environment(replay, {material, {}})}, replay.steps, solver, 1)

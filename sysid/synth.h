@@ -32,8 +32,9 @@ struct SynthSettings {
   Eigen::Vector3d gripper_half_extents{0.012, 0.02,
                                        0.05};  ///< box above the grasp that hides cloth; zero: none [m]
   Eigen::Vector3d cloud_offset = Eigen::Vector3d::Zero();  ///< camera against robot: observed - true [m]
-  double time_offset = 0.0;  ///< true time of an observation labelled t is t + time_offset [s]
-  bool forces = false;       ///< record the gripper's force on the sheet
+  double time_offset = 0.0;   ///< true time of an observation labelled t is t + time_offset [s]
+  bool clamp_slopes = false;  ///< the grasped patch does not bend
+  bool forces = false;        ///< record the gripper's force on the sheet
   unsigned seed = 1;
 };
 

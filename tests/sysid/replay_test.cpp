@@ -165,5 +165,46 @@ TEST_F(Lift, FingerprintFollowsSettingsAndInputs) {
   EXPECT_NE(fingerprint({moved}, grid), key);
 }
 
+TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {
+  // A strip carried by its end; places held alone leave the slope to one cell: first order.
+  data::Recording recording;
+  recording.name = recording.source = "strip";
+  recording.has_table = true;
+  recording.keyframes = {};
+  data::RecordedGrasp grasp;
+  grasp.gripper = "gripper";
+  grasp.select.corner = {1, 1};
+  grasp.select.within = 0.0501;
+  recording.grasps = {grasp};
+  data::Trajectory& path = recording.trajectories["gripper"];
+  for (int i = 0; i <= 30; ++i) {
+    path.times.push_back(0.01 * i);
+    path.poses.emplace_back(Eigen::Translation3d(0.175, 0.025, 0.04 * i / 30));
+  }
+  data::SheetMaterial material;
+  material.membrane_stiffness = 30;
+  material.bending_rigidity = 2e-4;
+  const auto height = [&](double cell, bool slopes) {  // of the middle of the strip, in the end
+    Replay replay;
+    replay.recording = recording;
+    replay.recording.mesh = data::parse_mesh_spec("sheet:0.2x0.05:" + std::to_string(cell));
+    replay.recording.start = replay.recording.mesh.vertices;
+    replay.sheet = sim::make_sheet(replay.recording.mesh);
+    if (slopes) stiffen_clamped(replay);
+    replay.steps = 30;
+    const data::Points& last = run(replay, {{material, {}}}).front().motion.positions.back();
+    for (Eigen::Index i = 0; i < last.rows(); ++i)
+      if ((replay.recording.mesh.vertices.row(i) - Eigen::RowVector3d(0.1, 0, 0)).norm() < 1e-9)
+        return last(i, 2);
+    return 0.0;
+  };
+  for (const bool slopes : {false, true}) {
+    const double coarse = height(0.025, slopes), middle = height(0.0125, slopes),
+                 fine = height(0.00625, slopes);
+    const double order = std::log2(std::abs((coarse - middle) / (middle - fine)));
+    EXPECT_EQ(order > 1.5, slopes) << order;
+  }
+}
+
 }  // namespace
 }  // namespace flash::sysid

@@ -1,0 +1,29 @@
+#pragma once
+#include <optional>
+#include <vector>
+
+#include "sysid/grid_search.h"
+#include "sysid/profile.h"
+
+namespace flash::sysid {
+
+/// The answer of a search whose motions were kept.
+struct Refined {
+  GridVerdict
+      verdict;  ///< parameters, estimate and covariance between the values of the grid, the rest of it
+  std::vector<SolverCheck> checks;
+  double interpolation = 0;  ///< by which the score of the estimate, simulated, is off [m]
+};
+
+/// Looks between the candidates of a grid by interpolating their motions (MotionModel), not their scores:
+/// first as the search's mesh moves, then with `solver_check` as cells of no size would, from a second mesh
+/// of half the cell. The difference between the finer mesh and that limit remains as uncertainty to both
+/// sides, so does what the interpolated motion differs from the simulated one at the estimate; half the step
+/// and four times the iterations, at the nearest of the thinned candidates, widen to one. `whole`: of the
+/// grid itself. Empty where a candidate diverged, or the estimate, simulated, is worse than the best
+/// candidate.
+std::optional<Refined> refine(const GridResults& results, const GridVerdict& whole,
+                              const std::vector<Replay>& replays, const GridSettings& grid,
+                              std::optional<double> repeatability, bool solver_check);
+
+}  // namespace flash::sysid

@@ -1,0 +1,137 @@
+#include "sysid/zoom.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sysid/parallel.h"
+
+namespace flash::sysid {
+namespace {
+
+using Extent = std::vector<std::array<double, 2>>;  // one an axis, as coordinates
+
+double coordinate(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
+
+std::array<double, 2> range_of(const Axis& axis) {
+  return {coordinate(axis, axis.values.front()), coordinate(axis, axis.values.back())};
+}
+
+/// Points an axis by how many are searched: some hundreds in all.
+int points_per_axis(const std::vector<Axis>& axes) {
+  const auto searched =
+      std::count_if(axes.begin(), axes.end(), [](const Axis& axis) { return axis.values.size() > 1; });
+  constexpr std::array<int, 5> kPoints = {1, 17, 9, 7, 5};
+  return kPoints[static_cast<std::size_t>(std::min<std::ptrdiff_t>(searched, 4))];
+}
+
+std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searched) {
+  const int points = points_per_axis(searched);
+  std::vector<Axis> axes = searched;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    Axis& axis = axes[k];
+    if (axis.values.size() < 2) continue;
+    const double first = axis.values.front(), last = axis.values.back();
+    axis.values.clear();
+    for (int i = 0; i < points; ++i) {
+      const double x = extent[k][0] + (extent[k][1] - extent[k][0]) * i / (points - 1);
+      axis.values.push_back(std::clamp(axis.logarithmic ? std::exp(x) : x, first, last));
+    }
+  }
+  return axes;
+}
+
+/// The next extent; the same where the last one fits.
+Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::vector<Axis>& axes) {
+  constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most
+  constexpr double kSmallest = 1e-4;      // half extent over the range
+  Extent next = extent;
+  bool fits = true;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    if (axes[k].values.size() < 2) continue;
+    const std::array<double, 2> range = range_of(axes[k]);
+    const double width = extent[k][1] - extent[k][0], spacing = width / (points_per_axis(axes) - 1);
+    const double best = coordinate(axes[k], *verdict.parameters[k].estimate);
+    double reach = 0;  // the larger half of the interval
+    for (const int side : {0, 1}) {
+      const double end =
+          coordinate(axes[k], (*verdict.parameters[k].interval95)[static_cast<std::size_t>(side)]);
+      const double edge = extent[k][static_cast<std::size_t>(side)];
+      const bool open = std::abs(end - edge) < 1e-9 * width;
+      const bool more = std::abs(edge - range[static_cast<std::size_t>(side)]) > 1e-9 * width;
+      // An open end: half as much again; more would lose what the last extents told.
+      reach = std::max(reach, open && more ? 0.75 * width / kRoom : std::abs(end - best));
+      fits = fits && !(open && more);
+    }
+    const double half = std::max({kRoom * reach, spacing, kSmallest * (range[1] - range[0])});
+    next[k] = {std::max(range[0], best - half), std::min(range[1], best + half)};
+    fits = fits && width < 1.001 * kMost / kRoom * (next[k][1] - next[k][0]);
+  }
+  return fits ? extent : next;
+}
+
+}  // namespace
+
+GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
+                         double share, const GridSettings& settings) {
+  GridResults results;
+  results.axes = axes;
+  std::vector<Replay> replays;
+  std::vector<MotionModel> all;
+  for (const ModelledReplay& model : models) {
+    results.recordings.push_back(model.replay.recording.name);
+    replays.push_back(model.replay);
+    all.push_back(model.model);
+  }
+  const std::vector<std::vector<double>> points = cartesian_product(axes);
+  results.candidates.resize(points.size());
+  const auto score = [&](const std::vector<MotionModel>& slices, std::size_t i) {
+    std::vector<ReplayResult> motions(slices.size());
+    for (std::size_t r = 0; r < slices.size(); ++r) {
+      motions[r].motion = slices[r].at({}, share);
+      motions[r].converged = motions[r].finite = true;
+    }
+    results.candidates[i] = score_motions(replays, motions, settings.score);
+    results.candidates[i].id = static_cast<int>(i);
+    results.candidates[i].values = points[i];
+  };
+  // Points that share their first values share the slices there.
+  const auto visit = [&](const auto& self, const std::vector<MotionModel>& slices, std::size_t k,
+                         std::size_t first, std::size_t count) -> void {
+    if (k == axes.size()) return score(slices, first);
+    const std::size_t values = axes[k].values.size(), part = count / values;
+    for_each_in_parallel(values, k == 0 ? settings.threads : 1, [&](std::size_t i) {
+      std::vector<MotionModel> held;
+      for (const MotionModel& slice : slices) held.push_back(slice.slice(axes[k].values[i]));
+      self(self, held, k + 1, first + i * part, part);
+    });
+  };
+  visit(visit, all, 0, 0, points.size());
+  return results;
+}
+
+Zoomed zoom(const std::vector<ModelledReplay>& models, double share,
+            const std::vector<std::array<double, 2>>& start, const GridSettings& settings,
+            std::optional<double> repeatability) {
+  constexpr int kRounds = 16;
+  Extent extent;
+  for (std::size_t k = 0; k < settings.axes.size(); ++k)
+    extent.push_back({coordinate(settings.axes[k], start[k][0]), coordinate(settings.axes[k], start[k][1])});
+  std::vector<Replay> replays;
+  for (const ModelledReplay& model : models) replays.push_back(model.replay);
+  const MotionsAt motions = motions_of(models, share);
+  Zoomed found;
+  for (int round = 0; round < kRounds; ++round) {
+    found.results = score_models(models, axes_over(extent, settings.axes), share, settings);
+    found.verdict = profile_grid(found.results, repeatability);
+    if (found.verdict.best < 0) break;
+    const std::vector<double> estimate(found.verdict.estimate.begin(), found.verdict.estimate.end());
+    found.information = keyframe_information(measure_sensitivity(replays, settings, estimate, true, motions));
+    found.verdict = profile_grid(found.results, {repeatability, {}, found.information, nullptr});
+    const Extent next = next_extent(extent, found.verdict, settings.axes);
+    if (next == extent) break;
+    extent = next;
+  }
+  return found;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,44 @@
+#pragma once
+#include <string>
+
+#include "data/procedural_mesh.h"
+#include "sysid/depth_camera.h"
+#include "sysid/replay.h"
+#include "sysid/synth.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::sysid {
+
+inline data::SheetMaterial short_lift_material() {
+  data::SheetMaterial material;
+  material.membrane_stiffness = 30;
+  material.bending_rigidity = 2e-4;
+  return material;
+}
+
+/// A strip lifted by its end within 0.4 s, recorded and loaded back from its files.
+inline Replay short_lift(const data::TemporaryFolder& folder,
+                         const std::string& mesh = "sheet:0.2x0.05:0.025") {
+  SynthSettings settings;
+  settings.name = "lift";
+  settings.displacement = Eigen::Vector3d(-0.02, 0, 0.04);
+  settings.duration = 0.4;
+  settings.keyframe_rate = 50;
+  settings.grasp_within = 0.051;
+  settings.clamp_slopes = true;
+  SynthCamera camera;
+  camera.intrinsics.width = 48;
+  camera.intrinsics.height = 36;
+  camera.intrinsics.fx = camera.intrinsics.fy = 50;
+  camera.intrinsics.cx = 23.5;
+  camera.intrinsics.cy = 17.5;
+  camera.base_from_camera = look_at({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02}, Eigen::Vector3d::UnitZ());
+  settings.cameras = {camera};
+  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, short_lift_material(), settings, {});
+  save_synthetic(made, folder / "lift");
+  ReplaySettings replay;
+  replay.clamp_slopes = true;
+  return make_replay(data::load_recording(folder / "lift"), replay);
+}
+
+}  // namespace flash::sysid
