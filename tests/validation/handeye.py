@@ -132,7 +132,7 @@ def sets_table(sets, table):
     rows = []
     for name, result in sets.items():
         if "error" in result:
-            rows.append([name, result["error"], *["-"] * 7])
+            rows.append([name, result["error"], *["-"] * 8])
             continue
         sigmas, residuals, sd = result["sigmas"], result["residuals"], result["predicted_sd"]
         used = sum(view["used"] for view in result["views"])
@@ -140,10 +140,15 @@ def sets_table(sets, table):
         rows.append([name, f"{used} of {len(result['views'])}", shown(pixels_of(result, sigmas, "corner_px")),
                      f"{math.degrees(sigmas['robot_rotation_rad']):.3f} / {1000 * sigmas['robot_translation_m']:.2f}",
                      " ".join(f"{x:.2f}" for x in sd["translation_mm"]), " ".join(f"{x:.3f}" for x in sd["rotation_deg"]),
-                     f"{shown(pixels_of(result, residuals, 'corner_rms_px'))} ({shown(baseline)})", verdict(result),
+                     f"{shown(pixels_of(result, residuals, 'corner_rms_px'))} ({shown(baseline)})", size(result), verdict(result),
                      f"{result['seconds']:.1f}"])
     return table(["set", "views", "corner px", "robot deg / mm", "sd x y z mm", "sd about x y z deg",
-                  "corrected px (baseline)", "held out against the best other method", "CPU s"], rows)
+                  "corrected px (baseline)", "target over stated size", "held out against the best other method", "CPU s"], rows)
+
+
+def size(result):
+    scale = result["scale"]
+    return "-" if not scale else (f"{scale['estimate']:.4f} +- {2 * scale['sd']:.4f}" + (", solved" if scale["solved"] else ""))
 
 
 def verdict(result):
