@@ -171,7 +171,7 @@ std::vector<std::string> next_steps(const Calibration& c) {
   constexpr double kWideTurn = 10, kSharpCorners = 0.3;  // [deg], [px]
   constexpr std::size_t kEnough = 15;
   std::vector<std::string> steps;
-  if (c.scale && std::abs(c.scale->estimate - 1) > std::max(0.01, 5 * c.scale->sd))
+  if (c.scale && (c.scale->solved || std::abs(c.scale->estimate - 1) > std::max(0.01, 5 * c.scale->sd)))
     steps.push_back(sentence(
         "Measure the printed target: the data want it %.2f %% larger than stated (negative: smaller).",
         100 * (c.scale->estimate - 1)));
