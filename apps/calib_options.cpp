@@ -40,14 +40,14 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
 }
 
 void add_target_size_option(CLI::App& verb, calib::TargetSize& size) {
-  verb.add_option(
-          "--target-size", size,
+  const std::map<std::string, calib::TargetSize> named = {{"automatic", calib::TargetSize::automatic},
+                                                          {"stated", calib::TargetSize::stated},
+                                                          {"solved", calib::TargetSize::solved}};
+  verb.add_option_function<std::string>(
+          "--target-size", [&size, named](const std::string& name) { size = named.at(name); },
           "stated; solved for with the rest; or automatic: solved for where the data say clearly that "
           "the print is off")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, calib::TargetSize>{{"automatic", calib::TargetSize::automatic},
-                                                   {"stated", calib::TargetSize::stated},
-                                                   {"solved", calib::TargetSize::solved}}))
+      ->check(CLI::IsMember({"automatic", "stated", "solved"}))
       ->default_str("automatic");
 }
 
