@@ -143,7 +143,7 @@ bool release(const Vector3d& force, VertexConstraint& c) {
   if (!any) return false;
   const bool still_held = c.touches[0].holds || c.touches[1].holds;
   c.hold = still_held ? Hold::slip : Hold::free;
-  c.free = still_held ? along_surfaces(c) : Matrix3d(Matrix3d::Identity());
+  c.free = still_held ? along_surfaces(c.touches) : Matrix3d(Matrix3d::Identity());
   c.correction -= c.free * c.correction;
   return true;
 }
@@ -166,7 +166,7 @@ bool hold(const Vector3d& step, VertexConstraint& c) {
     }
     touch.holds = true;
     c.hold = Hold::slip;
-    c.free = along_surfaces(c);
+    c.free = along_surfaces(c.touches);
     any = true;
   }
   return any;
@@ -235,7 +235,9 @@ StepReport Solver::step(Environment& environment) {
   now.constraints = begin_step(environment, time, now.positions);
   evaluate(now);
   longer.constraints = trial.constraints = now.constraints;
-  Points direction;
+  // The linear problem's own; kept between iterations for their memory.
+  std::vector<VertexConstraint> linear;
+  Points gradient, force, direction;
   bool stuck = false;
   int forced_moves = 0;
   while (report.iterations < w.settings.max_iterations &&
@@ -253,8 +255,8 @@ StepReport Solver::step(Environment& environment) {
     add_slip_stiffness(now.constraints, w.values);
     if (!stuck) add_surface_curvature(now.constraints, w.values);
     w.matrix.assign(w.values, sparse, bending, rigidity, problem.mass().minCoeff() / (h * h));
-    std::vector<VertexConstraint> linear = now.constraints;
-    Points gradient = now.residual, force;
+    linear = now.constraints;
+    gradient = now.residual;
     for (int exchange = 0; exchange < 6; ++exchange) {
       force = now.force;
       const int solves =

@@ -44,10 +44,10 @@ double friction_of(const Environment& environment, const Touch& touch) {
 /// their mean by mu lambda_n where there are two [m].
 Vector3d slip_of(const Environment& environment, const VertexConstraint& constraint, double time,
                  double time_step, const data::Points& positions, int i) {
-  VertexConstraint here = constraint;
+  std::array<Touch, 2> touches = constraint.touches;
   Vector3d surface_moved = Vector3d::Zero();
   double weights = 0;
-  for (Touch& touch : here.touches) {
+  for (Touch& touch : touches) {
     if (!touch.holds) continue;
     const Gap gap = gap_to(environment.obstacles[touch.obstacle], positions.row(i), time, time_step);
     touch.normal = gap.normal;
@@ -56,13 +56,13 @@ Vector3d slip_of(const Environment& environment, const VertexConstraint& constra
     weights += weight;
   }
   const Vector3d moved = (positions.row(i) - environment.state.positions.row(i)).transpose();
-  return along_surfaces(here) * (moved - surface_moved / weights);
+  return along_surfaces(touches) * (moved - surface_moved / weights);
 }
 
 }  // namespace
 
-Matrix3d along_surfaces(const VertexConstraint& constraint) {
-  const auto& [first, second] = constraint.touches;
+Matrix3d along_surfaces(const std::array<Touch, 2>& touches) {
+  const auto& [first, second] = touches;
   if (first.holds && second.holds) {
     const Vector3d edge = first.normal.cross(second.normal).normalized();
     return edge * edge.transpose();
@@ -147,7 +147,8 @@ void update_contacts(const Environment& environment, double time, double time_st
         constraint.touches = nearest_touches(environment, positions.row(i), time, time_step);
       continue;
     }
-    constraint = VertexConstraint{};
+    // Of a free one all but the touches is as it was made: most of them are, and it is much to write.
+    if (constraint.hold != Hold::free) constraint = VertexConstraint{};
     auto& touches = constraint.touches;
     touches = nearest_touches(environment, positions.row(i), time, time_step);
     const auto on_surface = [&](const Touch& touch) { return touch.obstacle >= 0 && touch.gap <= touching; };
@@ -161,7 +162,7 @@ void update_contacts(const Environment& environment, double time, double time_st
     if (!touches[0].holds && !touches[1].holds) continue;
 
     const double bound = constraint.friction_bound;
-    const Matrix3d along = along_surfaces(constraint);
+    const Matrix3d along = along_surfaces(touches);
     const Vector3d needed_tangential = along * needed;
     const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
     const double slip_length = slip.norm(), needed_length = needed_tangential.norm();

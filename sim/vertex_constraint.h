@@ -41,7 +41,7 @@ struct VertexConstraint {
 };
 
 /// Projector on the directions along all surfaces that hold the vertex: a plane, or the edge between two.
-Eigen::Matrix3d along_surfaces(const VertexConstraint& constraint);
+Eigen::Matrix3d along_surfaces(const std::array<Touch, 2>& touches);
 
 /// Normal forces of the two touches without friction between them: the solution of least squares for `needed`
 /// [N] with both not negative. A touch with `eligible` false takes none.
