@@ -29,12 +29,12 @@ class CurrentFolder {
 
 TEST(Provenance, PathsHoldFromTheFolderOfTheFileAndWhenBothAreMoved) {
   const data::TemporaryFolder folder;
-  folder.write("work/recording/poses.tum", "");
-  folder.write("work/results/camera.json", "");
+  folder.write("cell/recording/poses.tum", "");
+  folder.write("cell/results/camera.json", "");
   folder.write("elsewhere/nothing", "");
   ExtrinsicsInputs inputs{"recording", "chessboard:9x6:0.025", "recording/poses.tum", "", "ours"};
   {
-    const CurrentFolder here(folder / "work");
+    const CurrentFolder here(folder / "cell");
     inputs = relative_to(inputs, "results/camera.json");
   }
   EXPECT_EQ(inputs.dataset, "../recording");
@@ -42,8 +42,8 @@ TEST(Provenance, PathsHoldFromTheFolderOfTheFileAndWhenBothAreMoved) {
   EXPECT_EQ(inputs.target, "chessboard:9x6:0.025");
   EXPECT_EQ(inputs.camera, "");
   const CurrentFolder there(folder / "elsewhere");
-  EXPECT_TRUE(fs::equivalent(resolved(inputs.dataset, "../work/results/camera.json"), "../work/recording"));
-  fs::rename(folder / "work", folder / "moved");
+  EXPECT_TRUE(fs::equivalent(resolved(inputs.dataset, "../cell/results/camera.json"), "../cell/recording"));
+  fs::rename(folder / "cell", folder / "moved");
   EXPECT_TRUE(fs::equivalent(resolved(inputs.poses, folder / "moved/results/camera.json"),
                              folder / "moved/recording/poses.tum"));
   fs::rename(folder / "moved/recording", folder / "moved/gone");
