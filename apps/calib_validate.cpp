@@ -143,10 +143,12 @@ int run_validate(const ValidateOptions& options) {
 
   std::vector<calib::Observation> observations;
   for (const ValidatedView& view : views) observations.push_back(view.observation);
+  observations = calib::for_target_size(std::move(observations), extrinsics.target_scale);
   calib::HandEyePoses poses{extrinsics.transform.T, extrinsics.target_pose.T};
   const auto check_with = [&](const Eigen::Isometry3d& Z) {
     return calib::check_projection(extrinsics.setup, {poses.X, Z},
-                                   dataset.camera.value_or(data::CameraIntrinsics{}), target, observations);
+                                   dataset.camera.value_or(data::CameraIntrinsics{}), target, observations,
+                                   extrinsics.target_scale);
   };
   const Eigen::Isometry3d refitted = calib::target_pose_from(extrinsics.setup, poses.X, observations);
   if (options.refit_target) poses.Z = refitted;

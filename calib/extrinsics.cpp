@@ -237,6 +237,10 @@ Extrinsics load_extrinsics(const std::string& path) {
     extrinsics.robot_rotation_rad = sigmas.not_negative("robot_rotation_rad");
     extrinsics.robot_translation_m = sigmas.not_negative("robot_translation_m");
   }
+  if (object.has("scale")) {
+    const data::JsonObject scale = object.object("scale");
+    if (scale.boolean("solved", false)) extrinsics.target_scale = scale.positive("estimate");
+  }
   if (object.has("provenance")) {
     const data::JsonObject from = object.object("provenance");
     extrinsics.inputs = {from.string("dataset", ""), from.string("target", ""), from.string("poses", ""),

@@ -38,6 +38,8 @@ struct Extrinsics {
   NamedTransform transform;                ///< gripper <- camera (eye-in-hand) or base <- camera
   NamedTransform target_pose;              ///< base <- target (eye-in-hand) or gripper <- target
   Matrix6d covariance = Matrix6d::Zero();  ///< of the transform, right perturbation (dt, dtheta) [m, rad]
+  double target_scale =
+      1;  ///< size of the target that transform and target_pose are for, over the stated one
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
   bool pixels = true;  ///< false: of pose pairs, which have no corners
   ExtrinsicsInputs inputs;

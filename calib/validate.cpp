@@ -66,8 +66,9 @@ ViewProjection project_view(const Eigen::Isometry3d& T_camera_target, const data
 }  // namespace
 
 ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const data::CameraIntrinsics& camera,
-                                 const Target& target, const std::vector<Observation>& observations) {
-  const Eigen::Matrix3Xd points = target_points(target);
+                                 const Target& target, const std::vector<Observation>& observations,
+                                 double target_scale) {
+  const Eigen::Matrix3Xd points = target_scale * target_points(target);
   const std::vector<std::vector<int>> symmetries = target_symmetries(target);
   std::vector<Numbering> numberings;
   for (const std::vector<int>& symmetry : symmetries) numberings.push_back(numbering(points, symmetry));
@@ -98,6 +99,12 @@ ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const d
   check.mm_rms = std::sqrt(mm / views);
   check.deg_rms = std::sqrt(deg / views);
   return check;
+}
+
+std::vector<Observation> for_target_size(std::vector<Observation> observations, double scale) {
+  for (Observation& observation : observations)
+    for (Eigen::Isometry3d& T : observation.T_camera_target) T.translation() *= scale;
+  return observations;
 }
 
 Eigen::Isometry3d target_pose_from(Setup setup, const Eigen::Isometry3d& X,

@@ -28,9 +28,13 @@ struct ProjectionCheck {
 
 /// Projects corners and middle of the target through the chain. Nothing is fitted; where a target can be
 /// numbered in several ways, the numbering that fits a view best counts. Views without pixels (pose pairs)
-/// have px 0.
+/// have px 0. target_scale: size of the target over `target`; the views' own poses are for that size.
 ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const data::CameraIntrinsics& camera,
-                                 const Target& target, const std::vector<Observation>& observations);
+                                 const Target& target, const std::vector<Observation>& observations,
+                                 double target_scale = 1);
+
+/// The views as they are if the target is `scale` times as large: their own poses lie that much farther away.
+std::vector<Observation> for_target_size(std::vector<Observation> observations, double scale);
 
 /// T_base_target (eye-in-hand) or T_gripper_target as the mean over the views, for a target that was moved
 /// since.

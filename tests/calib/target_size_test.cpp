@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "calib/calibrate.h"
+#include "calib/validate.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {
@@ -51,6 +52,16 @@ TEST_P(TargetSizes, PrintThatIsOffIsMeasuredAndNoLongerMovesTheCamera) {
   EXPECT_LT(millimetres_off(result, scene), 0.2 * 0.015 * distance);
   ASSERT_FALSE(result.warnings.empty());
   EXPECT_NE(result.warnings.front().find("times as large as stated"), std::string::npos);
+}
+
+TEST_P(TargetSizes, ValidationIsForTheSizeThatWasSolvedFor) {
+  const HandEyeScene scene = scene_of(GetParam(), 1.015, 21);
+  const Calibration result = calibrated(scene, TargetSize::automatic);
+  const double scale = result.refined.bundle.scales.front();
+  const ProjectionCheck check =
+      check_projection(scene.settings.setup, result.poses, scene.camera, parse_target("chessboard:9x6:0.025"),
+                       for_target_size(scene.observations, scale), scale);
+  EXPECT_NEAR(check.corner_rms, result.chain_rms, 1e-9);  // the same sum, the other way round
 }
 
 TEST_P(TargetSizes, SizeThatIsRightStaysAsStated) {
