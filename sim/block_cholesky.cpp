@@ -308,12 +308,18 @@ bool BlockCholesky<Scalar>::factorize(const BlockValues<double>& values) {
 
 namespace {
 
-/// Three numbers: a call of memmove would cost more than the copy.
+// Few numbers: a call of memmove would cost more than the copy.
+
 template <typename Scalar>
 void copy_vertex(const Scalar* from, Scalar* to) {
   to[0] = from[0];
   to[1] = from[1];
   to[2] = from[2];
+}
+
+template <typename Scalar>
+void copy_vertices(const Scalar* from, int count, Scalar* to) {
+  for (int i = 0; i < count; ++i) copy_vertex(from + 3L * i, to + 3L * i);
 }
 
 }  // namespace
@@ -323,7 +329,7 @@ void BlockCholesky<Scalar>::solve_in_order(Scalar* x) const {
   const auto& nodes = symbolic_->supernodes;
   const auto gather = [&](const Supernode& node) {
     const int columns = 3 * node.column_count, rows = 3 * static_cast<int>(node.rows.size());
-    std::copy_n(x + 3L * node.first_column, columns, front_.data());
+    copy_vertices(x + 3L * node.first_column, node.column_count, front_.data());
     for (size_t r = 0; r < node.rows.size(); ++r)
       copy_vertex(x + 3L * node.rows[r], front_.data() + columns + 3 * r);
     std::fill(front_.begin() + columns + rows, front_.begin() + padded<Scalar>(columns + rows), Scalar(0));
@@ -334,7 +340,7 @@ void BlockCholesky<Scalar>::solve_in_order(Scalar* x) const {
     gather(node);
     solve_forward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns,
                   inverses_.data() + 6L * node.first_column, front_.data());
-    std::copy_n(front_.data(), columns, x + 3L * node.first_column);
+    copy_vertices(front_.data(), node.column_count, x + 3L * node.first_column);
     for (size_t r = 0; r < node.rows.size(); ++r)
       copy_vertex(front_.data() + columns + 3 * r, x + 3L * node.rows[r]);
   }
@@ -344,7 +350,7 @@ void BlockCholesky<Scalar>::solve_in_order(Scalar* x) const {
     gather(node);
     solve_backward(factor_.data() + offsets_[s], padded<Scalar>(columns + rows), columns,
                    inverses_.data() + 6L * node.first_column, front_.data());
-    std::copy_n(front_.data(), columns, x + 3L * node.first_column);
+    copy_vertices(front_.data(), node.column_count, x + 3L * node.first_column);
   }
 }
 

@@ -145,28 +145,12 @@ void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& bloc
     target += block;
 }
 
-/// y += scale * S x. Four lanes a vertex: one vector multiply-add an entry of S.
-void add_product(const Eigen::SparseMatrix<double, Eigen::RowMajor>& S, double scale, const Points& x,
-                 Points& y) {
-  typedef double Four __attribute__((vector_size(32), aligned(8)));
-  Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor> lanes(x.rows(), 4);
-  lanes.leftCols<3>() = x;
-  lanes.col(3).setZero();
-  for (int i = 0; i < S.outerSize(); ++i) {
-    Four even{}, odd{};
-    int k = S.outerIndexPtr()[i];
-    const int end = S.outerIndexPtr()[i + 1];
-    const auto column = [&](int entry) {
-      return *reinterpret_cast<const Four*>(lanes.data() + 4L * S.innerIndexPtr()[entry]);
-    };
-    for (; k + 1 < end; k += 2) {
-      even += S.valuePtr()[k] * column(k);
-      odd += S.valuePtr()[k + 1] * column(k + 1);
-    }
-    if (k < end) even += S.valuePtr()[k] * column(k);
-    even += odd;
-    for (int c = 0; c < 3; ++c) y(i, c) += scale * even[c];
-  }
+/// Four numbers a vertex.
+std::vector<double> padded_vertices(const Points& x) {
+  std::vector<double> padded(4 * x.rows());
+  for (long i = 0; i < x.rows(); ++i)
+    for (int c = 0; c < 3; ++c) padded[4 * i + c] = x(i, c);
+  return padded;
 }
 
 }  // namespace
@@ -194,7 +178,7 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
     return energy;
   }
   Points bent = Points::Zero(positions.rows(), 3);
-  add_product(bending.stiffness, D, positions, bent);
+  add_bending_product(bending, D, positions, bent);
   gradient += bent;
   energy.bending += 0.5 * bent.cwiseProduct(positions).sum();
   return energy;
@@ -231,7 +215,8 @@ void add_bending_stand_in(const BendingOperator& bending, double rigidity, Block
 }
 
 void add_bending_product(const BendingOperator& bending, double rigidity, const Points& x, Points& y) {
-  if (bending.stiffness.rows() > 0) add_product(bending.stiffness, rigidity, x, y);
+  if (!bending.stiffness.empty())
+    add_product(bending.stiffness, rigidity, padded_vertices(x).data(), y.data());
 }
 
 void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale,

@@ -25,6 +25,23 @@ inline double sum_of(const Lanes& lanes) {
   return low + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
 }
 
+/// Four numbers: those of a vertex, and one more.
+template <typename Scalar>
+struct FourOf {
+  typedef Scalar type __attribute__((vector_size(4 * sizeof(Scalar))));
+};
+
+template <typename Scalar>
+typename FourOf<Scalar>::type load_four(const Scalar* numbers) {
+  typename FourOf<Scalar>::type four;
+  std::memcpy(&four, numbers, sizeof(four));
+  return four;
+}
+template <typename Scalar>
+void store_four(const typename FourOf<Scalar>::type& four, Scalar* numbers) {
+  std::memcpy(numbers, &four, sizeof(four));
+}
+
 FLASH_HOST_DEVICE inline double square_root(double x) { return std::sqrt(x); }
 FLASH_HOST_DEVICE inline double logarithm(double x) { return std::log(x); }
 FLASH_HOST_DEVICE inline double select(bool condition, double yes, double no) { return condition ? yes : no; }

@@ -156,7 +156,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
       [&] { add_elastic_gradient(*plan, bending, material, x, y); });
   add("matrix", result.iterations, [&] {
     assemble(Curvature::exact);
-    product.assign(plan->triangle_product, values, bending.rows, material.bending_rigidity);
+    product.assign(plan->triangle_product, values, bending.elimination_stiffness, material.bending_rigidity);
   });
   add("factorization", factorizations, [&] {
     assemble(Curvature::positive);

@@ -58,9 +58,9 @@ void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse, const 
   single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < 0.01 * least_eigenvalue;
   const ProductPattern& pattern = sparse ? plan_->triangle_product : plan_->full_product;
   if (single_)
-    single_product_.assign(pattern, blocks, bending.rows, rigidity);
+    single_product_.assign(pattern, blocks, bending.elimination_stiffness, rigidity);
   else
-    double_product_.assign(pattern, blocks, bending.rows, rigidity);
+    double_product_.assign(pattern, blocks, bending.elimination_stiffness, rigidity);
 }
 
 int NewtonMatrix::solve(const std::vector<VertexConstraint>& constraints, const Points& gradient,

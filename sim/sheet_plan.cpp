@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 
 #include "sim/isometric_bending.h"
 #include "sim/morley.h"
@@ -49,11 +50,13 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   bending->model = model;
   if (model == data::BendingModel::hinge) return bending;
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
-  bending->stiffness = model == data::BendingModel::plate
-                           ? plate_bending_stiffness(plan.sheet, poissons_ratio, 1e-6)
-                           : isometric;
-  bending->stiffness.makeCompressed();
-  bending->rows = scalar_rows(bending->stiffness, elimination_position(*plan.symbolic));
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
+      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio, 1e-6)
+                                         : isometric;
+  std::vector<int> as_numbered(plan.pattern.size);
+  std::iota(as_numbered.begin(), as_numbered.end(), 0);
+  bending->stiffness = row_groups(stiffness, as_numbered);
+  bending->elimination_stiffness = row_groups(stiffness, elimination_position(*plan.symbolic));
   // Against the plate the isometric stiffness has its eigenvalues between 0.5 and 4.6 (regular meshes, nu =
   // 0.3): scaled, they lie around 1, where those of the membrane and the mass are.
   const double scale = model == data::BendingModel::plate ? 0.6 : 1.0;

@@ -1,5 +1,4 @@
 #pragma once
-#include <Eigen/SparseCore>
 #include <array>
 #include <map>
 #include <memory>
@@ -36,9 +35,9 @@ struct alignas(64) TriangleGroup {
 /// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
 struct BendingOperator {
   data::BendingModel model;
-  Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness;  ///< empty for the hinge model
-  ScalarRows rows;                                         ///< the same in elimination order
-  std::vector<double> stand_in;  ///< one number a block of the pattern: a sparser stiffness to factorize
+  RowGroups stiffness;              ///< empty for the hinge model
+  RowGroups elimination_stiffness;  ///< the same in elimination order
+  std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 
 /// Those made so far, for all environments of a sheet.

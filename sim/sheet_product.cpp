@@ -1,24 +1,8 @@
 #include "sim/sheet_product.h"
 
-#include <cstring>
-#include <type_traits>
+#include "sim/lanes.h"
 
 namespace flash::sim {
-namespace {
-
-template <typename Scalar>
-struct FourOf {
-  typedef Scalar type __attribute__((vector_size(4 * sizeof(Scalar))));
-};
-
-template <typename Scalar>
-typename FourOf<Scalar>::type load_four(const Scalar* numbers) {
-  typename FourOf<Scalar>::type four;
-  std::memcpy(&four, numbers, sizeof(four));
-  return four;
-}
-
-}  // namespace
 
 ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
                                const std::vector<int>& position) {
@@ -48,26 +32,9 @@ ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
   return product;
 }
 
-ScalarRows scalar_rows(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix,
-                       const std::vector<int>& position) {
-  std::vector<int> vertex(position.size());
-  for (size_t i = 0; i < position.size(); ++i) vertex[position[i]] = static_cast<int>(i);
-  ScalarRows rows;
-  rows.starts.push_back(0);
-  for (const int i : vertex) {
-    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(matrix, i); entry; ++entry) {
-      rows.columns.push_back(position[entry.col()]);
-      rows.values.push_back(entry.value());
-      rows.single_values.push_back(static_cast<float>(entry.value()));
-    }
-    rows.starts.push_back(static_cast<int>(rows.columns.size()));
-  }
-  return rows;
-}
-
 template <typename Scalar>
 void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValues<double>& values,
-                                  const ScalarRows& scalar_part, double scale) {
+                                  const RowGroups& scalar_part, double scale) {
   pattern_ = &pattern;
   scalar_part_ = &scalar_part;
   scale_ = static_cast<Scalar>(scale);
@@ -92,13 +59,6 @@ void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
   const size_t size = pattern_->starts.size() - 1;
   for (size_t i = 0; i < size; ++i)
     for (int c = 0; c < 3; ++c) padded_[4 * i + c] = x[3 * i + c];
-  const auto vertex = [&](int column) { return load_four(padded_.data() + 4L * column); };
-  const Scalar* entries;
-  if constexpr (std::is_same_v<Scalar, float>)
-    entries = scalar_part_->single_values.data();
-  else
-    entries = scalar_part_->values.data();
-  const bool has_scalar_part = !scalar_part_->values.empty();
   for (size_t i = 0; i < size; ++i) {
     Four sum{}, even{}, odd{};
     for (int k = pattern_->starts[i]; k < pattern_->starts[i + 1]; ++k) {
@@ -109,22 +69,9 @@ void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
       odd += load_four(block + 8) * from[2];
     }
     sum += even + odd;
-    if (has_scalar_part) {
-      const int* columns = scalar_part_->columns.data();
-      const int end = scalar_part_->starts[i + 1];
-      int k = scalar_part_->starts[i];
-      Four first{}, second{}, third{}, fourth{};
-      for (; k + 3 < end; k += 4) {
-        first += entries[k] * vertex(columns[k]);
-        second += entries[k + 1] * vertex(columns[k + 1]);
-        third += entries[k + 2] * vertex(columns[k + 2]);
-        fourth += entries[k + 3] * vertex(columns[k + 3]);
-      }
-      for (; k < end; ++k) first += entries[k] * vertex(columns[k]);
-      sum += scale_ * ((first + second) + (third + fourth));
-    }
     for (int c = 0; c < 3; ++c) y[3 * i + c] = sum[c];
   }
+  add_product(*scalar_part_, scale_, padded_.data(), y);
 }
 
 template class SheetProduct<float>;

@@ -1,8 +1,8 @@
 #pragma once
-#include <Eigen/SparseCore>
 #include <vector>
 
 #include "sim/block_cholesky.h"
+#include "sim/row_groups.h"
 
 namespace flash::sim {
 
@@ -19,31 +19,19 @@ struct ProductPattern {
 ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
                                const std::vector<int>& elimination_position);
 
-/// A matrix that acts on each coordinate alike, in elimination order, in both precisions.
-struct ScalarRows {
-  std::vector<int> starts, columns;
-  std::vector<double> values;
-  std::vector<float> single_values;
-};
-
-ScalarRows scalar_rows(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix,
-                       const std::vector<int>& elimination_position);
-
 /// y = (B + s S) x over the vertices of a sheet in elimination order, three numbers a vertex: B of 3 x 3
-/// blocks, S scalar. A block is three columns of four numbers, so that a column, or a vertex times an entry
-/// of S, is one vector multiply-add. Bytes: 12 numbers a block, a number and an index an entry of S; x stays
-/// in the first-level cache.
+/// blocks, S scalar. A block is three columns of four numbers, so that a column is one vector multiply-add.
 template <typename Scalar>
 class SheetProduct {
  public:
   /// The scalar part may be empty; the arguments but `values` have to outlive the product.
-  void assign(const ProductPattern& pattern, const BlockValues<double>& values, const ScalarRows& scalar_part,
+  void assign(const ProductPattern& pattern, const BlockValues<double>& values, const RowGroups& scalar_part,
               double scale);
   void multiply(const Scalar* x, Scalar* y);
 
  private:
   const ProductPattern* pattern_ = nullptr;
-  const ScalarRows* scalar_part_ = nullptr;
+  const RowGroups* scalar_part_ = nullptr;
   Scalar scale_ = 0;
   std::vector<Scalar> blocks_;  ///< 12 numbers each
   std::vector<Scalar> padded_;  ///< x, four numbers a vertex

@@ -44,20 +44,28 @@ double friction_of(const Environment& environment, const Touch& touch) {
 /// their mean by mu lambda_n where there are two [m].
 Vector3d slip_of(const Environment& environment, const VertexConstraint& constraint, double time,
                  double time_step, const data::Points& positions, int i) {
-  std::array<Touch, 2> touches = constraint.touches;
-  Vector3d surface_moved = Vector3d::Zero();
-  double weights = 0;
-  for (Touch& touch : touches) {
-    if (!touch.holds) continue;
-    const Gap gap = gap_to(environment.obstacles[touch.obstacle], positions.row(i), time, time_step);
-    touch.normal = gap.normal;
-    const double weight = friction_of(environment, touch) * touch.normal_force + 1e-300;
-    surface_moved += weight * gap.surface_moved;
-    weights += weight;
-  }
+  const auto gap_of = [&](const Touch& touch) {
+    return gap_to(environment.obstacles[touch.obstacle], positions.row(i), time, time_step);
+  };
   const Vector3d moved = (positions.row(i) - environment.state.positions.row(i)).transpose();
-  return along_surfaces(touches) * (moved - surface_moved / weights);
+  const auto& [first, second] = constraint.touches;
+  if (!(first.holds && second.holds)) {
+    const Gap gap = gap_of(first.holds ? first : second);
+    const Vector3d against = moved - gap.surface_moved;
+    return against - gap.normal * gap.normal.dot(against);
+  }
+  const Gap first_gap = gap_of(first), second_gap = gap_of(second);
+  const double first_weight = friction_of(environment, first) * first.normal_force + 1e-300,
+               second_weight = friction_of(environment, second) * second.normal_force + 1e-300;
+  const Vector3d surfaces_moved =
+      (first_weight * first_gap.surface_moved + second_weight * second_gap.surface_moved) /
+      (first_weight + second_weight);
+  const Vector3d edge = first_gap.normal.cross(second_gap.normal).normalized();
+  return edge * edge.dot(moved - surfaces_moved);
 }
+
+/// Length of a slip as friction takes it, smooth where it starts [m].
+double smooth_length(double length) { return std::sqrt(length * length + smoothing * smoothing); }
 
 }  // namespace
 
@@ -175,9 +183,9 @@ void update_contacts(const Environment& environment, double time, double time_st
     constraint.hold = Hold::slip;
     constraint.free = along;
     if (slip_length > resting) {
-      const double smooth_length = std::hypot(slip_length, smoothing);
-      constraint.slip_direction = slip / smooth_length;
-      constraint.slip_stiffness = bound / smooth_length;
+      const double length = smooth_length(slip_length);
+      constraint.slip_direction = slip / length;
+      constraint.slip_stiffness = bound / length;
     } else {
       constraint.slip_direction = -needed_tangential / needed_length;
     }
@@ -228,7 +236,7 @@ double friction_potential(const Environment& environment, double time, double ti
     if (constraint.friction_bound == 0) continue;
     const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
     potential += constraint.friction_bound *
-                 (constraint.slip_stiffness > 0 ? std::hypot(slip.norm(), smoothing) : slip.norm());
+                 (constraint.slip_stiffness > 0 ? smooth_length(slip.norm()) : slip.norm());
   }
   return potential;
 }

@@ -82,12 +82,12 @@ void triangular_solves(benchmark::State& state) {
 void matrix_product(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
   SheetProduct<float> product;
-  product.assign(towel.plan->triangle_product, towel.values, towel.bending().rows,
+  product.assign(towel.plan->triangle_product, towel.values, towel.bending().elimination_stiffness,
                  towel.material.bending_rigidity);
   Eigen::VectorXf x = Eigen::VectorXf::Ones(towel.positions.size()), y = x;
   for (auto _ : state) product.multiply(x.data(), y.data());
   const size_t blocks = towel.plan->triangle_product.sources.size(),
-               entries = towel.bending().rows.values.size();
+               entries = towel.bending().elimination_stiffness.values.size();
   state.SetBytesProcessed(state.iterations() * static_cast<long>(52 * blocks + 8 * entries));
 }
 
