@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <optional>
 #include <thread>
 
 #include "data/error.h"
@@ -35,6 +36,23 @@ std::string duration_text(double seconds) {
     std::snprintf(text, sizeof text, "%.1f h", seconds / 3600);
   }
   return text;
+}
+
+void set_sigma(const std::string& assignment, sysid::Objective& objective) {
+  const std::size_t equals = assignment.find('=');
+  const std::string name = assignment.substr(0, equals);
+  double* const sigma = name == "cloud"     ? &objective.cloud_sigma
+                        : name == "contour" ? &objective.contour_sigma
+                        : name == "markers" ? &objective.marker_sigma
+                        : name == "force"   ? &objective.force_sigma
+                                            : nullptr;
+  const std::optional<double> value =
+      data::parse_number(equals == std::string::npos ? "" : std::string_view(assignment).substr(equals + 1));
+  if (sigma == nullptr || !value || !(*value > 0) || !std::isfinite(*value))
+    throw data::InputError(
+        "--sigma: \"" + assignment +
+        "\": expected cloud, contour, markers or force = a positive number, as force=0.02");
+  *sigma = *value;
 }
 
 }  // namespace
@@ -85,6 +103,14 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   group.add_option("--huber", options.huber, "huber: where the distance stops counting in full [m]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  group
+      .add_option("--sigma", options.sigmas,
+                  "Noise of what was observed, as force=0.02: cloud, contour, markers [m] or force [N]; "
+                  "terms count by it")
+      ->allow_extra_args(false);
+  group.add_flag(
+      "--two-sided", options.two_sided,
+      "Simulated cloth inside the crop where none was seen counts too: for recordings that see all of it");
   group.add_option("--share", options.shared, "Nuisance values that all recordings have in common")
       ->check(CLI::IsMember({"offset", "yaw", "time"}))
       ->delimiter(',');
@@ -114,6 +140,8 @@ sysid::ScoreSettings score_settings(const ReplayOptions& options) {
                                                                  : sysid::RobustKind::trimmed;
   settings.objective.robust.trim_fraction = options.trim;
   settings.objective.robust.huber_delta = options.huber;
+  for (const std::string& assignment : options.sigmas) set_sigma(assignment, settings.objective);
+  settings.objective.two_sided = options.two_sided;
   const auto shares = [&](const char* name) {
     return std::find(options.shared.begin(), options.shared.end(), name) != options.shared.end();
   };

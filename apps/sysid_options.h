@@ -34,6 +34,8 @@ struct ReplayOptions {
   double from = 0, to = 0;
   std::string distance = "trimmed";
   double trim = 0.05, huber = 0.02;
+  std::vector<std::string> sigmas;  ///< of the terms of the score, as force=0.02
+  bool two_sided = false;
   std::vector<std::string> shared;
 };
 void add_replay_options(CLI::App& verb, ReplayOptions& options);

@@ -179,6 +179,10 @@ def verbs(sysid, sim):
             "depth": lambda f: [sysid, "replay", f / "depth", "--asset", f / "asset.json", "-o", f / "out"],
             "export": lambda f: [sysid, "export", f / "run", "-o", f / "out"],
             "report": lambda f: [sysid, "report", f / "run", "-o", f / "out"],
+            **{name: lambda f, value=value: [sysid, "replay", f / "recording", "--asset", f / "asset.json", "--sigma", value,
+                                             "-o", f / "out"]
+               for name, value in (("unknown term", "torque=1"), ("no number", "force=strong"),
+                                   ("not positive", "force=0"), ("not finite", "force=inf"))},
             "resume": lambda f: [sysid, "grid", f / "recording", "--asset", f / "asset.json", "--bending",
                                  "5e-5,1e-4,2e-4", "--no-solver-check", "--no-horizon", "--resume", "-o", f / "run"],
             "import": lambda f: [sysid, "import", f / "recording" / "frames", "--trajectory",
@@ -377,9 +381,15 @@ def import_cases():
         yield Case(name, "import", times(text), "times.csv")
 
 
+def option_cases():
+    for name in ("unknown term", "no number", "not positive", "not finite"):
+        yield Case(f"--sigma: {name}", name, lambda folder: None, "--sigma")
+
+
 def all_cases(first_frame):
     for cases in (asset_cases(), scene_cases(), mesh_cases(), recording_cases(), trajectory_cases(),
-                  cloud_cases(first_frame), camera_cases(), result_cases(), import_cases()):
+                  cloud_cases(first_frame), camera_cases(), result_cases(), import_cases(),
+                  option_cases()):
         yield from cases
 
 

@@ -134,7 +134,7 @@ def twin_table(fits):
                   "of noise alone mm"], rows)
 
 
-def twin_tables(fits, membrane):
+def twin_tables(fits, membrane, horizons):
     stiffness = [[pattern, *(f"{twins.pattern_stiffness(pattern, angle):.2f}"
                              for angle in (0, math.pi / 4, math.pi / 2))] for pattern in twins.PATTERNS]
     young = lifts.profile(membrane["rows"], "young")
@@ -142,7 +142,10 @@ def twin_tables(fits, membrane):
             "patterns": table(["diagonals", "bent along an edge", "along the diagonal", "along the other edge"],
                               stiffness),
             "membrane": table(["E t N/m", *(f"{value / 1000:g}" for value, _ in young)],
-                              [["residual mm", *(mm(score) for _, score in young)]])}
+                              [["residual mm", *(mm(score) for _, score in young)]]),
+            "horizons": table(["bending model", "diagonals", "predictable until s"],
+                              [[*fit, "3, the end" if until is None else f"{until:.2f}"]
+                               for fit, until in horizons.items()])}
 
 
 def synthetic_tables(experiments, coverage):

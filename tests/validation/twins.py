@@ -68,6 +68,23 @@ def fit_membrane(runs, data, assets, twin):
                      "--no-solver-check", "--fix", "friction=0.3", "--fix", "areal_density=0.2")
 
 
+# Longer than the recordings: what folds after their end.
+LONGER = ("--displacement=-0.1,0,0.35", "--duration", "3", "--rate", "20", "--camera", "0.2,-0.7,0.75", "--camera",
+          "0.95,0.9,0.6", "--noise", "0.002", "--seed", "5")
+LONGER_FITS = (("plate", "alternating"), ("isometric", "alternating"), ("isometric", "alternating by row"),
+               ("isometric", "alternating, other parity"))
+
+
+def horizon(runs, assets, meshes, model, pattern):
+    """When the lift of lift_b, made here and gone on with to 3 s, stops being predictable [s]; None: it does not."""
+    name = f"twin_longer/{model}_{pattern.replace(',', '').replace(' ', '_')}"
+    mesh = ("--asset", assets[model], "--mesh", meshes[pattern])
+    recording = runs.synth(f"{name}_recording", *mesh[1:], *LONGER, "--set", "bending=1e-5")
+    summary = runs.grid(name, [recording], *mesh, "--bending", "8e-6,1e-5,1.25e-5", "--no-solver-check", "--fix",
+                        "friction=0.3", "--fix", "areal_density=0.2", horizon=True)
+    return summary["recordings"][0]["horizon_s"]
+
+
 def pattern_stiffness(pattern, angle, cells=40):
     """Bending energy of a cylinder z = (x cos angle + y sin angle)^2 / 2 on the unit square under the sum over
     edges |e|^2 |jump of slope|^2 / (A_0 + A_1) / 2, over the plate's 1/2."""

@@ -53,7 +53,8 @@ def main():
         document |= tables.lift_tables(results)
         copy_pictures(options.out, options.document.parent / "images")
     if options.only in (None, "twins"):
-        document |= tables.twin_tables(run_twins(runs, options.data), run_membrane(runs, options.data))
+        document |= tables.twin_tables(run_twins(runs, options.data), run_membrane(runs, options.data),
+                                       run_horizons(runs))
     tables.replace_tables(options.document, document)
     print(options.document)
 
@@ -90,6 +91,11 @@ def run_twins(runs, data, only=None):
 def run_membrane(runs, data):
     assets, _ = twins.write_inputs(runs.out)
     return twins.fit_membrane(runs, data, assets, "lift_a")
+
+
+def run_horizons(runs):
+    inputs = twins.write_inputs(runs.out)
+    return {fit: twins.horizon(runs, *inputs, *fit) for fit in twins.LONGER_FITS}
 
 
 if __name__ == "__main__":
