@@ -134,15 +134,16 @@ def twin_table(fits):
                   "of noise alone mm"], rows)
 
 
-def twin_tables(fits, membrane, horizons):
+def twin_tables(fits, both, horizons):
     stiffness = [[pattern, *(f"{twins.pattern_stiffness(pattern, angle):.2f}"
                              for angle in (0, math.pi / 4, math.pi / 2))] for pattern in twins.PATTERNS]
-    young = lifts.profile(membrane["rows"], "young")
     return {"twins": twin_table(fits),
             "patterns": table(["diagonals", "bent along an edge", "along the diagonal", "along the other edge"],
                               stiffness),
-            "membrane": table(["E t N/m", *(f"{value / 1000:g}" for value, _ in young)],
-                              [["residual mm", *(mm(score) for _, score in young)]]),
+            "both": table(["recording", "E Pa", "95 % of E", "D N m", "95 % of D"],
+                          [[twin, *(text for name in ("young", "bending")
+                                    for text in (number(search["parameters"][name]["estimate"]), finding_text(search, name)))]
+                           for twin, search in both.items()]),
             "horizons": table(["bending model", "diagonals", "predictable until s"],
                               [[*fit, "3, the end" if until is None else f"{until:.2f}"]
                                for fit, until in horizons.items()])}

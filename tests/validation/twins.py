@@ -59,13 +59,12 @@ def fit(runs, data, assets, meshes, twin, model, pattern):
                      values, "--no-solver-check", "--fix", "friction=0.3", "--fix", "areal_density=0.2")
 
 
-def fit_membrane(runs, data, assets, twin):
-    """D against E t on cells of 20 mm."""
-    nominal, _ = TWINS[twin]
-    values = ",".join(f"{factor * nominal:.4g}" for factor in FACTORS["isometric"])
-    return runs.grid(f"twin_{twin}/membrane", [data / "twin" / twin], "--asset", assets["isometric"], "--mesh",
-                     "sheet:0.4x0.4:0.02:alternating", "--young", "1e4,2e4,3e4,6e4,1.2e5", "--bending", values,
-                     "--no-solver-check", "--fix", "friction=0.3", "--fix", "areal_density=0.2")
+def fit_both(runs, data, assets, meshes, twin):
+    """E and D at once on the truth's diagonals. The recordings of lift_a show the same motion, simulated once."""
+    return runs.grid(f"twin_{twin}/both", [data / "twin" / twin], "--asset", assets["isometric"], "--mesh",
+                     meshes["alternating, other parity"], "--young", "1e4:9e4:5:log", "--bending", "5e-5:2e-4:5:log",
+                     "--no-solver-check", "--fix", "friction=0.3", "--fix", "areal_density=0.2", "--rollouts",
+                     str(runs.out / "twin_lift_a" / "rollouts"))
 
 
 # Longer than the recordings: what folds after their end.

@@ -53,7 +53,7 @@ def main():
         document |= tables.lift_tables(results)
         copy_pictures(options.out, options.document.parent / "images")
     if options.only in (None, "twins"):
-        document |= tables.twin_tables(run_twins(runs, options.data), run_membrane(runs, options.data),
+        document |= tables.twin_tables(run_twins(runs, options.data), run_both(runs, options.data),
                                        run_horizons(runs))
     tables.replace_tables(options.document, document)
     print(options.document)
@@ -88,9 +88,9 @@ def run_twins(runs, data, only=None):
     return {fit: twins.fit(runs, data, *inputs, *fit) for fit in twins.FITS if only in (None, fit[0])}
 
 
-def run_membrane(runs, data):
-    assets, _ = twins.write_inputs(runs.out)
-    return twins.fit_membrane(runs, data, assets, "lift_a")
+def run_both(runs, data):
+    inputs = twins.write_inputs(runs.out)
+    return {twin: twins.fit_both(runs, data, *inputs, twin) for twin in ("lift_a", "lift_a_one_camera_3mm")}
 
 
 def run_horizons(runs):
