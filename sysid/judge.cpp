@@ -70,6 +70,8 @@ Summary judge(GridResults& results, std::vector<Replay>& replays, const GridSett
   }
   Summary summary = summarize(results, verdict, replays, grid);
   summary.solver_check = std::move(checks);
+  summary.settings["solver_check"] = settings.solver_check ? "yes" : "no";
+  summary.settings["horizon"] = settings.horizon ? "yes" : "no";
   constexpr double kCoarse = 0.05;  // of the score
   if (error.interpolation > kCoarse * verdict.score)
     summary.warnings.push_back("between the values of the grid the score is known to " +

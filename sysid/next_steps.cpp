@@ -74,6 +74,13 @@ std::vector<std::string> standing_unknowns(const Summary& summary) {
     if (fixed.source == "assumed" && name != "areal_density")
       assumed += (assumed.empty() ? "" : ", ") + label(summary, name);
   if (!assumed.empty()) unknowns.push_back("Assumed, not measured: " + assumed + ".");
+  const auto left_out = [&](const char* setting) {
+    const auto found = summary.settings.find(setting);
+    return found != summary.settings.end() && found->second == "no";
+  };
+  if (left_out("solver_check"))
+    unknowns.push_back("How far the solver itself moves the answer: no finer solution was asked for.");
+  if (left_out("horizon")) unknowns.push_back("Until when the motion can be predicted: it was not asked for.");
   return unknowns;
 }
 

@@ -39,5 +39,15 @@ TEST(NextSteps, AnAssumedWeightIsNotKnown) {
   EXPECT_FALSE(mentions(standing_unknowns(summary), "Weigh the sheet"));
 }
 
+TEST(NextSteps, ChecksThatWereLeftOutAreNotKnown) {
+  Summary summary = example_summary();
+  summary.settings["solver_check"] = summary.settings["horizon"] = "yes";
+  EXPECT_FALSE(mentions(standing_unknowns(summary), "asked for"));
+  summary.settings["solver_check"] = "no";
+  EXPECT_TRUE(mentions(standing_unknowns(summary), "finer solution"));
+  summary.settings["horizon"] = "no";
+  EXPECT_TRUE(mentions(standing_unknowns(summary), "predicted"));
+}
+
 }  // namespace
 }  // namespace flash::sysid
