@@ -80,7 +80,8 @@ std::vector<std::string> standing_unknowns(const Summary& summary) {
   };
   if (left_out("solver_check"))
     unknowns.push_back("How far the solver itself moves the answer: no finer solution was asked for.");
-  if (left_out("horizon")) unknowns.push_back("Until when the motion can be predicted: it was not asked for.");
+  if (left_out("horizon"))
+    unknowns.push_back("Until when the motion can be predicted: it was not asked for.");
   return unknowns;
 }
 

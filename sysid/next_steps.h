@@ -10,8 +10,8 @@ namespace flash::sysid {
 /// recordings do not, the range to widen, the constant to measure, or the export.
 std::vector<std::string> next_steps(const Summary& summary);
 
-/// What this search over these recordings cannot know, whatever its parameters: ratios to the weight where the
-/// areal density is not measured, constants that were assumed, and checks that were left out.
+/// What this search over these recordings cannot know, whatever its parameters: ratios to the weight where
+/// the areal density is not measured, constants that were assumed, and checks that were left out.
 std::vector<std::string> standing_unknowns(const Summary& summary);
 
 }  // namespace flash::sysid
