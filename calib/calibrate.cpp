@@ -182,15 +182,39 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
   }
 }
 
-/// Halves of few views determine too little by themselves.
-void check_splits(Calibration& result, const BundleSettings& settings, int least_views) {
+/// Errors that change smoothly with the robot's pose have a part that all views share: it comes on top.
+/// Returns by how much the variances have grown in the mean.
+double add_smooth_errors(Calibration& result, const BundleSettings& settings) {
+  const SystematicUncertainty systematic = systematic_uncertainty(result.refined, settings);
+  const SmoothErrors& errors = result.smooth_errors.emplace(systematic.arms.front());
+  if (!errors.found) return 1;
+  const Matrix6d noise = result.covariance;
+  result.covariance = systematic.covariance.topLeftCorner<6, 6>();
+  const int scale = shared_columns(result.refined.bundle, settings.unknowns).scales.front();
+  if (result.scale && scale >= 0) result.scale->sd = std::sqrt(systematic.covariance(scale, scale));
+  const double grown = noise.ldlt().solve(result.covariance).trace() / 6;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the robot's errors change smoothly with its pose, as those of a kinematic model or a lens do: "
+      "what is alike in all views cannot be seen, and was added to the stated standard deviations, "
+      "which it raised by %.1f",
+      std::sqrt(grown));
+  result.warnings.emplace_back(text);
+  return grown;
+}
+
+/// Halves of few views determine too little by themselves. grown: what has been added for errors that halves
+/// by place would show as well.
+void check_splits(Calibration& result, const BundleSettings& settings, int least_views, double grown) {
   if (result.used.size() < 4 * static_cast<std::size_t>(least_views)) return;
   const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings);
   result.splits = {check_halves(result.refined, settings, Split::interleaved)};
   result.splits.insert(result.splits.end(), systematic.begin(), systematic.end());
   const SplitCheck* worst = nullptr;
   result.covariance_factor = split_inflation(systematic, &worst);
-  if (worst == nullptr) return;
+  result.covariance_factor = std::max(1.0, result.covariance_factor / grown);
+  if (worst == nullptr || result.covariance_factor == 1) return;
   result.covariance *= result.covariance_factor;
   char text[240];
   std::snprintf(
@@ -305,7 +329,8 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.chain_rms = reprojection_rms(bundle, false);
   result.centre_rms = centre_rms(bundle, target_poses(observations));
   compare_methods(result, observations, plain, refine_settings, settings.folds);
-  check_splits(result, refine_settings.bundle, settings.least_views);
+  const double grown = add_smooth_errors(result, refine_settings.bundle);
+  check_splits(result, refine_settings.bundle, settings.least_views, grown);
   finish(result, observations);
   return result;
 }

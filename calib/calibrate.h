@@ -8,6 +8,7 @@
 #include "calib/observability.h"
 #include "calib/reference_methods.h"
 #include "calib/repair.h"
+#include "calib/smooth_errors.h"
 #include "calib/split_check.h"
 #include "calib/target_size.h"
 
@@ -59,9 +60,10 @@ struct Calibration {
   RotationDiversity diversity;
   WeakestDirection weakest;
   std::optional<ScaleCheck> scale;
-  std::vector<SplitCheck> splits;     ///< of X, interleaved first; none where there are too few views
-  double covariance_factor = 1;       ///< by which the splits have widened the covariance
-  std::vector<std::string> warnings;  ///< worst first
+  std::vector<SplitCheck> splits;             ///< of X, interleaved first; none where there are too few views
+  double covariance_factor = 1;               ///< by which the splits have widened the covariance
+  std::optional<SmoothErrors> smooth_errors;  ///< of the robot, which the covariance holds where found
+  std::vector<std::string> warnings;          ///< worst first
   bool usable = true;
 };
 

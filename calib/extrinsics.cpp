@@ -193,6 +193,16 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                                                 {"apart_deg", kDegrees * check.apart.tail<3>().norm()},
                                                 {"chi_square", check.chi_square}};
   }
+  json["smooth_errors"] = nullptr;
+  if (calibration.smooth_errors) {
+    const SmoothErrors& errors = *calibration.smooth_errors;
+    json["smooth_errors"] = {{"found", errors.found},
+                             {"gain", errors.gain},
+                             {"translation_m", errors.translation},
+                             {"rotation_rad", errors.rotation},
+                             {"about_base_rad", errors.about_base},
+                             {"reach", errors.reach}};
+  }
   json["warnings"] = calibration.warnings;
   json["exit_code"] = exit_code;
   json["provenance"] = {{"tool", "flash-calib"},    {"version", FLASH_VERSION}, {"dataset", inputs.dataset},
@@ -206,10 +216,12 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
 Extrinsics load_extrinsics(const std::string& path) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject object(file, path);
-  object.expect_fields({"schema",      "setup",        "method",   "transform",     "target_pose",
-                        "covariance",  "predicted_sd", "sigmas",   "residuals",     "depth",
-                        "time_offset", "comparison",   "views",    "observability", "convention_findings",
-                        "scale",       "splits",       "warnings", "exit_code",     "provenance"});
+  object.expect_fields(
+      {"schema",      "setup",        "method",        "transform",     "target_pose",
+       "covariance",  "predicted_sd", "sigmas",        "residuals",     "depth",
+       "time_offset", "comparison",   "views",         "observability", "convention_findings",
+       "scale",       "splits",       "smooth_errors", "warnings",      "exit_code",
+       "provenance"});
   if (object.string("schema") != "flash-extrinsics/1") throw object.error("schema", "flash-extrinsics/1");
   Extrinsics extrinsics;
   extrinsics.setup = parse_setup(object.string("setup"), path, "setup");

@@ -1,5 +1,6 @@
 #include "calib/register.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -7,6 +8,7 @@
 #include <map>
 
 #include "calib/linearization.h"
+#include "calib/smooth_errors.h"
 #include "data/error.h"
 #include "data/text.h"
 
@@ -159,19 +161,36 @@ Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& gi
     scale.solved = settings.bundle.unknowns.scales;
     if (scale.solved) cell.notices.push_back(size_notice(scale));
   }
+  const SystematicUncertainty systematic = systematic_uncertainty(refined, settings.bundle);
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
+  for (std::size_t i = 0; i < cell.scales.size(); ++i)
+    if (const int column = columns.scales[i]; column >= 0)
+      cell.scales[i].sd = std::sqrt(systematic.covariance(column, column));
   const std::vector<std::string> arms = names_of(members, &CellMember::arm);
   const std::vector<std::string> cameras = names_of(members, &CellMember::camera);
   const auto block = [&](int column) -> Matrix6d {
-    return column < 0 ? Matrix6d(Matrix6d::Zero()) : Matrix6d(refined.covariance.block<6, 6>(column, column));
+    return column < 0 ? Matrix6d(Matrix6d::Zero())
+                      : Matrix6d(systematic.covariance.block<6, 6>(column, column));
   };
+  // How much of what halves show has been added already.
+  const auto grown = [&](int column) {
+    if (column < 0) return 1.0;
+    const Matrix6d noise = refined.covariance.block<6, 6>(column, column);
+    return std::max(1.0, noise.ldlt().solve(block(column)).trace() / 6);
+  };
+  for (std::size_t a = 0; a < arms.size(); ++a)
+    if (systematic.arms[a].found)
+      cell.notices.push_back(arms[a] +
+                             ": the robot's errors change smoothly with its pose; what they have in common "
+                             "was added to the standard deviations");
   const std::string world = arms.front();
   const auto widened = [&](std::size_t base) {
     if (refined.bundle.poses.size() < 16) return 1.0;
     const std::vector<SplitCheck> checks = check_systematic(refined, settings.bundle, base);
     const SplitCheck* worst = nullptr;
-    const double factor = split_inflation(checks, &worst);
-    if (worst != nullptr)
+    const int column = base == 0 ? columns.cameras.front() : columns.bases[base];
+    const double factor = std::max(1.0, split_inflation(checks, &worst) / grown(column));
+    if (worst != nullptr && factor > 1)
       cell.notices.push_back((base == 0 ? cameras.front() : arms[base]) + ": " + describe(worst->split) +
                              " differ by more than noise explains; its standard deviations were raised by " +
                              data::format_short(std::sqrt(factor)));
