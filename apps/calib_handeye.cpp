@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -92,34 +93,58 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   }
 }
 
-calib::ImageCalibration from_images(const HandEyeOptions& options, calib::Setup setup,
-                                    const calib::Dataset& dataset, const calib::CalibrateSettings& settings) {
-  const calib::Target target = target_of(options.dataset, dataset);
-  const std::vector<calib::Detection> detections =
-      detect_all(dataset, target, options.dataset, options.common);
-  return calib::calibrate_images(setup, dataset, target, detections, settings);
+/// Wall time of the parts of a run, for --verbose.
+class Phases {
+ public:
+  void end(const char* name) {
+    const auto now = std::chrono::steady_clock::now();
+    text_ += (text_.empty() ? "" : ", ") + std::string(name) + " " +
+             fixed(std::chrono::duration<double>(now - begin_).count(), 2) + " s";
+    begin_ = now;
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
+  std::string text_;
+};
+
+calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
+                              const calib::Dataset& dataset, const calib::CalibrateSettings& settings,
+                              Phases& phases) {
+  const bool pairs = std::all_of(dataset.frames.begin(), dataset.frames.end(),
+                                 [](const calib::Frame& frame) { return frame.image.empty(); });
+  calib::ImageCalibration solved;
+  if (pairs) {
+    if (options.time_offset)
+      throw data::InputError(dataset.source + ": pairs of poses have no time; leave --time-offset out");
+    solved.calibration = calib::calibrate_pairs(setup, calib::pair_observations(dataset), settings);
+  } else {
+    const calib::Target target = target_of(options.dataset, dataset);
+    const std::vector<calib::Detection> detections =
+        detect_all(dataset, target, options.dataset, options.common);
+    phases.end("corners");
+    solved = calib::calibrate_images(setup, dataset, target, detections, settings);
+  }
+  phases.end("solving");
+  return solved;
 }
 
 int run_handeye(const HandEyeOptions& options) {
   const std::string report = report_path(options);
   for (const std::string& path : {options.out, report})
     if (!path.empty()) check_calib_output(path, options.common);
+  Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
+  phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
   constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
   if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
   settings.target_size = options.target_size;
+  settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = options.time_offset;
-  const bool pairs = std::all_of(dataset.frames.begin(), dataset.frames.end(),
-                                 [](const calib::Frame& frame) { return frame.image.empty(); });
-  if (pairs && options.time_offset)
-    throw data::InputError(dataset.source + ": pairs of poses have no time; leave --time-offset out");
-  const calib::ImageCalibration solved =
-      pairs ? calib::ImageCalibration{.calibration = calib::calibrate_pairs(
-                                          setup, calib::pair_observations(dataset), settings),
-                                      .refiner = ""}
-            : from_images(options, setup, dataset, settings);
+  const calib::ImageCalibration solved = solve(options, setup, dataset, settings, phases);
 
   const calib::ExtrinsicsInputs inputs = calib::relative_to(
       {dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
@@ -148,6 +173,8 @@ int run_handeye(const HandEyeOptions& options) {
                        .image +
                    ": not used: " + view.reason);
   for (const std::string& warning : solved.calibration.warnings) warn_calib(warning);
+  phases.end("writing");
+  if (options.common.verbose) say(options.common, phases.text());
   if (options.common.json)
     std::cout << text;
   else

@@ -52,6 +52,7 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
   calib::CalibrateSettings settings;
   settings.target_size = options.target_size;
+  settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = time_offset;
   const calib::ImageCalibration solved = calib::calibrate_images(kind, dataset, target, detections, settings);
   if (!options.common.quiet) {

@@ -1,10 +1,14 @@
 #include "calib/bundle.h"
 
 #include <ceres/ceres.h>
+#if __has_include(<glog/logging.h>)
+#include <glog/logging.h>
+#endif
 
 #include <array>
 #include <cmath>
 #include <memory>
+#include <optional>
 
 #include "calib/chain.h"
 #include "calib/projection.h"
@@ -62,16 +66,40 @@ void set_pose_jacobian(double* target, const Rows& rows) {
   jacobian.col(6).setZero();
 }
 
+/// The chain through one view, made anew only when its links have moved: all corners of a view are evaluated
+/// one after the other. Blocks: camera, base, target, correction; time offset.
+class ViewChain {
+ public:
+  ViewChain(Setup setup, const RobotPose& pose) : setup_(setup), pose_(pose) {}
+
+  const Chain& at(double const* const* x, double tau) {
+    std::array<double, 29> links;
+    for (std::size_t k = 0; k < 4; ++k) std::copy(x[k], x[k] + 7, links.begin() + 7 * k);
+    links.back() = tau;
+    if (!chain_ || links != links_) {
+      chain_.emplace(setup_, pose_of(x[0]), pose_of(x[1]), pose_.T_base_gripper, pose_of(x[3]), pose_of(x[2]),
+                     tau, pose_.velocity);
+      links_ = links;
+    }
+    return *chain_;
+  }
+
+ private:
+  Setup setup_;
+  const RobotPose& pose_;
+  std::array<double, 29> links_ = {};
+  std::optional<Chain> chain_;
+};
+
 /// Blocks: camera, base, target, correction, intrinsics, scale, time offset.
 class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1> {
  public:
-  CornerCost(Setup setup, const RobotPose& pose, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel,
+  CornerCost(std::shared_ptr<ViewChain> chain, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel,
              double sigma)
-      : setup_(setup), pose_(pose), point_(point), pixel_(pixel), weight_(1 / sigma) {}
+      : chain_(std::move(chain)), point_(point), pixel_(pixel), weight_(1 / sigma) {}
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    const Chain chain(setup_, pose_of(x[0]), pose_of(x[1]), pose_.T_base_gripper, pose_of(x[3]),
-                      pose_of(x[2]), *x[6], pose_.velocity);
+    const Chain& chain = chain_->at(x, *x[6]);
     const Eigen::Vector3d p = *x[5] * point_;
     const Eigen::Vector3d q = chain.target_in_camera() * p;
     if (!(q.z() > 1e-6)) return false;
@@ -98,8 +126,7 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
   }
 
  private:
-  Setup setup_;
-  const RobotPose& pose_;
+  std::shared_ptr<ViewChain> chain_;
   Eigen::Vector3d point_;
   Eigen::Vector2d pixel_;
   double weight_;
@@ -109,12 +136,11 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
 /// scale of the depth.
 class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1, 1> {
  public:
-  DepthCost(Setup setup, const RobotPose& pose, const Eigen::Vector3d& point, double sigma)
-      : setup_(setup), pose_(pose), point_(point), weight_(1 / sigma) {}
+  DepthCost(std::shared_ptr<ViewChain> chain, const Eigen::Vector3d& point, double sigma)
+      : chain_(std::move(chain)), point_(point), weight_(1 / sigma) {}
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    const Chain chain(setup_, pose_of(x[0]), pose_of(x[1]), pose_.T_base_gripper, pose_of(x[3]),
-                      pose_of(x[2]), *x[4], pose_.velocity);
+    const Chain& chain = chain_->at(x, *x[4]);
     const Eigen::Vector3d point = point_ / *x[5];
     const DepthResidual depth = depth_residual(chain, point);
     *residual = weight_ * depth.value;
@@ -131,8 +157,7 @@ class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1, 1> {
   }
 
  private:
-  Setup setup_;
-  const RobotPose& pose_;
+  std::shared_ptr<ViewChain> chain_;
   Eigen::Vector3d point_;
   double weight_;
 };
@@ -197,19 +222,20 @@ void add_views(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, co
     const auto camera = static_cast<std::size_t>(view.camera), arm = static_cast<std::size_t>(pose.arm),
                target = static_cast<std::size_t>(view.target);
     double* correction = blocks.corrections[static_cast<std::size_t>(view.pose)].data();
+    const auto chain = std::make_shared<ViewChain>(bundle.setup, pose);
     for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
       problem.AddResidualBlock(
-          new CornerCost(bundle.setup, pose, view.points.col(i), view.pixels.col(i), noise.corner[camera]),
+          new CornerCost(chain, view.points.col(i), view.pixels.col(i), noise.corner[camera]),
           settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr, blocks.cameras[camera].data(),
           blocks.bases[arm].data(), blocks.targets[target].data(), correction,
           blocks.intrinsics[camera].data(), &blocks.scales[target], &blocks.time_offsets[arm]);
     }
     for (Eigen::Index i = 0; i < view.depth_points.cols(); ++i) {
-      problem.AddResidualBlock(
-          new DepthCost(bundle.setup, pose, view.depth_points.col(i), noise.depth[camera]),
-          settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr, blocks.cameras[camera].data(),
-          blocks.bases[arm].data(), blocks.targets[target].data(), correction, &blocks.time_offsets[arm],
-          &blocks.depth_scales[camera]);
+      problem.AddResidualBlock(new DepthCost(chain, view.depth_points.col(i), noise.depth[camera]),
+                               settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr,
+                               blocks.cameras[camera].data(), blocks.bases[arm].data(),
+                               blocks.targets[target].data(), correction, &blocks.time_offsets[arm],
+                               &blocks.depth_scales[camera]);
     }
   }
 }
@@ -262,7 +288,23 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
 
 }  // namespace
 
+namespace {
+
+/// Ceres warns of singular steps on stderr, whatever its logging type; here they are an answer like others.
+void silence_ceres() {
+#if __has_include(<glog/logging.h>)
+  static const bool silent = [] {
+    FLAGS_minloglevel = google::GLOG_FATAL;
+    return true;
+  }();
+  static_cast<void>(silent);
+#endif
+}
+
+}  // namespace
+
 BundleSummary solve_bundle(Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings) {
+  silence_ceres();
   Blocks blocks(bundle);
   ceres::Problem problem;
   add_views(problem, blocks, bundle, noise, settings);

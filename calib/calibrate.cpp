@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <tuple>
 
 #include "calib/linearization.h"
@@ -135,14 +136,25 @@ double centre_rms(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_
   return std::sqrt(sum / static_cast<double>(bundle.views.size()));
 }
 
+/// A method can close A X = X B as well as others and still be far off in a direction that motions hardly
+/// show: then the target lies elsewhere in the pictures.
+void flag_wild_pixels(std::vector<ComparedMethod>& closed_forms) {
+  constexpr double kWild = 10;
+  double least = std::numeric_limits<double>::infinity();
+  for (const ComparedMethod& method : closed_forms)
+    if (!method.wild && method.px < least) least = method.px;
+  for (ComparedMethod& method : closed_forms)
+    method.wild = method.wild || !(method.px <= kWild * least + 1e-3);
+}
+
 void compare_methods(Calibration& result, const std::vector<Observation>& observations, const Bundle& plain,
-                     RefineSettings settings, int folds) {
+                     RefineSettings settings, const CalibrateSettings& calibrate) {
   const std::vector<PoseLoop> loops = loops_of(result.setup, observations);
   const std::vector<Eigen::Isometry3d> poses = target_poses(observations);
   Bundle bundle = plain;
   settings.noise = result.refined.noise;
   const auto hold = [&](Method method) {
-    return hold_out(result.refined.bundle, poses, method, settings, folds);
+    return hold_out(result.refined.bundle, poses, method, settings, calibrate.folds, calibrate.threads);
   };
   for (const ReferenceMethod& reference : reference_methods(loops)) {
     ComparedMethod& method = result.comparison.emplace_back();
@@ -156,6 +168,7 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
     if (reference.name == "park") method.held_out = hold(Method::park);
     if (reference.name == "shah") method.held_out = hold(Method::shah);
   }
+  flag_wild_pixels(result.comparison);
   for (const Method kind : {Method::bundle, Method::errors_in_variables}) {
     const Bundle& solved = kind == Method::bundle ? plain : result.refined.bundle;
     ComparedMethod& method = result.comparison.emplace_back();
@@ -206,9 +219,10 @@ double add_smooth_errors(Calibration& result, const BundleSettings& settings) {
 
 /// Halves of few views determine too little by themselves. grown: what has been added for errors that halves
 /// by place would show as well.
-void check_splits(Calibration& result, const BundleSettings& settings, int least_views, double grown) {
-  if (result.used.size() < 4 * static_cast<std::size_t>(least_views)) return;
-  const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings);
+void check_splits(Calibration& result, const BundleSettings& settings, const CalibrateSettings& calibrate,
+                  double grown) {
+  if (result.used.size() < 4 * static_cast<std::size_t>(calibrate.least_views)) return;
+  const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings, 0, calibrate.threads);
   result.splits = {check_halves(result.refined, settings, Split::interleaved)};
   result.splits.insert(result.splits.end(), systematic.begin(), systematic.end());
   const SplitCheck* worst = nullptr;
@@ -309,6 +323,10 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
     if (!checks.empty()) result.scale = checks.front();
   };
   check_scale();
+  if (settings.target_size == TargetSize::solved && !result.scale)
+    throw data::InputError(
+        "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
+        "out, or add views farther apart");
   if (settings.target_size == TargetSize::automatic && result.scale && clearly_off(*result.scale)) {
     // Views that a wrong size made look wrong come back.
     std::tie(observations, result.used, result.repair) = start;
@@ -328,9 +346,9 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.corner_rms = reprojection_rms(bundle, true);
   result.chain_rms = reprojection_rms(bundle, false);
   result.centre_rms = centre_rms(bundle, target_poses(observations));
-  compare_methods(result, observations, plain, refine_settings, settings.folds);
+  compare_methods(result, observations, plain, refine_settings, settings);
   const double grown = add_smooth_errors(result, refine_settings.bundle);
-  check_splits(result, refine_settings.bundle, settings.least_views, grown);
+  check_splits(result, refine_settings.bundle, settings, grown);
   finish(result, observations);
   return result;
 }

@@ -24,6 +24,7 @@ struct CalibrateSettings {
   double surprise = 35;   ///< squared size of a correction over that of most views, 6 degrees of freedom
   int folds = 10;         ///< of the held-out residuals
   TargetSize target_size = TargetSize::automatic;
+  int threads = 1;  ///< of held-out residuals and splits; 0: one a processor
 };
 
 /// A method of the comparison table.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/linearization.h"
+#include "calib/parallel.h"
 #include "calib/projection.h"
 
 namespace flash::calib {
@@ -196,36 +197,62 @@ const char* to_string(Method method) {
   return "errors_in_variables";
 }
 
+namespace {
+
+/// Sums of one part of the views, predicted by a solution without them.
+struct HeldOutSums {
+  double px = 0, mm = 0, deg = 0, corners = 0, views = 0;
+};
+
+HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target,
+                          Method method, const RefineSettings& settings, const std::vector<int>& fold,
+                          int part) {
+  HeldOutSums sums;
+  Bundle train = views_of(bundle, fold, part, false);
+  fit(train, T_camera_target, method, settings);
+  const Bundle test = views_of(bundle, fold, part, true);
+  for (const BundleView& view : test.views) {
+    const Eigen::Isometry3d predicted = predicted_pose(train, view, false);
+    // With lens and size of the target as they were solved for.
+    const Eigen::Matrix3Xd points = train.scales[static_cast<std::size_t>(view.target)] * view.points;
+    const Eigen::Isometry3d seen =
+        fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], points, view.pixels,
+                    T_camera_target[static_cast<std::size_t>(view.pose)]);
+    const Eigen::Vector3d centre = points.rowwise().mean();
+    const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
+    sums.px += residuals(train, view, false).squaredNorm();
+    sums.mm += (1e3 * (predicted * centre - seen * centre)).squaredNorm();
+    sums.deg += std::pow(angle * 180 / M_PI, 2);
+    sums.corners += static_cast<double>(view.points.cols());
+    ++sums.views;
+  }
+  return sums;
+}
+
+}  // namespace
+
 HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-                 const RefineSettings& settings, int folds) {
+                 const RefineSettings& settings, int folds, int threads) {
   const int count = static_cast<int>(bundle.poses.size());
   const int parts = std::min(folds, count);
   HeldOut result;
   for (int i = 0; i < count; ++i) result.fold.push_back(i % parts);
-  double corners = 0, views = 0;
-  for (int part = 0; part < parts; ++part) {
-    Bundle train = views_of(bundle, result.fold, part, false);
-    fit(train, T_camera_target, method, settings);
-    const Bundle test = views_of(bundle, result.fold, part, true);
-    for (const BundleView& view : test.views) {
-      const Eigen::Isometry3d predicted = predicted_pose(train, view, false);
-      // With lens and size of the target as they were solved for.
-      const Eigen::Matrix3Xd points = train.scales[static_cast<std::size_t>(view.target)] * view.points;
-      const Eigen::Isometry3d seen =
-          fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], points, view.pixels,
-                      T_camera_target[static_cast<std::size_t>(view.pose)]);
-      const Eigen::Vector3d centre = points.rowwise().mean();
-      const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
-      result.px += residuals(train, view, false).squaredNorm();
-      result.mm += (1e3 * (predicted * centre - seen * centre)).squaredNorm();
-      result.deg += std::pow(angle * 180 / M_PI, 2);
-      corners += static_cast<double>(view.points.cols());
-      ++views;
-    }
+  std::vector<HeldOutSums> sums(static_cast<std::size_t>(parts));
+  parallel_for(parts, threads, [&](int part) {
+    sums[static_cast<std::size_t>(part)] =
+        hold_out_part(bundle, T_camera_target, method, settings, result.fold, part);
+  });
+  HeldOutSums all;
+  for (const HeldOutSums& part : sums) {
+    all.px += part.px;
+    all.mm += part.mm;
+    all.deg += part.deg;
+    all.corners += part.corners;
+    all.views += part.views;
   }
-  result.px = std::sqrt(result.px / corners);
-  result.mm = std::sqrt(result.mm / views);
-  result.deg = std::sqrt(result.deg / views);
+  result.px = std::sqrt(all.px / all.corners);
+  result.mm = std::sqrt(all.mm / all.views);
+  result.deg = std::sqrt(all.deg / all.views);
   return result;
 }
 

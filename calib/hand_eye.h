@@ -60,8 +60,9 @@ const char* to_string(Method method);
 
 /// Every view left out once, in `folds` interleaved parts (a pose each when there are no more than that).
 /// Nothing of it stays in the solution: errors in variables estimates the noise levels anew, from those of
-/// `settings`; only the pivots are kept.
+/// `settings`; only the pivots are kept. Parts are solved on as many threads (0: one a processor), to the
+/// same digits.
 HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-                 const RefineSettings& settings, int folds = 10);
+                 const RefineSettings& settings, int folds = 10, int threads = 1);
 
 }  // namespace flash::calib

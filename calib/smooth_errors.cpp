@@ -89,8 +89,11 @@ PoseModes modes_of(const Bundle& bundle, std::size_t i) {
 }
 
 /// Squared distances of places and of attitudes (chordal, so that a kernel of both is positive), each over
-/// its mean.
-Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes) {
+/// its mean. The places are those reported, errors and all: spreads of less than ten times the noise
+/// (variances an axis) tell nothing of where the robot was, as those of a head that only turns.
+Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes, double place_noise,
+                                  double attitude_noise) {
+  constexpr double kLeast = 100 * 6;  // of the variance; two places differ by six of them
   const auto count = static_cast<Eigen::Index>(modes.size());
   Eigen::MatrixXd place = Eigen::MatrixXd::Zero(count, count), attitude = place;
   for (Eigen::Index i = 0; i < count; ++i)
@@ -100,8 +103,8 @@ Eigen::MatrixXd squared_distances(const std::vector<PoseModes>& modes) {
       attitude(i, j) = 0.5 * (a.attitude - b.attitude).squaredNorm();
     }
   const double pairs = static_cast<double>(count) * static_cast<double>(count - 1);
-  return place * (pairs / std::max(place.sum(), 1e-12)) +
-         attitude * (pairs / std::max(attitude.sum(), 1e-12));
+  return place / std::max({place.sum() / pairs, kLeast * place_noise, 1e-12}) +
+         attitude / std::max({attitude.sum() / pairs, kLeast * attitude_noise, 1e-12});
 }
 
 /// Matern 5/2.
@@ -284,9 +287,9 @@ std::vector<Reach> fit_fields(const std::vector<PoseInformation>& all, const Ref
     modes.push_back(modes_of(refined.bundle, i));
   }
   const Seen seen = seen_errors(parts);
-  const Eigen::MatrixXd squared = squared_distances(modes);
   const double t = std::pow(refined.noise.translation[static_cast<std::size_t>(arm)], 2),
                r = std::pow(refined.noise.rotation[static_cast<std::size_t>(arm)], 2);
+  const Eigen::MatrixXd squared = squared_distances(modes, t, r);
   // What turns the gripper may be at the wrist or at the base: the likelihood has a maximum for each.
   std::array<Variances, 2> starts;
   starts[0] << 0.5 * t, 0.5 * r, 0.5 * t, 0.5 * r, 0.02 * r;
@@ -335,7 +338,9 @@ SystematicUncertainty systematic_uncertainty(const Refinement& refined, const Bu
       // In place of the independent errors that the solution was made with.
       result.covariance -= A * all[poses[i]].prior.ldlt().solve(A.transpose());
     }
-    const Eigen::MatrixXd squared = squared_distances(modes);
+    const auto index = static_cast<std::size_t>(arm);
+    const Eigen::MatrixXd squared = squared_distances(modes, std::pow(refined.noise.translation[index], 2),
+                                                      std::pow(refined.noise.rotation[index], 2));
     const double least = std::min_element(reaches.begin(), reaches.end(), [](const Reach& a, const Reach& b) {
                            return a.fit.deviance < b.fit.deviance;
                          })->fit.deviance;

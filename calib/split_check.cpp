@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "calib/linearization.h"
+#include "calib/parallel.h"
 
 namespace flash::calib {
 namespace {
@@ -84,9 +85,12 @@ SplitCheck check_halves(const Refinement& refined, const BundleSettings& setting
 }
 
 std::vector<SplitCheck> check_systematic(const Refinement& refined, const BundleSettings& settings,
-                                         std::size_t base) {
-  std::vector<SplitCheck> checks;
-  for (const Split split : kSystematic) checks.push_back(check_halves(refined, settings, split, base));
+                                         std::size_t base, int threads) {
+  std::vector<SplitCheck> checks(std::size(kSystematic));
+  parallel_for(static_cast<int>(checks.size()), threads, [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    checks[k] = check_halves(refined, settings, kSystematic[k], base);
+  });
   return checks;
 }
 

@@ -28,7 +28,7 @@ SplitCheck check_halves(const Refinement& refined, const BundleSettings& setting
 
 /// All splits that can show an error beside noise.
 std::vector<SplitCheck> check_systematic(const Refinement& refined, const BundleSettings& settings,
-                                         std::size_t base = 0);
+                                         std::size_t base = 0, int threads = 1);
 
 /// By how much a covariance has to grow to be true to halves that should agree: the largest chi-square over
 /// its 6 degrees of freedom, where it lies beyond what the best of that many agreeing splits passes once in
