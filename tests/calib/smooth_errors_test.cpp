@@ -97,6 +97,7 @@ TEST(SmoothErrors, AFieldThatWasDrawnIsFoundInItsSizeAndCovered) {
     covered += squared_distance(scene, solution, systematic.covariance) < kChiSquare95;
   }
   EXPECT_GE(found, 32);
+  EXPECT_NEAR(size, 3e-3, 1e-3);  // another kernel than was drawn by, and a reach that goes with the size
   EXPECT_LT(by_noise, covered);
   EXPECT_GE(covered, 32);
 }
