@@ -171,10 +171,13 @@ std::vector<std::string> next_steps(const Calibration& c) {
   constexpr double kWideTurn = 10, kSharpCorners = 0.3;  // [deg], [px]
   constexpr std::size_t kEnough = 15;
   std::vector<std::string> steps;
-  if (c.scale && (c.scale->solved || std::abs(c.scale->estimate - 1) > std::max(0.01, 5 * c.scale->sd)))
-    steps.push_back(sentence(
-        "Measure the printed target: the data want it %.2f %% larger than stated (negative: smaller).",
-        100 * (c.scale->estimate - 1)));
+  if (c.scale && (c.scale->solved || std::abs(c.scale->estimate - 1) > std::max(0.01, 5 * c.scale->sd))) {
+    const double larger = 100 * (c.scale->estimate - 1);
+    steps.push_back(
+        sentence(larger > 0 ? "Measure the printed target: the data want it %.2f %% larger than stated."
+                            : "Measure the printed target: the data want it %.2f %% smaller than stated.",
+                 std::abs(larger)));
+  }
   const double second = kDegrees * c.diversity.spread.y();
   if (second < kWideTurn)
     steps.push_back(sentence("Turn the gripper more about a second axis: so far %.1f deg rms.", second));
