@@ -22,6 +22,9 @@ constexpr int kPointsPerCell = 8;                             // of a profile, b
 /// 95 % quantiles of chi^2 for 1 to 8 degrees of freedom.
 constexpr std::array<double, 8> kQuantile95 = {3.841, 5.991, 7.815, 9.488, 11.070, 12.592, 14.067, 15.507};
 
+constexpr double kStraight = 1e-3;     // of a rise, below which its straight part is rounding
+constexpr double kLeastCurved = 0.05;  // of a rise: beyond, only the slope is tested, at more than four sigma
+
 /// One point of a profile: coordinates that minimise the score at one coordinate held.
 struct ProfilePoint {
   Eigen::VectorXd x;
@@ -36,6 +39,7 @@ struct Sampling {
   double best_score = 0;          ///< [m]
   Eigen::VectorXd best_scores;    ///< of the samples [m]
   Eigen::MatrixXd gradients;      ///< of the samples at the estimate
+  Eigen::MatrixXd hessian;        ///< of the score there
   double quantile = 0;            ///< Student's, all keyframes counting alike
   double interpolation = 0;       ///< error of a score [m]
   std::vector<FewSamples> few{};  ///< one an axis; empty: all keyframes count alike
@@ -92,6 +96,11 @@ double birge_ratio(const Sampling& sampling, const Eigen::VectorXd& direction) {
 double chi_squared(const Sampling& sampling, const ProfilePoint& point, std::optional<std::size_t> axis) {
   const Eigen::VectorXd rises = sampling.surface.scores(point.x) - sampling.best_scores;
   const double rise = std::max(0.0, sampling.surface.weights().dot(rises) - sampling.interpolation);
+  // Where the range ends before the score falls no more, it rises from there in a straight line too.
+  const Eigen::VectorXd step = point.x - sampling.best;
+  double curved = rise;
+  if (sampling.surface.weights().dot(sampling.gradients * step) > kStraight * rise)
+    curved = std::clamp(0.5 * step.dot(sampling.hessian * step), kLeastCurved * rise, rise);
   std::vector<double> means, variances;
   double variance =
       variance_of_mean(sampling, rises, means, variances) * birge_ratio(sampling, point.x - sampling.best);
@@ -102,7 +111,7 @@ double chi_squared(const Sampling& sampling, const ProfilePoint& point, std::opt
   }
   const double scaled = kNormalQuantile / quantile;
   double chi2 = 0;
-  if (rise > 0) chi2 = variance > 0 ? 4 * rise * rise / variance * scaled * scaled : kInfinity;
+  if (curved > 0) chi2 = variance > 0 ? 4 * rise * curved / variance * scaled * scaled : kInfinity;
   if (sampling.repeatability) {
     const double squares = point.score * point.score - sampling.best_score * sampling.best_score;
     const double samples = static_cast<double>(rises.size());
@@ -377,7 +386,7 @@ GridVerdict profile_grid(const GridResults& results, const ProfileSettings& sett
 
   const ScoreSurface surface(results);
   const std::vector<bool> all(results.axes.size(), true);
-  Sampling sampling{surface, repeatability, {}, kInfinity, {}, {}, 0, settings.solver.interpolation};
+  Sampling sampling{surface, repeatability, {}, kInfinity, {}, {}, {}, 0, settings.solver.interpolation};
   constexpr std::size_t kStarts = 5;
   const auto try_from = [&](Eigen::VectorXd x) {
     const double score = surface.minimize(all, x);
@@ -404,6 +413,8 @@ GridVerdict profile_grid(const GridResults& results, const ProfileSettings& sett
   }
   sampling.best_scores = surface.scores(sampling.best);
   sampling.gradients = surface.gradients(sampling.best);
+  Eigen::VectorXd gradient;
+  surface.score(sampling.best, gradient, sampling.hessian);
   if (!settings.information.empty())
     sampling.few = few_samples(surface.weights().asDiagonal() * sampling.gradients, settings.information);
   verdict.keyframes = static_cast<int>(surface.weights().size());

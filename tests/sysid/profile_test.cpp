@@ -86,6 +86,25 @@ TEST(Profile, IntervalIsStudentsForTheMeanOfWhatEachKeyframeWouldAnswer) {
   }
 }
 
+TEST(Profile, AnEstimateAtTheEndOfTheRangeHasTheIntervalOfTheLikelihoodRatio) {
+  // The keyframes want m, the range begins at e beyond it: ((x - m)^2 - (e - m)^2) / variance < t^2.
+  const std::vector<double> own = scattered(20, std::log(1.2e-4), 0.3, 1);
+  const auto score = [&](std::size_t k, const std::vector<double>& x) {
+    return kFloor + 1e-3 * std::pow(x[0] - own[k], 2);
+  };
+  const double m = mean_of(own), half = 2.093 * standard_error(own);
+  for (const double beyond : {0.3, 1.0, 2.0}) {  // of the interval's half
+    const double edge = m + beyond * half;
+    Axis axis = parse_axis("bending", "1e-4:1e-3:25:log");
+    for (int i = 0; i < 25; ++i) axis.values[static_cast<std::size_t>(i)] = std::exp(edge + 0.1 * i);
+    const ParameterFinding finding = profile_grid(grid_of({axis}, 20, score)).parameters[0];
+    EXPECT_EQ(finding.edge, RangeEdge::low);
+    EXPECT_EQ(finding.identifiable, Identifiable::upper_bound);
+    const double expected = m + std::hypot(half, edge - m);
+    EXPECT_NEAR(std::log((*finding.interval95)[1]), expected, 0.05 * half) << beyond;
+  }
+}
+
 TEST(Profile, IntervalsAndCovarianceOfCorrelatedParameters) {
   const std::vector<double> first = scattered(24, std::log(100), 0.4, 2),
                             second = scattered(24, std::log(1.2e-4), 0.2, 3);
