@@ -23,8 +23,19 @@ void surface_at(const Motion& motion, double t, data::Points& positions, data::P
   const auto below = static_cast<std::size_t>(steps);
   const double fraction = steps - static_cast<double>(below);
   const data::Points &from = motion.positions[below], &to = motion.positions[below + 1];
-  positions = (1 - fraction) * from + fraction * to;
-  if (velocities) *velocities = (to - from) / motion.step;
+  if (fraction < kSameStep) {
+    positions = from;
+  } else if (fraction > 1 - kSameStep) {
+    positions = to;
+  } else {
+    positions = (1 - fraction) * from + fraction * to;
+  }
+  if (!velocities) return;
+  if (from.rows() == to.rows()) {
+    *velocities = (to - from) / motion.step;
+  } else {
+    *velocities = data::Points::Zero(positions.rows(), 3);
+  }
 }
 
 Eigen::Isometry3d Registration::observed_from_simulated() const {

@@ -59,8 +59,11 @@ struct Motion {
       forces{};  ///< last gripper on sheet, in each step: one fewer than positions [N]
 };
 
+/// Share of a step within which a time is that of the step itself.
+constexpr double kSameStep = 1e-6;
+
 /// Positions at time t, linear between steps, held outside the simulated span; `velocities` [m/s], when asked
-/// for, is the slope used, zero outside the span.
+/// for, is the slope used, zero outside the span and where a neighbour is empty.
 void surface_at(const Motion& motion, double t, data::Points& positions, data::Points* velocities = nullptr);
 
 /// Where the simulation stands against what was observed: p_observed = R (p_simulated - pivot) + pivot +

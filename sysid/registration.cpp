@@ -45,7 +45,7 @@ struct Side {
   Side(const RegistrationProblem& p, int points)
       : problem(p),
         observations(thinned(*p.observations, points)),
-        sheet(*p.triangles, p.motion->positions.front()) {
+        sheet(p.sheet ? *p.sheet : SheetQueries(*p.triangles, p.motion->positions.front())) {
     for (const Observation& observation : observations) {
       hints.emplace_back(observation.points.rows(), -1);
       if (observation.seen()) total_weight += observation.weight;
@@ -242,6 +242,7 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
     Eigen::VectorXd unknowns = start;
     for (const Side& side : sides) unknowns[side.index[4]] = start[side.index[4]] + time;
     unknowns = unknowns.cwiseMax(-box).cwiseMin(box);
+    if ((box.array() == 0).all()) break;  // nothing is free
     const double score = minimize(sides, box, objective, settings, unknowns);
     if (score < best_score) {
       best_score = score;

@@ -33,6 +33,7 @@ struct RegistrationProblem {
   const data::Triangles* triangles = nullptr;
   const Motion* motion = nullptr;
   const std::vector<Observation>* observations = nullptr;
+  const SheetQueries* sheet = nullptr;  ///< of `triangles`, to be copied; none: made
   RegistrationBounds bounds;
   Registration start;  ///< pivot and up are kept, the rest is where the fit starts
   data::CropBox crop{};

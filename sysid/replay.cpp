@@ -150,7 +150,8 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   replay.up = upward(recording);
 
   // Marks are named by vertices of the recording's own mesh.
-  const SurfaceDistance sheet(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  replay.queries =
+      std::make_shared<const SheetQueries>(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
   for (const data::Keyframe& keyframe : data::load_keyframes(recording, replay.notices)) {
     Observation observation{.t = keyframe.time,
                             .points = keyframe.cloud,
@@ -158,7 +159,7 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
                             .markers = keyframe.markers,
                             .force = keyframe.force};
     for (const int vertex : keyframe.marker_vertices)
-      observation.marks.push_back(sheet.nearest(recording.mesh.vertices.row(vertex).transpose()));
+      observation.marks.push_back(replay.queries->nearest(recording.mesh.vertices.row(vertex).transpose()));
     const bool weighs =
         keyframe.time >= settings.score_from && keyframe.time <= settings.score_to &&
         (keyframe.cloud.rows() >= settings.min_points || keyframe.contour.rows() >= settings.min_points ||
@@ -275,6 +276,7 @@ RegistrationProblem registration_problem(const Replay& replay, const Motion& mot
   problem.triangles = &replay.recording.mesh.triangles;
   problem.motion = &motion;
   problem.observations = &replay.observations;
+  problem.sheet = replay.queries.get();
   problem.bounds = {replay.recording.nuisance.offset, replay.recording.nuisance.yaw,
                     replay.recording.nuisance.time};
   problem.start.pivot = replay.pivot;

@@ -1,5 +1,6 @@
 #pragma once
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,6 +57,7 @@ struct ReplayResult {
 struct Replay {
   data::Recording recording;
   sim::Sheet sheet;
+  std::shared_ptr<const SheetQueries> queries;  ///< of the sheet at rest
   ReplaySettings settings;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity; the table normal without gravity
   Eigen::Vector3d pivot =
