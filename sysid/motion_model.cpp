@@ -24,7 +24,9 @@ void keep_read(const Replay& replay, Motion& motion) {
     const double steps = (observation.t - motion.start) / motion.step;
     if (!(steps > 0) || steps >= static_cast<double>(read.size() - 1)) continue;
     const auto below = static_cast<std::size_t>(steps);
-    read[below] = read[below + 1] = true;
+    const double fraction = steps - static_cast<double>(below);
+    if (fraction < 1 - kSameStep) read[below] = true;
+    if (fraction > kSameStep) read[below + 1] = true;
   }
   for (std::size_t i = 0; i < read.size(); ++i)
     if (!read[i]) motion.positions[i].resize(0, 3);
@@ -33,10 +35,12 @@ void keep_read(const Replay& replay, Motion& motion) {
 /// At every point of a grid; empty where one diverged.
 std::optional<std::vector<Motion>> motions_over(const Replay& replay, const std::vector<Axis>& axes,
                                                 const GridSettings& grid, const RolloutStore& store) {
-  std::vector<std::vector<double>> points = cartesian_product(axes);
+  const std::vector<std::vector<double>> points = cartesian_product(axes);
   std::vector<std::optional<Motion>> motions(points.size());
+  Replay single = replay;  // one motion a thread
+  single.settings.threads = 1;
   for_each_in_parallel(points.size(), grid.threads, [&](std::size_t i) {
-    ReplayResult result = store.run(replay, candidate_at(points[i], grid));
+    ReplayResult result = store.run(single, candidate_at(points[i], grid));
     keep_read(replay, result.motion);
     if (result.finite) motions[i] = std::move(result.motion);
   });
@@ -76,7 +80,6 @@ Motion MotionModel::at(const std::vector<double>& values, double share) const {
     motion = prolonged(motion, *prolongation_);
     if (share != 0) add(motion, share, difference_->at(values));
   }
-  if (correction_) add(motion, 1, *correction_);
   return motion;
 }
 
@@ -84,14 +87,7 @@ MotionModel MotionModel::slice(double value) const {
   MotionModel rest(coarse_.slice(value));
   if (difference_) rest.difference_ = difference_->slice(value);
   rest.prolongation_ = prolongation_;
-  rest.correction_ = correction_;
   return rest;
-}
-
-void MotionModel::correct(const Motion& difference) {
-  auto sum = std::make_shared<Motion>(difference);
-  if (correction_) add(*sum, 1, *correction_);
-  correction_ = std::move(sum);
 }
 
 Motion MotionModel::on_its_mesh(const Motion& motion) const {
@@ -111,32 +107,36 @@ MotionsAt motions_of(const std::vector<ModelledReplay>& models, double share) {
 
 std::vector<Axis> thinned(const std::vector<Axis>& axes) {
   std::vector<Axis> result = axes;
-  for (Axis& axis : result)
-    if (axis.values.size() > 3)
-      axis.values = {axis.values.front(), axis.values[axis.values.size() / 2], axis.values.back()};
+  for (Axis& axis : result) {
+    if (axis.values.size() < 4) continue;
+    std::vector<double> kept;
+    for (std::size_t i = 0; i + 1 < axis.values.size(); i += 2) kept.push_back(axis.values[i]);
+    kept.push_back(axis.values.back());
+    axis.values = std::move(kept);
+  }
   return result;
 }
 
-std::optional<ModelledReplay> model_motions(const Replay& replay, const GridSettings& grid,
-                                            const RolloutStore& store, bool finer) {
-  Replay single = replay;  // one motion a thread
-  single.settings.threads = 1;
-  const auto motions = motions_over(single, grid.axes, grid, store);
+std::optional<MotionSurface> motion_surface(const Replay& replay, const GridSettings& grid,
+                                            const RolloutStore& store) {
+  const auto motions = motions_over(replay, grid.axes, grid, store);
   if (!motions) return std::nullopt;
-  MotionSurface surface(grid.axes, *motions);
-  if (!finer) return ModelledReplay{replay, MotionModel(std::move(surface))};
+  return MotionSurface(grid.axes, *motions);
+}
 
-  const std::optional<Replay> fine = on_half_the_cell(single);
+std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const MotionSurface& motions,
+                                              const std::vector<Axis>& axes, const GridSettings& grid,
+                                              const RolloutStore& store) {
+  std::optional<Replay> fine = on_half_the_cell(replay);
   if (!fine) return std::nullopt;
-  const std::vector<Axis> axes = thinned(grid.axes);
   auto differences = motions_over(*fine, axes, grid, store);
   if (!differences) return std::nullopt;
   const auto matrix = std::make_shared<const Eigen::SparseMatrix<double>>(
       prolongation(replay.recording.mesh, fine->recording.mesh));
   const std::vector<std::vector<double>> points = cartesian_product(axes);
   for (std::size_t i = 0; i < points.size(); ++i)
-    add((*differences)[i], -1, prolonged(surface.at(points[i]), *matrix));
-  return ModelledReplay{*fine, MotionModel(std::move(surface), MotionSurface(axes, *differences), matrix)};
+    add((*differences)[i], -1, prolonged(motions.at(points[i]), *matrix));
+  return ModelledReplay{std::move(*fine), MotionModel(motions, MotionSurface(axes, *differences), matrix)};
 }
 
 }  // namespace flash::sysid

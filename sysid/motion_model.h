@@ -17,15 +17,15 @@ void add(Motion& a, double share, const Motion& b);
 /// these lie at rest.
 Eigen::SparseMatrix<double> prolongation(const data::TriangleMesh& from, const data::TriangleMesh& to);
 
-/// The motions of one recording at any values in the searched range, without simulating: those of the
+/// The motions of one recording at any values between those simulated, without simulating: those of the
 /// search's mesh, and what they lack of those of a finer one. With P the prolongation to the finer mesh,
 ///
 ///     x(p) = P x_coarse(p) + share (x_fine(p) - P x_coarse(p))
 ///
-/// the difference being far smaller and smoother than the motions, so that three values an axis do for it
-/// (an additive correction between models of two fidelities). share 0 leaves the search's
-/// own motions, 1 gives the finer ones, 4/3 extrapolates to cells of no size: the error of linear triangles
-/// is of second order (Richardson 1911).
+/// the difference being far smaller and smoother than the motions, so that fewer values do for it, one at
+/// least (an additive correction between models of two fidelities). share 0 leaves the search's own motions,
+/// 1 gives the finer ones, 4/3 extrapolates to cells of no size: the error of linear triangles is of second
+/// order (Richardson 1911).
 class MotionModel {
  public:
   explicit MotionModel(MotionSurface coarse) : coarse_(std::move(coarse)) {}
@@ -41,10 +41,6 @@ class MotionModel {
   /// With the first axis held.
   MotionModel slice(double value) const;
 
-  /// Adds `difference`, on the mesh of the model, to every motion from now on: what a simulation at one point
-  /// has beyond the model there makes it exact at that point and better around it.
-  void correct(const Motion& difference);
-
   /// A motion of the search's mesh on the mesh of the model.
   Motion on_its_mesh(const Motion& motion) const;
 
@@ -52,10 +48,9 @@ class MotionModel {
   MotionSurface coarse_;
   std::optional<MotionSurface> difference_;
   std::shared_ptr<const Eigen::SparseMatrix<double>> prolongation_;
-  std::shared_ptr<const Motion> correction_;
 };
 
-/// First, middle and last value of each axis.
+/// Every other value of each axis of more than three, and the last.
 std::vector<Axis> thinned(const std::vector<Axis>& axes);
 
 /// What stands in for the simulation of one recording.
@@ -67,9 +62,14 @@ struct ModelledReplay {
 /// As a source of motions.
 MotionsAt motions_of(const std::vector<ModelledReplay>& models, double share);
 
-/// The motions of all candidates, from the store where it has them. With `finer`, those of a mesh of half the
-/// cell at the thinned axes too. Empty where a candidate diverged, or where the sheet cannot be meshed anew.
-std::optional<ModelledReplay> model_motions(const Replay& replay, const GridSettings& grid,
-                                            const RolloutStore& store, bool finer);
+/// The motions at every point of `grid.axes`, from the store where it has them. Empty where one diverged.
+std::optional<MotionSurface> motion_surface(const Replay& replay, const GridSettings& grid,
+                                            const RolloutStore& store);
+
+/// Those motions with what they lack of a mesh of half the cell, which is simulated at the points of `axes`.
+/// Empty where one diverged, or where the sheet cannot be meshed anew.
+std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const MotionSurface& motions,
+                                              const std::vector<Axis>& axes, const GridSettings& grid,
+                                              const RolloutStore& store);
 
 }  // namespace flash::sysid

@@ -8,8 +8,6 @@
 namespace flash::sysid {
 namespace {
 
-using Extent = std::vector<std::array<double, 2>>;  // one an axis, as coordinates
-
 double coordinate(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
 
 std::array<double, 2> range_of(const Axis& axis) {
@@ -33,14 +31,22 @@ std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searc
     const double first = axis.values.front(), last = axis.values.back();
     axis.values.clear();
     for (int i = 0; i < points; ++i) {
-      const double x = extent[k][0] + (extent[k][1] - extent[k][0]) * i / (points - 1);
+      const double from = coordinate(axis, extent[k][0]), to = coordinate(axis, extent[k][1]);
+      const double x = from + (to - from) * i / (points - 1);
       axis.values.push_back(std::clamp(axis.logarithmic ? std::exp(x) : x, first, last));
     }
   }
   return axes;
 }
 
-/// The next extent; the same where the last one fits.
+}  // namespace
+
+Extent extent_of(const std::vector<Axis>& axes) {
+  Extent extent;
+  for (const Axis& axis : axes) extent.push_back({axis.values.front(), axis.values.back()});
+  return extent;
+}
+
 Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::vector<Axis>& axes) {
   constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most
   constexpr double kSmallest = 1e-4;      // half extent over the range
@@ -48,28 +54,26 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
   bool fits = true;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     if (axes[k].values.size() < 2) continue;
-    const std::array<double, 2> range = range_of(axes[k]);
-    const double width = extent[k][1] - extent[k][0], spacing = width / (points_per_axis(axes) - 1);
-    const double best = coordinate(axes[k], *verdict.parameters[k].estimate);
+    const auto at = [&](double value) { return coordinate(axes[k], value); };
+    const std::array<double, 2> range = range_of(axes[k]), now = {at(extent[k][0]), at(extent[k][1])};
+    const double width = now[1] - now[0], spacing = width / (points_per_axis(axes) - 1);
+    const double best = at(*verdict.parameters[k].estimate);
     double reach = 0;  // the larger half of the interval
-    for (const int side : {0, 1}) {
-      const double end =
-          coordinate(axes[k], (*verdict.parameters[k].interval95)[static_cast<std::size_t>(side)]);
-      const double edge = extent[k][static_cast<std::size_t>(side)];
-      const bool open = std::abs(end - edge) < 1e-9 * width;
-      const bool more = std::abs(edge - range[static_cast<std::size_t>(side)]) > 1e-9 * width;
+    for (const std::size_t side : {0, 1}) {
+      const double end = at((*verdict.parameters[k].interval95)[side]);
+      const bool open = std::abs(end - now[side]) < 1e-9 * width;
+      const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
       // An open end: half as much again; more would lose what the last extents told.
       reach = std::max(reach, open && more ? 0.75 * width / kRoom : std::abs(end - best));
       fits = fits && !(open && more);
     }
     const double half = std::max({kRoom * reach, spacing, kSmallest * (range[1] - range[0])});
-    next[k] = {std::max(range[0], best - half), std::min(range[1], best + half)};
-    fits = fits && width < 1.001 * kMost / kRoom * (next[k][1] - next[k][0]);
+    const double low = std::max(range[0], best - half), high = std::min(range[1], best + half);
+    next[k] = {axes[k].logarithmic ? std::exp(low) : low, axes[k].logarithmic ? std::exp(high) : high};
+    fits = fits && width < 1.001 * kMost / kRoom * (high - low);
   }
   return fits ? extent : next;
 }
-
-}  // namespace
 
 GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
                          double share, const GridSettings& settings) {
@@ -109,13 +113,10 @@ GridResults score_models(const std::vector<ModelledReplay>& models, const std::v
   return results;
 }
 
-Zoomed zoom(const std::vector<ModelledReplay>& models, double share,
-            const std::vector<std::array<double, 2>>& start, const GridSettings& settings,
-            std::optional<double> repeatability) {
+Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
+            const GridSettings& settings, std::optional<double> repeatability) {
   constexpr int kRounds = 16;
-  Extent extent;
-  for (std::size_t k = 0; k < settings.axes.size(); ++k)
-    extent.push_back({coordinate(settings.axes[k], start[k][0]), coordinate(settings.axes[k], start[k][1])});
+  Extent extent = start;
   std::vector<Replay> replays;
   for (const ModelledReplay& model : models) replays.push_back(model.replay);
   const MotionsAt motions = motions_of(models, share);

@@ -1,8 +1,18 @@
 #pragma once
+#include <array>
+#include <optional>
+#include <vector>
+
 #include "sysid/motion_model.h"
 #include "sysid/profile.h"
 
 namespace flash::sysid {
+
+/// One range an axis.
+using Extent = std::vector<std::array<double, 2>>;
+
+/// From the first to the last value of each axis.
+Extent extent_of(const std::vector<Axis>& axes);
 
 /// One grid within the searched range, and what its scores say with no regard to solver or interpolation.
 struct Zoomed {
@@ -15,11 +25,15 @@ struct Zoomed {
 GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
                          double share, const GridSettings& settings);
 
+/// An extent about the estimate, of which the interval of every parameter takes a half or which ends with the
+/// range of `axes`; `extent`, on which the verdict stands, itself where it is not much too large and leaves
+/// no interval open.
+Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::vector<Axis>& axes);
+
 /// Grids of some hundred points, each about the estimate of the one before, until the interval of every
 /// parameter takes a third to a half of the extent or ends with the searched range. A point costs a score, no
-/// simulation. `start`: the first extent, one range an axis of `settings.axes`.
-Zoomed zoom(const std::vector<ModelledReplay>& models, double share,
-            const std::vector<std::array<double, 2>>& start, const GridSettings& settings,
-            std::optional<double> repeatability);
+/// simulation. `start`: the first extent.
+Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
+            const GridSettings& settings, std::optional<double> repeatability);
 
 }  // namespace flash::sysid

@@ -52,8 +52,8 @@ struct Lift {
 TEST(MotionSurface, MeetsTheSimulatedScoreWhereTheSplineOfScoresDoesNot) {
   const Lift lift;
   const RolloutStore store(lift.grid.rollouts);
-  const auto model = model_motions(lift.replay, lift.grid, store, false);
-  ASSERT_TRUE(model);
+  const auto surface = motion_surface(lift.replay, lift.grid, store);
+  ASSERT_TRUE(surface);
   GridResults results;
   results.axes = lift.grid.axes;
   const auto simulated = [&](double bending) {
@@ -69,7 +69,7 @@ TEST(MotionSurface, MeetsTheSimulatedScoreWhereTheSplineOfScoresDoesNot) {
     const double between = std::sqrt(lift.grid.axes[0].values[i] * lift.grid.axes[0].values[i + 1]);
     const double truth = simulated(between).score;
     ReplayResult modelled;
-    modelled.motion = model->model.at({between}, 0);
+    modelled.motion = surface->at({between});
     modelled.finite = true;
     const Eigen::VectorXd x = Eigen::VectorXd::Constant(1, std::log(between));
     worst_of_motions =
@@ -82,7 +82,8 @@ TEST(MotionSurface, MeetsTheSimulatedScoreWhereTheSplineOfScoresDoesNot) {
 TEST(MotionModel, IsTheFinerSimulationWhereThatWasMade) {
   const Lift lift;
   const RolloutStore store(lift.grid.rollouts);
-  const auto model = model_motions(lift.replay, lift.grid, store, true);
+  const auto model = with_finer_mesh(lift.replay, *motion_surface(lift.replay, lift.grid, store),
+                                     thinned(lift.grid.axes), lift.grid, store);
   ASSERT_TRUE(model);
   const data::TriangleMesh& fine = model->replay.recording.mesh;
   EXPECT_EQ(fine.vertices.rows(), 33 * 9);
@@ -102,16 +103,21 @@ TEST(MotionModel, IsTheFinerSimulationWhereThatWasMade) {
     }
 }
 
-TEST(MotionModel, ACorrectionMovesEveryMotionAndAddsUp) {
-  const std::vector<Axis> axes = {parse_axis("friction", "0.1,0.5,0.9")};
-  const Motion still{0, 0.1, {data::Points::Zero(3, 3)}, {}};
-  MotionModel model(MotionSurface(axes, {still, still, still}));
-  Motion shift = still;
-  shift.positions[0].setConstant(0.25);
-  model.correct(shift);
-  model.correct(shift);
-  for (const Motion& motion : {model.at({0.2}, 0), model.slice(0.7).at({}, 1)})
-    EXPECT_EQ(motion.positions[0], data::Points::Constant(3, 3, 0.5));
+TEST(MotionModel, OneFinerSimulationMovesEveryMotionByWhatItHasBeyondTheOwn) {
+  const Lift lift;
+  const RolloutStore store(lift.grid.rollouts);
+  const MotionSurface own = *motion_surface(lift.replay, lift.grid, store);
+  const std::vector<Axis> point = {{"bending", {2e-4}, true}};
+  const auto model = with_finer_mesh(lift.replay, own, point, lift.grid, store);
+  ASSERT_TRUE(model);
+  const auto beyond = [&](double bending) {
+    Motion difference = model->model.at({bending}, 1);
+    add(difference, -1, model->model.at({bending}, 0));
+    return difference.positions.front();
+  };
+  const Motion finer = store.run(model->replay, candidate_at({2e-4}, lift.grid)).motion;
+  EXPECT_LT((model->model.at({2e-4}, 1).positions.front() - finer.positions.front()).norm(), 1e-12);
+  EXPECT_LT((beyond(7e-4) - beyond(2e-4)).norm(), 1e-12);
 }
 
 }  // namespace

@@ -1,0 +1,91 @@
+#include "sysid/lattice.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/sysid/short_lift.h"
+
+namespace flash::sysid {
+namespace {
+
+const std::vector<Axis> kSearched = {parse_axis("young", "3:48:5:log"), parse_axis("friction", "0.1:0.5:5"),
+                                     parse_axis("poisson", "0.3")};
+
+TEST(Lattice, HasValuesOfItsOwnWhereTheExtentIsNarrowerThanACellOfTheSearch) {
+  const std::vector<Axis> axes = lattice({{4, 6.25}, {0.15, 0.35}, {0.3, 0.3}}, kSearched, 3);
+  ASSERT_EQ(axes[0].values.size(), 3u);
+  EXPECT_DOUBLE_EQ(axes[0].values[0], 4);
+  EXPECT_DOUBLE_EQ(axes[0].values[1], 5);  // even in the logarithm
+  EXPECT_DOUBLE_EQ(axes[0].values[2], 6.25);
+  EXPECT_EQ(axes[1].values, kSearched[1].values);  // wider
+  EXPECT_EQ(axes[2].values, kSearched[2].values);
+}
+
+GridVerdict verdict_of(const Extent& intervals) {
+  GridVerdict verdict;
+  for (const auto& [low, high] : intervals) {
+    verdict.parameters.emplace_back();
+    verdict.parameters.back().interval95 = {low, high};
+    verdict.parameters.back().estimate = std::sqrt(low * high);
+  }
+  return verdict;
+}
+
+TEST(Lattice, StaysWhereIntervalsEndInsideOrWithTheRange) {
+  const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}};
+  for (const Extent& inside :
+       std::vector<Extent>{{{4, 8}, {0.16, 0.24}, {0.3, 0.3}}, {{3, 8}, {0.16, 0.24}, {0.3, 0.3}}})
+    EXPECT_EQ(next_lattice(extent, extent, verdict_of(inside), kSearched), extent);
+}
+
+TEST(Lattice, GoesTwiceAsFarOnTheSideThatAnIntervalLeaves) {
+  const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}};
+  const Extent up = next_lattice(extent, extent, verdict_of({{4, 9}, {0.18, 0.22}, {0.3, 0.3}}), kSearched);
+  EXPECT_DOUBLE_EQ(up[0][1], 27);  // 9 times the extent's factor of 3
+  EXPECT_LT(up[0][0], 4);
+  EXPECT_LT(up[1][1], 0.5);
+  const Extent down = next_lattice(extent, extent, verdict_of({{4, 8}, {0.15, 0.22}, {0.3, 0.3}}), kSearched);
+  EXPECT_EQ(down[1][0], 0.1);  // the range ends there
+}
+
+TEST(Lattice, OneFarWiderThanTheAnswerNeedsIsSimulatedAgain) {
+  const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}}, needed = {{3, 9}, {0.19, 0.21}, {0.3, 0.3}};
+  const Extent next =
+      next_lattice(extent, needed, verdict_of({{4, 8}, {0.196, 0.204}, {0.3, 0.3}}), kSearched);
+  EXPECT_GT(next[1][0], 0.18);
+  EXPECT_LT(next[1][1], 0.22);
+}
+
+// Brute force: motions between the points of a lattice simulated. Vertices that touch the table a step
+// earlier or later make steps of some hundredths of a millimetre, which no spline follows; on average they
+// are few.
+TEST(Lattice, MotionsBetweenItsPointsAreThoseSimulated) {
+  const data::TemporaryFolder folder;
+  const Replay replay = short_lift(folder, "sheet:0.2x0.05:0.0125");
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log"), parse_axis("friction", "0.15:0.6:3:log")};
+  const RolloutStore store(folder / "rollouts");
+  GridSettings local = grid;
+  local.axes = lattice({{1.7e-4, 2.5e-4}, {0.25, 0.36}}, grid.axes, 3);
+  const MotionSurface whole = *motion_surface(replay, grid, store),
+                      near = *motion_surface(replay, local, store);
+  double whole_off = 0, near_off = 0, count = 0;  // sums of squares [m^2]
+  for (const double bending : {1.8e-4, 2.3e-4, 2.45e-4})
+    for (const double friction : {0.26, 0.34}) {
+      const Motion simulated = store.run(replay, candidate_at({bending, friction}, grid)).motion;
+      const Motion far = whole.at({bending, friction}), close = near.at({bending, friction});
+      for (std::size_t i = 0; i < close.positions.size(); ++i) {
+        if (close.positions[i].rows() == 0) continue;
+        whole_off += (far.positions[i] - simulated.positions[i]).squaredNorm();
+        near_off += (close.positions[i] - simulated.positions[i]).squaredNorm();
+        count += static_cast<double>(close.positions[i].rows());
+      }
+    }
+  EXPECT_LT(std::sqrt(near_off / count), 1e-5);  // far below the 0.04 mm that a millimetre of noise leaves
+  EXPECT_LT(near_off, whole_off / 4);
+}
+
+}  // namespace
+}  // namespace flash::sysid
