@@ -27,8 +27,9 @@ def main():
     parser.add_argument("--sim", help="the program flash-sim")
     parser.add_argument("--scenes", type=pathlib.Path, help="folder of the reference scenes")
     parser.add_argument("--results", type=pathlib.Path, help="what make reference wrote of them")
-    parser.add_argument("--only", help="handeye, lifts, twins or reference: that part of the document; synthetic or a "
-                                       "recording: its fits alone, printed")
+    parser.add_argument("--only", help="handeye, lifts, twins, synthetic, convergence or reference: that part of the "
+                                       "document; a recording: its fits alone, printed")
+    parser.add_argument("--twins", type=int, default=len(synthetic.TWINS), help="how many of the coverage study")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     runs = Runs(options.sysid, options.out)
@@ -37,9 +38,6 @@ def main():
         return print(tables.clip_table({options.only: fit}), end="")
     if options.only in twins.TWINS:
         return print(tables.twin_table(run_twins(runs, options.data, options.only)), end="")
-    if options.only == "synthetic":
-        rows = synthetic.experiment_rows(runs), synthetic.coverage_rows(synthetic.coverage(runs))
-        return print(*tables.synthetic_tables(*rows).values(), sep="\n")
     document = {}
     if options.only in (None, "reference") and options.results:
         document |= reference.tables(options.scenes, options.results, tables.table)
@@ -55,6 +53,8 @@ def main():
     if options.only in (None, "twins"):
         document |= tables.twin_tables(run_twins(runs, options.data), run_both(runs, options.data),
                                        run_horizons(runs))
+    if options.only in (None, "synthetic"):
+        document |= tables.synthetic_tables(synthetic.experiment_rows(runs), synthetic.coverage_rows(synthetic.coverage(runs, synthetic.TWINS[:options.twins])))
     tables.replace_tables(options.document, document)
     print(options.document)
 
