@@ -150,10 +150,10 @@ def twin_tables(fits, both, horizons):
 
 
 def synthetic_tables(experiments, coverage):
-    rows = [[what, name, f"{right}", f"{held}", "-" if math.isnan(error) else f"{100 * error:.1f}"]
-            for what, name, right, held, error in experiments]
+    rows = [[what, name, f"{seeds}", f"{right}", f"{held}", "-" if math.isnan(error) else f"{100 * error:.1f}"]
+            for what, name, seeds, right, held, error in experiments]
     twins_rows = [[row["name"], str(row["twins"]), str(row["held"]), str(row["one_sided"]), str(row["no"]),
-                   f"{row['factor']:.2f}", f"{100 * row['error']:.0f}"] for row in coverage]
-    return {"experiments": table(["experiment", "asked", "right of 20", "inside their interval", "largest error %"], rows),
-            "coverage": table(["parameter", "twins", "intervals that hold the truth", "one-sided", "not identifiable",
+                   "-" if math.isnan(row["factor"]) else f"{row['factor']:.2f}", f"{100 * row['error']:.0f}"] for row in coverage]
+    return {"experiments": table(["experiment", "asked", "seeds", "right", "inside their interval", "largest error %"], rows),
+            "coverage": table(["parameter", "twins", "hold the truth, \"no\" included", "one-sided", "not identifiable",
                                "median half width, factor", "median error %"], twins_rows)}
