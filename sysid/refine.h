@@ -19,9 +19,10 @@ struct Refined {
 /// with `solver_check` as cells of no size would move, from a second mesh of half the cell. Where few
 /// simulations do, a small lattice about what is found, as wide as its intervals need, is simulated on both
 /// meshes, and estimate and intervals come from its motions. The difference between the finer mesh and the
-/// limit remains as uncertainty to both sides, so does what the interpolated motion differs from the simulated
-/// one at the estimate; half the step and four times the iterations, there, widen to one. `whole`: of the grid
-/// itself. Empty where a candidate diverged, or the estimate, simulated, is worse than the best candidate.
+/// limit remains as uncertainty to both sides, so does what the interpolated motion differs from the
+/// simulated one at the estimate; half the step and four times the iterations, there, widen to one. `whole`:
+/// of the grid itself. Empty where a candidate diverged, or the estimate, simulated, is worse than the best
+/// candidate.
 std::optional<Refined> refine(const GridResults& results, const GridVerdict& whole,
                               const std::vector<Replay>& replays, const GridSettings& grid,
                               std::optional<double> repeatability, bool solver_check);
