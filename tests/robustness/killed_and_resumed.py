@@ -12,7 +12,7 @@ import time
 
 import program
 
-AXES = ["--bending", "2e-5:5e-4:6:log", "--friction", "0.2:0.4:4", "--no-solver-check", "--no-horizon", "--envs", "4"]
+AXES = ["--bending", "2e-5:5e-4:6:log", "--friction", "0.15:0.6:4", "--no-solver-check", "--no-horizon", "--envs", "4"]
 FILES = ("results.csv", "registrations.csv", "keyframes.csv")
 
 
