@@ -45,7 +45,7 @@ const RegistrationBounds kBounds{Eigen::Vector3d::Constant(0.06), 0.3, 0.1};
 
 RegistrationProblem problem_of(const data::TriangleMesh& mesh, const Motion& motion,
                                const std::vector<Observation>& observations, const Registration& truth) {
-  RegistrationProblem problem{&mesh.triangles, &motion, &observations, kBounds, {}};
+  RegistrationProblem problem{&mesh.triangles, &motion, &observations, nullptr, kBounds, {}};
   problem.start.pivot = truth.pivot;
   return problem;
 }
