@@ -96,10 +96,11 @@ double birge_ratio(const Sampling& sampling, const Eigen::VectorXd& direction) {
 double chi_squared(const Sampling& sampling, const ProfilePoint& point, std::optional<std::size_t> axis) {
   const Eigen::VectorXd rises = sampling.surface.scores(point.x) - sampling.best_scores;
   const double rise = std::max(0.0, sampling.surface.weights().dot(rises) - sampling.interpolation);
-  // Where the range ends before the score falls no more, it rises from there in a straight line too.
+  // Where the range ends before the score falls no more, it rises from there in a straight line too. Only of
+  // kept motions is its slope known: between scores the spline may undershoot to nothing, where it has none.
   const Eigen::VectorXd step = point.x - sampling.best;
   double curved = rise;
-  if (sampling.surface.weights().dot(sampling.gradients * step) > kStraight * rise)
+  if (!sampling.few.empty() && sampling.surface.weights().dot(sampling.gradients * step) > kStraight * rise)
     curved = std::clamp(0.5 * step.dot(sampling.hessian * step), kLeastCurved * rise, rise);
   std::vector<double> means, variances;
   double variance =

@@ -58,12 +58,12 @@ struct ProfileSettings {
 ///
 /// t being Student's 97.5 % quantile at n - p degrees of freedom, d_r the mean over recording r. For a
 /// quadratic score this is the interval of the robust (sandwich) covariance H^-1 J H^-1 / n (White 1982); the
-/// factor 4 is there because D is half the squared distance while its spread is linear in it. An estimate at
-/// the end of the searched range need not be a minimum: D = G + Q there, Q by its curvature, and the same
-/// likelihood ratio is chi^2 = 4 D Q / var(D); Q counting as D / 20 at least. Where
-/// several recordings contradict each other beyond their keyframes' scatter, var(D) grows by their Birge
-/// ratio. `repeatability`, the trial-to-trial distance of a keyframe [m], caps chi^2 at n (s^2 - s_best^2) /
-/// repeatability^2.
+/// factor 4 is there because D is half the squared distance while its spread is linear in it. With
+/// `information`, an estimate at the end of the searched range need not be a minimum: D = G + Q there, Q by
+/// its curvature, and the same likelihood ratio is chi^2 = 4 D Q / var(D); Q counting as D / 20 at least.
+/// Where several recordings contradict each other beyond their keyframes' scatter, var(D) grows by their
+/// Birge ratio. `repeatability`, the trial-to-trial distance of a keyframe [m], caps chi^2 at n (s^2 -
+/// s_best^2) / repeatability^2.
 ///
 /// The interpolation is checked where it matters: D counts only by what it exceeds its error at the estimate.
 /// `information` says how unequally keyframes tell a parameter; var(D) and t are then those of few_samples.

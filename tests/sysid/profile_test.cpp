@@ -86,6 +86,7 @@ TEST(Profile, IntervalIsStudentsForTheMeanOfWhatEachKeyframeWouldAnswer) {
   }
 }
 
+// Of kept motions, which alone tell the slope there.
 TEST(Profile, AnEstimateAtTheEndOfTheRangeHasTheIntervalOfTheLikelihoodRatio) {
   // The keyframes want m, the range begins at e beyond it: ((x - m)^2 - (e - m)^2) / variance < t^2.
   const std::vector<double> own = scattered(20, std::log(1.2e-4), 0.3, 1);
@@ -97,7 +98,9 @@ TEST(Profile, AnEstimateAtTheEndOfTheRangeHasTheIntervalOfTheLikelihoodRatio) {
     const double edge = m + beyond * half;
     Axis axis = parse_axis("bending", "1e-4:1e-3:25:log");
     for (int i = 0; i < 25; ++i) axis.values[static_cast<std::size_t>(i)] = std::exp(edge + 0.1 * i);
-    const ParameterFinding finding = profile_grid(grid_of({axis}, 20, score)).parameters[0];
+    ProfileSettings settings;
+    settings.information.assign(20, Eigen::MatrixXd::Ones(1, 1));  // all keyframes tell alike
+    const ParameterFinding finding = profile_grid(grid_of({axis}, 20, score), settings).parameters[0];
     EXPECT_EQ(finding.edge, RangeEdge::low);
     EXPECT_EQ(finding.identifiable, Identifiable::upper_bound);
     const double expected = m + std::hypot(half, edge - m);
