@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "calib/linearization.h"
-#include "calib/parallel.h"
 #include "calib/projection.h"
+#include "data/parallel.h"
 
 namespace flash::calib {
 namespace {
@@ -238,9 +238,9 @@ HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_c
   HeldOut result;
   for (int i = 0; i < count; ++i) result.fold.push_back(i % parts);
   std::vector<HeldOutSums> sums(static_cast<std::size_t>(parts));
-  parallel_for(parts, threads, [&](int part) {
-    sums[static_cast<std::size_t>(part)] =
-        hold_out_part(bundle, T_camera_target, method, settings, result.fold, part);
+  data::for_each_in_parallel(sums.size(), threads, [&](std::size_t part) {
+    sums[part] =
+        hold_out_part(bundle, T_camera_target, method, settings, result.fold, static_cast<int>(part));
   });
   HeldOutSums all;
   for (const HeldOutSums& part : sums) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "calib/linearization.h"
-#include "calib/parallel.h"
+#include "data/parallel.h"
 
 namespace flash::calib {
 namespace {
@@ -87,8 +87,7 @@ SplitCheck check_halves(const Refinement& refined, const BundleSettings& setting
 std::vector<SplitCheck> check_systematic(const Refinement& refined, const BundleSettings& settings,
                                          std::size_t base, int threads) {
   std::vector<SplitCheck> checks(std::size(kSystematic));
-  parallel_for(static_cast<int>(checks.size()), threads, [&](int i) {
-    const auto k = static_cast<std::size_t>(i);
+  data::for_each_in_parallel(checks.size(), threads, [&](std::size_t k) {
     checks[k] = check_halves(refined, settings, kSystematic[k], base);
   });
   return checks;

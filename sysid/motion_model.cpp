@@ -1,7 +1,7 @@
 #include "sysid/motion_model.h"
 
+#include "data/parallel.h"
 #include "sysid/finer_mesh.h"
-#include "sysid/parallel.h"
 #include "sysid/surface_distance.h"
 
 namespace flash::sysid {
@@ -39,7 +39,7 @@ std::optional<std::vector<Motion>> motions_over(const Replay& replay, const std:
   std::vector<std::optional<Motion>> motions(points.size());
   Replay single = replay;  // one motion a thread
   single.settings.threads = 1;
-  for_each_in_parallel(points.size(), grid.threads, [&](std::size_t i) {
+  data::for_each_in_parallel(points.size(), grid.threads, [&](std::size_t i) {
     ReplayResult result = store.run(single, candidate_at(points[i], grid));
     keep_read(replay, result.motion);
     if (result.finite) motions[i] = std::move(result.motion);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sysid/parallel.h"
+#include "data/parallel.h"
 
 namespace flash::sysid {
 namespace {
@@ -103,7 +103,7 @@ GridResults score_models(const std::vector<ModelledReplay>& models, const std::v
                          std::size_t first, std::size_t count) -> void {
     if (k == axes.size()) return score(slices, first);
     const std::size_t values = axes[k].values.size(), part = count / values;
-    for_each_in_parallel(values, k == 0 ? settings.threads : 1, [&](std::size_t i) {
+    data::for_each_in_parallel(values, k == 0 ? settings.threads : 1, [&](std::size_t i) {
       std::vector<MotionModel> held;
       for (const MotionModel& slice : slices) held.push_back(slice.slice(axes[k].values[i]));
       self(self, held, k + 1, first + i * part, part);

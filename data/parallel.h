@@ -7,12 +7,13 @@
 #include <thread>
 #include <vector>
 
-namespace flash::sysid {
+namespace flash::data {
 
-/// Calls work(i) for 0 <= i < count, each once, on up to `threads` threads. What the first failure threw is
-/// thrown again after all have ended.
+/// Calls work(i) for 0 <= i < count, each once, on up to `threads` threads (0: one a processor). What the
+/// first failure threw is thrown again after all have ended.
 template <class Work>
 void for_each_in_parallel(std::size_t count, int threads, const Work& work) {
+  if (threads <= 0) threads = static_cast<int>(std::thread::hardware_concurrency());
   std::atomic<std::size_t> next = 0;
   std::exception_ptr failure;
   std::mutex mutex;  // of failure
@@ -34,4 +35,4 @@ void for_each_in_parallel(std::size_t count, int threads, const Work& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace flash::sysid
+}  // namespace flash::data
