@@ -110,6 +110,7 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
   const std::vector<double> floor = to_components(
       uniform_noise(result.bundle, kFloorPixels, kFloorRotation, kFloorTranslation, kFloorDepth));
   LinearModel model;
+  VarianceComponents estimate;
   bool pivots_chosen = !settings.estimate_noise || !settings.estimate_pivots;
   for (; result.rounds < settings.rounds && !result.converged; ++result.rounds) {
     const BundleSummary summary = solve_bundle(result.bundle, result.noise, settings.bundle);
@@ -118,18 +119,19 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
       result.converged = summary.converged;
       break;
     }
-    const VarianceComponents estimate =
-        estimate_variance_components(model, to_components(result.noise), floor);
+    estimate = estimate_variance_components(model, to_components(result.noise), floor);
     result.converged = summary.converged && estimate.gain < settings.tolerance;
-    result.noise_log_sd = estimate.log_covariance.diagonal().cwiseSqrt();
     if (!result.converged) result.noise = to_noise(estimate.sigmas, result.noise);
-    result.covariance = adjusted_covariance(model, estimate);
     if (result.converged && !pivots_chosen) {
       pivots_chosen = true;
       result.converged = !choose_pivots(result.bundle, result.noise, settings.bundle, floor);
     }
   }
-  if (settings.estimate_noise) return result;
+  if (settings.estimate_noise) {
+    result.noise_log_sd = estimate.log_covariance.diagonal().cwiseSqrt();
+    result.covariance = adjusted_covariance(model, estimate);
+    return result;
+  }
   const LinearSolution solution = solve_linear(model, to_components(result.noise));
   result.covariance = solution.information.ldlt().solve(
       Eigen::MatrixXd::Identity(solution.information.rows(), solution.information.cols()));

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace flash::calib {
@@ -163,21 +164,38 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
 Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComponents& components) {
   // A component that cannot be told from zero has no scale in log sigma: half a unit either way is enough.
   constexpr double kWidest = 0.5;
+  // Gauss and Hermite's, for a standard normal.
+  constexpr std::array<double, 4> kNodes = {0, 1.154405395, 2.366759411, 3.750439718};
+  constexpr std::array<double, 4> kWeights = {0.457142857, 0.240123179, 0.030757124, 0.000548269};
   const auto inverse = [](const Eigen::MatrixXd& information) -> Eigen::MatrixXd {
     return information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
   };
-  const Eigen::MatrixXd centre = inverse(solve_linear(model, components.sigmas).information);
-  Eigen::MatrixXd covariance = centre;
+  const LinearSolution centre = solve_linear(model, components.sigmas);
+  const Eigen::MatrixXd stated = inverse(centre.information);
+  Eigen::MatrixXd covariance = stated;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(components.log_covariance);
   const std::vector<double> no_floor(components.sigmas.size(), 0);
   for (Eigen::Index k = 0; k < eigen.eigenvalues().size(); ++k) {
-    const double width = std::min(kWidest, std::sqrt(std::max(0.0, eigen.eigenvalues()[k])));
-    const Eigen::VectorXd step = width * eigen.eigenvectors().col(k);
-    const LinearSolution up = solve_linear(model, scaled(components.sigmas, step, no_floor));
-    const LinearSolution down = solve_linear(model, scaled(components.sigmas, -step, no_floor));
-    covariance += 0.5 * (inverse(up.information) + inverse(down.information)) - centre;
-    const Eigen::VectorXd slope = 0.5 * (up.shared - down.shared);
-    covariance += slope * slope.transpose();
+    const double deviation = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+    double weights = 0;
+    Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(model.shared, model.shared), squares = mean;
+    Eigen::VectorXd shift = Eigen::VectorXd::Zero(model.shared);
+    const auto add = [&](double x, double weight) {
+      const Eigen::VectorXd step = x * std::min(kWidest, deviation) * eigen.eigenvectors().col(k);
+      const LinearSolution there = solve_linear(model, scaled(components.sigmas, step, no_floor));
+      // The likelihood is no normal distribution: its longer tail is towards the larger sigma.
+      if (deviation < kWidest) weight *= std::exp(0.5 * (x * x - there.deviance + centre.deviance));
+      const Eigen::VectorXd moved = there.shared - centre.shared;
+      weights += weight;
+      mean += weight * inverse(there.information);
+      shift += weight * moved;
+      squares += weight * moved * moved.transpose();
+    };
+    add(kNodes[0], kWeights[0]);
+    for (const std::size_t i : {1U, 2U, 3U})
+      for (const double side : {-1.0, 1.0}) add(side * kNodes[i], kWeights[i]);
+    shift /= weights;
+    covariance += mean / weights - stated + squares / weights - shift * shift.transpose();
   }
   return covariance;
 }

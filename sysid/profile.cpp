@@ -237,7 +237,15 @@ std::string note_of(const ParameterFinding& finding, double least, bool unconver
   return note;
 }
 
-ParameterFinding find_parameter(const GridResults& results, std::size_t k, const Sampling& sampling,
+/// A parameter's finding but for the words, and on which sides values are excluded.
+struct ProfiledParameter {
+  ParameterFinding finding;
+  std::vector<ProfilePoint> profile;
+  WholeProfile whole;
+  bool closed_below = false, closed_above = false;
+};
+
+ProfiledParameter find_interval(const GridResults& results, std::size_t k, const Sampling& sampling,
                                 std::vector<ProfilePoint> profile, const ProfileSettings& settings) {
   const ScoreSurface& surface = sampling.surface;
   const SolverError& solver = settings.solver;
@@ -274,7 +282,7 @@ ParameterFinding find_parameter(const GridResults& results, std::size_t k, const
     above += std::max(0.0, -shift[axis]);
   }
   const double error = solver.score + solver.interpolation;
-  const WholeProfile whole = whole_profile(finding, settings.whole, k, sampling.best_score);
+  WholeProfile whole = whole_profile(finding, settings.whole, k, sampling.best_score);
   const auto rises = [&](double from, double to) {
     for (std::size_t i = 0; i < whole.values.size(); ++i)
       if (whole.values[i] >= from && whole.values[i] <= to && whole.scores[i] - whole.least > error)
@@ -290,20 +298,52 @@ ParameterFinding find_parameter(const GridResults& results, std::size_t k, const
                         closed_above ? surface.value(k, above) : end};
   finding.values = whole.values;
   finding.scores = whole.scores;
+  return {std::move(finding), std::move(profile), std::move(whole), closed_below, closed_above};
+}
+
+/// What one parameter's profile does not exclude, another's interval holds: by its scatter, or on a side
+/// where the solver cannot be trusted to tell a valley from flat.
+void hold_profiles(const ScoreSurface& surface, const Eigen::VectorXd& best,
+                   std::vector<ProfiledParameter>& parameters) {
+  for (std::size_t j = 0; j < parameters.size(); ++j) {
+    const auto axis = static_cast<Eigen::Index>(j);
+    for (const ProfilePoint& point : parameters[j].profile) {
+      const bool closed =
+          point.x[axis] < best[axis] ? parameters[j].closed_below : parameters[j].closed_above;
+      if (closed && point.chi2 > kLimit) continue;
+      for (std::size_t k = 0; k < parameters.size(); ++k) {
+        if (k == j) continue;
+        ProfiledParameter& other = parameters[k];
+        const double value = surface.value(k, point.x[static_cast<Eigen::Index>(k)]),
+                     first = other.whole.values.front(), end = other.whole.values.back();
+        auto& [low, high] = *other.finding.interval95;
+        low = std::max(first, std::min(low, value));
+        high = std::min(end, std::max(high, value));
+        other.closed_below = other.closed_below && low > first;
+        other.closed_above = other.closed_above && high < end;
+      }
+    }
+  }
+}
+
+ParameterFinding conclude(const GridResults& results, std::size_t k, const Sampling& sampling,
+                          ProfiledParameter parameter) {
+  ParameterFinding finding = std::move(parameter.finding);
   bool unconverged = false;
-  if (profile.size() > 1) {
-    finding.identifiable = closed_below && closed_above ? Identifiable::yes
-                           : closed_above               ? Identifiable::upper_bound
-                           : closed_below               ? Identifiable::lower_bound
-                                                        : Identifiable::no;
-    finding.edge = best <= surface.coordinate(k, first) ? RangeEdge::low
-                   : best >= surface.coordinate(k, end) ? RangeEdge::high
-                                                        : RangeEdge::none;
+  if (parameter.profile.size() > 1) {
+    finding.identifiable = parameter.closed_below && parameter.closed_above ? Identifiable::yes
+                           : parameter.closed_above                         ? Identifiable::upper_bound
+                           : parameter.closed_below                         ? Identifiable::lower_bound
+                                                                            : Identifiable::no;
+    const double best = sampling.best[static_cast<Eigen::Index>(k)];
+    finding.edge = best <= sampling.surface.coordinate(k, finding.values.front())  ? RangeEdge::low
+                   : best >= sampling.surface.coordinate(k, finding.values.back()) ? RangeEdge::high
+                                                                                   : RangeEdge::none;
     const auto least = std::min_element(results.candidates.begin(), results.candidates.end(),
                                         [](const auto& a, const auto& b) { return a.score < b.score; });
     unconverged = least->status != CandidateStatus::ok;
   }
-  finding.note = note_of(finding, whole.least, unconverged);
+  finding.note = note_of(finding, parameter.whole.least, unconverged);
   return finding;
 }
 
@@ -425,8 +465,12 @@ GridVerdict profile_grid(const GridResults& results, const ProfileSettings& sett
 
   verdict.estimate_score = sampling.best_score;
   verdict.estimate.resize(surface.parameters());
+  std::vector<ProfiledParameter> profiled;
+  for (std::size_t k = 0; k < results.axes.size(); ++k)
+    profiled.push_back(find_interval(results, k, sampling, std::move(profiles[k]), settings));
+  hold_profiles(surface, sampling.best, profiled);
   for (std::size_t k = 0; k < results.axes.size(); ++k) {
-    verdict.parameters.push_back(find_parameter(results, k, sampling, std::move(profiles[k]), settings));
+    verdict.parameters.push_back(conclude(results, k, sampling, std::move(profiled[k])));
     verdict.estimate[static_cast<Eigen::Index>(k)] = *verdict.parameters.back().estimate;
   }
   verdict.covariance_log = covariance_of(results, sampling);

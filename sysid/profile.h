@@ -69,8 +69,8 @@ struct ProfileSettings {
 /// `information` says how unequally keyframes tell a parameter; var(D) and t are then those of few_samples.
 /// Each shift widens the interval to the side on which the better solution would have found the parameter,
 /// each remainder to both, in quadrature. A side on which the profile nowhere rises by more than these errors
-/// excludes nothing. Verdict: excluded values on both sides "yes", on neither "no", only above "upper_bound",
-/// only below "lower_bound".
+/// excludes nothing. An interval holds what the profiles of the other parameters do not exclude. Verdict:
+/// excluded values on both sides "yes", on neither "no", only above "upper_bound", only below "lower_bound".
 GridVerdict profile_grid(const GridResults& results, const ProfileSettings& settings);
 GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability = {},
                          const SolverError& solver = {});

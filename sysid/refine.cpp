@@ -95,7 +95,7 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
   for (const ModelledReplay& model : *models) on_model.push_back(model.replay);
 
   // Simulated anew about the answer where few simulations do, once more where its intervals end outside.
-  constexpr int kRounds = 2;
+  constexpr int kRounds = 4;
   constexpr std::size_t kFew = 30;
   GridSettings local = grid;
   Extent extent = extent_of(found.results.axes);

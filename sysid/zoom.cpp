@@ -63,8 +63,9 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
       const double end = at((*verdict.parameters[k].interval95)[side]);
       const bool open = std::abs(end - now[side]) < 1e-9 * width;
       const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
-      // An open end: half as much again; more would lose what the last extents told.
-      reach = std::max(reach, open && more ? 0.75 * width / kRoom : std::abs(end - best));
+      // Past an open end a quarter more; a longer way would lose what the last extents told.
+      reach = std::max(reach,
+                       open && more ? (std::abs(end - best) + 0.25 * width) / kRoom : std::abs(end - best));
       fits = fits && !(open && more);
     }
     const double half = std::max({kRoom * reach, spacing, kSmallest * (range[1] - range[0])});

@@ -108,5 +108,19 @@ TEST(VarianceComponents, DevianceIsMinusTwiceTheLogOfTheRestrictedLikelihood) {
   EXPECT_NEAR(fast(0.5, 2) - fast(0.9, 0.4), dense(0.5, 2) - dense(0.9, 0.4), 1e-8);
 }
 
+TEST(VarianceComponents, MeanOfFewRepeatsHasTheVarianceOfStudentsDistribution) {
+  for (const int count : {9, 16, 41}) {
+    std::mt19937 random(4);
+    std::normal_distribution<double> normal;
+    LinearModel model{.groups = 1, .components = 1, .own = 0, .shared = 1, .blocks = {}};
+    Eigen::MatrixXd rows(count, 2);
+    for (int j = 0; j < count; ++j) rows.row(j) << 1, normal(random);
+    model.blocks.push_back({0, 0, static_cast<double>(count), rows.transpose() * rows});
+    const VarianceComponents found = estimate_variance_components(model, {1}, {1e-6});
+    const double freedom = count - 1, of_mean = std::pow(found.sigmas[0], 2) / count;
+    EXPECT_NEAR(adjusted_covariance(model, found)(0, 0) / of_mean, freedom / (freedom - 2), 0.01);
+  }
+}
+
 }  // namespace
 }  // namespace flash::calib

@@ -12,6 +12,27 @@ namespace {
 const std::vector<Axis> kSearched = {parse_axis("young", "3:48:5:log"), parse_axis("friction", "0.1:0.5:5"),
                                      parse_axis("poisson", "0.3")};
 
+TEST(Zoom, ExtentGrowsPastAnOpenEndWhereverTheEstimateStands) {
+  GridVerdict verdict;
+  for (int k = 0; k < 3; ++k) verdict.parameters.emplace_back();
+  const Extent extent = {{6, 12}, {0.1, 0.2}, {0.3, 0.3}};
+  const auto next = [&](double young, double friction) {
+    verdict.parameters[0].estimate = young;
+    verdict.parameters[0].interval95 = {7, 12};
+    verdict.parameters[1].estimate = friction;
+    verdict.parameters[1].interval95 = {0.1, 0.2};
+    verdict.parameters[2].estimate = 0.3;
+    verdict.parameters[2].interval95 = {0.3, 0.3};
+    return next_extent(extent, verdict, kSearched);
+  };
+  for (const double young : {7.5, 8.5, 11.9}) EXPECT_GT(next(young, 0.15)[0][1], 12);
+  for (const double friction : {0.1, 0.15, 0.2}) {
+    const auto [low, high] = next(8, friction)[1];
+    EXPECT_EQ(low, 0.1);  // the range ends there
+    EXPECT_GT(high, 0.2);
+  }
+}
+
 TEST(Lattice, HasValuesOfItsOwnWhereTheExtentIsNarrowerThanACellOfTheSearch) {
   const std::vector<Axis> axes = lattice({{4, 6.25}, {0.15, 0.35}, {0.3, 0.3}}, kSearched, 3);
   ASSERT_EQ(axes[0].values.size(), 3u);

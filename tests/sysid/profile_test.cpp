@@ -184,6 +184,25 @@ TEST(Profile, AFinerSolutionWidensTheIntervalToItsSideOnly) {
   EXPECT_EQ(profile_grid(results, {}, {{}, 1.0}).parameters[0].identifiable, Identifiable::no);
 }
 
+TEST(Profile, AnIntervalHoldsTheValleyThatTheSolverCannotTellFromFlat) {
+  const std::vector<double> own = scattered(20, std::log(3e-5), 0.01, 8);
+  const GridResults results =
+      grid_of({parse_axis("poisson", "0:0.4:5"), parse_axis("bending", "1e-6:1e-3:31:log")}, 20,
+              [&](std::size_t k, const std::vector<double>& x) {
+                const double along = x[0] - 0.1 + 0.1 * (own[k] - std::log(3e-5));
+                return kFloor + 1e-3 * std::pow(x[1] - x[0] - own[k], 2) + 1e-4 * along * along;
+              });
+  const GridVerdict exact = profile_grid(results);
+  EXPECT_EQ(exact.parameters[0].identifiable, Identifiable::yes);
+  EXPECT_NEAR(std::log((*exact.parameters[1].interval95)[1] / 3e-5), 0.1, 0.02);
+  // poisson changes the score by 9e-6 m at most, bending by 1e-3 m and more.
+  const GridVerdict doubtful = profile_grid(results, {}, {{}, 5e-5});
+  EXPECT_EQ(doubtful.parameters[0].identifiable, Identifiable::no);
+  EXPECT_EQ(doubtful.parameters[1].identifiable, Identifiable::yes);
+  EXPECT_NEAR(std::log((*doubtful.parameters[1].interval95)[0] / 3e-5), 0.0, 0.01);
+  EXPECT_NEAR(std::log((*doubtful.parameters[1].interval95)[1] / 3e-5), 0.4, 0.01);
+}
+
 TEST(Profile, RecordingsThatContradictEachOtherWidenTheInterval) {
   std::vector<double> own = scattered(20, std::log(3e-5), 0.05, 7);
   const auto score = [&](std::size_t k, const std::vector<double>& x) {
