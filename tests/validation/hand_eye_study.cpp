@@ -111,9 +111,11 @@ int main(int argc, char** argv) {
   const int trials = argc > 1 ? std::atoi(argv[1]) : 60;
   // The scenes' geometry was chosen on seeds from 1; what is reported is from others.
   const unsigned first_seed = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 1001;
+  const int blocks = argc > 3 ? std::atoi(argv[3]) : 1;
   for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand})
     for (const auto& [deg, mm] : {std::pair{0.0, 0.0}, {0.05, 0.5}, {0.1, 1.0}})
-      flash::calib::study({setup, deg, mm}, trials, first_seed);
+      for (int block = 0; block < blocks; ++block)
+        flash::calib::study({setup, deg, mm}, trials, first_seed + static_cast<unsigned>(block * trials));
   for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand})
     for (const flash::calib::ArmErrors& errors :
          {flash::calib::ArmErrors{0.1, 0.2, 0.05}, {0.2, 0.5, 0.1}, {0.5, 0.5, 0.2}})
