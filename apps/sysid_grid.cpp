@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -12,6 +13,7 @@
 #include "data/text.h"
 #include "sysid/fingerprint.h"
 #include "sysid/judge.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/overlay.h"
 #include "sysid/parameter_label.h"
 #include "sysid/report.h"
@@ -159,10 +161,15 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
                             sysid::fingerprint(replays, settings), options.resume);
   for (const std::string& notice : notices) say(options.common, notice);
+  const double memory = sysid::estimate_memory(replays, settings).total();
   say(options.common,
       data::format_count(sysid::cartesian_product(settings.axes).size()) + " candidates, " +
           data::format_count(static_cast<std::size_t>(replays.front().sheet.rest.vertices.rows())) +
-          " vertices, " + std::to_string(threads) + " threads");
+          " vertices, " + std::to_string(threads) + " threads, about " +
+          data::format_count(static_cast<std::size_t>(std::ceil(memory / 1e6))) + " MB of memory");
+  if (sysid::physical_memory() > 0 && memory > sysid::physical_memory())
+    warn("this machine has " + data::format_count(static_cast<std::size_t>(sysid::physical_memory() / 1e6)) +
+         " MB of memory: search fewer values" + (threads > 1 ? " or on fewer --threads" : ""));
   bool complete = false;
   {
     ProgressLine line(options.common);

@@ -15,19 +15,9 @@ Motion prolonged(const Motion& motion, const Eigen::SparseMatrix<double>& prolon
   return result;
 }
 
-/// Empties the positions that no keyframe reads; all may be read where the clock is fitted.
+/// Empties the positions that no keyframe reads.
 void keep_read(const Replay& replay, Motion& motion) {
-  if (replay.recording.nuisance.time > 0) return;
-  std::vector<bool> read(motion.positions.size(), false);
-  read.front() = read.back() = true;
-  for (const Observation& observation : replay.observations) {
-    const double steps = (observation.t - motion.start) / motion.step;
-    if (!(steps > 0) || steps >= static_cast<double>(read.size() - 1)) continue;
-    const auto below = static_cast<std::size_t>(steps);
-    const double fraction = steps - static_cast<double>(below);
-    if (fraction < 1 - kSameStep) read[below] = true;
-    if (fraction > kSameStep) read[below + 1] = true;
-  }
+  const std::vector<bool> read = steps_read(replay, motion.start, motion.step, motion.positions.size());
   for (std::size_t i = 0; i < read.size(); ++i)
     if (!read[i]) motion.positions[i].resize(0, 3);
 }
@@ -53,6 +43,20 @@ std::optional<std::vector<Motion>> motions_over(const Replay& replay, const std:
 }
 
 }  // namespace
+
+std::vector<bool> steps_read(const Replay& replay, double start, double step, std::size_t count) {
+  std::vector<bool> read(count, replay.recording.nuisance.time > 0);
+  read.front() = read.back() = true;
+  for (const Observation& observation : replay.observations) {
+    const double steps = (observation.t - start) / step;
+    if (!(steps > 0) || steps >= static_cast<double>(count - 1)) continue;
+    const auto below = static_cast<std::size_t>(steps);
+    const double fraction = steps - static_cast<double>(below);
+    if (fraction < 1 - kSameStep) read[below] = true;
+    if (fraction > kSameStep) read[below + 1] = true;
+  }
+  return read;
+}
 
 void add(Motion& a, double share, const Motion& b) {
   for (std::size_t i = 0; i < a.positions.size(); ++i)

@@ -10,6 +10,9 @@
 
 namespace flash::sysid {
 
+/// Of a motion's steps those whose positions a keyframe reads; all where the clock is fitted.
+std::vector<bool> steps_read(const Replay& replay, double start, double step, std::size_t count);
+
 /// a += share b, at the steps that a keeps.
 void add(Motion& a, double share, const Motion& b);
 
