@@ -21,16 +21,20 @@ data::Colour shade(const data::Colour& colour, double light) {
   return shaded;
 }
 
+Eigen::Vector3d triangle_normal(const data::TriangleMesh& mesh, Eigen::Index t) {
+  const Eigen::Vector3d a = mesh.vertices.row(mesh.triangles(t, 0)),
+                        b = mesh.vertices.row(mesh.triangles(t, 1)),
+                        c = mesh.vertices.row(mesh.triangles(t, 2));
+  return (b - a).cross(c - a);
+}
+
+/// Zero where those of a folded sheet cancel.
 data::Points vertex_normals(const data::TriangleMesh& mesh) {
   data::Points normals = data::Points::Zero(mesh.vertices.rows(), 3);
-  for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t) {
-    const Eigen::Vector3d a = mesh.vertices.row(mesh.triangles(t, 0)),
-                          b = mesh.vertices.row(mesh.triangles(t, 1)),
-                          c = mesh.vertices.row(mesh.triangles(t, 2));
-    const Eigen::Vector3d normal = (b - a).cross(c - a);
-    for (int k = 0; k < 3; ++k) normals.row(mesh.triangles(t, k)) += normal.transpose();
-  }
-  return normals.rowwise().normalized();
+  for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) normals.row(mesh.triangles(t, k)) += triangle_normal(mesh, t).transpose();
+  for (Eigen::Index i = 0; i < normals.rows(); ++i) normals.row(i) = normals.row(i).normalized().eval();
+  return normals;
 }
 
 /// A picture with the scale of a far eye that looks along `direction` at the middle of the bounds.
@@ -70,6 +74,7 @@ void draw_surface(data::Picture& picture, const DepthView& view, const data::Tri
       if (view.triangle(v, u) < 0) continue;
       Eigen::Vector3d normal = Eigen::Vector3d::Zero();
       for (int k = 0; k < 3; ++k) normal += normals.row(mesh.triangles(view.triangle(v, u), k)).transpose();
+      if (normal.norm() < 0.1) normal = triangle_normal(mesh, view.triangle(v, u));
       // Lit from both sides: a sheet has no inside.
       picture.at(u, v) = shade(red, 0.55 + 0.5 * std::abs(normal.normalized().dot(light)));
     }

@@ -59,6 +59,22 @@ TEST(OverlayImage, DrawsSurfaceAndCloudToScale) {
   EXPECT_LT(count(picture, 200, 200, is_red), 400);
 }
 
+// Along the fold of a sheet that lies on itself the normals of its two halves cancel.
+TEST(OverlayImage, AFoldedSheetIsLitToo) {
+  data::TriangleMesh folded = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
+  folded.vertices.col(2) = folded.vertices.col(1).eval();
+  folded.vertices.col(1).setZero();
+  folded.vertices.col(0) = (folded.vertices.col(0).array() - 0.1).abs().eval();
+  const Eigen::AlignedBox3d bounds(Eigen::Vector3d(0, -0.1, 0), Eigen::Vector3d(0.1, 0.1, 0.2));
+  OverlayImageSettings settings;
+  settings.panel_width = settings.panel_height = 200;
+  settings.elevation = 0;
+  const data::Picture picture = draw_overlay(folded, data::Points(0, 3), bounds, settings);
+  const auto is_black = [](const data::Colour& c) { return c[0] < 40 && c[1] < 40 && c[2] < 40; };
+  EXPECT_NEAR(count(picture, 0, 200, is_red), 82 * 165, 0.05 * 82 * 165);
+  EXPECT_EQ(count(picture, 0, 400, is_black), 0);
+}
+
 TEST(OverlayImage, PointsBehindTheSurfaceArePale) {
   data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
   square.vertices.col(2) = square.vertices.col(1).eval();

@@ -54,7 +54,8 @@ def main():
         document |= tables.twin_tables(run_twins(runs, options.data), run_both(runs, options.data),
                                        run_horizons(runs))
     if options.only in (None, "synthetic"):
-        document |= tables.synthetic_tables(synthetic.experiment_rows(runs), synthetic.coverage_rows(synthetic.coverage(runs, synthetic.TWINS[:options.twins])))
+        found = synthetic.coverage(runs, synthetic.TWINS[:options.twins])
+        document |= tables.synthetic_tables(synthetic.experiment_rows(runs), synthetic.coverage_rows(found))
     tables.replace_tables(options.document, document)
     print(options.document)
 
@@ -63,6 +64,7 @@ def copy_pictures(out, images):
     images.mkdir(exist_ok=True)
     for source, name in (("lift_paper/best_replay/sequence.png", "paper.png"),
                          ("lift_navy/best_replay/sequence.png", "navy.png"),
+                         ("lift_tan/best_replay/sequence.png", "tan.png"),
                          ("lift_paper/picture/020.png", "overlay.png")):
         shutil.copyfile(out / source, images / name)
 
@@ -80,7 +82,7 @@ def run_lifts(runs, data):
     lifts.best_replay(runs, data, asset, "lift_paper", fits["lift_paper"]["material"], "picture", "20")
     return {"fits": fits, "pairs": pairs, "fold": lifts.fold(runs, data, asset, pairs["paper"]["joint"]),
             "limits": {clip: limits.measure(runs, data, asset, clip, fits[clip]["material"])
-                       for clip in ("lift_paper", "lift_navy")}}
+                       for clip in ("lift_paper", "lift_navy", "lift_tan")}}
 
 
 def run_twins(runs, data, only=None):
