@@ -159,8 +159,7 @@ Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& gi
   if (size == TargetSize::solved && cell.scales.empty())
     throw data::InputError(
         "the data do not tell the size of the targets: the robots move too little; leave --target-size "
-        "solved "
-        "out, or add views farther apart");
+        "solved out, or add views farther apart");
   if (!refined.converged) cell.notices.emplace_back("the joint refinement did not converge");
   for (ScaleCheck& scale : cell.scales) {
     scale.solved = settings.bundle.unknowns.scales;

@@ -109,5 +109,30 @@ TEST(Register, CamerasThatNumberTheBoardFromItsOtherEndAreAligned) {
   EXPECT_LT(apart.head<3>().norm(), 1e-3);
 }
 
+TEST(Register, SizeOfATargetIsNotSolvedForWhereArmsOnlyTurn) {
+  // All about one point: camera and target twice as far from it look the same.
+  HandEyeScene scene = arm_scene(7);
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < scene.observations.size(); ++i) {
+    Observation& o = scene.observations[i];
+    o.T_base_gripper.translation() = scene.true_poses.front().translation();
+    const Eigen::Isometry3d T = scene.truth.X.inverse() * o.T_base_gripper * scene.truth.Z;
+    for (Eigen::Index k = 0; k < scene.points.cols(); ++k)
+      o.pixels.col(k) = project(to_vector(scene.camera), T * scene.points.col(k)) +
+                        0.1 * Eigen::Vector2d(normal(random), normal(random));
+    o.T_camera_target = {T};
+  }
+  CellMember member = member_of(scene, "arm", "camera");
+  member.poses = scene.truth;
+  EXPECT_TRUE(solve_cell({member}).scales.empty());
+  try {
+    solve_cell({member}, {}, TargetSize::solved);
+    FAIL() << "accepted";
+  } catch (const data::InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("do not tell the size of the targets"), std::string::npos);
+  }
+}
+
 }  // namespace
 }  // namespace flash::calib
