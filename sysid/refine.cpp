@@ -94,7 +94,7 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
   std::vector<Replay> on_model;
   for (const ModelledReplay& model : *models) on_model.push_back(model.replay);
 
-  // Simulated anew about the answer where few simulations do, once more where its intervals end outside.
+  // Simulated anew about the answer where few simulations do, and again where its intervals end outside.
   constexpr int kRounds = 4;
   constexpr std::size_t kFew = 30;
   GridSettings local = grid;
