@@ -100,7 +100,7 @@ BAR_MATERIAL = {"young": 50.0, "poisson": 0.3}
 def lift(runs, bending, seed, relabel=None):
     """A lift searched for D and nu. The motions are the same for all seeds, noise and occlusion are not. `relabel`:
     another `kind` in recording.json."""
-    asset = write_asset(runs.out, "cloth.json", young=CLOTH_MEMBRANE)
+    asset = write_asset(runs.out, "stiff_strip.json", young=CLOTH_MEMBRANE)
     name = f"lift_{bending:g}"
     values, _, cell, truth = BENDING[bending]
     recording = runs.synth(f"{name}/recording_{seed:02d}", asset, "--mesh", f"{STRIP}{truth}:alternating_by_row", *LIFT, "--seed",
