@@ -161,7 +161,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
                             sysid::fingerprint(replays, settings), options.resume);
   for (const std::string& notice : notices) say(options.common, notice);
-  const double memory = sysid::estimate_memory(replays, settings).total();
+  const double memory = sysid::estimate_memory(replays, settings, !options.no_solver_check).total();
   say(options.common,
       data::format_count(sysid::cartesian_product(settings.axes).size()) + " candidates, " +
           data::format_count(static_cast<std::size_t>(replays.front().sheet.rest.vertices.rows())) +
@@ -169,7 +169,9 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
           data::format_count(static_cast<std::size_t>(std::ceil(memory / 1e6))) + " MB of memory");
   if (sysid::physical_memory() > 0 && memory > sysid::physical_memory())
     warn("this machine has " + data::format_count(static_cast<std::size_t>(sysid::physical_memory() / 1e6)) +
-         " MB of memory: search fewer values" + (threads > 1 ? " or on fewer --threads" : ""));
+         " MB of memory: " + (options.rollouts.empty() ? "a coarser --mesh" : "fewer values") +
+         (threads > 1 ? " or fewer --threads are needed"
+                      : (options.rollouts.empty() ? " is needed" : " are needed")));
   bool complete = false;
   {
     ProgressLine line(options.common);

@@ -162,7 +162,8 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
 }
 
 Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComponents& components) {
-  // A component that cannot be told from zero has no scale in log sigma: half a unit either way is enough.
+  // A component that cannot be told from zero has no scale in log sigma: that it is known to half a unit (one
+  // standard deviation) is enough.
   constexpr double kWidest = 0.5;
   // Gauss and Hermite's, for a standard normal.
   constexpr std::array<double, 4> kNodes = {0, 1.154405395, 2.366759411, 3.750439718};
@@ -177,17 +178,25 @@ Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComp
   const std::vector<double> no_floor(components.sigmas.size(), 0);
   for (Eigen::Index k = 0; k < eigen.eigenvalues().size(); ++k) {
     const double deviation = std::sqrt(std::max(0.0, eigen.eigenvalues()[k]));
+    if (deviation == 0) continue;
+    const double width = std::min(kWidest, deviation);
     double weights = 0;
     Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(model.shared, model.shared), squares = mean;
     Eigen::VectorXd shift = Eigen::VectorXd::Zero(model.shared);
     const auto add = [&](double x, double weight) {
-      const Eigen::VectorXd step = x * std::min(kWidest, deviation) * eigen.eigenvectors().col(k);
+      const Eigen::VectorXd step = x * width * eigen.eigenvectors().col(k);
       const LinearSolution there = solve_linear(model, scaled(components.sigmas, step, no_floor));
-      // The likelihood is no normal distribution: its longer tail is towards the larger sigma.
-      if (deviation < kWidest) weight *= std::exp(0.5 * (x * x - there.deviance + centre.deviance));
+      const Eigen::MatrixXd covariance_there = inverse(there.information);
+      // The likelihood over the normal distribution that it is near its maximum: its longer tail is towards
+      // larger errors. Towards smaller ones that of a component that is hardly told does not fall at all;
+      // there it counts as normal.
+      const double normal = std::pow(x * width / deviation, 2);
+      const double ratio = std::exp(0.5 * (normal - there.deviance + centre.deviance));
+      const bool smaller = stated.ldlt().solve(covariance_there).trace() < static_cast<double>(model.shared);
+      weight *= smaller ? std::min(1.0, ratio) : ratio;
       const Eigen::VectorXd moved = there.shared - centre.shared;
       weights += weight;
-      mean += weight * inverse(there.information);
+      mean += weight * covariance_there;
       shift += weight * moved;
       squares += weight * moved * moved.transpose();
     };

@@ -47,8 +47,8 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
 
 /// Covariance of the shared unknowns that knows that the noise levels are estimates: the mean of Phi(sigma)
 /// and the spread of the solution over the likelihood of log sigma, along each of its principal axes. For one
-/// component the variance of Student's distribution; to second order what Kackar and Harville 1984 and Kenward
-/// and Roger 1997 give in closed form.
+/// component the variance of Student's distribution; to second order what Kackar and Harville 1984 and
+/// Kenward and Roger 1997 give in closed form.
 Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComponents& components);
 
 }  // namespace flash::calib

@@ -24,7 +24,8 @@ double kept_steps(const Replay& replay) {
 
 }  // namespace
 
-MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSettings& settings) {
+MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSettings& settings,
+                               bool solver_check) {
   MemoryEstimate estimate;
   double motion = 0, solver = 0, kept = 0;
   for (const Replay& replay : replays) {
@@ -36,9 +37,13 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
   const auto candidates = static_cast<double>(cartesian_product(settings.axes).size());
   const double at_once = std::min<double>(
       {static_cast<double>(settings.threads), static_cast<double>(settings.envs), candidates});
+  const bool keeps = !settings.rollouts.empty();
   estimate.simulation = at_once * (solver + motion);
-  if (settings.rollouts.empty()) return estimate;
-  const auto finer = static_cast<double>(cartesian_product(thinned(settings.axes)).size());
+  if (solver_check) estimate.simulation = std::max(estimate.simulation, kFiner * (solver + motion));
+  if (solver_check && keeps) estimate.simulation = kFiner * at_once * (solver + motion);
+  if (!keeps) return estimate;
+  const double finer =
+      solver_check ? static_cast<double>(cartesian_product(thinned(settings.axes)).size()) : 0;
   // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer
   // one.
   const double own = candidates * kept, half_cell = finer * kFiner * kept;

@@ -46,6 +46,7 @@ std::optional<std::vector<Motion>> motions_over(const Replay& replay, const std:
 
 std::vector<bool> steps_read(const Replay& replay, double start, double step, std::size_t count) {
   std::vector<bool> read(count, replay.recording.nuisance.time > 0);
+  if (read.empty()) return read;
   read.front() = read.back() = true;
   for (const Observation& observation : replay.observations) {
     const double steps = (observation.t - start) / step;

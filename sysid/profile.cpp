@@ -200,22 +200,30 @@ struct WholeProfile {
   double least = 0;                    // score [m]
 };
 
-/// `part` itself or, where it is one, its points and around it those of the whole.
-WholeProfile whole_profile(const ParameterFinding& part, const GridVerdict* whole, std::size_t k,
-                           double least) {
-  if (whole == nullptr) return {part.values, part.scores, least};
-  const ParameterFinding& all = whole->parameters[k];
-  WholeProfile profile{{}, {}, least};
-  const auto add = [&](double value, double score) {
-    profile.values.push_back(value);
-    profile.scores.push_back(score);
-  };
-  std::size_t i = 0;
-  for (; i < all.values.size() && all.values[i] < part.values.front(); ++i) add(all.values[i], all.scores[i]);
-  for (std::size_t j = 0; j < part.values.size(); ++j) add(part.values[j], part.scores[j]);
-  for (; i < all.values.size(); ++i)
-    if (all.values[i] > part.values.back()) add(all.values[i], all.scores[i]);
-  return profile;
+/// Whether another parameter stands where the grid ends and its range does not: the profile lies lower there.
+bool cut_off(const ProfilePoint& point, std::size_t k, const ScoreSurface& surface,
+             const std::vector<RangeEnd>& ends) {
+  return std::any_of(ends.begin(), ends.end(), [&](const RangeEnd& end) {
+    if (end.axis == k) return false;
+    const auto axis = static_cast<Eigen::Index>(end.axis);
+    const Eigen::VectorXd& knots = surface.knots(end.axis);
+    const double first = knots[0], last = knots[knots.size() - 1], near = 1e-6 * (last - first),
+                 range = surface.coordinate(end.axis, end.estimate[axis]);
+    return (range < first - near && point.x[axis] <= first + near) ||
+           (range > last + near && point.x[axis] >= last - near);
+  });
+}
+
+/// A part and the ends of the range around it.
+WholeProfile whole_profile(WholeProfile part, const std::vector<RangeEnd>& ends, std::size_t k) {
+  for (const RangeEnd& end : ends) {
+    const double value = end.estimate[static_cast<Eigen::Index>(k)];
+    if (end.axis != k || (value >= part.values.front() && value <= part.values.back())) continue;
+    const bool below = value < part.values.front();
+    part.values.insert(below ? part.values.begin() : part.values.end(), value);
+    part.scores.insert(below ? part.scores.begin() : part.scores.end(), end.score);
+  }
+  return part;
 }
 
 std::string note_of(const ParameterFinding& finding, double least, bool unconverged) {
@@ -257,18 +265,24 @@ ProfiledParameter find_interval(const GridResults& results, std::size_t k, const
   finding.logarithmic = results.axes[k].logarithmic;
   std::size_t low = 0, high = 0;  // the outermost points inside; the estimate is one of them
   bool found = false;
+  WholeProfile part{{}, {}, sampling.best_score};
+  const double lowest = results.axes[k].values.front(), highest = results.axes[k].values.back();
+  const auto value_of = [&](std::size_t i) {  // the ends of the axis to the last digit
+    return i == 0 ? lowest : i + 1 == profile.size() ? highest : surface.value(k, profile[i].x[axis]);
+  };
   for (std::size_t i = 0; i < profile.size(); ++i) {
-    profile[i].chi2 = profile[i].x[axis] == best ? 0 : chi_squared(sampling, profile[i], k);
-    finding.values.push_back(surface.value(k, profile[i].x[axis]));
-    finding.scores.push_back(profile[i].score);
+    const bool is_best = profile[i].x[axis] == best;
+    profile[i].chi2 = is_best ? 0 : chi_squared(sampling, profile[i], k);
+    if (is_best || !cut_off(profile[i], k, surface, settings.ends)) {
+      part.values.push_back(value_of(i));
+      part.scores.push_back(profile[i].score);
+    }
     if (profile[i].chi2 > kLimit) continue;
     if (!found) low = i;
     high = i;
     found = true;
   }
-  finding.values.front() = results.axes[k].values.front();
-  finding.values.back() = results.axes[k].values.back();
-  finding.estimate = std::clamp(surface.value(k, best), finding.values.front(), finding.values.back());
+  finding.estimate = std::clamp(surface.value(k, best), lowest, highest);
 
   double below = low > 0 ? crossing(profile[low], profile[low - 1], axis) : knots[0];
   double above =
@@ -282,7 +296,7 @@ ProfiledParameter find_interval(const GridResults& results, std::size_t k, const
     above += std::max(0.0, -shift[axis]);
   }
   const double error = solver.score + solver.interpolation;
-  WholeProfile whole = whole_profile(finding, settings.whole, k, sampling.best_score);
+  WholeProfile whole = whole_profile(std::move(part), settings.ends, k);
   const auto rises = [&](double from, double to) {
     for (std::size_t i = 0; i < whole.values.size(); ++i)
       if (whole.values[i] >= from && whole.values[i] <= to && whole.scores[i] - whole.least > error)
@@ -291,9 +305,9 @@ ProfiledParameter find_interval(const GridResults& results, std::size_t k, const
   };
   const double first = whole.values.front(), end = whole.values.back();
   const bool closed_below =
-      low > 0 && below > surface.coordinate(k, first) && rises(first, finding.values[low - 1]);
+      low > 0 && below > surface.coordinate(k, first) && rises(first, value_of(low - 1));
   const bool closed_above =
-      high + 1 < profile.size() && above < surface.coordinate(k, end) && rises(finding.values[high + 1], end);
+      high + 1 < profile.size() && above < surface.coordinate(k, end) && rises(value_of(high + 1), end);
   finding.interval95 = {closed_below ? surface.value(k, below) : first,
                         closed_above ? surface.value(k, above) : end};
   finding.values = whole.values;
@@ -301,29 +315,35 @@ ProfiledParameter find_interval(const GridResults& results, std::size_t k, const
   return {std::move(finding), std::move(profile), std::move(whole), closed_below, closed_above};
 }
 
-/// What one parameter's profile does not exclude, another's interval holds: by its scatter, or on a side
-/// where the solver cannot be trusted to tell a valley from flat.
+/// Widens the interval to a value, at most to the range.
+void hold(ProfiledParameter& parameter, double value) {
+  auto& [low, high] = *parameter.finding.interval95;
+  const double first = parameter.whole.values.front(), end = parameter.whole.values.back();
+  low = std::max(first, std::min(low, value));
+  high = std::min(end, std::max(high, value));
+  parameter.closed_below = parameter.closed_below && low > first;
+  parameter.closed_above = parameter.closed_above && high < end;
+}
+
+/// What one parameter's profile does not exclude, the intervals of the others hold: by its scatter, or on a
+/// side where the solver cannot be trusted to tell a valley from flat.
 void hold_profiles(const ScoreSurface& surface, const Eigen::VectorXd& best,
-                   std::vector<ProfiledParameter>& parameters) {
-  for (std::size_t j = 0; j < parameters.size(); ++j) {
-    const auto axis = static_cast<Eigen::Index>(j);
-    for (const ProfilePoint& point : parameters[j].profile) {
-      const bool closed =
-          point.x[axis] < best[axis] ? parameters[j].closed_below : parameters[j].closed_above;
-      if (closed && point.chi2 > kLimit) continue;
-      for (std::size_t k = 0; k < parameters.size(); ++k) {
-        if (k == j) continue;
-        ProfiledParameter& other = parameters[k];
-        const double value = surface.value(k, point.x[static_cast<Eigen::Index>(k)]),
-                     first = other.whole.values.front(), end = other.whole.values.back();
-        auto& [low, high] = *other.finding.interval95;
-        low = std::max(first, std::min(low, value));
-        high = std::min(end, std::max(high, value));
-        other.closed_below = other.closed_below && low > first;
-        other.closed_above = other.closed_above && high < end;
-      }
+                   const std::vector<RangeEnd>& ends, std::vector<ProfiledParameter>& parameters) {
+  const std::vector<ProfiledParameter> found = parameters;
+  const auto closed = [&](std::size_t j, double x) {
+    return x < best[static_cast<Eigen::Index>(j)] ? found[j].closed_below : found[j].closed_above;
+  };
+  for (std::size_t j = 0; j < found.size(); ++j)
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      if (k == j) continue;
+      const auto axis = static_cast<Eigen::Index>(k);
+      for (const ProfilePoint& point : found[j].profile)
+        if (point.chi2 <= kLimit || !closed(j, point.x[static_cast<Eigen::Index>(j)]))
+          hold(parameters[k], surface.value(k, point.x[axis]));
+      for (const RangeEnd& end : ends)
+        if (end.axis == j && !closed(j, surface.coordinate(j, end.estimate[static_cast<Eigen::Index>(j)])))
+          hold(parameters[k], end.estimate[axis]);
     }
-  }
 }
 
 ParameterFinding conclude(const GridResults& results, std::size_t k, const Sampling& sampling,
@@ -468,7 +488,7 @@ GridVerdict profile_grid(const GridResults& results, const ProfileSettings& sett
   std::vector<ProfiledParameter> profiled;
   for (std::size_t k = 0; k < results.axes.size(); ++k)
     profiled.push_back(find_interval(results, k, sampling, std::move(profiles[k]), settings));
-  hold_profiles(surface, sampling.best, profiled);
+  hold_profiles(surface, sampling.best, settings.ends, profiled);
   for (std::size_t k = 0; k < results.axes.size(); ++k) {
     verdict.parameters.push_back(conclude(results, k, sampling, std::move(profiled[k])));
     verdict.estimate[static_cast<Eigen::Index>(k)] = *verdict.parameters.back().estimate;

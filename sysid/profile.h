@@ -37,14 +37,20 @@ struct SolverError {
   std::vector<SolverShift> remainders{};  ///< of which the size is known, not the sign
 };
 
+/// The profile of one parameter at an end of its range, where the grid judged is a part of it.
+struct RangeEnd {
+  std::size_t axis = 0;
+  double score = 0;          ///< least over the other parameters [m]
+  Eigen::VectorXd estimate;  ///< where it is least, one value an axis
+};
+
 /// How a grid is judged.
 struct ProfileSettings {
   std::optional<double> repeatability;  ///< trial-to-trial distance of a keyframe [m]
   SolverError solver;
   std::vector<Eigen::MatrixXd> information{};  ///< of each weighing keyframe (keyframe_information); empty:
                                                ///< all count alike
-  const GridVerdict* whole =
-      nullptr;  ///< profiles up to the ends of the range, where the grid is a part of it
+  std::vector<RangeEnd> ends{};                ///< of the ranges that the grid does not cover
 };
 
 /// Profile likelihood with the keyframe, not the point, as the sample. The score is interpolated between the

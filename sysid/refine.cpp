@@ -54,25 +54,23 @@ SolverShift shift_of(const SolverCheck& check, const std::vector<Axis>& axes) {
 }
 
 /// The profile of every parameter at the two ends of its range: the rest searched anew with it held there.
-GridVerdict verdict_at_ends(const std::vector<ModelledReplay>& models, double share, const Zoomed& found,
-                            const GridSettings& grid, std::optional<double> repeatability) {
-  GridVerdict verdict = found.verdict;
+std::vector<RangeEnd> profile_at_ends(const std::vector<ModelledReplay>& models, double share,
+                                      const Zoomed& found, const GridSettings& grid,
+                                      std::optional<double> repeatability) {
+  std::vector<RangeEnd> ends;
   for (std::size_t k = 0; k < grid.axes.size(); ++k) {
-    ParameterFinding& finding = verdict.parameters[k];
-    finding.values = grid.axes[k].values;
-    finding.scores.assign(finding.values.size(), found.verdict.estimate_score);
-    if (finding.values.size() < 2) continue;
-    finding.values = {grid.axes[k].values.front(), grid.axes[k].values.back()};
-    finding.scores.clear();
-    for (const double end : finding.values) {
+    const std::vector<double>& values = grid.axes[k].values;
+    if (values.size() < 2) continue;
+    for (const double end : {values.front(), values.back()}) {
       GridSettings held = grid;
       held.axes[k].values = {end};
       Extent extent = extent_of(found.results.axes);
       extent[k] = {end, end};
-      finding.scores.push_back(zoom(models, share, extent, held, repeatability).verdict.estimate_score);
+      const GridVerdict verdict = zoom(models, share, extent, held, repeatability).verdict;
+      if (verdict.best >= 0) ends.push_back({k, verdict.estimate_score, verdict.estimate});
     }
   }
-  return verdict;
+  return ends;
 }
 
 }  // namespace
@@ -90,7 +88,7 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
   if (!models) return std::nullopt;
   Zoomed found = zoom(*models, share, cells_around(best, grid.axes), grid, repeatability);
   if (found.verdict.best < 0) return std::nullopt;
-  const GridVerdict ends = verdict_at_ends(*models, share, found, grid, repeatability);
+  const std::vector<RangeEnd> ends = profile_at_ends(*models, share, found, grid, repeatability);
   std::vector<Replay> on_model;
   for (const ModelledReplay& model : *models) on_model.push_back(model.replay);
 
@@ -155,7 +153,7 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
 
   for (const SolverCheck& check : refined.checks)
     error.score = std::max(error.score, std::hypot(whole.score, check.surface_change_m) - whole.score);
-  const GridVerdict verdict = profile_grid(found.results, {repeatability, error, found.information, &ends});
+  const GridVerdict verdict = profile_grid(found.results, {repeatability, error, found.information, ends});
   refined.verdict = whole;
   refined.verdict.parameters = verdict.parameters;
   refined.verdict.estimate = verdict.estimate;

@@ -63,9 +63,10 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
       const double end = at((*verdict.parameters[k].interval95)[side]);
       const bool open = std::abs(end - now[side]) < 1e-9 * width;
       const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
-      // Past an open end a quarter more; a longer way would lose what the last extents told.
-      reach = std::max(reach,
-                       open && more ? (std::abs(end - best) + 0.25 * width) / kRoom : std::abs(end - best));
+      // Past an open end by a quarter of the width or more; a longer way would lose what the last extents
+      // told.
+      const double past = std::max(0.75 * width, std::abs(end - best) + 0.25 * width);
+      reach = std::max(reach, open && more ? past / kRoom : std::abs(end - best));
       fits = fits && !(open && more);
     }
     const double half = std::max({kRoom * reach, spacing, kSmallest * (range[1] - range[0])});
@@ -128,7 +129,7 @@ Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Exten
     if (found.verdict.best < 0) break;
     const std::vector<double> estimate(found.verdict.estimate.begin(), found.verdict.estimate.end());
     found.information = keyframe_information(measure_sensitivity(replays, settings, estimate, true, motions));
-    found.verdict = profile_grid(found.results, {repeatability, {}, found.information, nullptr});
+    found.verdict = profile_grid(found.results, {repeatability, {}, found.information});
     const Extent next = next_extent(extent, found.verdict, settings.axes);
     if (next == extent) break;
     extent = next;

@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <cstdio>
 #include <random>
 
 namespace flash::calib {
@@ -119,6 +120,40 @@ TEST(VarianceComponents, MeanOfFewRepeatsHasTheVarianceOfStudentsDistribution) {
     const VarianceComponents found = estimate_variance_components(model, {1}, {1e-6});
     const double freedom = count - 1, of_mean = std::pow(found.sigmas[0], 2) / count;
     EXPECT_NEAR(adjusted_covariance(model, found)(0, 0) / of_mean, freedom / (freedom - 2), 0.01);
+  }
+}
+
+/// The layout above with mean squares between and within groups that are `ratio` to one exactly.
+LinearModel one_way_of(int groups, double ratio) {
+  constexpr int kEach = 6;
+  LinearModel model{.groups = groups, .components = 2, .own = 1, .shared = 1, .blocks = {}};
+  Eigen::VectorXd means = Eigen::VectorXd::LinSpaced(groups, -1, 1);
+  means *= std::sqrt(ratio / kEach * (groups - 1) / means.squaredNorm());
+  Eigen::VectorXd within = Eigen::VectorXd::LinSpaced(kEach, -1, 1);
+  within *= std::sqrt((kEach - 1) / within.squaredNorm());
+  for (int i = 0; i < groups; ++i) {
+    Eigen::MatrixXd rows(kEach, 3);
+    for (int j = 0; j < kEach; ++j) rows.row(j) << 1, 1, -(means[i] + within[j]);
+    model.blocks.push_back({i, 0, kEach, rows.transpose() * rows});
+    Eigen::RowVector3d prior(1, 0, 0);
+    model.blocks.push_back({i, 1, 1, prior.transpose() * prior});
+  }
+  return model;
+}
+
+TEST(VarianceComponents, MeanOfFewGroupsIsLessCertainHoweverWeakTheirSpread) {
+  // The mean of the groups' means is Student's with one degree less than groups, whatever the components.
+  for (const auto& [groups, ratio] :
+       {std::pair{8, 3.0}, {10, 2.0}, {15, 2.0}, {20, 2.0}, {10, 20.0}, {20, 20.0}}) {
+    const LinearModel model = one_way_of(groups, ratio);
+    const VarianceComponents found = estimate_variance_components(model, {1, 1}, {1e-6, 1e-6});
+    const double plugged_in = 1 / solve_linear(model, found.sigmas).information(0, 0);
+    const double factor = adjusted_covariance(model, found)(0, 0) / plugged_in;
+    const double student = (groups - 1.0) / (groups - 3.0);
+    std::printf("%d groups, ratio %.0f: %.3f, Student's %.3f\n", groups, ratio, factor, student);
+    EXPECT_GT(factor, 1);
+    EXPECT_LT(factor, 1.1 * student);
+    EXPECT_GT(factor, 0.9 * student);
   }
 }
 

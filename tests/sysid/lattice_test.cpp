@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/sysid/short_lift.h"
@@ -31,6 +32,27 @@ TEST(Zoom, ExtentGrowsPastAnOpenEndWhereverTheEstimateStands) {
     EXPECT_EQ(low, 0.1);  // the range ends there
     EXPECT_GT(high, 0.2);
   }
+}
+
+TEST(Zoom, ExtentsReachAMinimumFarOutside) {
+  // A sharp minimum at 40: what is seen of it is its nearest point, with a narrow interval.
+  Extent extent = {{3.5, 4}, {0.2, 0.2}, {0.3, 0.3}};
+  const std::vector<Axis> searched = {kSearched[0], parse_axis("friction", "0.2"), kSearched[2]};
+  GridVerdict verdict = {};
+  for (int k = 0; k < 3; ++k) verdict.parameters.emplace_back();
+  for (int round = 0; round < 16; ++round) {
+    const auto [low, high] = extent[0];
+    const double best = std::clamp(40.0, low, high);
+    verdict.parameters[0].estimate = best;
+    verdict.parameters[0].interval95 = {std::max(low, best - 0.01), std::min(high, best + 0.01)};
+    for (const std::size_t k : {1U, 2U}) {
+      verdict.parameters[k].estimate = extent[k][0];
+      verdict.parameters[k].interval95 = {extent[k][0], extent[k][1]};
+    }
+    extent = next_extent(extent, verdict, searched);
+  }
+  EXPECT_LT(extent[0][0], 40);
+  EXPECT_GT(extent[0][1], 40);
 }
 
 TEST(Lattice, HasValuesOfItsOwnWhereTheExtentIsNarrowerThanACellOfTheSearch) {

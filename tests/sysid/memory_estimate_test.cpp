@@ -21,7 +21,7 @@ TEST(MemoryEstimate, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_lift(folder)};
   GridSettings grid = grid_over("1e-4:4e-4:3:log");
-  EXPECT_EQ(estimate_memory(replays, grid).kept, 0);
+  EXPECT_EQ(estimate_memory(replays, grid, true).kept, 0);
   grid.rollouts = folder / "rollouts";
 
   const Replay& replay = replays.front();
@@ -35,19 +35,20 @@ TEST(MemoryEstimate, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
   const double motion = static_cast<double>(steps.size() * sizeof(double)) *
                         static_cast<double>(replay.sheet.rest.vertices.size());
   // Three of the search's mesh while three of four times as many vertices are made splines of, held twice.
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid).kept, (3 + 2 * 3 * 4) * motion);
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).kept, (3 + 2 * 3 * 4) * motion);
 }
 
 TEST(MemoryEstimate, GrowsWithWhatIsInWorkAtOnce) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_lift(folder)};
   GridSettings grid = grid_over("1e-4:4e-4:9:log");
-  const double one = estimate_memory(replays, grid).simulation;
-  grid.threads = 4;
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid).simulation, 4 * one);
-  grid.envs = 2;  // the fewer of the two
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid).simulation, 2 * one);
-  EXPECT_LT(estimate_memory(replays, grid).total(), physical_memory());
+  const double one = estimate_memory(replays, grid, false).simulation;
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * one);  // of half the cell
+  grid.threads = 6;
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, false).simulation, 6 * one);
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 6 * one);  // checks come one by one
+  grid.envs = 5;                                                               // the fewer of the two
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, false).simulation, 5 * one);
 }
 
 }  // namespace

@@ -203,6 +203,30 @@ TEST(Profile, AnIntervalHoldsTheValleyThatTheSolverCannotTellFromFlat) {
   EXPECT_NEAR(std::log((*doubtful.parameters[1].interval95)[1] / 3e-5), 0.4, 0.01);
 }
 
+TEST(Profile, AValleyThatLeavesTheGridIsHeldToTheEndsOfTheRange) {
+  const std::vector<double> own = scattered(20, std::log(3e-5), 0.01, 8);
+  const GridResults results =
+      grid_of({parse_axis("poisson", "0.08:0.12:5"), parse_axis("bending", "2.5e-5:4e-5:9:log")}, 20,
+              [&](std::size_t k, const std::vector<double>& x) {
+                const double along = x[0] - 0.1 + 0.1 * (own[k] - std::log(3e-5));
+                return kFloor + 1e-3 * std::pow(x[1] - x[0] - own[k], 2) + 1e-4 * along * along;
+              });
+  // Over 0 to 0.4 and 1e-6 to 1e-3 the score rises by 9e-6 m along the valley, by far more across it.
+  const auto end = [](std::size_t axis, double poisson, double bending, double rise) {
+    return RangeEnd{axis, kFloor + rise, Eigen::Vector2d(poisson, bending)};
+  };
+  const ProfileSettings settings{.repeatability = {},
+                                 .solver = {{}, 5e-5},
+                                 .ends = {end(0, 0, 3e-5, 1e-6), end(0, 0.4, 3e-5 * std::exp(0.4), 9e-6),
+                                          end(1, 0, 1e-6, 1e-2), end(1, 0.4, 1e-3, 1e-2)}};
+  const GridVerdict verdict = profile_grid(results, settings);
+  EXPECT_EQ(verdict.parameters[0].identifiable, Identifiable::no);
+  EXPECT_EQ((*verdict.parameters[0].interval95)[1], 0.4);
+  EXPECT_EQ(verdict.parameters[1].identifiable, Identifiable::yes);
+  EXPECT_LE((*verdict.parameters[1].interval95)[0], 3e-5);
+  EXPECT_NEAR((*verdict.parameters[1].interval95)[1], 3e-5 * std::exp(0.4), 1e-9);
+}
+
 TEST(Profile, RecordingsThatContradictEachOtherWidenTheInterval) {
   std::vector<double> own = scattered(20, std::log(3e-5), 0.05, 7);
   const auto score = [&](std::size_t k, const std::vector<double>& x) {
