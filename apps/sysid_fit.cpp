@@ -30,6 +30,7 @@ struct FitOptions {
   std::string start;
   std::vector<std::string> freeze, priors, fixed;
   int iterations = 15;
+  int generations = 0;
   std::string out;
 };
 
@@ -74,6 +75,8 @@ sysid::FitSettings fit_settings(const FitOptions& options, const sysid::Summary&
       throw data::InputError("--prior: " + name + ": is not among the parameters fitted");
   }
   settings.iterations = options.iterations;
+  settings.global.generations = options.generations;
+  settings.global.seed = options.common.seed;
   settings.grid.score = score_settings(options.replay);
   return settings;
 }
@@ -103,8 +106,9 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
   for (const sysid::FitStep& step : result.path) {
     nlohmann::ordered_json entry;
     for (std::size_t k = 0; k < axes.size(); ++k) entry[axes[k].name] = step.values[k];
-    entry["cost"] = step.cost;
+    entry["cost"] = step.cost;  // null where every candidate of a generation diverged
     entry["accepted"] = step.accepted;
+    entry["stage"] = step.stage == sysid::FitStage::global ? "global" : "local";
     json["path"].push_back(entry);
   }
   return json;
@@ -128,8 +132,13 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   for (const std::string& notice : notices) say(options.common, notice);
 
   const std::vector<sysid::Axis>& axes = settings.grid.axes;
+  int generation = 0;
   const sysid::FitResult result = sysid::fit(replays, settings, [&](const sysid::FitStep& step) {
-    std::string line = "cost " + data::format_short(step.cost);
+    std::string line = step.stage == sysid::FitStage::global
+                           ? "generation " + std::to_string(++generation) + " of " +
+                                 std::to_string(options.generations) + ": cost "
+                           : "cost ";
+    line += data::format_short(step.cost);
     for (std::size_t k = 0; k < axes.size(); ++k)
       line += "  " + axes[k].name + " " + data::format_short(step.values[k]);
     say(options.common, line + (step.accepted ? "" : "  (left)"));
@@ -169,6 +178,10 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_option("--fix", options->fixed, "A measured constant, as friction=0.3")->allow_extra_args(false);
   verb->add_option("--steps", options->iterations, "Of the optimizer at most")
       ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  verb->add_option("--global", options->generations,
+                   "Generations of a search over the whole ranges before, of 16 candidates each; 0: none")
+      ->check(CLI::Range(0, 10000))
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "Folder for fit.json")->required();
   add_replay_options(*verb, options->replay);

@@ -5,8 +5,10 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "data/error.h"
+#include "data/parallel.h"
 #include "sysid/sensitivity.h"
 
 namespace flash::sysid {
@@ -40,12 +42,13 @@ double median_of(Eigen::VectorXd values) {
   return *middle;
 }
 
-/// All residuals of all recordings, with derivatives where they are asked for.
+/// All residuals of all recordings, with derivatives where they are asked for. Scale and limit are those at
+/// `from`.
 class Residuals : public ceres::CostFunction {
  public:
-  Residuals(const std::vector<Replay>& replays, const FitSettings& settings)
+  Residuals(const std::vector<Replay>& replays, const FitSettings& settings, const std::vector<double>& from)
       : replays_(replays), settings_(settings) {
-    const Sensitivity start = measure_sensitivity(replays, settings.grid, settings.start, false);
+    const Sensitivity start = measure_sensitivity(replays, settings.grid, from, false);
     if (start.places.empty()) throw data::InputError("--start: the simulation diverges there");
     const Eigen::VectorXd rows = residuals_of(start);
     limit_ = std::max(median_of(rows.cwiseAbs()), 1e-12);
@@ -67,16 +70,9 @@ class Residuals : public ceres::CostFunction {
     const std::vector<double> values = values_at(axes, parameters[0]);
     const bool differentiate = jacobians != nullptr && jacobians[0] != nullptr;
     const Sensitivity here = measure_sensitivity(replays_, settings_.grid, values, differentiate);
-    for (const ReplayResult& motion : here.motions)
-      if (!motion.finite) return false;
-    const Eigen::VectorXd rows = residuals_of(here);
+    const Eigen::VectorXd rows = here.places.empty() ? Eigen::VectorXd() : residuals_of(here);
     if (rows.size() != rows_) return false;
-    for (Eigen::Index i = 0; i < rows_; ++i) residuals[i] = scale_ * tamed(rows[i]);
-    for (std::size_t p = 0; p < settings_.priors.size(); ++p) {
-      const auto [axis, weight] = prior_row(p);
-      residuals[rows_ + static_cast<Eigen::Index>(p)] =
-          weight * (parameters[0][axis] - coordinate(axes[axis], settings_.priors[p].value));
-    }
+    fill(rows, parameters[0], residuals);
     if (!differentiate) return true;
     using Jacobian = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     const Eigen::Index all = num_residuals();
@@ -93,7 +89,40 @@ class Residuals : public ceres::CostFunction {
     return true;
   }
 
+  /// Costs at several coordinates, all simulated in one batch a recording; infinite where they diverge.
+  std::vector<double> costs(const std::vector<Eigen::VectorXd>& points) const {
+    std::vector<ReplayCandidate> candidates;
+    for (const Eigen::VectorXd& x : points)
+      candidates.push_back(candidate_at(values_at(settings_.grid.axes, x.data()), settings_.grid));
+    std::vector<std::vector<ReplayResult>> motions;
+    for (const Replay& replay : replays_) motions.push_back(run(replay, candidates));
+    std::vector<double> costs(points.size(), std::numeric_limits<double>::infinity());
+    data::for_each_in_parallel(points.size(), replays_.front().settings.threads, [&](std::size_t i) {
+      const auto motion_of = [&](std::size_t r, const std::vector<std::vector<double>>&) {
+        return std::vector<ReplayResult>{std::move(motions[r][i])};
+      };
+      const std::vector<double> values = values_at(settings_.grid.axes, points[i].data());
+      const Sensitivity here = measure_sensitivity(replays_, settings_.grid, values, false, motion_of);
+      if (here.places.empty()) return;
+      const Eigen::VectorXd rows = residuals_of(here);
+      if (rows.size() != rows_) return;
+      Eigen::VectorXd residuals(num_residuals());
+      fill(rows, points[i].data(), residuals.data());
+      costs[i] = residuals.squaredNorm() / 2;
+    });
+    return costs;
+  }
+
  private:
+  void fill(const Eigen::VectorXd& rows, const double* x, double* residuals) const {
+    for (Eigen::Index i = 0; i < rows_; ++i) residuals[i] = scale_ * tamed(rows[i]);
+    for (std::size_t p = 0; p < settings_.priors.size(); ++p) {
+      const auto [axis, weight] = prior_row(p);
+      residuals[rows_ + static_cast<Eigen::Index>(p)] =
+          weight * (x[axis] - coordinate(settings_.grid.axes[axis], settings_.priors[p].value));
+    }
+  }
+
   /// r up to the limit, beyond it sqrt(limit (2 |r| - limit)): Huber's cost is its square.
   double tamed(double r) const {
     const double size = std::abs(r);
@@ -125,7 +154,8 @@ class Path : public ceres::IterationCallback {
        const std::function<void(const FitStep&)>& report)
       : axes_(axes), x_(x), report_(report) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    steps.push_back({values_at(axes_, x_.data()), summary.cost, summary.step_is_successful});
+    steps.push_back(
+        {values_at(axes_, x_.data()), summary.cost, summary.step_is_successful, FitStage::local});
     if (report_) report_(steps.back());
     return ceres::SOLVER_CONTINUE;
   }
@@ -137,15 +167,43 @@ class Path : public ceres::IterationCallback {
   const std::function<void(const FitStep&)>& report_;
 };
 
+/// The best of each generation; the last accepted one is the best of all.
+std::vector<FitStep> search_globally(const std::vector<Replay>& replays, const FitSettings& settings,
+                                     const std::function<void(const FitStep&)>& report) {
+  const std::vector<Axis>& axes = settings.grid.axes;
+  const auto count = static_cast<Eigen::Index>(axes.size());
+  Eigen::VectorXd low(count), high(count), start(count);
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    low[i] = coordinate(axes[k], axes[k].values.front());
+    high[i] = coordinate(axes[k], axes[k].values.back());
+    start[i] = coordinate(axes[k], settings.start[k]);
+  }
+  const Residuals residuals(replays, settings, settings.start);
+  std::vector<FitStep> steps;
+  global_search([&](const std::vector<Eigen::VectorXd>& points) { return residuals.costs(points); }, low, high,
+                start, settings.global, [&](const Generation& generation) {
+                  steps.push_back({values_at(axes, generation.point.data()), generation.cost,
+                                   generation.improved, FitStage::global});
+                  if (report) report(steps.back());
+                });
+  return steps;
+}
+
 }  // namespace
 
 FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
               const std::function<void(const FitStep&)>& report) {
   const std::vector<Axis>& axes = settings.grid.axes;
+  FitResult result;
+  std::vector<double> from = settings.start;
+  if (settings.global.generations > 0) result.path = search_globally(replays, settings, report);
+  for (const FitStep& generation : result.path)
+    if (generation.accepted) from = generation.values;
   std::vector<double> x;
-  for (std::size_t k = 0; k < axes.size(); ++k) x.push_back(coordinate(axes[k], settings.start[k]));
+  for (std::size_t k = 0; k < axes.size(); ++k) x.push_back(coordinate(axes[k], from[k]));
   ceres::Problem problem;
-  problem.AddResidualBlock(new Residuals(replays, settings), nullptr, x.data());  // the problem owns it
+  problem.AddResidualBlock(new Residuals(replays, settings, from), nullptr, x.data());  // the problem owns it
   for (std::size_t k = 0; k < axes.size(); ++k) {
     problem.SetParameterLowerBound(x.data(), static_cast<int>(k),
                                    coordinate(axes[k], axes[k].values.front()));
@@ -163,9 +221,8 @@ FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
 
-  FitResult result;
   result.values = values_at(axes, x.data());
-  result.path = std::move(path.steps);
+  result.path.insert(result.path.end(), path.steps.begin(), path.steps.end());
   result.termination = summary.message;
   ceres::Covariance::Options with;
   with.algorithm_type = ceres::DENSE_SVD;

@@ -2,6 +2,7 @@
 #include <functional>
 #include <vector>
 
+#include "sysid/global_search.h"
 #include "sysid/grid_search.h"
 #include "sysid/prior.h"
 
@@ -11,15 +12,19 @@ struct FitSettings {
   GridSettings grid;  ///< axes: the parameters fitted, with the range each may take; fixed ones as there
   std::vector<double> start;  ///< one an axis
   std::vector<Prior> priors;
+  GlobalSearchSettings global;  ///< before Levenberg-Marquardt, over the axes' ranges
   int iterations = 15;      ///< of Levenberg-Marquardt at most
   double tolerance = 1e-4;  ///< stops when a step gains less than this share of the cost
 };
 
-/// One iterate.
+enum class FitStage { global, local };
+
+/// One iterate, or the best candidate of a generation of the global search.
 struct FitStep {
   std::vector<double> values;  ///< one an axis
-  double cost = 0;             ///< chi^2 / 2, priors included
-  bool accepted = true;        ///< otherwise tried and left
+  double cost = 0;             ///< chi^2 / 2, priors included; comparable within a stage
+  bool accepted = true;        ///< otherwise tried and left; of a generation: better than all before
+  FitStage stage = FitStage::local;
 };
 
 struct FitResult {
@@ -30,13 +35,13 @@ struct FitResult {
   std::string termination;     ///< in words, of the optimizer
 };
 
-/// Levenberg-Marquardt (Ceres, trust region, box) over the logarithms of logarithmic axes, from `start`, on
-/// the signed distances of what was observed (ObservedPlaces), thinned, registration fitted at every point
+/// Levenberg-Marquardt (Ceres, trust region, box) over the logarithms of logarithmic axes, from `start` or
+/// from the best of a global search of the same cost, each generation one batch of environments, on the signed distances of what was observed (ObservedPlaces), thinned, registration fitted at every point
 /// and projected out of the derivatives (variable projection, Kaufman 1975). Large distances count by their
-/// size, not their square, from the median of those at the start. Derivatives are finite differences, all
-/// parameters in one batch of environments. With sigma^2 the mean square at the start and n keyframes the
+/// size, not their square, from the median of those at the stage's start. Derivatives are finite differences, all
+/// parameters in one batch of environments. With sigma^2 the mean square there and n keyframes the
 /// cost is n / 2 mean square / sigma^2 plus half the squared deviations from the priors. `report` is called
-/// after each step.
+/// after each step. Throws data::InputError where the simulation diverges at `start`.
 FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
               const std::function<void(const FitStep&)>& report = {});
 
