@@ -8,6 +8,7 @@
 #include "data/procedural_mesh.h"
 #include "data/sha256.h"
 #include "data/text.h"
+#include "sysid/separate_regions.h"
 
 namespace flash::sysid {
 namespace {
@@ -171,6 +172,8 @@ Summary summarize(const GridResults& results, const GridVerdict& verdict, const 
   for (std::size_t r = 0; r < replays.size(); ++r)
     summary.recordings.push_back(summarize_recording(replays[r], best.recordings[r], verdict, nuisance));
   summary.warnings = warnings_of(summary, best, settings);
+  if (const std::string warning = warning_of_regions(results, verdict.level95); !warning.empty())
+    summary.warnings.push_back(warning);
   if (const std::string reason = reason_unusable(summary, best); !reason.empty()) {
     summary.exit_code = 3;
     summary.warnings.insert(summary.warnings.begin(), reason);
