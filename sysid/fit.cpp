@@ -154,8 +154,7 @@ class Path : public ceres::IterationCallback {
        const std::function<void(const FitStep&)>& report)
       : axes_(axes), x_(x), report_(report) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
-    steps.push_back(
-        {values_at(axes_, x_.data()), summary.cost, summary.step_is_successful, FitStage::local});
+    steps.push_back({values_at(axes_, x_.data()), summary.cost, summary.step_is_successful, FitStage::local});
     if (report_) report_(steps.back());
     return ceres::SOLVER_CONTINUE;
   }
@@ -181,8 +180,9 @@ std::vector<FitStep> search_globally(const std::vector<Replay>& replays, const F
   }
   const Residuals residuals(replays, settings, settings.start);
   std::vector<FitStep> steps;
-  global_search([&](const std::vector<Eigen::VectorXd>& points) { return residuals.costs(points); }, low, high,
-                start, settings.global, [&](const Generation& generation) {
+  global_search([&](const std::vector<Eigen::VectorXd>& points) { return residuals.costs(points); }, low,
+                high, start, settings.global,
+                [&](const Generation& generation) {
                   steps.push_back({values_at(axes, generation.point.data()), generation.cost,
                                    generation.improved, FitStage::global});
                   if (report) report(steps.back());

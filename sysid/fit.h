@@ -13,8 +13,8 @@ struct FitSettings {
   std::vector<double> start;  ///< one an axis
   std::vector<Prior> priors;
   GlobalSearchSettings global;  ///< before Levenberg-Marquardt, over the axes' ranges
-  int iterations = 15;      ///< of Levenberg-Marquardt at most
-  double tolerance = 1e-4;  ///< stops when a step gains less than this share of the cost
+  int iterations = 15;          ///< of Levenberg-Marquardt at most
+  double tolerance = 1e-4;      ///< stops when a step gains less than this share of the cost
 };
 
 enum class FitStage { global, local };
@@ -36,9 +36,10 @@ struct FitResult {
 };
 
 /// Levenberg-Marquardt (Ceres, trust region, box) over the logarithms of logarithmic axes, from `start` or
-/// from the best of a global search of the same cost, each generation one batch of environments, on the signed distances of what was observed (ObservedPlaces), thinned, registration fitted at every point
-/// and projected out of the derivatives (variable projection, Kaufman 1975). Large distances count by their
-/// size, not their square, from the median of those at the stage's start. Derivatives are finite differences, all
+/// from the best of a global search of the same cost, each generation one batch of environments, on the
+/// signed distances of what was observed (ObservedPlaces), thinned, registration fitted at every point and
+/// projected out of the derivatives (variable projection, Kaufman 1975). Large distances count by their size,
+/// not their square, from the median of those at the stage's start. Derivatives are finite differences, all
 /// parameters in one batch of environments. With sigma^2 the mean square there and n keyframes the
 /// cost is n / 2 mean square / sigma^2 plus half the squared deviations from the priors. `report` is called
 /// after each step. Throws data::InputError where the simulation diverges at `start`.

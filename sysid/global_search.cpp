@@ -101,7 +101,8 @@ std::vector<Generation> global_search(const BatchCost& cost, const Eigen::Vector
 
   std::vector<std::size_t> best(points.size());
   std::iota(best.begin(), best.end(), std::size_t{0});
-  std::stable_sort(best.begin(), best.end(), [&](std::size_t i, std::size_t j) { return costs[i] < costs[j]; });
+  std::stable_sort(best.begin(), best.end(),
+                   [&](std::size_t i, std::size_t j) { return costs[i] < costs[j]; });
   best.resize(static_cast<std::size_t>(population));
   std::sort(best.begin(), best.end());  // as drawn: neighbours on the ring are not alike in cost
   pagmo::population swarm(pagmo::problem(BoxProblem{&low, &high, &generations}), 0, settings.seed);

@@ -114,9 +114,11 @@ std::string warning_of_regions(const GridResults& results, double level) {
   std::string values;
   for (std::size_t k = 0; k < results.axes.size(); ++k)
     values += (k > 0 ? ", " : "") + results.axes[k].name + " " + data::format_short(other.values[k]);
-  return "the 95 % region is in " + std::to_string(regions.size()) + " separate parts: " + values + " scores " +
-         data::format_short(1000 * other.score) + " mm against " + data::format_short(1000 * best.score) +
-         " mm: intervals cannot say which; try `flash-sysid fit --global 12`, or a recording that tells them apart";
+  return "the 95 % region is in " + std::to_string(regions.size()) + " separate parts: " + values +
+         " scores " + data::format_short(1000 * other.score) + " mm against " +
+         data::format_short(1000 * best.score) +
+         " mm: intervals cannot say which; try `flash-sysid fit --global 12`, or a recording that tells them "
+         "apart";
 }
 
 }  // namespace flash::sysid

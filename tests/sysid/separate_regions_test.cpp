@@ -36,10 +36,9 @@ double bowl(const std::vector<double>& x, double a, double b, double width) {
 }
 
 TEST(SeparateRegions, TwoBowlsAreTwoAndTheBetterComesFirst) {
-  const GridResults results =
-      map_of({evenly("friction", 11), evenly("grasp_pitch", 11)}, [](const auto& x) {
-        return std::min(bowl(x, 0.2, 0.3, 0.1) + 0.05, bowl(x, 0.8, 0.7, 0.1));
-      });
+  const GridResults results = map_of({evenly("friction", 11), evenly("grasp_pitch", 11)}, [](const auto& x) {
+    return std::min(bowl(x, 0.2, 0.3, 0.1) + 0.05, bowl(x, 0.8, 0.7, 0.1));
+  });
   const std::vector<std::size_t> regions = separate_regions(results, kFloor * std::sqrt(1.5));
   ASSERT_EQ(regions.size(), 2u);
   EXPECT_EQ(results.candidates[regions[0]].values, (std::vector<double>{0.8, 0.7}));
