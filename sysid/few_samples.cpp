@@ -1,7 +1,10 @@
 #include "sysid/few_samples.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <limits>
 
 namespace flash::sysid {
 namespace {
@@ -58,6 +61,20 @@ std::vector<FewSamples> few_samples(const Eigen::MatrixXd& slopes,
     if (squares > 0) few.freedom = trace * trace / squares;
   }
   return found;
+}
+
+double student_quantile(double freedom) {
+  constexpr std::array<double, 4> kFew = {12.706, 4.303, 3.182, 2.776};
+  if (freedom < 1) return std::numeric_limits<double>::infinity();
+  if (freedom <= 4) {
+    const double below = std::min(std::floor(freedom), 3.0), above = below + 1;
+    const auto at = static_cast<std::size_t>(below);
+    const double share = (1 / below - 1 / freedom) / (1 / below - 1 / above);
+    return std::pow(kFew[at - 1], 1 - share) * std::pow(kFew[at], share);
+  }
+  const double z = 1.959964, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z, n = freedom;
+  return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) +
+         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
 }
 
 }  // namespace flash::sysid

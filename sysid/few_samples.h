@@ -18,4 +18,8 @@ struct FewSamples {
 std::vector<FewSamples> few_samples(const Eigen::MatrixXd& slopes,
                                     const std::vector<Eigen::MatrixXd>& information);
 
+/// 97.5 % quantile of Student's distribution: Abramowitz and Stegun 26.7.5 beyond 4 degrees of freedom, below
+/// between tabulated ones, its logarithm linear in 1 / freedom. Infinite below one.
+double student_quantile(double freedom);
+
 }  // namespace flash::sysid

@@ -121,13 +121,6 @@ double chi_squared(const Sampling& sampling, const ProfilePoint& point, std::opt
   return chi2;
 }
 
-Eigen::VectorXd coordinates_of(const ScoreSurface& surface, const CandidateResult& candidate) {
-  Eigen::VectorXd x(surface.parameters());
-  for (std::size_t k = 0; k < candidate.values.size(); ++k)
-    x[static_cast<Eigen::Index>(k)] = surface.coordinate(k, candidate.values[k]);
-  return x;
-}
-
 /// Best candidates first, diverged ones left out.
 std::vector<const CandidateResult*> ranked(const GridResults& results) {
   std::vector<const CandidateResult*> order;
@@ -164,7 +157,7 @@ std::vector<ProfilePoint> profile_along(const ScoreSurface& surface, std::size_t
     const auto found = std::find_if(order.begin(), order.end(), [&](const CandidateResult* candidate) {
       return surface.coordinate(k, candidate->values[k]) == knot;
     });
-    slices.push_back(found == order.end() ? best : coordinates_of(surface, **found));
+    slices.push_back(found == order.end() ? best : surface.coordinates((*found)->values));
   }
   std::vector<ProfilePoint> profile(coordinates.size());
   const auto visit = [&](std::size_t i, const Eigen::VectorXd& neighbour) {
@@ -405,7 +398,7 @@ double equivalent_sigma(const GridResults& results, const Sampling& sampling) {
   double sigma = 0, nearest = kInfinity;
   for (const CandidateResult& candidate : results.candidates) {
     if (!std::isfinite(candidate.score)) continue;
-    ProfilePoint point{coordinates_of(sampling.surface, candidate), candidate.score, 0};
+    ProfilePoint point{sampling.surface.coordinates(candidate.values), candidate.score, 0};
     const double chi2 = chi_squared(sampling, point, std::nullopt);
     const double squares = candidate.score * candidate.score - sampling.best_score * sampling.best_score;
     if (!(chi2 > 0) || squares <= 0 || std::abs(std::log(chi2 / kLimit)) >= nearest) continue;
@@ -416,20 +409,6 @@ double equivalent_sigma(const GridResults& results, const Sampling& sampling) {
 }
 
 }  // namespace
-
-double student_quantile(double freedom) {
-  constexpr std::array<double, 4> kFew = {12.706, 4.303, 3.182, 2.776};
-  if (freedom < 1) return kInfinity;
-  if (freedom <= 4) {
-    const double below = std::min(std::floor(freedom), 3.0), above = below + 1;
-    const auto at = static_cast<std::size_t>(below);
-    const double share = (1 / below - 1 / freedom) / (1 / below - 1 / above);
-    return std::pow(kFew[at - 1], 1 - share) * std::pow(kFew[at], share);
-  }
-  const double z = kNormalQuantile, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z, n = freedom;
-  return z + (z3 + z) / (4 * n) + (5 * z5 + 16 * z3 + 3 * z) / (96 * n * n) +
-         (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * n * n * n);
-}
 
 GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability,
                          const SolverError& solver) {
@@ -459,7 +438,7 @@ GridVerdict profile_grid(const GridResults& results, const ProfileSettings& sett
     return false;
   };
   for (std::size_t i = 0; i < std::min(kStarts, order.size()); ++i)
-    try_from(coordinates_of(surface, *order[i]));
+    try_from(surface.coordinates(order[i]->values));
 
   std::vector<std::vector<ProfilePoint>> profiles;
   for (std::size_t k = 0; k < results.axes.size(); ++k) {

@@ -81,8 +81,4 @@ GridVerdict profile_grid(const GridResults& results, const ProfileSettings& sett
 GridVerdict profile_grid(const GridResults& results, std::optional<double> repeatability = {},
                          const SolverError& solver = {});
 
-/// 97.5 % quantile of Student's distribution: Abramowitz and Stegun 26.7.5 beyond 4 degrees of freedom, below
-/// between tabulated ones, its logarithm linear in 1 / freedom. Infinite below one.
-double student_quantile(double freedom);
-
 }  // namespace flash::sysid

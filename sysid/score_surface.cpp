@@ -58,6 +58,11 @@ ScoreSurface::ScoreSurface(const GridResults& results) {
 double ScoreSurface::coordinate(std::size_t k, double value) const {
   return logarithmic_[k] ? std::log(value) : value;
 }
+Eigen::VectorXd ScoreSurface::coordinates(const std::vector<double>& values) const {
+  Eigen::VectorXd x(parameters());
+  for (std::size_t k = 0; k < values.size(); ++k) x[static_cast<Eigen::Index>(k)] = coordinate(k, values[k]);
+  return x;
+}
 double ScoreSurface::value(std::size_t k, double coordinate) const {
   return logarithmic_[k] ? std::exp(coordinate) : coordinate;
 }

@@ -18,6 +18,7 @@ class ScoreSurface {
   /// Coordinate of a value of axis k and back: the logarithm where the axis is logarithmic.
   double coordinate(std::size_t k, double value) const;
   double value(std::size_t k, double coordinate) const;
+  Eigen::VectorXd coordinates(const std::vector<double>& values) const;  ///< of values, one an axis
 
   Eigen::Index parameters() const { return static_cast<Eigen::Index>(splines_.size()); }
   const Eigen::VectorXd& knots(std::size_t k) const {

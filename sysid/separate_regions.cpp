@@ -29,15 +29,6 @@ bool adjacent(const Place& a, const Place& b) {
   return true;
 }
 
-Eigen::VectorXd coordinates_of(const ScoreSurface& surface, const CandidateResult& candidate) {
-  Eigen::VectorXd x(surface.parameters());
-  for (Eigen::Index k = 0; k < x.size(); ++k) {
-    const auto axis = static_cast<std::size_t>(k);
-    x[k] = surface.coordinate(axis, candidate.values[axis]);
-  }
-  return x;
-}
-
 /// Whether one of the free coordinates after the other leads from x to `end` without leaving the level.
 bool path_below(const ScoreSurface& surface, const Eigen::VectorXd& from, const Eigen::VectorXd& end,
                 const std::vector<bool>& free, double level) {
@@ -97,9 +88,9 @@ std::vector<std::size_t> separate_regions(const GridResults& results, double lev
   for (const Axis& axis : results.axes) searched.push_back(axis.values.size() > 1);
   std::vector<std::size_t> separate;
   for (const std::size_t i : best) {
-    const Eigen::VectorXd x = coordinates_of(surface, results.candidates[i]);
+    const Eigen::VectorXd x = surface.coordinates(results.candidates[i].values);
     const bool joined = std::any_of(separate.begin(), separate.end(), [&](std::size_t other) {
-      const Eigen::VectorXd y = coordinates_of(surface, results.candidates[other]);
+      const Eigen::VectorXd y = surface.coordinates(results.candidates[other].values);
       return path_below(surface, y, x, searched, barrier) || path_below(surface, x, y, searched, barrier);
     });
     if (!joined) separate.push_back(i);
