@@ -86,8 +86,8 @@ def coverage_rows(found):
     return rows
 
 
-# Lifts with friction known, of a strip that hardly stretches, as cloth does. (One of E t = 10 N/m is as soft in its plane
-# as a sheet 11 mm thick: it can bend across as well, and how far that goes does tell nu.)
+# Lifts with friction known, of a strip that hardly stretches, as cloth does. (One of E t = 10 N/m and D = 1e-4 N m is as soft
+# in its plane as a sheet 11 mm thick: it can bend across as well, and how far that goes tells of nu.)
 # D [N m]: searched, allowed error, cell of the search, cell of the truth.
 CLOTH_MEMBRANE = 1000.0  # [N/m]
 SEEDS = range(301, 321)  # up to 220 were those of the development
