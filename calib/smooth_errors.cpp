@@ -208,7 +208,7 @@ Fit fit_variances(const Seen& seen, const std::array<Eigen::MatrixXd, kComponent
   fit.v.tail(kComponents - free).setZero();
   Eigen::LLT<Eigen::MatrixXd> llt(covariance(fit.v));
   fit.deviance = deviance_of(llt, seen.beta);
-  for (int iteration = 0; iteration < 40; ++iteration) {
+  for (int iteration = 0; iteration < 200; ++iteration) {
     const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(n, n));
     const Eigen::VectorXd y = inverse * seen.beta;
     Eigen::MatrixXd My(n, free);
@@ -247,7 +247,7 @@ Fit fit_variances(const Seen& seen, const std::array<Eigen::MatrixXd, kComponent
       const Eigen::LLT<Eigen::MatrixXd> there(covariance(trial.v));
       trial.deviance = deviance_of(there, seen.beta);
       if (!(trial.deviance < fit.deviance)) continue;
-      improved = fit.deviance - trial.deviance > 1e-3;
+      improved = fit.deviance - trial.deviance > 1e-7;
       fit = trial;
       llt = there;
       if (!improved) return fit;

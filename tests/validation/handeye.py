@@ -224,10 +224,9 @@ def protocol_table(rows, table):
         shown_rows.append(["eye-in-hand" if setup == "eih" else "eye-to-hand", noise, pair(mean[0:2]), pair(mean[2:4]),
                            pair(mean[4:6]), pair(baseline[2]), f"{min(ratios):.2f} to {max(ratios):.2f}", f"{mean[6]:.2f}",
                            f"{sum(held)} of {len(blocks)}", f"{mean[7]:.3f} / {mean[8]:.4f} / {mean[9]:.3f}"])
-    counts = ", ".join(f"{inside.count(count)} have {count}" for count in sorted(set(inside), reverse=True))
     return table(["setup", "robot noise", "Park deg / mm", "bundle", "errors in variables", "baseline", "ratio",
                   "NEES", f"in {low:.2f} to {high:.2f}", "estimated px / deg / mm"],
-                 shown_rows) + f"\nOf {BLOCKS} blocks {counts} of the six rows in the band.\n"
+                 shown_rows) + f"\nRows in the band, of six, block by block: {' '.join(map(str, inside))}.\n"
 
 
 def models_table(rows, table):
