@@ -184,14 +184,18 @@ TEST(Profile, AFinerSolutionWidensTheIntervalToItsSideOnly) {
   EXPECT_EQ(profile_grid(results, {}, {{}, 1.0}).parameters[0].identifiable, Identifiable::no);
 }
 
-TEST(Profile, AnIntervalHoldsTheValleyThatTheSolverCannotTellFromFlat) {
+/// A score that rises little along log(bending) = log(3e-5) + poisson, from 0.1, and much across it.
+GridResults valley_over(const char* poisson, const char* bending) {
   const std::vector<double> own = scattered(20, std::log(3e-5), 0.01, 8);
-  const GridResults results =
-      grid_of({parse_axis("poisson", "0:0.4:5"), parse_axis("bending", "1e-6:1e-3:31:log")}, 20,
-              [&](std::size_t k, const std::vector<double>& x) {
-                const double along = x[0] - 0.1 + 0.1 * (own[k] - std::log(3e-5));
-                return kFloor + 1e-3 * std::pow(x[1] - x[0] - own[k], 2) + 1e-4 * along * along;
-              });
+  return grid_of({parse_axis("poisson", poisson), parse_axis("bending", bending)}, 20,
+                 [&](std::size_t k, const std::vector<double>& x) {
+                   const double along = x[0] - 0.1 + 0.1 * (own[k] - std::log(3e-5));
+                   return kFloor + 1e-3 * std::pow(x[1] - x[0] - own[k], 2) + 1e-4 * along * along;
+                 });
+}
+
+TEST(Profile, AnIntervalHoldsTheValleyThatTheSolverCannotTellFromFlat) {
+  const GridResults results = valley_over("0:0.4:5", "1e-6:1e-3:31:log");
   const GridVerdict exact = profile_grid(results);
   EXPECT_EQ(exact.parameters[0].identifiable, Identifiable::yes);
   EXPECT_NEAR(std::log((*exact.parameters[1].interval95)[1] / 3e-5), 0.1, 0.02);
@@ -204,13 +208,7 @@ TEST(Profile, AnIntervalHoldsTheValleyThatTheSolverCannotTellFromFlat) {
 }
 
 TEST(Profile, AValleyThatLeavesTheGridIsHeldToTheEndsOfTheRange) {
-  const std::vector<double> own = scattered(20, std::log(3e-5), 0.01, 8);
-  const GridResults results =
-      grid_of({parse_axis("poisson", "0.08:0.12:5"), parse_axis("bending", "2.5e-5:4e-5:9:log")}, 20,
-              [&](std::size_t k, const std::vector<double>& x) {
-                const double along = x[0] - 0.1 + 0.1 * (own[k] - std::log(3e-5));
-                return kFloor + 1e-3 * std::pow(x[1] - x[0] - own[k], 2) + 1e-4 * along * along;
-              });
+  const GridResults results = valley_over("0.08:0.12:5", "2.5e-5:4e-5:9:log");
   // Over 0 to 0.4 and 1e-6 to 1e-3 the score rises by 9e-6 m along the valley, by far more across it.
   const auto end = [](std::size_t axis, double poisson, double bending, double rise) {
     return RangeEnd{axis, kFloor + rise, Eigen::Vector2d(poisson, bending)};
