@@ -244,15 +244,15 @@ void warn_of_scale(Calibration& result) {
   if (!result.scale) return;
   const double off = std::abs(result.scale->estimate - 1), sd = result.scale->sd;
   if (!result.scale->solved && (off < 0.01 || off < 5 * sd)) return;
-  char text[280];
-  std::snprintf(text, sizeof text,
-                "the data want a target %.4f +- %.4f times as large as stated: measure its squares, or the "
-                "intrinsics or the robot's unit are wrong%s",
-                result.scale->estimate, 2 * sd,
-                result.scale->solved
-                    ? "; the answer is for a target of that size (--target-size stated keeps "
-                      "the stated one)"
-                    : "");
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the data want a target %.4f +- %.4f (2 sd) times as large as stated: measure its squares, or the "
+      "intrinsics or the robot's unit are wrong%s",
+      result.scale->estimate, 2 * sd,
+      result.scale->solved ? "; the answer is for a target of that size (--target-size stated keeps "
+                             "the stated one)"
+                           : "");
   result.warnings.insert(result.warnings.begin(), text);
   if (off > 0.03) result.usable = false;
 }

@@ -75,10 +75,10 @@ void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout
 }
 
 std::string size_notice(const ScaleCheck& scale) {
-  char text[160];
+  char text[200];
   std::snprintf(
       text, sizeof text,
-      "a target is taken to be %.4f +- %.4f times as large as stated, as the data want it: measure it",
+      "a target is taken to be %.4f +- %.4f (2 sd) times as large as stated, as the data want it: measure it",
       scale.estimate, 2 * scale.sd);
   return text;
 }
@@ -161,15 +161,15 @@ Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& gi
         "the data do not tell the size of the targets: the robots move too little; leave --target-size "
         "solved out, or add views farther apart");
   if (!refined.converged) cell.notices.emplace_back("the joint refinement did not converge");
-  for (ScaleCheck& scale : cell.scales) {
-    scale.solved = settings.bundle.unknowns.scales;
-    if (scale.solved) cell.notices.push_back(size_notice(scale));
-  }
   const SystematicUncertainty systematic = systematic_uncertainty(refined, settings.bundle);
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
   for (std::size_t i = 0; i < cell.scales.size(); ++i)
     if (const int column = columns.scales[i]; column >= 0)
       cell.scales[i].sd = std::sqrt(systematic.covariance(column, column));
+  for (ScaleCheck& scale : cell.scales) {
+    scale.solved = settings.bundle.unknowns.scales;
+    if (scale.solved) cell.notices.push_back(size_notice(scale));
+  }
   const std::vector<std::string> arms = names_of(members, &CellMember::arm);
   const std::vector<std::string> cameras = names_of(members, &CellMember::camera);
   const auto block = [&](int column) -> Matrix6d {

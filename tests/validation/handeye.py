@@ -152,7 +152,7 @@ def sets_table(sets, table):
                      f"{shown(pixels_of(result, residuals, 'corner_rms_px'))} ({shown(baseline)})", size(result), verdict(result),
                      f"{result['seconds']:.1f}"])
     return table(["set", "views", "corner px", "robot deg / mm", "sd x y z mm", "sd about x y z deg",
-                  "corrected px (baseline)", "target over stated size", "held out against the best other method", "CPU s"], rows)
+                  "corrected px (baseline)", "target over stated size, +- 2 sd", "held out against the best other method", "CPU s"], rows)
 
 
 def size(result):
