@@ -165,20 +165,12 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
         return add_membrane_gradient<decltype(law)>(plan, lame, positions, gradient);
       });
 
-  const double D = material.bending_rigidity;
   if (bending.model == data::BendingModel::hinge) {
-    for (const Hinge& hinge : plan.hinges) {
-      HingePositions x, hinge_gradient;
-      for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);
-      double hinge_energy;
-      hinge_response(hinge, x, hinge_energy, hinge_gradient, nullptr);
-      energy.bending += D * hinge_energy;
-      for (int k = 0; k < 4; ++k) gradient.row(hinge.vertices[k]) += D * hinge_gradient.col(k).transpose();
-    }
+    energy.bending = add_hinge_gradient(plan.hinges, material.bending_rigidity, positions, gradient);
     return energy;
   }
   Points bent = Points::Zero(positions.rows(), 3);
-  add_bending_product(bending, D, positions, bent);
+  add_bending_product(bending, material.bending_rigidity, positions, bent);
   gradient += bent;
   energy.bending += 0.5 * bent.cwiseProduct(positions).sum();
   return energy;
@@ -191,21 +183,40 @@ void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
                     [&](auto law, const SheetLame& lame) {
                       add_membrane_hessian<decltype(law)>(plan, lame, positions, scale, curvature, values);
                     });
-  if (bending.model != data::BendingModel::hinge) return;
-  const double D = scale * material.bending_rigidity;
-  for (size_t e = 0; e < plan.hinges.size(); ++e) {
-    const Hinge& hinge = plan.hinges[e];
+  if (bending.model == data::BendingModel::hinge)
+    add_hinge_hessian(plan, plan.hinges, scale * material.bending_rigidity, positions, values);
+}
+
+double add_hinge_gradient(const std::vector<Hinge>& hinges, double rigidity, const Points& positions,
+                          Points& gradient) {
+  double energy = 0;
+  for (const Hinge& hinge : hinges) {
+    HingePositions x, hinge_gradient;
+    for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);
+    double hinge_energy;
+    hinge_response(hinge, x, hinge_energy, hinge_gradient, nullptr);
+    energy += rigidity * hinge_energy;
+    for (int k = 0; k < 4; ++k)
+      gradient.row(hinge.vertices[k]) += rigidity * hinge_gradient.col(k).transpose();
+  }
+  return energy;
+}
+
+void add_hinge_hessian(const SheetPlan& plan, const std::vector<Hinge>& hinges, double rigidity,
+                       const Points& positions, BlockValues<double>& values) {
+  for (size_t e = 0; e < hinges.size(); ++e) {
+    const Hinge& hinge = hinges[e];
     HingePositions x, hinge_gradient;
     for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);
     double hinge_energy;
     Matrix12 hessian;
     hinge_response(hinge, x, hinge_energy, hinge_gradient, &hessian);
     for (int k = 0; k < 4; ++k)
-      add_block(values, {hinge.vertices[k], false}, D * hessian.block<3, 3>(3 * k, 3 * k));
+      add_block(values, {hinge.vertices[k], false}, rigidity * hessian.block<3, 3>(3 * k, 3 * k));
     constexpr std::array<std::pair<int, int>, 6> blocks = {{{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}}};
     for (int b = 0; b < 6; ++b)
       add_block(values, plan.hinge_slots[e][b],
-                D * hessian.block<3, 3>(3 * blocks[b].first, 3 * blocks[b].second));
+                rigidity * hessian.block<3, 3>(3 * blocks[b].first, 3 * blocks[b].second));
   }
 }
 
@@ -217,18 +228,6 @@ void add_bending_stand_in(const BendingOperator& bending, double rigidity, Block
 void add_bending_product(const BendingOperator& bending, double rigidity, const Points& x, Points& y) {
   if (!bending.stiffness.empty())
     add_product(bending.stiffness, rigidity, padded_vertices(x).data(), y.data());
-}
-
-void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, double scale,
-                       const data::Points& x, data::Points& y) {
-  const auto block = [&](size_t k) { return Eigen::Map<const Matrix3d>(values.data() + 9 * k); };
-  for (int i = 0; i < pattern.size; ++i) y.row(i) += scale * (block(i) * x.row(i).transpose()).transpose();
-  for (size_t k = 0; k < pattern.pairs.size(); ++k) {
-    const auto [row, column] = pattern.pairs[k];
-    const auto b = block(pattern.size + k);
-    y.row(row) += scale * (b * x.row(column).transpose()).transpose();
-    y.row(column) += scale * (b.transpose() * x.row(row).transpose()).transpose();
-  }
 }
 
 }  // namespace flash::sim

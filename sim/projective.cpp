@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
 
 #include "sim/anderson.h"
-#include "sim/elastic_energy.h"
 #include "sim/grasp.h"
+#include "sim/incremental_potential.h"
 #include "sim/projective_contact.h"
 #include "sim/vertex_constraint.h"
 
@@ -42,57 +43,6 @@ struct ProjectiveSolver::Workspace {
 };
 
 namespace {
-
-/// Forces of one implicit Euler step at an iterate.
-class StepForces {
- public:
-  StepForces(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment,
-             const VectorXd& mass, double time_step)
-      : plan_(plan), bending_(bending), environment_(environment), mass_(mass), h_(time_step) {
-    const State& start = environment.state;
-    target_ = start.positions + h_ * start.velocities;
-    target_.rowwise() += h_ * h_ * environment.gravity.transpose();
-    loads_ = Points::Zero(start.positions.rows(), 3);
-    for (const Load& load : environment.loads) loads_.row(load.vertex) += load.force.transpose();
-    const double damping = environment.material.stiffness_damping;
-    if (damping > 0) {
-      damping_.assign(9 * (plan.pattern.size + plan.pattern.pairs.size()), 0.0);
-      add_elastic_hessian(plan, bending, environment.material, start.positions, damping / h_,
-                          Curvature::positive, damping_);
-      add_bending_stand_in(bending, damping / h_ * environment.material.bending_rigidity, damping_);
-    }
-  }
-
-  /// What every vertex needs from outside to obey its equation of motion at x [N], the gradient of
-  /// `potential` [J].
-  Points needed(const Points& x, ElasticEnergy& energy, double& potential) const {
-    const Points moved = x - environment_.state.positions, ahead = x - target_;
-    const double drag = environment_.material.air_drag / h_;
-    Points force = mass_.asDiagonal() * (ahead / (h_ * h_) + drag * moved);
-    potential = 0.5 * (mass_.asDiagonal() * ahead).cwiseProduct(ahead).sum() / (h_ * h_) +
-                0.5 * drag * (mass_.asDiagonal() * moved).cwiseProduct(moved).sum() -
-                loads_.cwiseProduct(x).sum();
-    force -= loads_;
-    if (!damping_.empty()) {
-      Points damped = Points::Zero(x.rows(), 3);
-      add_block_product(plan_.pattern, damping_, 1.0, moved, damped);
-      potential += 0.5 * damped.cwiseProduct(moved).sum();
-      force += damped;
-    }
-    energy = add_elastic_gradient(plan_, bending_, environment_.material, x, force);
-    potential += energy.membrane + energy.bending;
-    return force;
-  }
-
- private:
-  const SheetPlan& plan_;
-  const BendingOperator& bending_;
-  const Environment& environment_;
-  const VectorXd& mass_;
-  double h_;
-  Points target_, loads_;
-  BlockValues<double> damping_;
-};
 
 /// The law of the contacts at an iterate, gaps linear in the multipliers: with dx = -h^2 A^-1 (force - H^T
 /// lambda) from the multipliers at hand, and W for a change of them.
@@ -203,10 +153,11 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
       bending_operator(*w.plan, environment.material.bending_model, environment.material.poissons_ratio);
   ProjectiveSystem& system = w.system_of(environment.material);
   update_grasps(environment, time);
-  const StepForces forces(*w.plan, bending, environment, system.mass(), h);
+  const IncrementalPotential step(*w.plan, bending, environment, h);
 
   Points x = environment.state.positions + h * environment.state.velocities;
-  const std::vector<VertexConstraint> holds = begin_step(environment, time, x);
+  const ContactStep contact_step(environment, h, std::numeric_limits<double>::infinity());
+  const std::vector<VertexConstraint> holds = begin_step(contact_step, x);
   const Index n = x.rows();
   std::vector<Vector3d> free_axes(n);
   std::array<std::vector<int>, 3> held;
@@ -231,8 +182,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   bool accelerated = false;
   for (;; ++report.iterations) {
     ElasticEnergy elastic;
-    double potential;
-    force = forces.needed(x, elastic, potential);
+    const double potential = step.evaluate(x, force, elastic);
     // The plain iteration lowers the potential of the step, contact forces frozen, because A bounds its
     // curvature; an accelerated iterate that raises it is taken back. A guard by the residual would not do:
     // on the way through a buckle the residual has to rise.

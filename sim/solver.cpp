@@ -2,89 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include "sim/elastic_energy.h"
+#include "sim/active_set.h"
 #include "sim/grasp.h"
+#include "sim/incremental_potential.h"
 #include "sim/newton_matrix.h"
 #include "sim/vertex_constraint.h"
 
 namespace flash::sim {
 
 using data::Points;
-using Eigen::Map;
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-struct Solver::Workspace {
-  std::shared_ptr<const SheetPlan> plan;
-  SolverSettings settings;
-  NewtonMatrix matrix;
-  BlockValues<double> values, damping;
-  bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
-
-  Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
-      : plan(std::move(plan_in)), settings(settings_in), matrix(plan) {}
-};
-
 namespace {
-
-/// The incremental potential of one implicit Euler step and what it is made of.
-class StepProblem {
- public:
-  StepProblem(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment,
-              double time_step, const BlockValues<double>& damping)
-      : plan_(plan), bending_(bending), environment_(environment), h_(time_step), damping_(damping) {
-    const State& start = environment.state;
-    mass_ = environment.material.areal_density * plan.sheet.vertex_area;
-    target_ = start.positions + h_ * start.velocities;
-    target_.rowwise() += h_ * h_ * environment.gravity.transpose();
-    loads_ = Points::Zero(start.positions.rows(), 3);
-    for (const Load& load : environment.loads) loads_.row(load.vertex) += load.force.transpose();
-  }
-
-  const Eigen::VectorXd& mass() const { return mass_; }
-
-  /// Potential [J] at `positions`; `force` becomes its gradient: what every vertex needs from outside [N].
-  double evaluate(const Points& positions, Points& force, ElasticEnergy& elastic) const {
-    const Points inertial = positions - target_, moved = positions - environment_.state.positions;
-    const double drag = environment_.material.air_drag / h_;
-    force = mass_.asDiagonal() * (inertial / (h_ * h_) + drag * moved) - loads_;
-    double potential = 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() +
-                       0.5 * drag * (mass_.asDiagonal() * moved).cwiseProduct(moved).sum() -
-                       loads_.cwiseProduct(moved).sum();
-    if (!damping_.empty()) {
-      Points damped = Points::Zero(moved.rows(), 3);
-      add_block_product(plan_.pattern, damping_, 1.0, moved, damped);
-      force += damped;
-      potential += 0.5 * damped.cwiseProduct(moved).sum();
-    }
-    elastic = add_elastic_gradient(plan_, bending_, environment_.material, positions, force);
-    return potential + elastic.membrane + elastic.bending;
-  }
-
-  /// Hessian of the potential, without the stiffness of a quadratic bending model.
-  /// `sparse`: over edges alone.
-  void assemble(const Points& positions, Curvature curvature, bool sparse,
-                BlockValues<double>& values) const {
-    if (damping_.empty())
-      values.assign(9 * (plan_.pattern.size + (sparse ? plan_.edge_count : plan_.pattern.pairs.size())), 0.0);
-    else
-      values = damping_;
-    add_elastic_hessian(plan_, bending_, environment_.material, positions, 1.0, curvature, values);
-    const double per_mass = 1 / (h_ * h_) + environment_.material.air_drag / h_;
-    for (int i = 0; i < plan_.pattern.size; ++i)
-      for (int c = 0; c < 3; ++c) values[9L * i + 4 * c] += mass_[i] * per_mass;
-  }
-
- private:
-  const SheetPlan& plan_;
-  const BendingOperator& bending_;
-  const Environment& environment_;
-  double h_;
-  const BlockValues<double>& damping_;
-  Eigen::VectorXd mass_;
-  Points target_, loads_;
-};
 
 /// A point on the way to the end of a step, always feasible.
 struct Iterate {
@@ -94,101 +25,306 @@ struct Iterate {
   double potential = 0;
 };
 
-/// The friction force of a slipping vertex turns with its slip.
-void add_slip_stiffness(const std::vector<VertexConstraint>& constraints, BlockValues<double>& values) {
-  for (size_t i = 0; i < constraints.size(); ++i) {
-    const VertexConstraint& c = constraints[i];
-    if (c.slip_stiffness == 0) continue;
-    Map<Matrix3d> block(values.data() + 9 * i);
-    block += c.slip_stiffness * c.free *
-             (Matrix3d::Identity() - c.slip_direction * c.slip_direction.transpose()) * c.free;
+constexpr double rounding_tolerance = 1e-6;  ///< relative residual below which a shorter step is no help
+constexpr double vertex_tolerance = 30;      ///< that of a vertex over that of the sheet
+constexpr double gap_tolerance = 1e-9;       ///< on gaps and complementarity [m]
+constexpr double energy_tolerance = 1e-2;    ///< on energy from nothing, of what there is to turn
+
+}  // namespace
+
+struct Solver::Workspace {
+  std::shared_ptr<const SheetPlan> plan;
+  SolverSettings settings;
+  NewtonMatrix matrix;
+  BlockValues<double> values;
+  bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
+  // Kept between steps for their memory.
+  Iterate now, trial, longer;
+  std::vector<VertexConstraint> linear;
+  Points gradient, force, direction;
+
+  Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
+      : plan(std::move(plan_in)), settings(settings_in), matrix(plan) {}
+};
+
+namespace {
+
+/// One implicit Euler step as a problem: its potential, its contacts and the scale of its forces.
+struct StepProblem {
+  const BendingOperator& bending;
+  IncrementalPotential potential;
+  ContactStep contacts;
+  double gravity;      ///< [m/s^2]; 9.81 without
+  double force_scale;  ///< |M g| [N]
+
+  StepProblem(const SheetPlan& plan, const Environment& environment, double time_step, double exit_speed)
+      : bending(
+            bending_operator(plan, environment.material.bending_model, environment.material.poissons_ratio)),
+        potential(plan, bending, environment, time_step),
+        contacts(environment, time_step, exit_speed),
+        gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81),
+        force_scale(potential.mass().norm() * gravity) {}
+
+  void evaluate(Iterate& iterate) const {
+    iterate.potential = potential.evaluate(iterate.positions, iterate.force, iterate.elastic);
+    update_contacts(contacts, iterate.positions, iterate.force, iterate.constraints);
+    iterate.residual = iterate.force;
+    for (int i = 0; i < iterate.residual.rows(); ++i)
+      iterate.residual.row(i) -= iterate.constraints[i].reaction.transpose();
+  }
+
+  bool balanced(const Iterate& iterate, double tolerance) const {
+    if (!(iterate.residual.norm() <= tolerance * force_scale)) return false;
+    for (int i = 0; i < iterate.residual.rows(); ++i)
+      if (!(iterate.residual.row(i).norm() <= vertex_tolerance * tolerance * potential.mass()[i] * gravity))
+        return false;
+    return true;
+  }
+};
+
+/// Newton's method from w.now, which is feasible, to balance or to the end of its means.
+void iterate_to_balance(const StepProblem& problem, Solver::Workspace& w, StepReport& report) {
+  const double h = problem.contacts.time_step, tolerance = w.settings.tolerance;
+  const BendingOperator& bending = problem.bending;
+  const double rigidity = problem.potential.effective_rigidity();
+  const bool sparse = bending.model != data::BendingModel::hinge;
+  Iterate &now = w.now, &trial = w.trial, &longer = w.longer;
+  longer.constraints = trial.constraints = now.constraints;
+  bool stuck = false;
+  int forced_moves = 0;
+  while (report.iterations < w.settings.max_iterations && !problem.balanced(now, tolerance)) {
+    ++report.iterations;
+    if (w.refactor) {
+      problem.potential.assemble(now.positions, Curvature::positive, false, w.values);
+      add_bending_stand_in(bending, rigidity, w.values);
+      add_slip_stiffness(now.constraints, w.values);
+      restrict_matrix(w.plan->pattern, now.constraints, w.values);
+      if (!w.matrix.factorize(w.values)) return;
+      ++report.factorizations;
+    }
+    problem.potential.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, sparse,
+                               w.values);
+    add_slip_stiffness(now.constraints, w.values);
+    if (!stuck) add_surface_curvature(now.constraints, w.values);
+    w.matrix.assign(w.values, sparse, bending, rigidity, problem.potential.mass().minCoeff() / (h * h));
+    w.linear = now.constraints;
+    w.gradient = now.residual;
+    for (int exchange = 0; exchange < 6; ++exchange) {
+      w.force = now.force;
+      const int solves =
+          w.matrix.solve(w.linear, w.gradient, 0.3 * tolerance * problem.force_scale, w.direction, w.force);
+      report.solves += solves;
+      w.refactor = solves > w.settings.stale_factor_solves;
+      if (!exchange_contacts(w.direction, now.force, now.residual, w.force, w.gradient, w.linear)) break;
+    }
+
+    // The potential guides the step; where the surface is curved or the normal forces change it is not exact,
+    // and a smaller residual does as well. Near the solution the potential falls by less than its rounding.
+    const auto potential_at = [&](const Iterate& iterate) {
+      return iterate.potential + friction_potential(problem.contacts, now.constraints, iterate.positions);
+    };
+    const double before = potential_at(now);
+    const double slope = now.residual.cwiseProduct(w.direction).sum();
+    const auto move = [&](double length, Iterate& to) {
+      to.positions = now.positions + length * w.direction;
+      project_to_feasible(problem.contacts, w.linear, to.positions);
+      problem.evaluate(to);
+      return potential_at(to);
+    };
+    double length = 1.0, after = move(length, trial);
+    const auto acceptable = [&] {
+      return after <= before + 1e-4 * length * slope ||
+             trial.residual.norm() <= (1 - 0.1 * length) * now.residual.norm();
+    };
+    while (!acceptable() && length > 1e-3) after = move(length *= 0.5, trial);
+    if (!acceptable() && !stuck) {
+      // Once more with a fresh factor and a positive matrix, whose direction leads down.
+      stuck = w.refactor = true;
+      continue;
+    }
+    // A small step all the same lets the contacts decide anew.
+    if (!acceptable() && (++forced_moves > 6 || !std::isfinite(after))) return;
+    stuck = false;
+    // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short.
+    // Go on along the direction, by secants, while the potential falls.
+    for (double end_slope; length >= 1 && length < 30; std::swap(trial, longer)) {
+      end_slope = trial.residual.cwiseProduct(w.direction).sum();
+      if (end_slope > 0.2 * slope) break;
+      length *= std::clamp(slope / (slope - end_slope), 1.5, 3.0);
+      const double further = move(length, longer);
+      if (further >= after || !(longer.residual.norm() < 10 * now.residual.norm())) break;
+      after = further;
+    }
+    std::swap(now, trial);
   }
 }
 
-/// A vertex that slides over a round surface turns its normal force: the Hessian of the gap times -lambda_n.
-void add_surface_curvature(const std::vector<VertexConstraint>& constraints, BlockValues<double>& values) {
-  for (size_t i = 0; i < constraints.size(); ++i)
-    for (const Touch& touch : constraints[i].touches)
-      if (touch.holds)
-        Map<Matrix3d>(values.data() + 9 * i) -= touch.normal_force * touch.curved * touch.curved.transpose();
+/// Fills in forces, contact and penetration at the end of a step.
+void report_contacts(const StepProblem& problem, const Iterate& end, StepReport& report) {
+  const Environment& environment = problem.contacts.environment;
+  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
+  report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
+  for (size_t i = 0; i < end.constraints.size(); ++i) {
+    const VertexConstraint& c = end.constraints[i];
+    if (c.hold == Hold::fixed) {
+      if (c.grasp < 0) report.fixed_forces.push_back({int(i), c.reaction});
+      if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
+      continue;
+    }
+    for (const Touch& touch : c.touches) {
+      report.penetration_max = std::max(report.penetration_max, touch.sunk - touch.gap);
+      // Where it is let out slowly it may stay below the surface.
+      report.complementarity = std::max(report.complementarity, -touch.gap);
+      if (!touch.holds) continue;
+      report.complementarity = std::max(report.complementarity, touch.gap);
+      report.obstacle_forces[touch.obstacle] += force_from(environment, c, touch);
+    }
+  }
+  report.held_penetration = deepest_held(problem.contacts, end.constraints, end.positions);
+  report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
+  if (report.penetration_max > 0) {
+    for (size_t i = 0; i < end.constraints.size(); ++i)
+      for (size_t k = 0; end.constraints[i].hold != Hold::fixed && k < environment.obstacles.size(); ++k) {
+        const Gap gap = problem.contacts.gap(int(k), environment.state.positions, int(i));
+        const double depth = gap.sunk - gap.distance;
+        if (depth > gap_tolerance && depth > report.start_penetration.depth)
+          report.start_penetration = {depth, int(i), int(k)};
+      }
+  }
 }
 
-/// P B P + (I - P) scaled to its neighbours: the matrix of the free directions.
-void restrict_matrix(const BlockPattern& pattern, const std::vector<VertexConstraint>& constraints,
-                     BlockValues<double>& values) {
-  const auto block = [&](size_t k) { return Map<Matrix3d>(values.data() + 9 * k); };
-  const auto is_free = [&](int i) { return constraints[i].hold == Hold::free; };
-  for (int i = 0; i < pattern.size; ++i) {
-    if (is_free(i)) continue;
-    const Matrix3d& P = constraints[i].free;
-    block(i) = P * block(i) * P + block(i).trace() / 3 * (Matrix3d::Identity() - P);
-  }
-  for (size_t k = 0; k < pattern.pairs.size(); ++k) {
-    const auto [row, column] = pattern.pairs[k];
-    if (is_free(row) && is_free(column)) continue;
-    auto b = block(pattern.size + k);
-    b = constraints[row].free * b * constraints[column].free;
-  }
-}
-
-/// Frees a vertex from the touches that would have to pull. Returns whether from any.
-bool release(const Vector3d& force, VertexConstraint& c) {
-  const std::array<bool, 2> held = {c.touches[0].holds, c.touches[1].holds};
-  const std::array<double, 2> normal = normal_forces(c.touches, held, force);
-  bool any = false;
-  for (int k = 0; k < 2; ++k) {
-    any = any || (held[k] && normal[k] == 0);
-    c.touches[k].holds = held[k] && normal[k] > 0;
-  }
-  if (!any) return false;
-  const bool still_held = c.touches[0].holds || c.touches[1].holds;
-  c.hold = still_held ? Hold::slip : Hold::free;
-  c.free = still_held ? along_surfaces(c.touches) : Matrix3d(Matrix3d::Identity());
-  c.correction -= c.free * c.correction;
-  return true;
-}
-
-/// Holds a vertex on the touches that `step` drives it into. Returns whether on any.
-bool hold(const Vector3d& step, VertexConstraint& c) {
-  bool any = false;
-  for (int k = 0; k < 2; ++k) {
-    Touch& touch = c.touches[k];
-    const Touch& other = c.touches[1 - k];
-    if (touch.obstacle < 0 || touch.holds || touch.gap + touch.normal.dot(step) >= -1e-12) continue;
-    const double missing = -touch.gap - touch.normal.dot(c.correction);
-    if (other.holds) {
-      // Within the surface that holds already, up to the edge.
-      const Vector3d inward = touch.normal - other.normal * other.normal.dot(touch.normal);
-      if (inward.squaredNorm() < 1e-6) continue;
-      c.correction += missing / inward.squaredNorm() * inward;
+/// Energies at the end of a step, and whether they came from somewhere: the potential of the step must not
+/// end above its start value, nor the energy above that of the start and the work done.
+bool account_for_energy(const StepProblem& problem, const Iterate& end, StepReport& report) {
+  const Environment& environment = problem.contacts.environment;
+  const State& start = environment.state;
+  const double h = problem.contacts.time_step;
+  const Eigen::VectorXd& mass = problem.potential.mass();
+  const Points moved = end.positions - start.positions;
+  const auto kinetic_of = [&](const Points& velocities) {
+    return 0.5 * (mass.asDiagonal() * velocities).cwiseProduct(velocities).sum();
+  };
+  report.kinetic = kinetic_of(moved / h);
+  report.membrane = end.elastic.membrane;
+  report.bending = end.elastic.bending;
+  double falls = 0, unbalanced = 0;
+  bool start_is_feasible = report.start_penetration.depth == 0;
+  for (int i = 0; i < mass.size(); ++i) {
+    const Vector3d way = moved.row(i);
+    report.potential -= mass[i] * environment.gravity.dot(end.positions.row(i));
+    falls += mass[i] * environment.gravity.dot(way);
+    unbalanced += std::abs(end.residual.row(i).dot(way));
+    const VertexConstraint& c = end.constraints[i];
+    if (c.hold == Hold::free) continue;
+    const double work = c.reaction.dot(way);
+    if (c.hold == Hold::fixed) {
+      report.work += work;
+      start_is_feasible = start_is_feasible && ((Eigen::Matrix3d::Identity() - c.free) * way).isZero(0);
     } else {
-      c.correction += missing * touch.normal;
+      report.work += std::max(0.0, work);
     }
-    touch.holds = true;
-    c.hold = Hold::slip;
-    c.free = along_surfaces(c.touches);
-    any = true;
   }
-  return any;
+  for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));
+  for (const ObstacleMotion& motion : problem.contacts.motions)
+    start_is_feasible = start_is_feasible && !motion.moves;
+
+  Points force;
+  ElasticEnergy elastic;
+  const double potential_at_start = problem.potential.evaluate(start.positions, force, elastic);
+  const double elastic_at_start = elastic.membrane + elastic.bending,
+               elastic_at_end = report.membrane + report.bending;
+  const double kinetic_at_start = kinetic_of(start.velocities);
+  const double gain =
+      report.kinetic - kinetic_at_start + elastic_at_end - elastic_at_start - falls - report.work;
+  const double there =
+      kinetic_at_start + elastic_at_start + std::max(0.0, falls) + std::max(0.0, report.work);
+  // Of positions, and what the weight does over a nanometre.
+  const double rounding =
+      1e-9 * mass.sum() * problem.gravity +
+      1e-14 * environment.material.membrane_stiffness * mass.sum() / environment.material.areal_density;
+  if (!(gain <= energy_tolerance * there + unbalanced + rounding)) return false;
+  if (!start_is_feasible) return true;
+  return end.potential <= potential_at_start + energy_tolerance * there + unbalanced + rounding;
 }
 
-/// One exchange of the active set of the linear problem: holds vertices that `direction` drives into a
-/// surface and frees those that the surface would have to pull (`force`: what they would need at its end).
-/// Returns whether any.
-bool exchange_contacts(const Points& direction, const Points& force_before, const Points& force,
-                       Points& gradient, std::vector<VertexConstraint>& constraints) {
-  bool any = false;
-  for (size_t i = 0; i < constraints.size(); ++i) {
-    VertexConstraint& c = constraints[i];
-    if (c.hold == Hold::fixed || c.touches[0].obstacle < 0) continue;
-    if (c.hold != Hold::free && release(force.row(i), c)) {
-      gradient.row(i) = force_before.row(i);
-      any = true;
-    } else if (c.hold != Hold::stick && hold(direction.row(i), c)) {
-      any = true;
-    }
+/// One step of `h` as a whole; environment.state advances in any case. Returns whether it is as good as
+/// halves would be: solved, or to all that rounding allows.
+bool try_step(Environment& environment, double h, Solver::Workspace& w, StepReport& report) {
+  const StepProblem problem(*w.plan, environment, h, w.settings.exit_speed);
+  w.now.positions = environment.state.positions + h * environment.state.velocities;
+  w.now.constraints = begin_step(problem.contacts, w.now.positions);
+  problem.evaluate(w.now);
+  iterate_to_balance(problem, w, report);
+
+  report.residual = w.now.residual.norm() / problem.force_scale;
+  report_contacts(problem, w.now, report);
+  const bool energy_is_sound = account_for_energy(problem, w.now, report);
+  const bool sound = report.complementarity <= gap_tolerance && energy_is_sound;
+  report.converged = sound && problem.balanced(w.now, w.settings.tolerance);
+  environment.state.time += h;
+  if (!w.now.positions.allFinite()) {
+    // Better a sheet that stands still, and says so, than none.
+    report.residual = std::numeric_limits<double>::infinity();
+    environment.state.velocities.setZero();
+    report.converged = false;
+    return false;
   }
-  return any;
+  environment.state.velocities = (w.now.positions - environment.state.positions) / h;
+  environment.state.positions = w.now.positions;
+  return sound && problem.balanced(w.now, std::max(w.settings.tolerance, rounding_tolerance));
+}
+
+const Penetration& deeper(const Penetration& a, const Penetration& b) { return a.depth >= b.depth ? a : b; }
+
+/// What two halves of a step come to.
+StepReport joined(const StepReport& first, const StepReport& second) {
+  StepReport whole = second;
+  whole.residual = std::isnan(first.residual) ? first.residual : std::max(first.residual, second.residual);
+  whole.iterations += first.iterations;
+  whole.solves += first.solves;
+  whole.factorizations += first.factorizations;
+  whole.substeps += first.substeps;
+  whole.converged = first.converged && second.converged;
+  whole.penetration_max = std::max(first.penetration_max, second.penetration_max);
+  whole.held_penetration = deeper(first.held_penetration, second.held_penetration);
+  whole.start_penetration = first.start_penetration;
+  whole.complementarity = std::max(first.complementarity, second.complementarity);
+  whole.cone_violation = std::max(first.cone_violation, second.cone_violation);
+  whole.work += first.work;
+  for (size_t k = 0; k < whole.grasp_forces.size(); ++k)
+    whole.grasp_forces[k] = 0.5 * (first.grasp_forces[k] + second.grasp_forces[k]);
+  for (size_t k = 0; k < whole.obstacle_forces.size(); ++k)
+    whole.obstacle_forces[k] = 0.5 * (first.obstacle_forces[k] + second.obstacle_forces[k]);
+  for (size_t k = 0; k < whole.fixed_forces.size(); ++k)
+    whole.fixed_forces[k].force = 0.5 * (first.fixed_forces[k].force + second.fixed_forces[k].force);
+  return whole;
+}
+
+/// One step of `h`, in halves where it cannot be solved as a whole, `halvings` times still. Once a half has
+/// failed the other is not divided any more: the step has not converged anyway.
+StepReport advance(Environment& environment, double h, int halvings, Solver::Workspace& w) {
+  const State start = environment.state;
+  StepReport report;
+  if (try_step(environment, h, w, report)) return report;
+  w.refactor = true;
+  if (halvings <= 0) return report;
+  const int spent_iterations = report.iterations, spent_solves = report.solves,
+            spent_factorizations = report.factorizations;
+  const State whole = std::exchange(environment.state, start);
+  // Supports go half the way in each half.
+  std::vector<Vector3d> targets;
+  for (FixedVertex& support : environment.fixed) {
+    targets.push_back(support.position);
+    support.position = 0.5 * (support.position + start.positions.row(support.vertex).transpose());
+  }
+  const StepReport first = advance(environment, 0.5 * h, halvings - 1, w);
+  for (size_t k = 0; k < targets.size(); ++k) environment.fixed[k].position = targets[k];
+  StepReport parts = joined(first, advance(environment, 0.5 * h, first.converged ? halvings - 1 : 0, w));
+  environment.state.time = whole.time;
+  parts.iterations += spent_iterations;
+  parts.solves += spent_solves;
+  parts.factorizations += spent_factorizations;
+  return parts;
 }
 
 }  // namespace
@@ -203,139 +339,8 @@ Solver::Solver(Solver&&) noexcept = default;
 StepReport Solver::step(Environment& environment) {
   Workspace& w = *workspace_;
   const double h = w.settings.time_step;
-  const State& start = environment.state;
-  const double time = start.time + h;
-  const BendingOperator& bending =
-      bending_operator(*w.plan, environment.material.bending_model, environment.material.poissons_ratio);
-  const double rigidity = environment.material.bending_rigidity;
-  update_grasps(environment, time);
-
-  w.damping.clear();
-  if (environment.material.stiffness_damping > 0) {
-    w.damping.assign(9 * (w.plan->pattern.size + w.plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*w.plan, bending, environment.material, start.positions,
-                        environment.material.stiffness_damping / h, Curvature::positive, w.damping);
-    add_bending_stand_in(bending, environment.material.stiffness_damping / h * rigidity, w.damping);
-  }
-  const StepProblem problem(*w.plan, bending, environment, h, w.damping);
-  const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
-  const double force_scale = problem.mass().norm() * gravity;
-
-  const bool sparse = w.damping.empty() && bending.model != data::BendingModel::hinge;
-  StepReport report;
-  Iterate now, trial, longer;
-  const auto evaluate = [&](Iterate& iterate) {
-    iterate.potential = problem.evaluate(iterate.positions, iterate.force, iterate.elastic);
-    update_contacts(environment, time, h, iterate.positions, iterate.force, iterate.constraints);
-    iterate.residual = iterate.force;
-    for (int i = 0; i < iterate.residual.rows(); ++i)
-      iterate.residual.row(i) -= iterate.constraints[i].reaction.transpose();
-  };
-  now.positions = start.positions + h * start.velocities;
-  now.constraints = begin_step(environment, time, now.positions);
-  evaluate(now);
-  longer.constraints = trial.constraints = now.constraints;
-  // The linear problem's own; kept between iterations for their memory.
-  std::vector<VertexConstraint> linear;
-  Points gradient, force, direction;
-  bool stuck = false;
-  int forced_moves = 0;
-  while (report.iterations < w.settings.max_iterations &&
-         now.residual.norm() > w.settings.tolerance * force_scale) {
-    ++report.iterations;
-    if (w.refactor) {
-      problem.assemble(now.positions, Curvature::positive, false, w.values);
-      add_bending_stand_in(bending, rigidity, w.values);
-      add_slip_stiffness(now.constraints, w.values);
-      restrict_matrix(w.plan->pattern, now.constraints, w.values);
-      if (!w.matrix.factorize(w.values)) break;
-      ++report.factorizations;
-    }
-    problem.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, sparse, w.values);
-    add_slip_stiffness(now.constraints, w.values);
-    if (!stuck) add_surface_curvature(now.constraints, w.values);
-    w.matrix.assign(w.values, sparse, bending, rigidity, problem.mass().minCoeff() / (h * h));
-    linear = now.constraints;
-    gradient = now.residual;
-    for (int exchange = 0; exchange < 6; ++exchange) {
-      force = now.force;
-      const int solves =
-          w.matrix.solve(linear, gradient, 0.3 * w.settings.tolerance * force_scale, direction, force);
-      report.solves += solves;
-      w.refactor = solves > w.settings.stale_factor_solves;
-      if (!exchange_contacts(direction, now.force, force, gradient, linear)) break;
-    }
-
-    // The potential guides the step; where the surface is curved or the normal forces change it is not exact,
-    // and a smaller residual does as well. Near the solution the potential falls by less than its rounding.
-    const double before =
-        now.potential + friction_potential(environment, time, h, now.constraints, now.positions);
-    const double slope = now.residual.cwiseProduct(direction).sum();
-    const auto move = [&](double length, Iterate& to) {
-      to.positions = now.positions + length * direction;
-      project_to_feasible(environment, time, h, linear, to.positions);
-      evaluate(to);
-      return to.potential + friction_potential(environment, time, h, now.constraints, to.positions);
-    };
-    double length = 1.0, after = move(length, trial);
-    const auto acceptable = [&] {
-      return after <= before + 1e-4 * length * slope ||
-             trial.residual.norm() <= (1 - 0.1 * length) * now.residual.norm();
-    };
-    while (!acceptable() && length > 1e-3) after = move(length *= 0.5, trial);
-    if (!acceptable() && !stuck) {
-      // Once more with a fresh factor and a positive matrix, whose direction leads down.
-      stuck = w.refactor = true;
-      continue;
-    }
-    // A small step all the same lets the contacts decide anew.
-    if (!acceptable() && (++forced_moves > 6 || !std::isfinite(after))) break;
-    stuck = false;
-    // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short.
-    // Go on along the direction, by secants, while the potential falls.
-    for (double end_slope; length >= 1 && length < 30; std::swap(trial, longer)) {
-      end_slope = trial.residual.cwiseProduct(direction).sum();
-      if (end_slope > 0.2 * slope) break;
-      length *= std::clamp(slope / (slope - end_slope), 1.5, 3.0);
-      const double further = move(length, longer);
-      if (further >= after || !(longer.residual.norm() < 10 * now.residual.norm())) break;
-      after = further;
-    }
-    std::swap(now, trial);
-  }
-  report.residual = now.residual.norm() / force_scale;
-  report.converged = report.residual <= w.settings.tolerance;
-
-  report.membrane = now.elastic.membrane;
-  report.bending = now.elastic.bending;
-  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
-  report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
-  for (size_t i = 0; i < now.constraints.size(); ++i) {
-    const VertexConstraint& c = now.constraints[i];
-    for (const Touch& touch : c.touches)
-      report.penetration_max = std::max(report.penetration_max, -touch.gap);
-    if (c.hold == Hold::fixed) {
-      if (c.grasp < 0) report.fixed_forces.push_back({int(i), c.reaction});
-      if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
-      continue;
-    }
-    for (const Touch& touch : c.touches) {
-      if (!touch.holds) continue;
-      report.complementarity = std::max(report.complementarity, std::abs(touch.gap));
-      report.obstacle_forces[touch.obstacle] += force_from(environment, c, touch);
-    }
-  }
-  environment.state.velocities = (now.positions - start.positions) / h;
-  environment.state.positions = now.positions;
-  environment.state.time = time;
-  const Eigen::VectorXd& mass = problem.mass();
-  report.kinetic =
-      0.5 *
-      (mass.asDiagonal() * environment.state.velocities).cwiseProduct(environment.state.velocities).sum();
-  report.potential = 0;
-  for (int i = 0; i < mass.size(); ++i)
-    report.potential -= mass[i] * environment.gravity.dot(now.positions.row(i));
-  return report;
+  update_grasps(environment, environment.state.time + h);
+  return advance(environment, h, w.settings.halvings, w);
 }
 
 }  // namespace flash::sim

@@ -2,6 +2,7 @@
 #include <memory>
 #include <vector>
 
+#include "sim/contact_geometry.h"
 #include "sim/environment.h"
 #include "sim/sheet.h"
 #include "sim/sheet_plan.h"
@@ -13,6 +14,8 @@ struct SolverSettings {
   int max_iterations = 60;      ///< Newton iterations a step
   double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
   int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
+  double exit_speed = 1.0;      ///< at which vertices that start inside an obstacle come out, at most [m/s]
+  int halvings = 6;  ///< a step that cannot be solved is repeated in two halves, each so again, so often
 };
 
 /// How one step of one environment went.
@@ -21,19 +24,27 @@ struct StepReport {
   int iterations = 0;   ///< of Newton's method
   int solves = 0;       ///< with a factor: iterations of the linear solver
   int factorizations = 0;
+  int substeps = 1;  ///< more where the step could not be solved as one
+  /// Force balance to the tolerance, as a whole and to 30 times of it at every vertex; gaps, complementarity
+  /// and the friction cone; no energy from nothing.
   bool converged = false;
-  double penetration_max = 0;                                    ///< deepest vertex below a surface [m]
-  double complementarity = 0;                                    ///< max |min(gap, lambda / stiffness)| [m]
-  double cone_violation = 0;                                     ///< max(|lambda_t| - mu lambda_n) [N]
+  double penetration_max = 0;     ///< deepest vertex below a surface, held ones too [m]
+  Penetration held_penetration;   ///< the deepest that a support or a gripper holds below a surface
+  Penetration start_penetration;  ///< the deepest other that started the step inside an obstacle
+  double complementarity = 0;     ///< max |min(gap, lambda / stiffness)| [m]
+  double cone_violation = 0;      ///< max(|lambda_t| - mu lambda_n) [N]
   double kinetic = 0, membrane = 0, bending = 0, potential = 0;  ///< energies [J]
-  std::vector<Eigen::Vector3d> grasp_forces;                     ///< gripper on sheet, one a grasp [N]
-  std::vector<Eigen::Vector3d> obstacle_forces;                  ///< obstacle on sheet, one an obstacle [N]
-  std::vector<Load> fixed_forces;                                ///< support on sheet, one a fixed vertex
+  double work = 0;  ///< that supports, grippers and obstacles did on the sheet, those that do any [J]
+  // Forces of a step in parts are their means over time.
+  std::vector<Eigen::Vector3d> grasp_forces;     ///< gripper on sheet, one a grasp [N]
+  std::vector<Eigen::Vector3d> obstacle_forces;  ///< obstacle on sheet, one an obstacle [N]
+  std::vector<Load> fixed_forces;                ///< support on sheet, one a fixed vertex
 };
 
 /// Steps an environment by implicit Euler: semi-smooth Newton on the potential of the step, feasible at every
-/// iterate. Holds what depends on the sheet and the last factorization, which later steps start from: one
-/// Solver an environment.
+/// iterate. A step that does not converge, or whose potential or energy would end above where it began, is
+/// repeated in halves. Holds what depends on the sheet and the last factorization, which later steps start
+/// from: one Solver an environment.
 class Solver {
  public:
   Solver(const Sheet& sheet, const SolverSettings& settings);
@@ -44,8 +55,9 @@ class Solver {
   /// Advances environment.state by one time step. An unconverged step is reported, never thrown.
   StepReport step(Environment& environment);
 
+  struct Workspace;  ///< of its own
+
  private:
-  struct Workspace;
   std::unique_ptr<Workspace> workspace_;
 };
 

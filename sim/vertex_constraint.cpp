@@ -1,9 +1,10 @@
 #include "sim/vertex_constraint.h"
 
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
-
-#include "sim/contact_geometry.h"
 
 namespace flash::sim {
 
@@ -18,21 +19,18 @@ constexpr double resting = 1e-13;  ///< slip up to which a vertex has not moved:
 constexpr double smoothing =
     1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
 
-/// The two obstacles nearest to a point.
-std::array<Touch, 2> nearest_touches(const Environment& environment, const Vector3d& point, double time,
-                                     double time_step) {
-  std::array<Touch, 2> touches;
-  for (size_t k = 0; k < environment.obstacles.size(); ++k) {
-    const Gap gap = gap_to(environment.obstacles[k], point, time, time_step);
-    const Touch touch{static_cast<int>(k), false, gap.distance, 0, gap.normal, gap.curved};
-    if (touches[0].obstacle < 0 || touch.gap < touches[0].gap) {
-      touches[1] = touches[0];
-      touches[0] = touch;
-    } else if (touches[1].obstacle < 0 || touch.gap < touches[1].gap) {
-      touches[1] = touch;
-    }
+/// Of vertex i against every obstacle. Keeps the memory of `touches`.
+void find_touches(const ContactStep& step, const data::Points& positions, int i,
+                  std::vector<Touch>& touches) {
+  touches.resize(step.environment.obstacles.size());
+  for (size_t k = 0; k < touches.size(); ++k) {
+    const Gap gap = step.gap(static_cast<int>(k), positions, i);
+    touches[k] = {.obstacle = static_cast<int>(k),
+                  .gap = gap.distance,
+                  .sunk = gap.sunk,
+                  .normal = gap.normal,
+                  .curved = gap.curved};
   }
-  return touches;
 }
 
 double friction_of(const Environment& environment, const Touch& touch) {
@@ -41,27 +39,27 @@ double friction_of(const Environment& environment, const Touch& touch) {
 }
 
 /// Displacement since the start of the step along the surfaces that hold the vertex, against them: against
-/// their mean by mu lambda_n where there are two [m].
-Vector3d slip_of(const Environment& environment, const VertexConstraint& constraint, double time,
-                 double time_step, const data::Points& positions, int i) {
-  const auto gap_of = [&](const Touch& touch) {
-    return gap_to(environment.obstacles[touch.obstacle], positions.row(i), time, time_step);
-  };
-  const Vector3d moved = (positions.row(i) - environment.state.positions.row(i)).transpose();
-  const auto& [first, second] = constraint.touches;
-  if (!(first.holds && second.holds)) {
-    const Gap gap = gap_of(first.holds ? first : second);
-    const Vector3d against = moved - gap.surface_moved;
-    return against - gap.normal * gap.normal.dot(against);
+/// their mean by mu lambda_n where there are several [m].
+Vector3d slip_of(const ContactStep& step, const VertexConstraint& constraint, const data::Points& positions,
+                 int i) {
+  Vector3d surfaces_moved = Vector3d::Zero();
+  double weights = 0;
+  std::array<Vector3d, 3> normals;
+  size_t count = 0;
+  for (const Touch& touch : constraint.touches) {
+    if (!touch.holds) continue;
+    const Gap gap = step.gap(touch.obstacle, positions, i);
+    const double weight = friction_of(step.environment, touch) * touch.normal_force + 1e-300;
+    surfaces_moved += weight * gap.surface_moved;
+    weights += weight;
+    normals[count++] = gap.normal;
   }
-  const Gap first_gap = gap_of(first), second_gap = gap_of(second);
-  const double first_weight = friction_of(environment, first) * first.normal_force + 1e-300,
-               second_weight = friction_of(environment, second) * second.normal_force + 1e-300;
-  const Vector3d surfaces_moved =
-      (first_weight * first_gap.surface_moved + second_weight * second_gap.surface_moved) /
-      (first_weight + second_weight);
-  const Vector3d edge = first_gap.normal.cross(second_gap.normal).normalized();
-  return edge * edge.dot(moved - surfaces_moved);
+  const Vector3d against =
+      (positions.row(i) - step.environment.state.positions.row(i)).transpose() - surfaces_moved / weights;
+  if (count == 1) return against - normals[0] * normals[0].dot(against);
+  if (count > 2) return Vector3d::Zero();
+  const Vector3d edge = normals[0].cross(normals[1]).normalized();
+  return edge * edge.dot(against);
 }
 
 /// Length of a slip as friction takes it, smooth where it starts [m].
@@ -69,33 +67,75 @@ double smooth_length(double length) { return std::sqrt(length * length + smoothi
 
 }  // namespace
 
-Matrix3d along_surfaces(const std::array<Touch, 2>& touches) {
-  const auto& [first, second] = touches;
-  if (first.holds && second.holds) {
-    const Vector3d edge = first.normal.cross(second.normal).normalized();
-    return edge * edge.transpose();
-  }
-  const Vector3d& normal = first.holds ? first.normal : second.normal;
-  return Matrix3d::Identity() - normal * normal.transpose();
+Matrix3d along_surfaces(const std::vector<Touch>& touches) {
+  std::array<Vector3d, 3> normals;
+  size_t count = 0;
+  for (const Touch& touch : touches)
+    if (touch.holds) normals[count++] = touch.normal;
+  if (count > 2) return Matrix3d::Zero();
+  if (count == 1) return Matrix3d::Identity() - normals[0] * normals[0].transpose();
+  const Vector3d edge = normals[0].cross(normals[1]).normalized();
+  return edge * edge.transpose();
 }
 
-std::array<double, 2> normal_forces(const std::array<Touch, 2>& touches, const std::array<bool, 2>& eligible,
-                                    const Vector3d& needed) {
-  const double first = eligible[0] ? touches[0].normal.dot(needed) : 0.0;
-  const double second = eligible[1] ? touches[1].normal.dot(needed) : 0.0;
-  if (eligible[0] && eligible[1]) {
-    const double cosine = touches[0].normal.dot(touches[1].normal), regular = 1 - cosine * cosine;
-    // Faces that point the same way, or against each other, have no edge: one of them holds.
-    if (regular > 1e-6) {
-      const double both_first = (first - cosine * second) / regular,
-                   both_second = (second - cosine * first) / regular;
-      if (both_first > 0 && both_second > 0) return {both_first, both_second};
-      if (first > 0 && both_second <= 0) return {first, 0.0};
-      return {0.0, both_first <= 0 ? std::max(second, 0.0) : 0.0};
+std::vector<double> complementary(const std::vector<Vector3d>& normals, const std::vector<double>& b) {
+  const int count = static_cast<int>(normals.size());
+  std::vector<double> best(normals.size(), 0.0);
+  double largest = 0, best_violation = 0;
+  for (const double each : b) {
+    largest = std::max(largest, std::abs(each));
+    best_violation = std::max(best_violation, each);
+  }
+  const double rounding = 1e-12 * largest;
+  // Of one, two or three faces; in space no more are independent.
+  const auto try_faces = [&](const std::array<int, 3>& faces, int size) {
+    Matrix3d gram = Matrix3d::Identity();
+    Vector3d right = Vector3d::Zero();
+    for (int r = 0; r < size; ++r) {
+      right[r] = b[faces[r]];
+      for (int c = 0; c < size; ++c) gram(r, c) = normals[faces[r]].dot(normals[faces[c]]);
+    }
+    if (gram.determinant() < 1e-6) return;  // faces that point the same way, or against each other
+    const Vector3d x = gram.inverse() * right;
+    if (x.head(size).minCoeff() < 0) return;
+    Vector3d sum = Vector3d::Zero();
+    for (int r = 0; r < size; ++r) sum += x[r] * normals[faces[r]];
+    double violation = 0;
+    for (int k = 0; k < count; ++k) violation = std::max(violation, b[k] - normals[k].dot(sum));
+    if (violation >= best_violation - rounding) return;
+    best_violation = violation;
+    std::fill(best.begin(), best.end(), 0.0);
+    for (int r = 0; r < size; ++r) best[faces[r]] = x[r];
+  };
+  for (int i = 0; i < count; ++i) {
+    try_faces({i, 0, 0}, 1);
+    for (int j = i + 1; j < count; ++j) {
+      try_faces({i, j, 0}, 2);
+      for (int k = j + 1; k < count; ++k) try_faces({i, j, k}, 3);
     }
   }
-  if (first > 0) return {first, 0.0};
-  return {0.0, std::max(second, 0.0)};
+  return best;
+}
+
+std::vector<double> normal_forces(const std::vector<Touch>& touches, const std::vector<bool>& eligible,
+                                  const Vector3d& needed) {
+  std::vector<double> forces(touches.size(), 0.0);
+  std::vector<size_t> those;
+  for (size_t k = 0; k < touches.size(); ++k)
+    if (eligible[k]) those.push_back(k);
+  if (those.size() == 1) {
+    forces[those[0]] = std::max(0.0, touches[those[0]].normal.dot(needed));
+    return forces;
+  }
+  std::vector<Vector3d> normals;
+  std::vector<double> along;
+  for (const size_t k : those) {
+    normals.push_back(touches[k].normal);
+    along.push_back(touches[k].normal.dot(needed));
+  }
+  const std::vector<double> found = complementary(normals, along);
+  for (size_t k = 0; k < those.size(); ++k) forces[those[k]] = found[k];
+  return forces;
 }
 
 Vector3d force_from(const Environment& environment, const VertexConstraint& constraint, const Touch& touch) {
@@ -108,8 +148,15 @@ Vector3d force_from(const Environment& environment, const VertexConstraint& cons
   return touch.normal_force * touch.normal + share * friction;
 }
 
-std::vector<VertexConstraint> begin_step(const Environment& environment, double time,
-                                         data::Points& positions) {
+ContactStep::ContactStep(const Environment& environment_in, double time_step_in, double exit_speed_in)
+    : environment(environment_in),
+      time(environment_in.state.time + time_step_in),
+      time_step(time_step_in),
+      exit_speed(exit_speed_in),
+      motions(obstacle_motions(environment_in, environment_in.state.time, time)) {}
+
+std::vector<VertexConstraint> begin_step(const ContactStep& step, data::Points& positions) {
+  const Environment& environment = step.environment;
   std::vector<VertexConstraint> constraints(environment.state.positions.rows());
   for (const FixedVertex& support : environment.fixed) {
     VertexConstraint& constraint = constraints[support.vertex];
@@ -124,9 +171,9 @@ std::vector<VertexConstraint> begin_step(const Environment& environment, double 
     const Grasp& grasp = environment.grasps[k];
     const data::Points& offsets = environment.state.grasp_offsets[k];
     if (offsets.rows() == 0) continue;
-    const Eigen::Isometry3d pose = data::pose_at(grasp.gripper, time);
+    const Eigen::Isometry3d pose = data::pose_at(grasp.gripper, step.time);
     const double closed =
-        grasp.closing_time > 0 ? std::clamp((time - grasp.from) / grasp.closing_time, 0.0, 1.0) : 1.0;
+        grasp.closing_time > 0 ? std::clamp((step.time - grasp.from) / grasp.closing_time, 0.0, 1.0) : 1.0;
     const double blend = closed * closed * (3 - 2 * closed);
     for (size_t v = 0; v < grasp.vertices.size(); ++v) {
       Vector3d offset = offsets.row(v);
@@ -138,41 +185,46 @@ std::vector<VertexConstraint> begin_step(const Environment& environment, double 
       positions.row(grasp.vertices[v]) = pose * offset;
     }
   }
-  project_to_feasible(environment, time, 0, constraints, positions);
+  project_to_feasible(step, constraints, positions);
   return constraints;
 }
 
-void update_contacts(const Environment& environment, double time, double time_step,
-                     const data::Points& positions, const data::Points& force,
+void update_contacts(const ContactStep& step, const data::Points& positions, const data::Points& force,
                      std::vector<VertexConstraint>& constraints) {
   for (size_t i = 0; i < constraints.size(); ++i) {
     VertexConstraint& constraint = constraints[i];
     const Vector3d needed = force.row(i);
     if (constraint.hold == Hold::fixed) {
       constraint.reaction = needed - constraint.free * needed;
-      // Not kept out of the obstacles, but seen there.
-      if (!constraint.free.isZero())
-        constraint.touches = nearest_touches(environment, positions.row(i), time, time_step);
       continue;
     }
-    // Of a free one all but the touches is as it was made: most of them are, and it is much to write.
-    if (constraint.hold != Hold::free) constraint = VertexConstraint{};
     auto& touches = constraint.touches;
-    touches = nearest_touches(environment, positions.row(i), time, time_step);
-    const auto on_surface = [&](const Touch& touch) { return touch.obstacle >= 0 && touch.gap <= touching; };
-    if (!on_surface(touches[0])) continue;
-    const std::array<double, 2> normal = normal_forces(touches, {true, on_surface(touches[1])}, needed);
-    for (int k = 0; k < 2; ++k) {
+    find_touches(step, positions, static_cast<int>(i), touches);
+    // Of a free one all but the touches is as it was made: most of them are, and it is much to write.
+    if (constraint.hold != Hold::free) {
+      VertexConstraint released;
+      released.touches = std::move(touches);
+      constraint = std::move(released);
+    }
+    const auto on_surface = [](const Touch& touch) { return touch.gap <= touching; };
+    if (std::none_of(touches.begin(), touches.end(), on_surface)) continue;
+    std::vector<bool> eligible(touches.size());
+    std::transform(touches.begin(), touches.end(), eligible.begin(), on_surface);
+    const std::vector<double> normal = normal_forces(touches, eligible, needed);
+    bool held = false;
+    for (size_t k = 0; k < touches.size(); ++k) {
       touches[k].holds = normal[k] > 0;
       touches[k].normal_force = normal[k];
-      if (touches[k].holds) constraint.friction_bound += friction_of(environment, touches[k]) * normal[k];
+      if (touches[k].holds)
+        constraint.friction_bound += friction_of(step.environment, touches[k]) * normal[k];
+      held = held || touches[k].holds;
     }
-    if (!touches[0].holds && !touches[1].holds) continue;
+    if (!held) continue;
 
     const double bound = constraint.friction_bound;
     const Matrix3d along = along_surfaces(touches);
     const Vector3d needed_tangential = along * needed;
-    const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
+    const Vector3d slip = slip_of(step, constraint, positions, static_cast<int>(i));
     const double slip_length = slip.norm(), needed_length = needed_tangential.norm();
     if (slip_length <= resting && needed_length <= bound) {
       constraint.hold = Hold::stick;
@@ -194,51 +246,93 @@ void update_contacts(const Environment& environment, double time, double time_st
   }
 }
 
-void project_to_feasible(const Environment& environment, double time, double time_step,
-                         const std::vector<VertexConstraint>& constraints, data::Points& positions) {
-  if (environment.obstacles.empty()) return;
-  // Exact for one obstacle; onto two at once by turns.
-  const int sweeps = environment.obstacles.size() > 1 ? 40 : 1;
+namespace {
+
+/// Moves vertex i by the shortest way out of all obstacles, and onto those where it is to land. Exact for
+/// planes at once; round surfaces and faces that change take a few rounds.
+void project_vertex(const ContactStep& step, const VertexConstraint& constraint, data::Points& positions,
+                    int i) {
+  const size_t count = step.environment.obstacles.size();
+  std::vector<Vector3d> normals(count);
+  std::vector<double> depths(count);
+  for (int round = 0; round < 40; ++round) {
+    double moved = 0;
+    for (size_t k = 0; k < count; ++k) {
+      const Gap gap = step.gap(static_cast<int>(k), positions, i);
+      normals[k] = gap.normal;
+      depths[k] = -gap.distance;
+      // A vertex that is to land does so where the step is long enough to bring it down.
+      const bool lands =
+          !constraint.touches.empty() && constraint.touches[k].holds && gap.distance > 0 &&
+          (constraint.touches[k].gap <= touching || gap.distance <= 0.01 * constraint.touches[k].gap);
+      if (!lands) continue;
+      positions.row(i) -= gap.distance * gap.normal.transpose();
+      moved = std::max(moved, gap.distance);
+      depths[k] = 0;
+    }
+    if (moved == 0 && std::all_of(depths.begin(), depths.end(), [](double depth) { return depth <= 0; }))
+      return;
+    if (count == 1) {
+      if (depths[0] > 0) {
+        positions.row(i) += depths[0] * normals[0].transpose();
+        moved = depths[0];
+      }
+    } else {
+      const std::vector<double> x = complementary(normals, depths);
+      Vector3d way = Vector3d::Zero();
+      for (size_t k = 0; k < count; ++k) way += x[k] * normals[k];
+      positions.row(i) += way.transpose();
+      moved = std::max(moved, way.norm());
+    }
+    if (moved <= resting) return;
+  }
+}
+
+}  // namespace
+
+void project_to_feasible(const ContactStep& step, const std::vector<VertexConstraint>& constraints,
+                         data::Points& positions) {
+  if (step.environment.obstacles.empty()) return;
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& constraint = constraints[i];
     if (constraint.hold == Hold::fixed) continue;
-    const auto touch_of = [&](size_t obstacle) {
-      return std::find_if(constraint.touches.begin(), constraint.touches.end(), [&](const Touch& touch) {
-        return touch.holds && touch.obstacle == static_cast<int>(obstacle);
-      });
-    };
-    for (int sweep = 0; sweep < sweeps; ++sweep) {
-      double moved = 0;
-      for (size_t k = 0; k < environment.obstacles.size(); ++k) {
-        const Gap gap = gap_to(environment.obstacles[k], positions.row(i), time, time_step);
-        const auto touch = touch_of(k);
-        // A vertex that is to land does so where the step is long enough to bring it down.
-        const bool lands = touch != constraint.touches.end() &&
-                           (touch->gap <= touching || gap.distance <= 0.01 * touch->gap);
-        if (!(gap.distance < 0 || lands)) continue;
-        positions.row(i) -= gap.distance * gap.normal.transpose();
-        moved = std::max(moved, std::abs(gap.distance));
-      }
-      if (moved <= resting) break;
-    }
-    if (constraint.hold == Hold::slip) {
-      const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
-      if (slip.dot(constraint.slip_direction) < 0) positions.row(i) -= slip.transpose();
+    project_vertex(step, constraint, positions, static_cast<int>(i));
+    if (constraint.hold != Hold::slip) continue;
+    Vector3d slip = slip_of(step, constraint, positions, static_cast<int>(i));
+    if (slip.dot(constraint.slip_direction) >= 0) continue;
+    // On a round surface the way back along it leaves it: back on it, and again.
+    for (int round = 0; round < 10 && slip.norm() > resting; ++round) {
+      positions.row(i) -= slip.transpose();
+      project_vertex(step, constraint, positions, static_cast<int>(i));
+      slip = slip_of(step, constraint, positions, static_cast<int>(i));
     }
   }
 }
 
-double friction_potential(const Environment& environment, double time, double time_step,
-                          const std::vector<VertexConstraint>& constraints, const data::Points& positions) {
+double friction_potential(const ContactStep& step, const std::vector<VertexConstraint>& constraints,
+                          const data::Points& positions) {
   double potential = 0;
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& constraint = constraints[i];
     if (constraint.friction_bound == 0) continue;
-    const Vector3d slip = slip_of(environment, constraint, time, time_step, positions, static_cast<int>(i));
+    const Vector3d slip = slip_of(step, constraint, positions, static_cast<int>(i));
     potential += constraint.friction_bound *
                  (constraint.slip_stiffness > 0 ? smooth_length(slip.norm()) : slip.norm());
   }
   return potential;
+}
+
+Penetration deepest_held(const ContactStep& step, const std::vector<VertexConstraint>& constraints,
+                         const data::Points& positions) {
+  Penetration deepest;
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    if (constraints[i].hold != Hold::fixed) continue;
+    for (size_t k = 0; k < step.motions.size(); ++k) {
+      const double depth = -gap_to(step.environment.obstacles[k], step.motions[k], positions.row(i)).distance;
+      if (depth > deepest.depth) deepest = {depth, static_cast<int>(i), static_cast<int>(k)};
+    }
+  }
+  return deepest;
 }
 
 }  // namespace flash::sim

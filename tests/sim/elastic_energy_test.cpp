@@ -56,6 +56,19 @@ TEST(ElasticEnergy, GradientIsTheDerivativeOfTheEnergy) {
   }
 }
 
+/// y += values * x, block by block.
+void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, const Points& x,
+                       Points& y) {
+  const auto block = [&](size_t k) { return Eigen::Map<const Eigen::Matrix3d>(values.data() + 9 * k); };
+  for (int i = 0; i < pattern.size; ++i) y.row(i) += (block(i) * x.row(i).transpose()).transpose();
+  for (size_t k = 0; k < pattern.pairs.size(); ++k) {
+    const auto [row, column] = pattern.pairs[k];
+    const auto b = block(pattern.size + k);
+    y.row(row) += (b * x.row(column).transpose()).transpose();
+    y.row(column) += (b.transpose() * x.row(row).transpose()).transpose();
+  }
+}
+
 TEST(ElasticEnergy, HessianOfAStretchedSheetIsTheDerivativeOfTheGradient) {
   // Stretched in both directions every eigenvalue is positive, so that the projection changes nothing.
   const Sheet sheet = small_sheet();
@@ -68,7 +81,7 @@ TEST(ElasticEnergy, HessianOfAStretchedSheetIsTheDerivativeOfTheGradient) {
     BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
     add_elastic_hessian(*plan, bending, material, x, 1.0, Curvature::exact, values);
     Points product = Points::Zero(x.rows(), 3);
-    add_block_product(plan->pattern, values, 1.0, along, product);
+    add_block_product(plan->pattern, values, along, product);
     add_bending_product(bending, material.bending_rigidity, along, product);
     const double step = 1e-7;
     Points ahead = Points::Zero(x.rows(), 3), behind = ahead;

@@ -97,6 +97,7 @@ TYPED_TEST(Grasping, ReactionIsWeightPlusInertiaInEveryStep) {
   const Sheet sheet = small_sheet();
   Environment environment = environment_of(sheet);
   environment.material.stiffness_damping = 1e-3;
+  environment.material.bending_rigidity = 1e-3;  // projective dynamics does not converge on a limp one
   Grasp grasp;
   grasp.vertices = near_corner(sheet, 0.035);
   grasp.gripper = swinging_gripper(0.5);

@@ -1,0 +1,347 @@
+#include "tests/sim/random_scenes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+
+#include "data/procedural_mesh.h"
+
+namespace flash::sim {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+/// Draws that do not depend on the standard library's distributions.
+class Lot {
+ public:
+  explicit Lot(unsigned long seed) : generator_(seed) {}
+  double uniform(double low, double high) {
+    return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53;
+  }
+  double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
+  int below(int count) { return static_cast<int>(generator_() % static_cast<unsigned long>(count)); }
+  bool chance(double share) { return uniform(0, 1) < share; }
+  Vector3d direction() {
+    Vector3d v;
+    do v = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
+    while (v.norm() > 1 || v.norm() < 0.1);
+    return v.normalized();
+  }
+
+ private:
+  std::mt19937_64 generator_;
+};
+
+std::string draw_mesh(Lot& lot, double& side) {
+  static constexpr const char* patterns[] = {"one_way", "alternating", "alternating_by_row", "jittered"};
+  side = lot.uniform(0.1, 0.4);
+  const double other = side * lot.uniform(0.4, 1);
+  const double cell = std::sqrt(side * other / lot.uniform(12, 110));
+  char text[100];
+  std::snprintf(text, sizeof text, "sheet:%.4fx%.4f:%.5f:%s", side, other, cell, patterns[lot.below(4)]);
+  return text;
+}
+
+data::SheetMaterial draw_material(Lot& lot) {
+  using data::BendingModel;
+  using data::Constitutive;
+  static constexpr Constitutive laws[] = {Constitutive::tri_arap, Constitutive::tri_corotated,
+                                          Constitutive::tri_stvk, Constitutive::tri_neohookean};
+  static constexpr BendingModel models[] = {BendingModel::plate, BendingModel::isometric,
+                                            BendingModel::hinge};
+  data::SheetMaterial material;
+  material.constitutive = laws[lot.below(4)];
+  material.bending_model = models[lot.below(3)];
+  material.membrane_stiffness = lot.log_uniform(1, 1e6);
+  material.poissons_ratio = lot.uniform(0, 0.45);
+  material.areal_density = lot.log_uniform(0.05, 1);
+  material.bending_rigidity = lot.log_uniform(1e-7, 1e-2);
+  material.friction = lot.chance(0.2) ? 0 : lot.uniform(0, 1.2);
+  if (lot.chance(0.2)) material.air_drag = lot.uniform(0, 5);
+  if (lot.chance(0.1)) material.stiffness_damping = lot.log_uniform(1e-4, 1e-2);
+  return material;
+}
+
+/// A path in straight stretches, each at a speed of its own.
+data::Trajectory draw_path(Lot& lot, const Vector3d& start, double seconds, double fastest, bool level) {
+  data::Trajectory path;
+  Vector3d at = start;
+  double time = 0;
+  while (true) {
+    path.times.push_back(time);
+    path.poses.push_back(Isometry3d(Eigen::Translation3d(at)));
+    if (time > seconds) return path;
+    Vector3d along = lot.direction();
+    along.z() = level ? 0 : std::abs(along.z());
+    const double stretch = lot.uniform(0.03, 0.3) * seconds + 1e-3;
+    at += lot.uniform(0, fastest) * stretch * along;
+    time += stretch;
+  }
+}
+
+void move(Environment& environment, const Isometry3d& pose) {
+  environment.state.positions =
+      (environment.state.positions * pose.linear().transpose()).rowwise() + pose.translation().transpose();
+}
+
+double lowest(const Environment& environment) { return environment.state.positions.col(2).minCoeff(); }
+
+/// The vertices within `reach` of a corner of the sheet, held from the start.
+Grasp grasp_corner(const Environment& environment, int corner, double reach,
+                   const data::Trajectory& gripper) {
+  Grasp grasp;
+  const auto row = environment.state.positions.row(corner);
+  for (int i = 0; i < environment.state.positions.rows(); ++i)
+    if ((environment.state.positions.row(i) - row).norm() <= reach) grasp.vertices.push_back(i);
+  grasp.gripper = gripper;
+  return grasp;
+}
+
+Obstacle draw_support(Lot& lot, double side) {
+  if (lot.chance(0.5))
+    return {Cylinder{{0.5 * side, 0.25 * side, 0.1},
+                     Vector3d(lot.uniform(-1, 1), 1, 0).normalized(),
+                     lot.uniform(0.01, 0.08)}};
+  Box box{.half_extents = {lot.uniform(0.02, 0.1), lot.uniform(0.02, 0.1), lot.uniform(0.005, 0.05)}};
+  box.pose = Eigen::Translation3d(0.5 * side, 0.25 * side, 0.1) *
+             Eigen::AngleAxisd(lot.uniform(0, 3), Vector3d::UnitZ());
+  return {box};
+}
+
+Isometry3d tumbled(Lot& lot) { return Isometry3d(Eigen::AngleAxisd(lot.uniform(0, 3), lot.direction())); }
+
+/// Puts the sheet `height` above the point `above`.
+void raise_above(Environment& environment, double top, double height) {
+  environment.state.positions.col(2).array() += top + height - lowest(environment);
+}
+
+void draw_scene(Lot& lot, double side, RandomScene& scene) {
+  Environment& environment = scene.environment;
+  const double seconds = scene.steps * scene.settings.time_step;
+  const Obstacle table{Plane{}};
+  const auto throw_at = [&](double fastest) {
+    environment.state.velocities.rowwise() +=
+        (lot.uniform(0, fastest) * Vector3d(lot.uniform(-0.3, 0.3), lot.uniform(-0.3, 0.3), -1)).transpose();
+  };
+  const int corner = 0;
+  switch (scene.kind) {
+    case SceneKind::drop:
+      move(environment, tumbled(lot));
+      raise_above(environment, 0, lot.uniform(0, 0.05));
+      throw_at(3);
+      environment.obstacles = {table};
+      return;
+    case SceneKind::impact: {
+      const double thick = lot.log_uniform(0.001, 0.03);
+      Box board{.half_extents = {0.3, 0.3, 0.5 * thick}};
+      board.pose = Eigen::Translation3d(0.5 * side, 0.3 * side, 0) *
+                   Eigen::AngleAxisd(lot.uniform(-0.3, 0.3), Vector3d::UnitX());
+      if (lot.chance(0.7)) move(environment, tumbled(lot));
+      raise_above(environment, 0.13, lot.uniform(0, 0.1));
+      throw_at(20);
+      environment.obstacles = {{board}};
+      return;
+    }
+    case SceneKind::drape:
+      if (lot.chance(0.5)) environment.obstacles.push_back(table);
+      environment.obstacles.push_back(draw_support(lot, side));
+      raise_above(environment, 0.19, lot.uniform(0, 0.05));
+      throw_at(1);
+      return;
+    case SceneKind::lift: {
+      environment.obstacles = {table};
+      const Vector3d at = environment.state.positions.row(corner);
+      environment.grasps = {
+          grasp_corner(environment, corner, 0.15 * side, draw_path(lot, at, seconds, 3, false))};
+      return;
+    }
+    case SceneKind::drag: {
+      environment.obstacles = {table};
+      const Vector3d at = environment.state.positions.row(corner);
+      environment.grasps = {
+          grasp_corner(environment, corner, 0.15 * side, draw_path(lot, at, seconds, 2, true))};
+      if (lot.chance(0.5)) environment.obstacles.push_back({Plane{Vector3d(-0.01, 0, 0), Vector3d::UnitX()}});
+      return;
+    }
+    case SceneKind::corner: {
+      move(environment, tumbled(lot));
+      raise_above(environment, 0, 0.001);
+      environment.state.positions.col(0).array() += 0.001 - environment.state.positions.col(0).minCoeff();
+      environment.state.positions.col(1).array() += 0.001 - environment.state.positions.col(1).minCoeff();
+      environment.state.velocities.rowwise() = lot.uniform(0, 2) * Vector3d(-1, -1, -1).transpose();
+      const double lean = lot.uniform(0, 0.3);
+      environment.obstacles = {table,
+                               {Plane{Vector3d::Zero(), Vector3d(1, 0, lean).normalized()}},
+                               {Plane{Vector3d::Zero(), Vector3d(0, 1, lean).normalized()}}};
+      environment.gravity = 9.81 * Vector3d(-lot.uniform(0, 1), -lot.uniform(0, 1), -1).normalized();
+      return;
+    }
+    case SceneKind::pusher: {
+      Box pusher{.half_extents = {0.02, lot.uniform(0.02, 0.3), 0.02}};
+      const double speed = lot.log_uniform(0.05, 2);
+      for (const double t : {0.0, seconds + 1}) {
+        pusher.trajectory.times.push_back(t);
+        pusher.trajectory.poses.push_back(
+            Isometry3d(Eigen::Translation3d(-0.021 + speed * t, 0.2 * side, 0.0205)));
+      }
+      environment.obstacles = {table, {pusher}};
+      if (lot.chance(0.3)) {
+        const Vector3d away = Vector3d(side + 0.02, 0, 0);
+        environment.obstacles.push_back({Plane{away, -Vector3d::UnitX()}});
+      }
+      return;
+    }
+    case SceneKind::deep: {
+      if (lot.chance(0.3)) move(environment, tumbled(lot));
+      environment.obstacles = {table};
+      if (lot.chance(0.3)) environment.obstacles.push_back(draw_support(lot, side));
+      environment.state.positions.col(2).array() -= lot.log_uniform(0.001, 0.1) + lowest(environment);
+      return;
+    }
+  }
+}
+
+/// Depth of a point in an obstacle, negative outside: from the shapes' definitions alone [m].
+double depth_in(const Obstacle& obstacle, const Vector3d& point, double time) {
+  if (const auto* plane = std::get_if<Plane>(&obstacle.shape))
+    return -plane->normal.dot(point - plane->point);
+  if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape))
+    return cylinder->radius - (point - cylinder->point).cross(cylinder->axis).norm();
+  const Box& box = std::get<Box>(obstacle.shape);
+  const Isometry3d pose = box.trajectory.times.empty() ? box.pose : data::pose_at(box.trajectory, time);
+  return (box.half_extents - (pose.inverse() * point).cwiseAbs()).minCoeff();
+}
+
+/// Of the straight way from `from` to `to`, seen from the obstacle as it moves.
+double depth_on_the_way(const Obstacle& obstacle, const Vector3d& from, const Vector3d& to, double from_time,
+                        double to_time) {
+  double deepest = -1;
+  for (int k = 0; k <= 400; ++k) {
+    const double share = k / 400.0;
+    deepest = std::max(
+        deepest, depth_in(obstacle, from + share * (to - from), from_time + share * (to_time - from_time)));
+  }
+  return deepest;
+}
+
+double moved_energy(const Environment& environment, const StepReport& report) {
+  double loads = 0;
+  for (const Load& load : environment.loads)
+    loads -= load.force.dot(environment.state.positions.row(load.vertex));
+  return report.kinetic + report.membrane + report.bending + report.potential + loads;
+}
+
+}  // namespace
+
+const char* to_string(SceneKind kind) {
+  static constexpr const char* names[] = {"drop", "impact", "drape",  "lift",
+                                          "drag", "corner", "pusher", "deep"};
+  return names[static_cast<int>(kind)];
+}
+
+RandomScene random_scene(unsigned long seed) {
+  Lot lot(seed);
+  RandomScene scene;
+  scene.kind = static_cast<SceneKind>(lot.below(static_cast<int>(SceneKind::last) + 1));
+  double side = 0;
+  scene.mesh = draw_mesh(lot, side);
+  scene.sheet = make_sheet(data::parse_mesh_spec(scene.mesh));
+  scene.settings.time_step = lot.log_uniform(0.001, 0.03);
+  scene.environment.material = draw_material(lot);
+  scene.environment.state.positions = scene.sheet.rest.vertices;
+  scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
+  draw_scene(lot, side, scene);
+  return scene;
+}
+
+SceneFindings observe(RandomScene scene) {
+  Environment& environment = scene.environment;
+  const double h = scene.settings.time_step;
+  SceneFindings found;
+  found.steps = scene.steps;
+  Solver solver(scene.sheet, scene.settings);
+  std::vector<bool> held(static_cast<std::size_t>(environment.state.positions.rows()), false);
+  for (const Grasp& grasp : environment.grasps)
+    for (const int vertex : grasp.vertices) held[static_cast<std::size_t>(vertex)] = true;
+  // Vertices that began inside and are not out yet.
+  std::vector<std::vector<bool>> inside(environment.obstacles.size(), std::vector<bool>(held.size(), false));
+  for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
+    for (std::size_t i = 0; i < held.size(); ++i)
+      inside[k][i] = depth_in(environment.obstacles[k], environment.state.positions.row(i), 0) > 1e-9;
+
+  double energy = 0, put_in = 0;
+  bool energy_known = false;
+  for (int step = 0; step < scene.steps; ++step) {
+    const State before = environment.state;
+    if (!energy_known) {
+      // The elastic energy of the start is that of the rest shape.
+      const Eigen::VectorXd mass = environment.material.areal_density * scene.sheet.vertex_area;
+      energy = 0.5 * (mass.asDiagonal() * before.velocities).cwiseProduct(before.velocities).sum();
+      for (int i = 0; i < mass.size(); ++i)
+        energy -= mass[i] * environment.gravity.dot(before.positions.row(i));
+      put_in = 0.5 * (mass.asDiagonal() * before.velocities).cwiseProduct(before.velocities).sum();
+      energy_known = true;
+    }
+    const StepReport report = solver.step(environment);
+    const State& after = environment.state;
+    found.finite = found.finite && after.positions.allFinite() && after.velocities.allFinite() &&
+                   std::isfinite(report.residual);
+    if (!found.finite) return found;
+    if (!report.converged) {
+      ++found.unconverged;
+      found.residual_max = std::max(found.residual_max, report.residual);
+    }
+    for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
+      for (std::size_t i = 0; i < held.size(); ++i) {
+        const Vector3d from = before.positions.row(i), to = after.positions.row(i);
+        const double depth = depth_in(environment.obstacles[k], to, after.time);
+        if (report.converged)
+          found.unseen_depth = std::max(found.unseen_depth, depth - report.penetration_max);
+        if (held[i]) continue;
+        if (inside[k][i]) {
+          const double out = (depth_in(environment.obstacles[k], from, before.time) - depth) / h;
+          if (depth_in(environment.obstacles[k], from, before.time) > 0)
+            found.exit_speed = std::max(found.exit_speed, out);
+          inside[k][i] = depth > 0;
+          continue;
+        }
+        if (!report.converged) continue;
+        found.free_depth = std::max(found.free_depth, depth);
+        found.crossed = std::max(
+            found.crossed, depth_on_the_way(environment.obstacles[k], from, to, before.time, after.time));
+      }
+
+    // Work of what moves the sheet: grippers and pushers here never turn.
+    double work = 0;
+    for (std::size_t k = 0; k < environment.grasps.size(); ++k)
+      work +=
+          report.grasp_forces[k].dot(data::pose_at(environment.grasps[k].gripper, after.time).translation() -
+                                     data::pose_at(environment.grasps[k].gripper, before.time).translation());
+    for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
+      if (const auto* box = std::get_if<Box>(&environment.obstacles[k].shape);
+          box != nullptr && !box->trajectory.times.empty())
+        work += report.obstacle_forces[k].dot(data::pose_at(box->trajectory, after.time).translation() -
+                                              data::pose_at(box->trajectory, before.time).translation());
+    const double now = moved_energy(environment, report), gain = now - energy - work;
+    // What falls puts in its weight's work, over the step.
+    put_in += std::max(work, 0.0);
+    const double falls = std::max(0.0, [&] {
+      double drop = 0;
+      const Eigen::VectorXd mass = environment.material.areal_density * scene.sheet.vertex_area;
+      for (int i = 0; i < mass.size(); ++i)
+        drop += mass[i] * environment.gravity.dot(after.positions.row(i) - before.positions.row(i));
+      return drop;
+    }());
+    put_in += falls;
+    if (report.converged && scene.kind != SceneKind::deep) {
+      found.energy_gain = std::max(found.energy_gain, gain);
+      found.energy_gain_share = std::max(found.energy_gain_share, gain / std::max(put_in, 1e-12));
+    }
+    energy = now;
+  }
+  return found;
+}
+
+}  // namespace flash::sim
