@@ -1,6 +1,7 @@
 #include "sim/active_set.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace flash::sim {
 
@@ -63,11 +64,12 @@ bool release(const Vector3d& force, VertexConstraint& c) {
   return true;
 }
 
-/// Holds a vertex on the touches that `step` drives it into. Returns whether on any.
-bool hold(const Vector3d& step, VertexConstraint& c) {
+/// Holds a vertex on the touches up to `reach` away that `step` drives it into. Returns whether on any.
+bool hold(const Vector3d& step, double reach, VertexConstraint& c) {
   bool any = false;
   for (Touch& touch : c.touches) {
-    if (touch.holds || touch.let_go || touch.gap + touch.normal.dot(step) >= -1e-12) continue;
+    if (touch.holds || touch.let_go || touch.gap > reach || touch.gap + touch.normal.dot(step) >= -1e-12)
+      continue;
     // Within the surfaces that hold already, up to the edge.
     const Vector3d inward = c.free * touch.normal;
     if (inward.squaredNorm() < 1e-6) continue;
@@ -91,9 +93,18 @@ bool exchange_contacts(const Points& direction, const Points& force_before, cons
     if (c.hold != Hold::free && release(force.row(i), c)) {
       gradient.row(i) = c.hold == Hold::free ? force_before.row(i) : residual_before.row(i);
       any = true;
-    } else if (c.hold != Hold::stick && hold(direction.row(i), c)) {
+    } else if (c.hold != Hold::stick && hold(direction.row(i), std::numeric_limits<double>::infinity(), c)) {
       any = true;
     }
+  }
+  return any;
+}
+
+bool hold_touching(const Points& direction, std::vector<VertexConstraint>& constraints) {
+  bool any = false;
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    VertexConstraint& c = constraints[i];
+    if (c.hold == Hold::free || c.hold == Hold::slip) any = hold(direction.row(i), touching_gap, c) || any;
   }
   return any;
 }

@@ -25,4 +25,8 @@ bool exchange_contacts(const data::Points& direction, const data::Points& force_
                        const data::Points& residual_before, const data::Points& force, data::Points& gradient,
                        std::vector<VertexConstraint>& constraints);
 
+/// Holds vertices on a surface that `direction` would take below it, and changes nothing else: directions of
+/// the problem that is left lead down, however short the step. Returns whether any.
+bool hold_touching(const data::Points& direction, std::vector<VertexConstraint>& constraints);
+
 }  // namespace flash::sim

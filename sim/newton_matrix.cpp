@@ -1,5 +1,6 @@
 #include "sim/newton_matrix.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -67,6 +68,79 @@ int NewtonMatrix::solve(const std::vector<VertexConstraint>& constraints, const 
                         double tolerance, Points& direction, Points& force) {
   return single_ ? conjugate_gradients(single_product_, constraints, gradient, tolerance, direction, force)
                  : conjugate_gradients(double_product_, constraints, gradient, tolerance, direction, force);
+}
+
+int NewtonMatrix::solve_coupled(const std::vector<VertexConstraint>& constraints, const Points& gradient,
+                                double tolerance, Points& direction, Points& force) {
+  return single_ ? generalized_minimal_residual(single_product_, constraints, gradient, tolerance, direction,
+                                                force)
+                 : generalized_minimal_residual(double_product_, constraints, gradient, tolerance, direction,
+                                                force);
+}
+
+template <typename Scalar>
+int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product,
+                                               const std::vector<VertexConstraint>& constraints,
+                                               const Points& gradient, double tolerance, Points& direction,
+                                               Points& force) {
+  constexpr int most = 40;
+  const std::vector<int>& position = elimination_position(*plan_->symbolic);
+  const long size = gradient.size();
+  Vector<Scalar> residual(size), x = Vector<Scalar>::Zero(size), image(size), preconditioned(size);
+  Vector<float> single(size);
+  std::vector<Restriction<Scalar>> free, coupled;
+  for (size_t i = 0; i < constraints.size(); ++i) {
+    residual.template segment<3>(3L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
+    const VertexConstraint& constraint = constraints[i];
+    if (constraint.hold == Hold::free) continue;
+    free.push_back({position[i], constraint.free.cast<Scalar>()});
+    coupled.push_back({position[i], (constraint.free + constraint.friction_coupling).cast<Scalar>()});
+    x.template segment<3>(3L * position[i]) = constraint.correction.cast<Scalar>();
+  }
+  restrict_to_free(free, residual);
+  if (!x.isZero(0)) {
+    product.multiply(x.data(), image.data());
+    restrict_to_free(coupled, image);
+    residual -= image;
+  }
+  const Scalar norm = residual.norm();
+  const Scalar target = std::max(Scalar(0.1) * norm, static_cast<Scalar>(tolerance));
+  int count = 0;
+  if (norm > target) {
+    Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> basis(size, most + 1), directions(size, most);
+    Eigen::MatrixXd hessenberg = Eigen::MatrixXd::Zero(most + 1, most);
+    Eigen::VectorXd weights;
+    basis.col(0) = residual / norm;
+    for (double left = norm; count < most && left > target;) {
+      precondition(factor_, basis.col(count), single, preconditioned);
+      restrict_to_free(free, preconditioned);
+      directions.col(count) = preconditioned;
+      product.multiply(preconditioned.data(), image.data());
+      restrict_to_free(coupled, image);
+      for (int k = 0; k <= count; ++k) {
+        hessenberg(k, count) = basis.col(k).dot(image);
+        image -= static_cast<Scalar>(hessenberg(k, count)) * basis.col(k);
+      }
+      const Scalar length = image.norm();
+      hessenberg(count + 1, count) = length;
+      if (length > 0) basis.col(count + 1) = image / length;
+      ++count;
+      Eigen::VectorXd right = Eigen::VectorXd::Zero(count + 1);
+      right[0] = norm;
+      const Eigen::MatrixXd small = hessenberg.topLeftCorner(count + 1, count);
+      weights = small.colPivHouseholderQr().solve(right);
+      left = (right - small * weights).norm();
+      if (!(length > 0)) break;
+    }
+    for (int k = 0; k < count; ++k) x += static_cast<Scalar>(weights[k]) * directions.col(k);
+  }
+  product.multiply(x.data(), image.data());
+  direction.resize(gradient.rows(), 3);
+  for (int i = 0; i < direction.rows(); ++i) {
+    direction.row(i) = x.template segment<3>(3L * position[i]).transpose().template cast<double>();
+    force.row(i) += image.template segment<3>(3L * position[i]).transpose().template cast<double>();
+  }
+  return count;
 }
 
 template <typename Scalar>

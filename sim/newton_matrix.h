@@ -32,7 +32,19 @@ class NewtonMatrix {
   int solve(const std::vector<VertexConstraint>& constraints, const data::Points& gradient, double tolerance,
             data::Points& direction, data::Points& force);
 
+  /// The same with friction forces that grow with the normal forces: of the matrix L A P, P the free
+  /// directions and L = P + sum_k mu_k d l_k^T, where d is the direction of slip and l_k . f the normal force
+  /// of a surface under the force f. Not symmetric: by GMRES (Saad and Schultz 1986).
+  int solve_coupled(const std::vector<VertexConstraint>& constraints, const data::Points& gradient,
+                    double tolerance, data::Points& direction, data::Points& force);
+
  private:
+  template <typename Scalar>
+  int generalized_minimal_residual(SheetProduct<Scalar>& product,
+                                   const std::vector<VertexConstraint>& constraints,
+                                   const data::Points& gradient, double tolerance, data::Points& direction,
+                                   data::Points& force);
+
   template <typename Scalar>
   int conjugate_gradients(SheetProduct<Scalar>& product, const std::vector<VertexConstraint>& constraints,
                           const data::Points& gradient, double tolerance, data::Points& direction,

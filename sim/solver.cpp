@@ -26,6 +26,7 @@ struct Iterate {
 };
 
 constexpr double rounding_tolerance = 1e-6;  ///< relative residual below which a shorter step is no help
+constexpr int coupled_after = 20;            ///< iterations
 constexpr double vertex_tolerance = 30;      ///< that of a vertex over that of the sheet
 constexpr double gap_tolerance = 1e-9;       ///< on gaps and complementarity [m]
 constexpr double energy_tolerance = 1e-2;    ///< on energy from nothing, of what there is to turn
@@ -107,15 +108,23 @@ void iterate_to_balance(const StepProblem& problem, Solver::Workspace& w, StepRe
     add_slip_stiffness(now.constraints, w.values);
     if (!stuck) add_surface_curvature(now.constraints, w.values);
     w.matrix.assign(w.values, sparse, bending, rigidity, problem.potential.mass().minCoeff() / (h * h));
+    // Friction at the normal forces of the iterate converges where these change little. In the parts of a
+    // step that could not be solved as one it goes round in circles at times: then both at once, by the
+    // residual.
+    const bool coupled = !stuck && h < w.settings.time_step && report.iterations > coupled_after;
     w.linear = now.constraints;
     w.gradient = now.residual;
     for (int exchange = 0; exchange < 6; ++exchange) {
       w.force = now.force;
-      const int solves =
-          w.matrix.solve(w.linear, w.gradient, 0.3 * tolerance * problem.force_scale, w.direction, w.force);
+      const double enough = 0.3 * tolerance * problem.force_scale;
+      const int solves = coupled ? w.matrix.solve_coupled(w.linear, w.gradient, enough, w.direction, w.force)
+                                 : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
       report.solves += solves;
       w.refactor = solves > w.settings.stale_factor_solves;
-      if (!exchange_contacts(w.direction, now.force, now.residual, w.force, w.gradient, w.linear)) break;
+      const bool changed =
+          stuck ? hold_touching(w.direction, w.linear)
+                : exchange_contacts(w.direction, now.force, now.residual, w.force, w.gradient, w.linear);
+      if (!changed) break;
     }
 
     // The potential guides the step; where the surface is curved or the normal forces change it is not exact,
@@ -133,7 +142,7 @@ void iterate_to_balance(const StepProblem& problem, Solver::Workspace& w, StepRe
     };
     double length = 1.0, after = move(length, trial);
     const auto acceptable = [&] {
-      return after <= before + 1e-4 * length * slope ||
+      return (!coupled && after <= before + 1e-4 * length * slope) ||
              trial.residual.norm() <= (1 - 0.1 * length) * now.residual.norm();
     };
     while (!acceptable() && length > 1e-3) after = move(length *= 0.5, trial);

@@ -13,8 +13,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double touching =
-    1e-10;  ///< gap up to which a vertex is on a surface: rounding of a projected position [m]
 constexpr double resting = 1e-13;  ///< slip up to which a vertex has not moved: rounding of a position [m]
 constexpr double smoothing =
     1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
@@ -60,6 +58,20 @@ Vector3d slip_of(const ContactStep& step, const VertexConstraint& constraint, co
   if (count > 2) return Vector3d::Zero();
   const Vector3d edge = normals[0].cross(normals[1]).normalized();
   return edge * edge.dot(against);
+}
+
+/// Gradient of sum mu_k lambda_k by the force on the vertex, over the surfaces that hold it.
+Vector3d bound_gradient(const Environment& environment, const std::vector<Touch>& touches) {
+  Eigen::Matrix3d normals = Matrix3d::Zero(), gram = Matrix3d::Identity();
+  Vector3d friction = Vector3d::Zero();
+  int count = 0;
+  for (const Touch& touch : touches) {
+    if (!touch.holds) continue;
+    normals.col(count) = touch.normal;
+    friction[count++] = friction_of(environment, touch);
+  }
+  gram.topLeftCorner(count, count) = normals.leftCols(count).transpose() * normals.leftCols(count);
+  return normals * gram.inverse() * friction;
 }
 
 /// Length of a slip as friction takes it, smooth where it starts [m].
@@ -206,7 +218,7 @@ void update_contacts(const ContactStep& step, const data::Points& positions, con
       released.touches = std::move(touches);
       constraint = std::move(released);
     }
-    const auto on_surface = [](const Touch& touch) { return touch.gap <= touching; };
+    const auto on_surface = [](const Touch& touch) { return touch.gap <= touching_gap; };
     if (std::none_of(touches.begin(), touches.end(), on_surface)) continue;
     std::vector<bool> eligible(touches.size());
     std::transform(touches.begin(), touches.end(), eligible.begin(), on_surface);
@@ -242,6 +254,8 @@ void update_contacts(const ContactStep& step, const data::Points& positions, con
       constraint.slip_direction = -needed_tangential / needed_length;
     }
     constraint.reaction = -bound * constraint.slip_direction;
+    constraint.friction_coupling =
+        constraint.slip_direction * bound_gradient(step.environment, touches).transpose();
     for (const Touch& touch : touches) constraint.reaction += touch.normal_force * touch.normal;
   }
 }
@@ -264,7 +278,7 @@ void project_vertex(const ContactStep& step, const VertexConstraint& constraint,
       // A vertex that is to land does so where the step is long enough to bring it down.
       const bool lands =
           !constraint.touches.empty() && constraint.touches[k].holds && gap.distance > 0 &&
-          (constraint.touches[k].gap <= touching || gap.distance <= 0.01 * constraint.touches[k].gap);
+          (constraint.touches[k].gap <= touching_gap || gap.distance <= 0.01 * constraint.touches[k].gap);
       if (!lands) continue;
       positions.row(i) -= gap.distance * gap.normal.transpose();
       moved = std::max(moved, gap.distance);

@@ -7,6 +7,9 @@
 
 namespace flash::sim {
 
+/// Gap up to which a vertex is on a surface: rounding of a projected position [m].
+inline constexpr double touching_gap = 1e-10;
+
 /// What a vertex may do at the current iterate of a step.
 enum class Hold {
   free,
@@ -37,6 +40,8 @@ struct VertexConstraint {
   Eigen::Vector3d reaction = Eigen::Vector3d::Zero();    ///< force on the vertex, always admissible [N]
   Eigen::Vector3d slip_direction =
       Eigen::Vector3d::Zero();  ///< slip / its smoothed length; unit where slip starts
+  /// How the friction force changes with the force on the vertex, by its normal forces.
+  Eigen::Matrix3d friction_coupling = Eigen::Matrix3d::Zero();
   double friction_bound = 0.0;  ///< sum of mu lambda_n [N]
   double slip_stiffness = 0.0;  ///< friction_bound / |slip|, of the friction force across the slip [N/m]
 };
