@@ -13,10 +13,7 @@ using Eigen::Vector3d;
 void add_slip_stiffness(const std::vector<VertexConstraint>& constraints, BlockValues<double>& values) {
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& c = constraints[i];
-    if (c.slip_stiffness == 0) continue;
-    Map<Matrix3d> block(values.data() + 9 * i);
-    block += c.slip_stiffness * c.free *
-             (Matrix3d::Identity() - c.slip_direction * c.slip_direction.transpose()) * c.free;
+    if (c.hold == Hold::slip) Map<Matrix3d>(values.data() + 9 * i) += c.free * c.slip_stiffness * c.free;
   }
 }
 

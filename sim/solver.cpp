@@ -186,7 +186,7 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
       report.complementarity = std::max(report.complementarity, -touch.gap);
       if (!touch.holds) continue;
       report.complementarity = std::max(report.complementarity, touch.gap);
-      report.obstacle_forces[touch.obstacle] += force_from(environment, c, touch);
+      report.obstacle_forces[touch.obstacle] += touch.normal_force * touch.normal + touch.friction;
     }
   }
   report.held_penetration = deepest_held(problem.contacts, end.constraints, end.positions);

@@ -60,22 +60,58 @@ Vector3d slip_of(const ContactStep& step, const VertexConstraint& constraint, co
   return edge * edge.dot(against);
 }
 
-/// Gradient of sum mu_k lambda_k by the force on the vertex, over the surfaces that hold it.
-Vector3d bound_gradient(const Environment& environment, const std::vector<Touch>& touches) {
-  Eigen::Matrix3d normals = Matrix3d::Zero(), gram = Matrix3d::Identity();
-  Vector3d friction = Vector3d::Zero();
+/// Length of a slip as friction takes it, smooth where it starts [m].
+double smooth_length(double length) { return std::sqrt(length * length + smoothing * smoothing); }
+
+/// Fills in the vertex's own slip against each touching surface. Returns the longest [m].
+double find_slips(const ContactStep& step, const data::Points& positions, int i,
+                  std::vector<Touch>& touches) {
+  double longest = 0;
+  for (Touch& touch : touches) {
+    if (touch.gap > touching_gap) continue;
+    const Vector3d moved = (positions.row(i) - step.environment.state.positions.row(i)).transpose() -
+                           step.gap(touch.obstacle, positions, i).surface_moved;
+    const Vector3d slip = moved - touch.normal * touch.normal.dot(moved);
+    longest = std::max(longest, slip.norm());
+    touch.slip = smooth_length(slip.norm());
+    touch.slip_direction = slip / touch.slip;
+  }
+  return longest;
+}
+
+/// Normal forces of surfaces that each rub against their own slip: the reaction is the sum of
+/// lambda_k (n_k - mu_k d_k).
+std::vector<double> rubbing_forces(const Environment& environment, const std::vector<Touch>& touches,
+                                   const std::vector<bool>& eligible, const Vector3d& needed) {
+  std::vector<Vector3d> normals, directions;
+  std::vector<double> along, forces(touches.size(), 0.0);
+  for (size_t k = 0; k < touches.size(); ++k) {
+    if (!eligible[k]) continue;
+    normals.push_back(touches[k].normal);
+    directions.push_back(touches[k].normal -
+                         friction_of(environment, touches[k]) * touches[k].slip_direction);
+    along.push_back(touches[k].normal.dot(needed));
+  }
+  const std::vector<double> found = complementary(normals, directions, along);
+  for (size_t k = 0, next = 0; k < touches.size(); ++k)
+    if (eligible[k]) forces[k] = found[next++];
+  return forces;
+}
+
+/// How the friction force of slipping surfaces changes with the force on the vertex: the sum of mu_k d_k
+/// l_k^T, where l_k . f is the normal force of surface k under the force f.
+Matrix3d coupling_of(const Environment& environment, const std::vector<Touch>& touches) {
+  Matrix3d normals = Matrix3d::Zero(), rubs = Matrix3d::Zero(), gram = Matrix3d::Identity();
   int count = 0;
   for (const Touch& touch : touches) {
     if (!touch.holds) continue;
     normals.col(count) = touch.normal;
-    friction[count++] = friction_of(environment, touch);
+    rubs.col(count++) = friction_of(environment, touch) * touch.slip_direction;
   }
-  gram.topLeftCorner(count, count) = normals.leftCols(count).transpose() * normals.leftCols(count);
-  return normals * gram.inverse() * friction;
+  gram.topLeftCorner(count, count) =
+      normals.leftCols(count).transpose() * (normals.leftCols(count) - rubs.leftCols(count));
+  return rubs * gram.inverse() * normals.transpose();
 }
-
-/// Length of a slip as friction takes it, smooth where it starts [m].
-double smooth_length(double length) { return std::sqrt(length * length + smoothing * smoothing); }
 
 }  // namespace
 
@@ -90,7 +126,8 @@ Matrix3d along_surfaces(const std::vector<Touch>& touches) {
   return edge * edge.transpose();
 }
 
-std::vector<double> complementary(const std::vector<Vector3d>& normals, const std::vector<double>& b) {
+std::vector<double> complementary(const std::vector<Vector3d>& normals,
+                                  const std::vector<Vector3d>& directions, const std::vector<double>& b) {
   const int count = static_cast<int>(normals.size());
   std::vector<double> best(normals.size(), 0.0);
   double largest = 0, best_violation = 0;
@@ -105,13 +142,14 @@ std::vector<double> complementary(const std::vector<Vector3d>& normals, const st
     Vector3d right = Vector3d::Zero();
     for (int r = 0; r < size; ++r) {
       right[r] = b[faces[r]];
-      for (int c = 0; c < size; ++c) gram(r, c) = normals[faces[r]].dot(normals[faces[c]]);
+      for (int c = 0; c < size; ++c) gram(r, c) = normals[faces[r]].dot(directions[faces[c]]);
     }
-    if (gram.determinant() < 1e-6) return;  // faces that point the same way, or against each other
+    // Faces that point the same way, or against each other.
+    if (std::abs(gram.determinant()) < 1e-6) return;
     const Vector3d x = gram.inverse() * right;
     if (x.head(size).minCoeff() < 0) return;
     Vector3d sum = Vector3d::Zero();
-    for (int r = 0; r < size; ++r) sum += x[r] * normals[faces[r]];
+    for (int r = 0; r < size; ++r) sum += x[r] * directions[faces[r]];
     double violation = 0;
     for (int k = 0; k < count; ++k) violation = std::max(violation, b[k] - normals[k].dot(sum));
     if (violation >= best_violation - rounding) return;
@@ -145,19 +183,9 @@ std::vector<double> normal_forces(const std::vector<Touch>& touches, const std::
     normals.push_back(touches[k].normal);
     along.push_back(touches[k].normal.dot(needed));
   }
-  const std::vector<double> found = complementary(normals, along);
+  const std::vector<double> found = complementary(normals, normals, along);
   for (size_t k = 0; k < those.size(); ++k) forces[those[k]] = found[k];
   return forces;
-}
-
-Vector3d force_from(const Environment& environment, const VertexConstraint& constraint, const Touch& touch) {
-  if (!touch.holds) return Vector3d::Zero();
-  Vector3d friction = constraint.reaction;
-  for (const Touch& each : constraint.touches) friction -= each.normal_force * each.normal;
-  const double share = constraint.friction_bound > 0
-                           ? friction_of(environment, touch) * touch.normal_force / constraint.friction_bound
-                           : 0.0;
-  return touch.normal_force * touch.normal + share * friction;
 }
 
 ContactStep::ContactStep(const Environment& environment_in, double time_step_in, double exit_speed_in)
@@ -222,41 +250,54 @@ void update_contacts(const ContactStep& step, const data::Points& positions, con
     if (std::none_of(touches.begin(), touches.end(), on_surface)) continue;
     std::vector<bool> eligible(touches.size());
     std::transform(touches.begin(), touches.end(), eligible.begin(), on_surface);
-    const std::vector<double> normal = normal_forces(touches, eligible, needed);
-    bool held = false;
+    const bool slipped = find_slips(step, positions, static_cast<int>(i), touches) > resting;
+    const bool several = std::count(eligible.begin(), eligible.end(), true) > 1;
+    const std::vector<double> normal = slipped && several
+                                           ? rubbing_forces(step.environment, touches, eligible, needed)
+                                           : normal_forces(touches, eligible, needed);
+    int held = 0;
     for (size_t k = 0; k < touches.size(); ++k) {
       touches[k].holds = normal[k] > 0;
       touches[k].normal_force = normal[k];
-      if (touches[k].holds)
-        constraint.friction_bound += friction_of(step.environment, touches[k]) * normal[k];
-      held = held || touches[k].holds;
+      if (!touches[k].holds) continue;
+      constraint.friction_bound += friction_of(step.environment, touches[k]) * normal[k];
+      ++held;
     }
-    if (!held) continue;
+    if (held == 0) continue;
 
     const double bound = constraint.friction_bound;
     const Matrix3d along = along_surfaces(touches);
     const Vector3d needed_tangential = along * needed;
-    const Vector3d slip = slip_of(step, constraint, positions, static_cast<int>(i));
-    const double slip_length = slip.norm(), needed_length = needed_tangential.norm();
-    if (slip_length <= resting && needed_length <= bound) {
+    if (!slipped && needed_tangential.norm() <= bound) {
       constraint.hold = Hold::stick;
       constraint.free.setZero();
       constraint.reaction = needed;
+      for (Touch& touch : touches)
+        if (touch.holds && bound > 0)
+          touch.friction =
+              friction_of(step.environment, touch) * touch.normal_force / bound * needed_tangential;
       continue;
     }
     constraint.hold = Hold::slip;
     constraint.free = along;
-    if (slip_length > resting) {
-      const double length = smooth_length(slip_length);
-      constraint.slip_direction = slip / length;
-      constraint.slip_stiffness = bound / length;
+    if (slipped) {
+      const Vector3d slip = slip_of(step, constraint, positions, static_cast<int>(i));
+      constraint.slip_direction = slip / smooth_length(slip.norm());
+      constraint.friction_coupling = coupling_of(step.environment, touches);
     } else {
-      constraint.slip_direction = -needed_tangential / needed_length;
+      constraint.slip_direction = -needed_tangential / needed_tangential.norm();
     }
-    constraint.reaction = -bound * constraint.slip_direction;
-    constraint.friction_coupling =
-        constraint.slip_direction * bound_gradient(step.environment, touches).transpose();
-    for (const Touch& touch : touches) constraint.reaction += touch.normal_force * touch.normal;
+    for (Touch& touch : touches) {
+      if (!touch.holds) continue;
+      const double own_bound = friction_of(step.environment, touch) * touch.normal_force;
+      const Vector3d& direction = slipped ? touch.slip_direction : constraint.slip_direction;
+      touch.friction = -own_bound * direction;
+      constraint.reaction += touch.normal_force * touch.normal + touch.friction;
+      if (slipped)
+        constraint.slip_stiffness += own_bound / touch.slip *
+                                     (Matrix3d::Identity() - touch.normal * touch.normal.transpose() -
+                                      direction * direction.transpose());
+    }
   }
 }
 
@@ -292,7 +333,7 @@ void project_vertex(const ContactStep& step, const VertexConstraint& constraint,
         moved = depths[0];
       }
     } else {
-      const std::vector<double> x = complementary(normals, depths);
+      const std::vector<double> x = complementary(normals, normals, depths);
       Vector3d way = Vector3d::Zero();
       for (size_t k = 0; k < count; ++k) way += x[k] * normals[k];
       positions.row(i) += way.transpose();
@@ -329,9 +370,15 @@ double friction_potential(const ContactStep& step, const std::vector<VertexConst
   for (size_t i = 0; i < constraints.size(); ++i) {
     const VertexConstraint& constraint = constraints[i];
     if (constraint.friction_bound == 0) continue;
-    const Vector3d slip = slip_of(step, constraint, positions, static_cast<int>(i));
-    potential += constraint.friction_bound *
-                 (constraint.slip_stiffness > 0 ? smooth_length(slip.norm()) : slip.norm());
+    for (const Touch& touch : constraint.touches) {
+      if (!touch.holds) continue;
+      const Gap gap = step.gap(touch.obstacle, positions, static_cast<int>(i));
+      const Vector3d moved =
+          (positions.row(i) - step.environment.state.positions.row(i)).transpose() - gap.surface_moved;
+      const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
+      potential += friction_of(step.environment, touch) * touch.normal_force *
+                   (constraint.slip_stiffness.isZero(0) ? slip : smooth_length(slip));
+    }
   }
   return potential;
 }

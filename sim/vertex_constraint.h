@@ -26,8 +26,11 @@ struct Touch {
   double gap = 0.0;         ///< [m]
   double sunk = 0.0;        ///< as in Gap [m]
   double normal_force = 0;  ///< lambda_n of an obstacle that holds [N]
+  double slip = 0.0;        ///< length of the slip against it in this step, as friction takes it [m]
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  Eigen::Vector3d curved = Eigen::Vector3d::Zero();  ///< as in Gap
+  Eigen::Vector3d curved = Eigen::Vector3d::Zero();          ///< as in Gap
+  Eigen::Vector3d slip_direction = Eigen::Vector3d::Zero();  ///< of its own slip, over `slip`
+  Eigen::Vector3d friction = Eigen::Vector3d::Zero();        ///< its friction force on the vertex [N]
 };
 
 /// The constraint on one vertex at the current iterate of a step.
@@ -39,11 +42,12 @@ struct VertexConstraint {
   Eigen::Matrix3d free = Eigen::Matrix3d::Identity();    ///< projector on the directions it may move in
   Eigen::Vector3d reaction = Eigen::Vector3d::Zero();    ///< force on the vertex, always admissible [N]
   Eigen::Vector3d slip_direction =
-      Eigen::Vector3d::Zero();  ///< slip / its smoothed length; unit where slip starts
+      Eigen::Vector3d::Zero();  ///< of the slip that is free to go on, over its length
   /// How the friction force changes with the force on the vertex, by its normal forces.
   Eigen::Matrix3d friction_coupling = Eigen::Matrix3d::Zero();
   double friction_bound = 0.0;  ///< sum of mu lambda_n [N]
-  double slip_stiffness = 0.0;  ///< friction_bound / |slip|, of the friction force across the slip [N/m]
+  /// How the friction force turns with the slip: the sum of mu lambda_n / |slip| across it [N/m].
+  Eigen::Matrix3d slip_stiffness = Eigen::Matrix3d::Zero();
 };
 
 /// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
@@ -66,21 +70,19 @@ struct ContactStep {
 /// Projector on the directions along all surfaces that hold the vertex: a plane, the edge of two, or nothing.
 Eigen::Matrix3d along_surfaces(const std::vector<Touch>& touches);
 
-/// The x >= 0 with y = N^T N x - b >= 0 and x . y = 0, N the unit `normals` as columns: of at most three of
-/// them that are independent. Where there is none (faces that press against each other), what comes nearest.
-/// As forces, with b = N^T f: the non-negative ones that come nearest to f. As a displacement N x, with b
-/// minus the gaps: the shortest that closes all of them.
-std::vector<double> complementary(const std::vector<Eigen::Vector3d>& normals, const std::vector<double>& b);
+/// The x >= 0 with y = N^T C x - b >= 0 and x . y = 0 (a linear complementarity problem), N the unit
+/// `normals` as columns and C the `directions`: of at most three of them that are independent. Where there is
+/// none (faces that press against each other), what comes nearest. As forces, with b = N^T f and C = N: the
+/// non-negative ones that come nearest to f. As a displacement N x, with b minus the gaps: the shortest that
+/// closes all of them.
+std::vector<double> complementary(const std::vector<Eigen::Vector3d>& normals,
+                                  const std::vector<Eigen::Vector3d>& directions,
+                                  const std::vector<double>& b);
 
 /// Normal forces of the touches without friction between them: the non-negative ones of least squares for
 /// `needed` [N]. A touch whose `eligible` is false takes none.
 std::vector<double> normal_forces(const std::vector<Touch>& touches, const std::vector<bool>& eligible,
                                   const Eigen::Vector3d& needed);
-
-/// The part of the reaction that an obstacle contributes; friction is shared in proportion to mu lambda_n
-/// [N].
-Eigen::Vector3d force_from(const Environment& environment, const VertexConstraint& constraint,
-                           const Touch& touch);
 
 /// Held vertices by the environment's supports and grasps at the end of the step; moves them to where they
 /// have to be, and every other vertex out of the obstacles.
@@ -89,7 +91,8 @@ std::vector<VertexConstraint> begin_step(const ContactStep& step, data::Points& 
 /// Decides from the iterate alone what holds each vertex. `force` is what it needs from outside to obey its
 /// equation of motion [N]. A vertex on a surface is held while it needs a push. It sticks where it has not
 /// slipped in this step and needs a friction force inside the cone; else the force is on the rim, against the
-/// slip. Between two surfaces it moves along their edge alone, where both rub; between three, not at all.
+/// slip. Of several surfaces each rubs against its own slip, which enters the normal forces of the others;
+/// the vertex moves along the edge of two alone, and between three not at all.
 void update_contacts(const ContactStep& step, const data::Points& positions, const data::Points& force,
                      std::vector<VertexConstraint>& constraints);
 

@@ -215,16 +215,40 @@ double depth_in(const Obstacle& obstacle, const Vector3d& point, double time) {
   return (box.half_extents - (pose.inverse() * point).cwiseAbs()).minCoeff();
 }
 
-/// Of the straight way from `from` to `to`, seen from the obstacle as it moves.
-double depth_on_the_way(const Obstacle& obstacle, const Vector3d& from, const Vector3d& to, double from_time,
-                        double to_time) {
-  double deepest = -1;
+/// Whether the straight way from `from` to `to`, seen from the obstacle as it moves, goes through it: in by
+/// one face of a box and out by the one behind, or past the axis of a cylinder.
+bool goes_through(const Obstacle& obstacle, const Vector3d& from, const Vector3d& to, double from_time,
+                  double to_time) {
+  bool inside = false;
   for (int k = 0; k <= 400; ++k) {
     const double share = k / 400.0;
-    deepest = std::max(
-        deepest, depth_in(obstacle, from + share * (to - from), from_time + share * (to_time - from_time)));
+    inside = inside ||
+             depth_in(obstacle, from + share * (to - from), from_time + share * (to_time - from_time)) > 1e-6;
   }
-  return deepest;
+  if (!inside) return false;
+  if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
+    const auto radial = [&](const Vector3d& x) {
+      return Vector3d((x - cylinder->point) - cylinder->axis * cylinder->axis.dot(x - cylinder->point));
+    };
+    return depth_in(obstacle, to, to_time) < 0 && radial(from).dot(radial(to)) < 0;
+  }
+  const auto* box = std::get_if<Box>(&obstacle.shape);
+  if (box == nullptr) return false;
+  const bool moves = !box->trajectory.times.empty();
+  const Vector3d start = (moves ? data::pose_at(box->trajectory, from_time) : box->pose).inverse() * from,
+                 end = (moves ? data::pose_at(box->trajectory, to_time) : box->pose).inverse() * to;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double half = box->half_extents[axis];
+    // Where it stands beside the box at the start or at the end, it went round an edge.
+    const auto beside = [&](const Vector3d& x) {
+      return std::abs(x[(axis + 1) % 3]) > box->half_extents[(axis + 1) % 3] ||
+             std::abs(x[(axis + 2) % 3]) > box->half_extents[(axis + 2) % 3];
+    };
+    if (start[axis] * end[axis] < 0 && std::abs(start[axis]) > half - 1e-9 &&
+        std::abs(end[axis]) > half - 1e-9 && !beside(start) && !beside(end))
+      return true;
+  }
+  return false;
 }
 
 double moved_energy(const Environment& environment, const StepReport& report) {
@@ -311,8 +335,7 @@ SceneFindings observe(RandomScene scene) {
         }
         if (!report.converged) continue;
         found.free_depth = std::max(found.free_depth, depth);
-        found.crossed = std::max(
-            found.crossed, depth_on_the_way(environment.obstacles[k], from, to, before.time, after.time));
+        found.crossed += goes_through(environment.obstacles[k], from, to, before.time, after.time);
       }
 
     // Work of what moves the sheet: grippers and pushers here never turn.

@@ -1,0 +1,34 @@
+#include "tests/sim/random_scenes.h"
+
+#include <gtest/gtest.h>
+
+namespace flash::sim {
+namespace {
+
+/// Forty of the scenes of `make random-scenes`, which draws a thousand.
+TEST(RandomScenes, AreSolvedOrSaidNotToBe) {
+  int unsolved = 0;
+  for (unsigned long seed = 20001; seed <= 20040; ++seed) {
+    const SceneFindings found = observe(random_scene(seed));
+    EXPECT_TRUE(found.finite) << seed;
+    EXPECT_LT(found.unseen_depth, 1e-4) << seed;
+    EXPECT_LT(found.free_depth, 1e-9) << seed;
+    EXPECT_EQ(found.crossed, 0) << seed;
+    EXPECT_LT(found.energy_gain_share, 1e-2) << seed;
+    if (found.unconverged > 0) {
+      ++unsolved;
+    } else {
+      EXPECT_LT(found.exit_speed, 1.1) << seed;
+    }
+  }
+  EXPECT_LE(unsolved, 1);  // 2 % of the scenes
+}
+
+TEST(RandomScenes, TheSameSeedIsTheSameScene) {
+  const SceneFindings first = observe(random_scene(7)), again = observe(random_scene(7));
+  EXPECT_EQ(first.energy_gain, again.energy_gain);
+  EXPECT_EQ(first.free_depth, again.free_depth);
+}
+
+}  // namespace
+}  // namespace flash::sim
