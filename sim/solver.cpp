@@ -191,14 +191,16 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
   }
   report.held_penetration = deepest_held(problem.contacts, end.constraints, end.positions);
   report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
-  if (report.penetration_max > 0) {
-    for (size_t i = 0; i < end.constraints.size(); ++i)
-      for (size_t k = 0; end.constraints[i].hold != Hold::fixed && k < environment.obstacles.size(); ++k) {
-        const Gap gap = problem.contacts.gap(int(k), environment.state.positions, int(i));
-        const double depth = gap.sunk - gap.distance;
-        if (depth > gap_tolerance && depth > report.start_penetration.depth)
-          report.start_penetration = {depth, int(i), int(k)};
-      }
+  for (size_t k = 0; k < environment.obstacles.size(); ++k) {
+    ObstacleMotion at_start = problem.contacts.motions[k];
+    at_start.end = at_start.start;
+    for (size_t i = 0; i < end.constraints.size(); ++i) {
+      if (end.constraints[i].hold == Hold::fixed) continue;
+      const double depth =
+          -gap_to(environment.obstacles[k], at_start, environment.state.positions.row(int(i))).distance;
+      if (depth > gap_tolerance && depth > report.start_penetration.depth)
+        report.start_penetration = {depth, int(i), int(k)};
+    }
   }
 }
 

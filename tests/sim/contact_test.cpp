@@ -238,5 +238,151 @@ TEST(Contact, AStripFallenIntoAGrooveIsCarriedByBothSides) {
   EXPECT_LT(report.penetration_max, 1e-9);
 }
 
+TEST(Contact, AFastSheetStaysOnAThinBoardAndAPeg) {
+  // 20 m/s: 20 and 200 mm a step, onto 1 mm, and onto a peg of 8 mm.
+  const Sheet sheet = small_sheet(8, 0.12);
+  for (const double time_step : {0.001, 0.01}) {
+    for (const bool board : {true, false}) {
+      Environment environment = environment_of(sheet);
+      environment.state.positions.col(2).array() += 0.05;
+      environment.state.velocities.col(2).setConstant(-20);
+      if (board)
+        environment.obstacles = {{Box{.half_extents = {0.2, 0.2, 0.0005}}}};
+      else
+        environment.obstacles = {{Cylinder{{0.06, 0, -0.004}, Vector3d::UnitY(), 0.004}}};
+      Solver solver(sheet, {.time_step = time_step});
+      for (int n = 0; n < int(0.04 / time_step); ++n) {
+        const data::Points before = environment.state.positions;
+        const StepReport report = solver.step(environment);
+        EXPECT_LT(report.penetration_max, 1e-9);
+        if (board) {
+          EXPECT_TRUE(report.converged) << time_step;
+          EXPECT_GT(environment.state.positions.col(2).minCoeff(), 0.0005 - 1e-9);
+        } else if (report.converged && report.substeps == 1) {
+          // No vertex from above the peg's axis to below it within its width.
+          for (int i = 0; i < before.rows(); ++i)
+            EXPECT_FALSE(std::abs(before(i, 0) - 0.06) < 0.003 &&
+                         std::abs(environment.state.positions(i, 0) - 0.06) < 0.003 && before(i, 2) > 0 &&
+                         environment.state.positions(i, 2) < -0.004);
+        }
+      }
+    }
+  }
+}
+
+TEST(Contact, AFastPlateTakesTheSheetAlong) {
+  // A plate of 1 mm at 10 m/s: 100 mm a step.
+  const Sheet sheet = small_sheet(6, 0.06);
+  Environment environment = environment_of(sheet);
+  environment.gravity.setZero();
+  Box plate{.half_extents = {0.1, 0.1, 0.0005}};
+  for (const double t : {0.0, 1.0}) {
+    plate.trajectory.times.push_back(t);
+    plate.trajectory.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(0.03, 0.03, 10 * t - 0.02)));
+  }
+  environment.obstacles = {{plate}};
+  Solver solver(sheet, {});
+  for (int n = 1; n <= 5; ++n) {
+    EXPECT_TRUE(solver.step(environment).converged);
+    EXPECT_GT(environment.state.positions.col(2).minCoeff(), 0.1 * n - 0.02 + 0.0005 - 1e-9);
+  }
+}
+
+TEST(Contact, AHandBelowTheTableIsReported) {
+  const Sheet sheet = small_sheet(6, 0.12);
+  Environment environment = environment_of(sheet);
+  environment.obstacles = {{Plane{}}};
+  Grasp grasp;
+  grasp.vertices = {0, 1};
+  for (const double t : {0.0, 0.1}) {
+    grasp.gripper.times.push_back(t);
+    grasp.gripper.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(0, 0, -0.8 * t)));
+  }
+  environment.grasps = {grasp};
+  Solver solver(sheet, {});
+  StepReport report;
+  for (int n = 0; n < 10; ++n) report = solver.step(environment);
+  EXPECT_NEAR(report.held_penetration.depth, 0.08, 1e-9);
+  EXPECT_NEAR(report.penetration_max, 0.08, 1e-9);
+  EXPECT_LE(report.held_penetration.vertex, 1);
+  EXPECT_EQ(report.held_penetration.obstacle, 0);
+}
+
+TEST(Contact, WhatStartsInsideComesOutSlowly) {
+  const Sheet sheet = small_sheet(6, 0.12);
+  for (const double depth : {0.001, 0.1, 0.5}) {
+    Environment environment = environment_of(sheet);
+    environment.obstacles = {{Plane{}}};
+    environment.state.positions.col(2).array() -= depth;
+    Solver solver(sheet, {});
+    double fastest = 0;
+    StepReport report;
+    for (int n = 0; n < 70; ++n) {
+      report = solver.step(environment);
+      EXPECT_TRUE(report.converged);
+      if (n == 0) {
+        EXPECT_NEAR(report.start_penetration.depth, depth, 1e-9);
+      }
+      fastest = std::max(fastest, environment.state.velocities.col(2).maxCoeff());
+    }
+    EXPECT_LT(fastest, 1 + 1e-9);
+    EXPECT_LT(report.penetration_max, 1e-9);
+  }
+}
+
+TEST(Contact, ASheetInACornerOfThreeSurfacesIsSolved) {
+  const Sheet sheet = small_sheet(6, 0.12);
+  for (const double friction : {0.0, 0.3}) {
+    Environment environment = environment_of(sheet);
+    environment.material.friction = friction;
+    environment.material.bending_rigidity = 1e-4;
+    environment.gravity = 9.81 * Vector3d(-0.5, -0.4, -0.7).normalized();
+    environment.state.positions.array() += 0.02;
+    environment.obstacles = {{Plane{}},
+                             {Plane{Vector3d::Zero(), Vector3d::UnitX()}},
+                             {Plane{Vector3d::Zero(), Vector3d::UnitY()}}};
+    Solver solver(sheet, {});
+    int converged = 0;
+    StepReport report;
+    for (int n = 0; n < 200; ++n) converged += (report = solver.step(environment)).converged;
+    EXPECT_EQ(converged, 200) << friction;
+    EXPECT_LT(report.penetration_max, 1e-9);
+    const Vector3d carried =
+        report.obstacle_forces[0] + report.obstacle_forces[1] + report.obstacle_forces[2];
+    const double mass = weight_of(sheet, environment) / 9.81;
+    // At rest but for what still swings.
+    EXPECT_LT((carried + mass * environment.gravity).norm(), 0.1 * mass * 9.81) << friction;
+  }
+}
+
+TEST(Contact, NoEnergyComesOfAnImpactOfAStiffSheetInLongSteps) {
+  // What bent and stretched at impact gave back many times what there was.
+  const Sheet sheet = small_sheet(6, 0.12);
+  for (const double stiffness : {1e3, 1e5}) {
+    Environment environment = environment_of(sheet);
+    environment.material = {.constitutive = data::Constitutive::tri_arap,
+                            .membrane_stiffness = stiffness,
+                            .bending_rigidity = 1e-5,
+                            .friction = 0};
+    environment.obstacles = {{Plane{}}};
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.2, Vector3d(1, 0.3, 0).normalized()).matrix();
+    environment.state.positions = environment.state.positions * turn.transpose();
+    environment.state.positions.col(2).array() += 0.002 - environment.state.positions.col(2).minCoeff();
+    environment.state.velocities.col(2).setConstant(-1);
+    Solver solver(sheet, {.time_step = 0.02});
+    double energy = 0.5 * weight_of(sheet, environment) / 9.81;
+    for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
+      energy += environment.material.areal_density * sheet.vertex_area[i] * 9.81 *
+                environment.state.positions(i, 2);
+    for (int n = 0; n < 40; ++n) {
+      const StepReport report = solver.step(environment);
+      EXPECT_TRUE(report.converged);
+      const double now = report.kinetic + report.membrane + report.bending + report.potential;
+      EXPECT_LT(now, 1.01 * energy);
+      energy = now;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace flash::sim
