@@ -14,8 +14,8 @@ using Triangle = std::array<int, 3>;
 /// The corner of all triangles outside the hull: a vertex at infinity, so that hull edges need no rounding.
 constexpr int kGhost = -1;
 
-/// Points on a lattice of 2^30 steps along the longer side of their box: sums and products of its whole numbers
-/// below are exact, which those of doubles are not.
+/// Points on a lattice of 2^30 steps along the longer side of their box: sums and products of its whole
+/// numbers below are exact, which those of doubles are not.
 using Node = Eigen::Matrix<std::int64_t, 2, 1>;
 __extension__ using Exact = __int128;
 
@@ -38,7 +38,8 @@ std::int64_t turn(const Node& a, const Node& b, const Node& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
-/// Whether p lies inside the circle through the counter-clockwise a, b, c; not on it. At most 2^124 is added up.
+/// Whether p lies inside the circle through the counter-clockwise a, b, c; not on it. At most 2^124 is added
+/// up.
 bool in_circle(const Node& a, const Node& b, const Node& c, const Node& p) {
   return Exact(turn(p, b, c)) * (a - p).squaredNorm() + Exact(turn(p, c, a)) * (b - p).squaredNorm() +
              Exact(turn(p, a, b)) * (c - p).squaredNorm() >
