@@ -89,9 +89,10 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--trajectory", import.trajectory, "T_base_gripper, TUM or CSV")->required();
   verb->add_option("--times", import.times,
                    "rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
-  CLI::Option* sheet = verb->add_option("--sheet", import.sheet,
-                                        "WIDTHxHEIGHT [m], as 0.278x0.278: from the grasped corner, "
-                                        "the width is on the right hand, seen from above");
+  CLI::Option* sheet =
+      verb->add_option("--sheet", import.sheet,
+                       "WIDTHxHEIGHT [m], as 0.3x0.24; from corner 0,0 or 1,1, seen from above, the "
+                       "width is on the right hand");
   verb->add_option("--mesh", import.mesh, "Mesh specification or file, in place of --sheet")->excludes(sheet);
   verb->add_option("--cell", import.cell, "Of the sheet's mesh [m]")
       ->check(CLI::PositiveNumber)

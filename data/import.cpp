@@ -159,27 +159,40 @@ std::vector<Eigen::Vector2d> lying_points(const Recording& recording,
   return thinned;
 }
 
-/// Whether a rectangle with its sides changed over lies under the first clouds where this one does not.
+/// Whether the first clouds, of a sheet that still lies, fit it better with its sides changed over or turned.
 std::vector<std::string> compare_sides(const Recording& recording, const std::vector<Keyframe>& keyframes,
                                        double heading) {
   const Points& rest = recording.mesh.vertices;
   const std::array<int, 2> corner = *recording.grasps[0].select.corner;
   const Eigen::RowVector3d size = rest.colwise().maxCoeff() - rest.colwise().minCoeff();
   const std::vector<Eigen::Vector2d> points = lying_points(recording, keyframes);
-  if (!recording.mesh_spec.starts_with("sheet:") || points.empty()) return {};
+  if (!recording.mesh_spec.starts_with("sheet:")) return {};
+  if (points.empty() && size.x() == size.y()) return {};
+  if (points.empty())
+    return {
+        "import: --sheet: no cloud shows the sheet before the gripper moves, so its sides cannot be "
+        "checked: " +
+        format_short(corner[0] == corner[1] ? size.x() : size.y()) +
+        " m are on the right hand, from the grasped corner and seen from above"};
   LyingSheet given{(recording.base_from_object * corner_of(rest, corner).transpose()).head<2>(), size.x(),
                    size.y(), heading};
   if (corner[0] != corner[1]) std::swap(given.right, given.left);
   LyingSheet swapped = given;
   std::swap(swapped.right, swapped.left);
-  const double as_given = distance_to(turned_to(given, points), points);
+  const LyingSheet fitted = turned_to(given, points);
+  const double as_given = distance_to(fitted, points);
   const double as_swapped = distance_to(turned_to(swapped, points), points);
   constexpr double clear = 0.002;  // below it, noise decides [m]
-  if (!(as_swapped < 0.5 * as_given) || as_given - as_swapped < clear) return {};
-  return {"--sheet: with the sides changed over, " + format_short(size.y()) + "x" + format_short(size.x()) +
-          ", the sheet is " + format_short(1000 * as_swapped) +
-          " mm from what the first clouds show of it, " + "as given " + format_short(1000 * as_given) +
-          " mm: change the sides over, or name another corner with --grasp corner:I,J"};
+  if (as_swapped < 0.5 * as_given && as_given - as_swapped > clear)
+    return {"import: warning: --sheet: with the sides changed over, " + format_short(size.y()) + "x" +
+            format_short(size.x()) + ", the sheet is " + format_short(1000 * as_swapped) +
+            " mm from what the first clouds show of it, as given " + format_short(1000 * as_given) +
+            " mm: change the sides over, or name another corner with --grasp corner:I,J"};
+  constexpr double good = 0.008;  // what a cloud of 10 mm between its points is from its sheet [m]
+  const double turn = (fitted.heading - heading) * 180 / std::numbers::pi;
+  if (as_given > good || std::abs(turn) < 1.5) return {};
+  return {"import: what the first clouds show of the lying sheet fits best with --heading " +
+          format_short(fitted.heading * 180 / std::numbers::pi)};
 }
 
 /// Loads the recording as its users will, which checks it; what is wrong is not yet in a file of the user.
