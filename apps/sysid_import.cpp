@@ -33,10 +33,17 @@ Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
     const auto number =
         words.size() == 1 || words.size() == 3 ? data::parse_number(words[word]) : std::nullopt;
     if (!number || !(*number >= 0) || !std::isfinite(*number))
-      throw data::InputError("--offset: expected one bound or three, x,y,z, in metres, as 0.06");
+      throw data::InputError("--offset: found \"" + (words.empty() ? "" : words[word]) +
+                             "\", expected one bound or three, x,y,z, in metres, as 0.06");
     bounds[k] = *number;
   }
   return bounds;
+}
+
+void expect_finite(const char* option, double value) {
+  if (!std::isfinite(value))
+    throw data::InputError(std::string(option) + ": found " + data::format_short(value) +
+                           ", expected a finite number");
 }
 
 int run_import(const CLI::App& verb, ImportVerbOptions options) {
@@ -48,8 +55,8 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   if (options.shape == "pinch") import.shape = data::GraspShape::pinch;
   if (verb.count("--within") > 0) import.within = options.within;
   if (verb.count("--table-height") > 0) import.table_height = options.table_height;
-  if (!std::isfinite(options.heading_degrees) || !std::isfinite(options.table_height))
-    throw data::InputError("--heading, --table-height: expected finite numbers");
+  expect_finite("--heading", options.heading_degrees);
+  expect_finite("--table-height", options.table_height);
   if (verb.count("--heading") > 0) import.heading = options.heading_degrees * M_PI / 180;
 
   const data::Recording recording = data::import_recording(import);

@@ -167,8 +167,9 @@ std::vector<std::string> compare_sides(const Recording& recording, const std::ve
   const Eigen::RowVector3d size = rest.colwise().maxCoeff() - rest.colwise().minCoeff();
   const std::vector<Eigen::Vector2d> points = lying_points(recording, keyframes);
   if (!recording.mesh_spec.starts_with("sheet:")) return {};
-  if (points.empty() && size.x() == size.y()) return {};
-  if (points.empty())
+  constexpr std::size_t fewest = 50;  // else it is stray points that show
+  if (points.size() < fewest && size.x() == size.y()) return {};
+  if (points.size() < fewest)
     return {
         "import: --sheet: no cloud shows the sheet before the gripper moves, so its sides cannot be "
         "checked: " +
