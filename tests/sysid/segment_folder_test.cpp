@@ -209,6 +209,21 @@ TEST_F(SegmentFolder, ATrajectoryOfAnotherClockIsRefusedAndNothingIsLeft) {
   EXPECT_FALSE(fs::exists(folder("a")));
 }
 
+TEST_F(SegmentFolder, PointsThatAreNowhereAreCountedOrRefused) {
+  write_depth_view(folder("raw"), {0.1});
+  data::Points hole(2, 3);
+  hole << 0.5, 0.1, 0.17, 0.5, 0.1, std::nan("");
+  data::save_point_cloud(hole, folder("b") + "/000.ply");
+  const std::vector<RawView> views = {open_raw_view(folder("raw")), open_raw_view(folder("b"))};
+  const SegmentedFolder result = segment_folder(views, {0.0}, {}, folder("out"));
+  ASSERT_EQ(result.warnings.size(), 1u);
+  EXPECT_NE(result.warnings[0].find("1 points of the clouds are not finite"), std::string::npos);
+  hole(1, 2) = 1e30;
+  data::save_point_cloud(hole, folder("b") + "/000.ply");
+  EXPECT_NE(message_of([&] { segment_folder(views, {0.0}, {}, folder("out")); }).find("more than 100 km"),
+            std::string::npos);
+}
+
 TEST_F(SegmentFolder, WhatIsMissingIsNamed) {
   EXPECT_NE(message_of([&] { open_raw_view(folder("nowhere")); }).find("does not exist"), std::string::npos);
   fs::create_directories(folder("empty"));
