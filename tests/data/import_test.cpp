@@ -168,9 +168,8 @@ TEST_F(ImportFiles, SenselessOptionsAreRefusedByTheirNames) {
             "--cell: found \"100\", expected at most the shorter side of the sheet, 0.2 m");
   EXPECT_EQ(message([](ImportOptions& o) { o.sheet = "200x200", o.cell = 10; }),
             "--sheet: found \"200x200\", expected metres (millimetres read as metres?)");
-  EXPECT_EQ(
-      message([](ImportOptions& o) { o.times = "rate:1e300"; }),
-      "--times: found \"rate:1e300\", expected rate:HZ, rate:HZ:START or a CSV file with a column t");
+  EXPECT_EQ(message([](ImportOptions& o) { o.times = "rate:1e300"; }),
+            "--times: found \"rate:1e300\", expected rate:HZ, rate:HZ:START or a CSV file with a column t");
   EXPECT_EQ(message([](ImportOptions& o) { o.asset = "nowhere.json"; }),
             "--asset: found \"nowhere.json\", expected a file");
   const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
