@@ -317,7 +317,9 @@ Recording import_recording(const ImportOptions& options) {
   import_frames(options, recording);
   std::vector<double> times;
   for (const RecordedKeyframe& keyframe : recording.keyframes) times.push_back(keyframe.time);
-  std::vector<std::string> notices = compare_clocks(times, trajectory, options.trajectory);
+  std::vector<std::string> notices = recording.notices;
+  for (const std::string& line : compare_clocks(times, trajectory, options.trajectory))
+    notices.push_back(line);
 
   std::vector<std::string> guesses;
   if (options.times.empty()) guesses.push_back("10 frames a second (--times)");
