@@ -21,7 +21,7 @@ struct ImportVerbOptions {
   CommonOptions common;
   data::ImportOptions import;
   std::vector<std::string> offset;
-  std::string shape = "clamp";
+  std::string shape = "clamp", tool_at = "corner";
   double within = 0, table_height = 0, heading_degrees = 0;
 };
 
@@ -32,21 +32,31 @@ Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
     const std::size_t word = words.size() == 1 ? 0 : static_cast<std::size_t>(k);
     const auto number =
         words.size() == 1 || words.size() == 3 ? data::parse_number(words[word]) : std::nullopt;
-    if (!number || *number < 0)
-      throw data::InputError("--offset: expected one bound or three, x,y,z, in metres, as 0.06");
+    if (!number || !(*number >= 0) || !std::isfinite(*number))
+      throw data::InputError("--offset: found \"" + (words.empty() ? "" : words[word]) +
+                             "\", expected one bound or three, x,y,z, in metres, as 0.06");
     bounds[k] = *number;
   }
   return bounds;
+}
+
+void expect_finite(const char* option, double value) {
+  if (!std::isfinite(value))
+    throw data::InputError(std::string(option) + ": found " + data::format_short(value) +
+                           ", expected a finite number");
 }
 
 int run_import(const CLI::App& verb, ImportVerbOptions options) {
   data::ImportOptions& import = options.import;
   import.overwrite = options.common.force;
   if (!options.offset.empty()) import.nuisance.offset = parse_bounds(options.offset);
+  import.tool_at_patch = options.tool_at == "patch";
   if (options.shape == "point") import.shape = data::GraspShape::point;
   if (options.shape == "pinch") import.shape = data::GraspShape::pinch;
   if (verb.count("--within") > 0) import.within = options.within;
   if (verb.count("--table-height") > 0) import.table_height = options.table_height;
+  expect_finite("--heading", options.heading_degrees);
+  expect_finite("--table-height", options.table_height);
   if (verb.count("--heading") > 0) import.heading = options.heading_degrees * M_PI / 180;
 
   const data::Recording recording = data::import_recording(import);
@@ -84,9 +94,12 @@ void add_import_verb(CLI::App& app, Action& action) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   verb->add_option("--trajectory", import.trajectory, "T_base_gripper, TUM or CSV")->required();
-  verb->add_option("--times", import.times, "rate:HZ, rate:HZ:START, or a CSV with one time a frame")
-      ->capture_default_str();
-  CLI::Option* sheet = verb->add_option("--sheet", import.sheet, "WIDTHxHEIGHT [m], as 0.278x0.278");
+  verb->add_option("--times", import.times,
+                   "rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
+  CLI::Option* sheet =
+      verb->add_option("--sheet", import.sheet,
+                       "WIDTHxHEIGHT [m], as 0.3x0.24; from corner 0,0 or 1,1, seen from above, the "
+                       "width is on the right hand");
   verb->add_option("--mesh", import.mesh, "Mesh specification or file, in place of --sheet")->excludes(sheet);
   verb->add_option("--cell", import.cell, "Of the sheet's mesh [m]")
       ->check(CLI::PositiveNumber)
@@ -95,6 +108,9 @@ void add_import_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--within", options->within, "Size of the grasped patch [m]; without it 1.2 cells")
       ->check(CLI::PositiveNumber);
+  verb->add_option("--tool-at", options->tool_at, "What is under the tool centre point at the start")
+      ->check(CLI::IsMember({"corner", "patch"}))
+      ->capture_default_str();
   verb->add_option("--shape", options->shape, "How the patch sits in the fingers")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}))
       ->capture_default_str();

@@ -31,6 +31,24 @@ std::string shortened(const nlohmann::json& value) {
   return text;
 }
 
+/// Values are copied, printed and destroyed by recursion, whose depth the stack bounds.
+void check_depth(const std::string& text, const std::string& source) {
+  constexpr int deepest = 256;
+  int depth = 0, line = 1;
+  bool quoted = false, escaped = false;
+  for (const char c : text) {
+    if (c == '"' && !escaped) quoted = !quoted;
+    escaped = quoted && c == '\\' && !escaped;
+    if (c == '\n') ++line;
+    if (quoted) continue;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > deepest)
+      throw input_error(source, "line " + std::to_string(line),
+                        "found more than " + std::to_string(deepest) + " levels of nesting");
+  }
+}
+
 constexpr std::size_t kLine = 110;
 
 void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t used, std::string& text) {
@@ -66,6 +84,7 @@ void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t
 }  // namespace
 
 nlohmann::json parse_json(const std::string& text, const std::string& source) {
+  check_depth(text, source);
   try {
     return nlohmann::json::parse(text);
   } catch (const nlohmann::json::exception& error) {

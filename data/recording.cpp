@@ -6,6 +6,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/frame_files.h"
 #include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
@@ -96,6 +97,7 @@ void read_trajectories(const JsonObject& file, Recording& recording) {
         throw InputError(
             path + ": reaches " + format_short(pose.translation().norm()) +
             " m from the origin, expected metres in the robot's base frame (millimetres read as metres?)");
+    for (const std::string& jumps : find_jumps(trajectory, path)) recording.notices.push_back(jumps);
     recording.trajectories[name] = trajectory;
     recording.trajectory_paths[name] = path;
   }

@@ -116,7 +116,7 @@ struct Keyframe {
 
 /// Loads every keyframe; depth images become points through the camera. Throws InputError where all are
 /// empty, or a cloud is far off the scale of the mesh (millimetres read as metres). `notices` says which are
-/// empty.
+/// empty, whether that is usual, and how many points are not finite.
 std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std::string>& notices);
 
 /// Vertices a grasp takes, in order of index. Throws InputError where there are none.

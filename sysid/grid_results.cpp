@@ -15,6 +15,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/text.h"
 #include "sysid/fingerprint.h"
 
@@ -175,7 +176,7 @@ CandidateStatus status_of(const Row& row) {
 
 nlohmann::json load_grid(const std::string& folder) {
   const std::string path = path_of(folder, "grid.json");
-  const nlohmann::json grid = nlohmann::json::parse(data::read_file(path), nullptr, false);
+  const nlohmann::json grid = data::load_json(path);
   if (!grid.is_object() || grid.value("schema", "") != kSchema || !grid.contains("axes") ||
       !grid.contains("recordings")) {
     throw data::InputError(path + ": schema: expected \"" + kSchema + "\" with axes and recordings");

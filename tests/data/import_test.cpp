@@ -125,14 +125,83 @@ TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
             "import: --depth needs --intrinsics and --extrinsics");
 }
 
-TEST_F(ImportFiles, WhatFailsItsCheckLeavesNoRecording) {
+TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
+  // Seen from above, from the grasped corner: 0.3 m to the left (+x), 0.2 m to the right (+y).
+  Points cloud(31 * 21, 3);
+  for (int i = 0; i < 31; ++i)
+    for (int j = 0; j < 21; ++j) cloud.row(21 * i + j) << 0.5 - 0.01 * i, 0.1 + 0.01 * j, 0.06;
+  for (const char* name : {"clouds/2.ply", "clouds/10.pcd", "clouds/11.ply"})
+    save_point_cloud(cloud, folder_ / name);
+  options_.overwrite = true;
+  const auto told = [&](const std::string& sheet, const std::string& grasp) {
+    options_.sheet = sheet;
+    options_.grasp = grasp;
+    for (const std::string& notice : import_recording(options_).notices)
+      if (notice.find("--sheet") != std::string::npos) return notice;
+    return std::string();
+  };
+  EXPECT_EQ(told("0.2x0.3", "corner"), "");
+  EXPECT_EQ(told("0.2x0.3", "corner:1,1"), "");
+  EXPECT_EQ(told("0.3x0.2", "corner:1,0"), "");
+  EXPECT_NE(told("0.3x0.2", "corner").find("--sheet: with the sides changed over, 0.2x0.3, the sheet is"),
+            std::string::npos);
+  EXPECT_NE(told("0.2x0.3", "corner:0,1"), "");
+}
+
+TEST_F(ImportFiles, TheMiddleOfThePatchCanBeAtTheTool) {
+  options_.tool_at_patch = true;
+  options_.within = 0.04;
+  const Recording recording = import_recording(options_);
+  Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+  const std::vector<int> held = select_vertices(recording, recording.grasps[0]);
+  for (const int vertex : held) middle += recording.start.row(vertex) / static_cast<double>(held.size());
+  EXPECT_TRUE(middle.isApprox(Eigen::RowVector3d(0.5, 0.1, 0.05), 1e-9)) << middle;
+}
+
+TEST_F(ImportFiles, SenselessOptionsAreRefusedByTheirNames) {
+  const auto message = [&](auto change) {
+    ImportOptions options = options_;
+    change(options);
+    return input_error_of([&] { import_recording(options); });
+  };
+  EXPECT_EQ(message([](ImportOptions& o) { o.cell = 100; }),
+            "--cell: found \"100\", expected at most the shorter side of the sheet, 0.2 m");
+  EXPECT_EQ(message([](ImportOptions& o) { o.sheet = "200x200", o.cell = 10; }),
+            "--sheet: found \"200x200\", expected metres (millimetres read as metres?)");
+  EXPECT_EQ(message([](ImportOptions& o) { o.times = "rate:1e300"; }),
+            "--times: found \"rate:1e300\", expected rate:HZ, rate:HZ:START or a CSV file with a column t");
+  EXPECT_EQ(message([](ImportOptions& o) { o.asset = "nowhere.json"; }),
+            "--asset: found \"nowhere.json\", expected a file");
+  const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
+  EXPECT_EQ(message([&](ImportOptions& o) { o.trajectory = one; }),
+            "--trajectory: " + one + ": found one pose, expected two or more");
+  EXPECT_NE(
+      message([](ImportOptions& o) { o.times = "rate:10:1764000000"; }).find("expected one clock for both"),
+      std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "lift"));
+}
+
+TEST_F(ImportFiles, TheAssetIsNamedFromTheRecording) {
+  options_.asset = folder_.write("towel.json", "{}");
+  for (const bool again : {false, true}) {
+    options_.overwrite = again;
+    EXPECT_EQ(std::filesystem::weakly_canonical(import_recording(options_).asset),
+              std::filesystem::weakly_canonical(options_.asset));
+    EXPECT_NE(read_file(folder_ / "lift/recording.json").find("\"../towel.json\""), std::string::npos);
+  }
+}
+
+TEST_F(ImportFiles, WhatFailsItsCheckLeavesNothing) {
   options_.grasp = "corner:0,2";
   EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("--grasp: found \"corner:0,2\""),
             std::string::npos);
   options_.grasp = "position";  // the sheet would lie at the origin, half a metre from the gripper
   EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("no vertex lies within"),
             std::string::npos);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "lift/recording.json"));
+  std::size_t entries = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "."))
+    entries += !entry.path().empty();
+  EXPECT_EQ(entries, 2u);  // tcp.csv, clouds
   options_.grasp = "corner";
   options_.crop_z = "0.5:0.1";
   EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
@@ -144,6 +213,14 @@ TEST_F(ImportFiles, WhatFailsItsCheckLeavesNoRecording) {
   options_.crop_z.clear();
   import_recording(options_);
   EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("exists already"), std::string::npos);
+  // A shorter recording over a longer one leaves none of its frames, but what it did not write.
+  folder_.write("lift/frames/notes.txt", "mine");
+  std::filesystem::remove(folder_ / "clouds/11.ply");
+  options_.overwrite = true;
+  import_recording(options_);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "lift/frames/000002.ply"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/000001.ply"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/notes.txt"));
 }
 
 class ImportedClip : public testing::TestWithParam<const char*> {};

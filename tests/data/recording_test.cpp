@@ -218,7 +218,38 @@ TEST_F(RecordingFiles, BrokenAndEmptyCloudsAreNamed) {
   Points cloud = load_point_cloud(folder_ / "frames/000.ply");
   cloud(1, 2) = NAN;
   save_point_cloud(cloud, folder_ / "frames/001.ply");
-  EXPECT_EQ(message(), folder_ / "frames/001.ply" + ": 1 of 3 points are not finite; first at index 1");
+  EXPECT_EQ(message(), "");
+  const Recording recording = load_recording(folder_ / "recording.json");
+  std::vector<std::string> notices;
+  EXPECT_EQ(load_keyframes(recording, notices)[0].cloud.rows(), 1);
+  EXPECT_NE(notices.back().find("2 points of 2 keyframes are not finite and were left out"),
+            std::string::npos);
+}
+
+TEST_F(RecordingFiles, EmptyKeyframesAreUsualWhileTheSheetStillLies) {
+  const auto notice = [&](double raised) {
+    folder_.write("gripper.tum", "0 0.2 0.2 0 0 0 0 1\n0.5 0.2 0.2 " + std::to_string(raised) + " 0 0 0 1\n");
+    json_["keyframes"] = json::array();
+    for (int k = 0; k < 4; ++k)
+      json_["keyframes"].push_back({{"t", 0.2 * k}, {"cloud", k < 3 ? "frames/001.ply" : "frames/000.ply"}});
+    EXPECT_EQ(message(), "");
+    std::vector<std::string> notices;
+    load_keyframes(load_recording(folder_ / "recording.json"), notices);
+    return notices.at(0);
+  };
+  const std::string found = "3 of 4 keyframes have no point inside the crop box (t = 0 to 0.4 s)";
+  EXPECT_TRUE(notice(0.03).ends_with(found +
+                                     ": as usual at the beginning of a lift, while the sheet lies on the "
+                                     "table"))
+      << notice(0.03);
+  EXPECT_TRUE(notice(0.3).ends_with(found)) << notice(0.3);
+}
+
+TEST_F(RecordingFiles, JumpsOfTheGripperAreTold) {
+  folder_.write("gripper.tum", "0 0.2 0.2 0 0 0 0 1\n0.5 0.2 0.2 0.1 0 0 0 1\n0.6 10.2 0.2 0.1 0 0 0 1\n");
+  EXPECT_EQ(message(), "");
+  EXPECT_NE(load_recording(folder_ / "recording.json").notices.at(0).find("a jump of up to 10 m"),
+            std::string::npos);
 }
 
 class SharedRecording : public testing::TestWithParam<std::string> {};
