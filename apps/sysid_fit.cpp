@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
@@ -28,7 +29,8 @@ struct FitOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::string start;
-  std::vector<std::string> freeze, priors, fixed;
+  std::vector<std::string> freeze, priors;
+  FixedTexts fixed;
   int iterations = 15;
   int generations = 0;
   std::string out;
@@ -41,8 +43,7 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
 // What the search looked for, over the range it searched; frozen ones stay where it found them.
 sysid::FitSettings fit_settings(const FitOptions& options, const sysid::Summary& found) {
   sysid::FitSettings settings;
-  for (const std::string& assignment : options.fixed)
-    settings.grid.fixed.push_back(sysid::parse_fixed(assignment));
+  settings.grid.fixed = parse_fixed(options.fixed);
   const auto is_fixed = [&](const std::string& name) {
     return std::any_of(settings.grid.fixed.begin(), settings.grid.fixed.end(),
                        [&](const sysid::Axis& axis) { return axis.name == name; });
@@ -175,16 +176,18 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_option("--prior", options->priors,
                    "What is known beforehand, as bending=1e-5:2 (factor, one sigma)")
       ->allow_extra_args(false);
-  verb->add_option("--fix", options->fixed, "A measured constant, as friction=0.3")->allow_extra_args(false);
+  add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3");
   verb->add_option("--steps", options->iterations, "Of the optimizer at most")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 10000))
       ->capture_default_str();
   verb->add_option("--global", options->generations,
                    "Generations of a search over the whole ranges before, of 16 candidates each; 0: none")
-      ->check(CLI::Range(0, 10000))
+      ->check(whole_number(0, 10000))
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "Folder for fit.json")->required();
   add_replay_options(*verb, options->replay);
+  add_seed_option(*verb, options->common);
+  add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
       "Example:\n  flash-sysid fit lift --start run --freeze poisson --prior bending=1e-5:2 -o fitted");

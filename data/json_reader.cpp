@@ -163,8 +163,9 @@ double JsonObject::number(const char* key) const {
 
 int JsonObject::integer(const char* key) const {
   const double value = raw(key).is_number() ? raw(key).get<double>() : std::nan("");
-  if (!(std::abs(value) <= std::numeric_limits<int>::max()) || value != std::floor(value))
-    throw error(key, "a whole number");
+  if (value != std::floor(value)) throw error(key, "a whole number");
+  if (!(std::abs(value) <= std::numeric_limits<int>::max()))
+    throw error(key, "a whole number of at most 2,147,483,647");
   return static_cast<int>(value);
 }
 
