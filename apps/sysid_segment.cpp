@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
@@ -35,7 +36,8 @@ std::vector<double> even_times(std::size_t count, double rate) {
 
 int run_segment(SegmentOptions options) {
   std::vector<sysid::RawView> views;
-  for (const std::string& folder : options.views) views.push_back(sysid::open_raw_view(folder));
+  for (const std::string& folder : options.views)
+    views.push_back(sysid::open_raw_view(folder, options.common.force));
   options.settings.find_table = !options.no_table;
   if (!options.trajectory.empty()) options.settings.gripper = data::load_tum(options.trajectory);
   if (!options.low.empty())
@@ -49,10 +51,17 @@ int run_segment(SegmentOptions options) {
   std::size_t points = 0;
   for (const sysid::Segmentation& frame : segmented.frames)
     points += static_cast<std::size_t>(frame.cloth.rows());
+  std::vector<std::string> warnings;
+  for (const sysid::RawView& view : views)
+    warnings.insert(warnings.end(), view.warnings.begin(), view.warnings.end());
+  for (const std::string& warning : warnings) warn(warning);
   const std::string picture = (fs::path(options.out) / segmented.picture).string();
   if (options.common.json) {
-    nlohmann::ordered_json json = {
-        {"clouds", segmented.clouds}, {"picture", picture}, {"points", points}, {"table", nullptr}};
+    nlohmann::ordered_json json = {{"clouds", segmented.clouds},
+                                   {"picture", picture},
+                                   {"points", points},
+                                   {"table", nullptr},
+                                   {"warnings", warnings}};
     if (segmented.table) {
       const Eigen::Vector3d &p = segmented.table->point, &n = segmented.table->normal;
       json["table"] = {{"point", {p.x(), p.y(), p.z()}}, {"normal", {n.x(), n.y(), n.z()}}};
@@ -83,25 +92,32 @@ void add_segment_verb(CLI::App& app, Action& action) {
   verb->add_option("--trajectory", options->trajectory,
                    "T_base_gripper, TUM: the arm above the gripper is cut away");
   verb->add_option("--rate", options->rate, "Frames a second")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--crop-min", options->low, "x,y,z of the box to keep [m]")->delimiter(',')->expected(3);
-  verb->add_option("--crop-max", options->high, "x,y,z of the box to keep [m]")->delimiter(',')->expected(3);
+  verb->add_option("--crop-min", options->low, "x,y,z of the box to keep [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(any_number());
+  verb->add_option("--crop-max", options->high, "x,y,z of the box to keep [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(any_number());
   verb->add_option("--arm-radius", options->settings.arm_radius, "[m]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_from(0))
       ->capture_default_str();
   verb->add_option("--clearance", segment.table_clearance,
                    "Cloth is kept from this height above the table [m]")
+      ->check(any_number())
       ->capture_default_str();
   verb->add_option("--cluster-gap", segment.cluster_gap, "Points closer than this belong together [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--voxel", segment.voxel, "One point a cell of this edge [m]; 0: every point")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_from(0))
       ->capture_default_str();
   verb->add_flag("--no-table", options->no_table, "There is no table in view");
   verb->add_option("-o,--out", options->out, "Folder for frames/ and segment.png")->required();
-  add_common_options(*verb, options->common);
+  add_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer("Example:\n  flash-sysid segment raw/camera --trajectory gripper.tum --rate 10 -o segmented");
   verb->callback([options, &action] { action = [options] { return run_segment(*options); }; });
 }

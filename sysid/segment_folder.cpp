@@ -6,7 +6,7 @@
 
 #include "data/depth_image.h"
 #include "data/error.h"
-#include "data/import.h"
+#include "data/extrinsics.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
 #include "sysid/segment_picture.h"
@@ -75,7 +75,7 @@ std::string frame_name(int frame) {
 
 }  // namespace
 
-RawView open_raw_view(const std::string& folder) {
+RawView open_raw_view(const std::string& folder, bool accept_unusable) {
   if (!fs::is_directory(folder)) throw data::input_error(folder, "folder", "does not exist");
   RawView view;
   view.folder = folder;
@@ -89,11 +89,15 @@ RawView open_raw_view(const std::string& folder) {
     view.camera = data::load_camera_intrinsics((fs::path(folder) / "camera_info.yaml").string());
   }
   const fs::path extrinsics = fs::path(folder) / "extrinsics.json";
-  if (fs::exists(extrinsics))
-    view.base_from_camera = data::load_extrinsics(extrinsics.string());
-  else if (!clouds)
+  if (fs::exists(extrinsics)) {
+    const data::CameraPose pose = data::load_camera_pose(extrinsics.string(), accept_unusable);
+    view.base_from_camera = pose.transform.T;
+    for (const std::string& warning : pose.warnings)
+      view.warnings.push_back(extrinsics.string() + ": " + warning);
+  } else if (!clouds) {
     throw data::input_error(extrinsics.string(), "file",
                             "missing: depth images need the pose of their camera");
+  }
   return view;
 }
 

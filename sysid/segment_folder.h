@@ -17,12 +17,14 @@ struct RawView {
   std::optional<data::CameraIntrinsics> camera;  ///< of depth images; clouds need none
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< T_base_camera
   double depth_scale = 0.001;                                          ///< [m] a count
+  std::vector<std::string> warnings;                                   ///< of the calibration of the camera
 };
 
 /// Finds what a folder holds: clouds in it (or in clouds/, frames/), else depth images in depth/ (or in it)
 /// with camera_info.yaml beside them. T_base_camera comes from `extrinsics.json` ("flash-extrinsics/1");
 /// clouds without one are taken as they stand, in the base frame. Throws InputError naming what is missing.
-RawView open_raw_view(const std::string& folder);
+/// `accept_unusable`: extrinsics that flash-calib ended with exit code 3, refused otherwise.
+RawView open_raw_view(const std::string& folder, bool accept_unusable = false);
 
 /// One frame in the base frame [m]; depth pixels of zero are left out.
 data::Points load_raw_frame(const RawView& view, int frame);
