@@ -13,6 +13,7 @@
 #include "data/text.h"
 #include "sysid/overlay.h"
 #include "sysid/overlay_image.h"
+#include "sysid/registration_parameter.h"
 
 namespace flash {
 namespace {
@@ -150,8 +151,9 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (!result.converged)
     warn("not converged in " + data::format_short(100 * motion.unconverged_share) +
          " % of the steps (residual " + data::format_short(result.residual_max) + ")");
-  for (const std::string& bound : result.recordings.front().bounds_hit)
-    warn(bound + " is at its bound; widen `nuisance` in recording.json");
+  for (const sysid::RegistrationParameter& parameter : sysid::registration_parameters)
+    if (sysid::is_at_bound(result.recordings.front().bounds_hit, parameter))
+      warn(sysid::at_bound_text(parameter, recording.nuisance));
   if (options.common.json) {
     std::cout << result_json(result, motion).dump(2) << '\n';
   } else {
