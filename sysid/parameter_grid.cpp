@@ -71,6 +71,8 @@ std::string option_of(const std::string& name) {
   return option;
 }
 
+void check_parameter(const std::string& option, const std::string& name) { info_of(option, name); }
+
 Axis parse_axis(const std::string& name, const std::string& specification) {
   const std::string option = option_of(name);
   const ParameterInfo& info = info_of(option, name);

@@ -31,6 +31,9 @@ const std::vector<ParameterInfo>& known_parameters();
 /// How the command line calls a parameter: "--start-yaw" for start_yaw.
 std::string option_of(const std::string& name);
 
+/// Throws data::InputError naming `option` and the nearest known one unless a parameter has that name.
+void check_parameter(const std::string& option, const std::string& name);
+
 /// "low:high:count:log", "low:high:count" (evenly), "a,b,c" or one value.
 /// Throws data::InputError naming the option: unknown parameter (with the nearest known), malformed, out of
 /// range.

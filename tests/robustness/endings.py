@@ -196,6 +196,21 @@ def check_defaults(options, folder):
     yield "Up to 1 % of the steps" in done.stdout, "--help does not say what is tolerated"
 
 
+def check_fit(options, folder):
+    """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
+    recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
+    program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "5e-5,1e-4,2e-4", "--no-solver-check",
+                 "--no-horizon", "--quiet", "-o", run)
+    line = [options.sysid, "fit", recording, "--start", run, "--prior", "bending=1e-4:2", "--quiet"]
+    done = program.call(*line, "--freeze", "poisson", "-o", folder / "fitted")
+    yield done.returncode == 0 and "95 %: " in done.stdout, f"fit: exit code {done.returncode}: {done.stderr}{done.stdout}"
+    fit = json.loads((folder / "fitted" / "fit.json").read_text())
+    yield fit["fixed"]["poisson"] == 0.3, f"fit: held at {fit['fixed']}"
+    yield "radient" not in fit["termination"], f"fit: ended with {fit['termination']}"
+    done = program.call(*line, "--freeze", "poison", "-o", folder / "other")
+    yield done.returncode == REFUSED and 'did you mean "poisson"' in done.stderr, f"fit --freeze poison: {done.stderr}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sim", required=True, type=pathlib.Path, help="the program flash-sim")
@@ -207,7 +222,8 @@ def main():
         folder = pathlib.Path(temporary)
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
-        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults):
+        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults,
+                      *([check_fit] if options.calib else [])):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds
