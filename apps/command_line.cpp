@@ -99,6 +99,26 @@ void check_verb(const CLI::App& app, int argc, char** argv) {
                          (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)"));
 }
 
+void collect_options(const CLI::App& app, std::vector<std::string>& names) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* group : app.get_subcommands(nullptr)) collect_options(*group, names);
+}
+
+/// What CLI11 found wrong with the command line; for a long option that the verb does not have, the nearest.
+std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
+  std::vector<std::string> known;
+  for (const CLI::App* verb : app.get_subcommands()) collect_options(*verb, known);
+  for (int i = 2; i < argc && dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr; ++i) {
+    const std::string word(argv[i], std::strcspn(argv[i], "="));
+    if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
+    const std::string nearest = data::nearest_name(word, known);
+    return word + ": unknown option" +
+           (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)");
+  }
+  return std::string(error.what()) + " (see --help)";
+}
+
 /// An empty text is never meant: "-o ''" would write into the working folder.
 void check_no_empty_value(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
@@ -135,7 +155,7 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
       app.parse(argc, argv);
     } catch (const CLI::ParseError& error) {
       if (error.get_exit_code() == 0) return app.exit(error);
-      return report(app.get_name(), std::string(error.what()) + " (see --help)", exit_bad_input);
+      return report(app.get_name(), wrong_words(app, error, argc, argv), exit_bad_input);
     }
     check_no_empty_value(app);
     return body();

@@ -81,7 +81,10 @@ Axis parse_axis(const std::string& name, const std::string& specification) {
     for (const std::string_view word : data::split(specification, ","))
       axis.values.push_back(number(option, word));
     std::sort(axis.values.begin(), axis.values.end());
-    axis.values.erase(std::unique(axis.values.begin(), axis.values.end()), axis.values.end());
+    const auto twice = std::adjacent_find(axis.values.begin(), axis.values.end());
+    if (twice != axis.values.end())
+      throw data::InputError(option + ": found " + data::format_short(*twice) +
+                             " twice, expected values that differ");
   } else {
     const std::vector<std::string_view> parts = data::split(specification, ":");
     axis.logarithmic = parts.size() == 4 && parts[3] == "log";

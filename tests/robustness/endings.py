@@ -77,6 +77,8 @@ def refusals(sim, sysid, calib):
         ([*run, "short.json", "-o", long], [long, "File name too long"]),
         ([*run, "short.json", "-o", "short.json/out"], ["short.json/out", "Not a directory"]),
         ([sim, "rum"], ["unknown verb", "run"]),
+        ([*grid, "--bendin", "1e-4"], ["--bendin: unknown option", 'did you mean "--bending"']),
+        ([*grid, "--bending", "1e-4,1e-4"], ["--bending", "twice"]),
         ([*bench, "--vertices", "1e9"], ["--vertices", "from 4 to 1,000,000"]),
         ([*bench, "--vertices", "1000000", "--threads", "1000", "--envs", "1000"], ["--vertices", "MB of memory"]),
         ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "above 0"]),
