@@ -83,8 +83,7 @@ Axis parse_axis(const std::string& name, const std::string& specification) {
     std::sort(axis.values.begin(), axis.values.end());
     const auto twice = std::adjacent_find(axis.values.begin(), axis.values.end());
     if (twice != axis.values.end())
-      throw data::InputError(option + ": found " + data::format_short(*twice) +
-                             " twice, expected values that differ");
+      throw data::InputError(option + ": " + data::format_short(*twice) + " is given twice");
   } else {
     const std::vector<std::string_view> parts = data::split(specification, ":");
     axis.logarithmic = parts.size() == 4 && parts[3] == "log";
