@@ -60,7 +60,10 @@ void add_export_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "The asset file")->required();
   add_common_options(*verb, options->common);
-  verb->footer("Example:\n  flash-sysid export run -o tuned.json");
+  verb->footer(
+      "Exit code 3: the asset is written, but the search behind it ended with 3, for the reason that is "
+      "said.\n"
+      "Example:\n  flash-sysid export run -o tuned.json");
   verb->callback([options, &action] { action = [options] { return run_export(*options); }; });
 }
 

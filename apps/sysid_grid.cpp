@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
@@ -30,7 +31,7 @@ struct GridOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::vector<std::pair<std::string, std::string>> axes;
-  std::vector<std::string> fixed;
+  FixedTexts fixed;
   int envs = 64;
   double repeatability = 0;  ///< [m]; 0: the residual stands for it
   bool no_solver_check = false;
@@ -57,8 +58,7 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   for (const auto& [name, text] : options.axes) settings.axes.push_back(sysid::parse_axis(name, text));
   if (settings.axes.empty())
     throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
-  for (const std::string& assignment : options.fixed)
-    settings.fixed.push_back(sysid::parse_fixed(assignment));
+  settings.fixed = parse_fixed(options.fixed);
   std::vector<sysid::Axis> all = settings.axes;
   all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
   sysid::check_axes(all, base.material.constitutive);
@@ -157,6 +157,8 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   std::vector<std::string> notices;
   const sysid::GridSettings settings =
       grid_settings(options, material_base(asset, replays.front().sheet.rest, notices), threads);
+  sysid::check_grasp_axes(settings.axes, replays);
+  sysid::check_grasp_axes(settings.fixed, replays);
   if (options.common.force && !options.resume) clear_results(options.out);
   sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
                             sysid::fingerprint(replays, settings), options.resume);
@@ -177,7 +179,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
     ProgressLine line(options.common);
     complete = sysid::grid_search(
         replays, settings, store, [&](const sysid::Progress& progress) { line.show(progress); },
-        &stop_on_interrupt());
+        &stop_on_signals());
   }
 
   if (!complete) {
@@ -214,13 +216,12 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
-  verb->add_option("--fix", options->fixed, "A measured constant, as friction=0.3; carried into the asset")
-      ->allow_extra_args(false);
+  add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3; carried into the asset");
   verb->add_option("--envs", options->envs, "Candidates a batch")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 100000))
       ->capture_default_str();
   verb->add_option("--repeatability", options->repeatability, "Trial-to-trial distance of a keyframe [m]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   verb->add_option("--map", options->map, "The two parameters of the report's score map")
       ->delimiter(',')
       ->expected(2);
@@ -232,6 +233,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);
+  add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
       "Example:\n"

@@ -4,27 +4,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <optional>
 #include <thread>
 
+#include "apps/option_checks.h"
 #include "data/error.h"
 #include "data/text.h"
 #include "sim/sheet.h"
 
 namespace flash {
 namespace {
-
-std::atomic<bool> interrupted = false;  // a signal handler reaches nothing else
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-void on_interrupt(int signal) {
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
-}
 
 std::string duration_text(double seconds) {
   char text[32];
@@ -57,17 +50,25 @@ void set_sigma(const std::string& assignment, sysid::Objective& objective) {
 
 }  // namespace
 
-void add_common_options(CLI::App& verb, CommonOptions& options) {
+void add_common_options(CLI::App& verb, CommonOptions& options, const char* force) {
   CLI::App& group = *verb.add_option_group("Common");
   group.add_flag("--json", options.json, "Print the result as JSON on stdout");
   CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
   group.add_flag("--verbose", options.verbose, "Print every notice")->excludes(quiet);
-  group.add_flag("--force", options.force, "Overwrite what is there");
-  group.add_option("--seed", options.seed, "Of everything random")->capture_default_str();
+  group.add_flag("--force", options.force, force);
   group.add_option("--threads", options.threads, "0: one a processor")
-      ->check(CLI::NonNegativeNumber)
+      ->check(thread_number())
       ->capture_default_str();
-  group.add_option("--device", options.device, "Where the simulation runs")
+}
+
+void add_seed_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--seed", options.seed, "Random seed: the same one gives the same result")
+      ->check(whole_number(0, std::numeric_limits<unsigned>::max()))
+      ->capture_default_str();
+}
+
+void add_device_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--device", options.device, "Where the simulation runs")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->capture_default_str();
 }
@@ -75,33 +76,31 @@ void add_common_options(CLI::App& verb, CommonOptions& options) {
 void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   CLI::App& group = *verb.add_option_group("Replay and score");
   group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
-  group.add_option("--time-step", options.time_step, "[s]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  group.add_option("--time-step", options.time_step, "[s]")->check(positive_number())->capture_default_str();
   group.add_option("--iterations", options.iterations, "Of the solver, a step at most")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 10000))
       ->capture_default_str();
   group.add_option("--tolerance", options.tolerance, "On the residual |r| / |M g|")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   group.add_option("--grasp-shape", options.grasp_shape, "In place of the recording's")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}));
   group
       .add_option("--grasp-within", options.grasp_within,
                   "Size of the grasped patch in place of the recording's [m]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   group.add_flag("--clamp-slopes", options.clamp_slopes,
                  "A clamped patch does not bend: it holds the sheet's slope as well as its place");
-  group.add_option("--from", options.from, "Keyframes before do not count [s]");
-  group.add_option("--to", options.to, "Keyframes after do not count [s]");
+  group.add_option("--from", options.from, "Keyframes before do not count [s]")->check(any_number());
+  group.add_option("--to", options.to, "Keyframes after do not count [s]")->check(any_number());
   group.add_option("--distance", options.distance, "How point distances become one number")
       ->check(CLI::IsMember({"mean", "trimmed", "huber"}))
       ->capture_default_str();
   group.add_option("--trim", options.trim, "trimmed: share of the largest distances left out")
-      ->check(CLI::Range(0.0, 0.5))
+      ->check(number_between(0, 0.5))
       ->capture_default_str();
   group.add_option("--huber", options.huber, "huber: where the distance stops counting in full [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   group
       .add_option("--sigma", options.sigmas,
@@ -153,14 +152,37 @@ void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, st
   CLI::App& group =
       *verb.add_option_group("Searched parameters", "low:high:count[:log], a list a,b,c, or one value");
   for (const sysid::ParameterInfo& info : sysid::known_parameters()) {
-    std::string dashed = info.name;
-    std::replace(dashed.begin(), dashed.end(), '_', '-');
-    const std::string flags = dashed == info.name ? "--" + info.name : "--" + dashed + ",--" + info.name;
     const std::string unit = info.unit.empty() ? "" : " [" + info.unit + "]";
-    group.add_option_function<std::string>(
-        flags, [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
-        info.meaning + unit);
+    const auto add = [&](CLI::App& to, const std::string& option) {
+      return to.add_option_function<std::string>(
+          option, [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
+          info.meaning + unit);
+    };
+    const std::string option = sysid::option_of(info.name);
+    add(group, option);
+    if (option != "--" + info.name) add(verb, "--" + info.name)->group("");  // as files call it
   }
+}
+
+void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& meaning) {
+  const auto add = [&](const std::string& name) {
+    return verb
+        .add_option_function<std::vector<std::string>>(
+            name,
+            [&fixed, name](const std::vector<std::string>& texts) {
+              for (const std::string& text : texts) fixed.emplace_back(name, text);
+            },
+            meaning)
+        ->allow_extra_args(false);
+  };
+  add("--fix");
+  add("--set")->group("");
+}
+
+std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed) {
+  std::vector<sysid::Axis> axes;
+  for (const auto& [option, text] : fixed) axes.push_back(sysid::parse_fixed(text, option));
+  return axes;
 }
 
 void say(const CommonOptions& options, const std::string& line) {
@@ -220,12 +242,6 @@ void ProgressLine::show(const sysid::Progress& progress) {
                 progress.done, progress.total, progress.candidates_per_second,
                 duration_text(progress.seconds_left).c_str(), 1000 * progress.best_score);
   std::cerr << line << std::flush;
-}
-
-const std::atomic<bool>& stop_on_interrupt() {
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  return interrupted;
 }
 
 }  // namespace flash

@@ -1,6 +1,5 @@
 #pragma once
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <string>
 #include <vector>
 
@@ -20,7 +19,12 @@ struct CommonOptions {
   std::string device = "auto";
   int threads = 0;  ///< 0: one a processor
 };
-void add_common_options(CLI::App& verb, CommonOptions& options);
+inline constexpr const char* force_overwrites = "Overwrite what is there";
+inline constexpr const char* force_covers_calibrations =
+    "Overwrite what is there; use a calibration that flash-calib ended with exit code 3";
+void add_common_options(CLI::App& verb, CommonOptions& options, const char* force = force_overwrites);
+void add_seed_option(CLI::App& verb, CommonOptions& options);    ///< of verbs that draw at random
+void add_device_option(CLI::App& verb, CommonOptions& options);  ///< of verbs that simulate
 
 /// How a recording is replayed and scored.
 struct ReplayOptions {
@@ -44,6 +48,13 @@ sysid::ScoreSettings score_settings(const ReplayOptions& options);
 
 /// Adds --young, --poisson, ...: one option a known parameter, its text kept by name.
 void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values);
+
+/// Constants that were given, with the option that gave them.
+using FixedTexts = std::vector<std::pair<std::string, std::string>>;
+
+/// --fix NAME=VALUE; --set, which some verbs called it, is taken as well.
+void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& meaning);
+std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed);
 
 /// What a verb says to people, on stderr, unless --quiet.
 void say(const CommonOptions& options, const std::string& line);
@@ -77,8 +88,5 @@ class ProgressLine {
   bool visible_;
   bool drawn_ = false;
 };
-
-/// Set by Ctrl-C from now on; a second Ctrl-C ends the program at once.
-const std::atomic<bool>& stop_on_interrupt();
 
 }  // namespace flash

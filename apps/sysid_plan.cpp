@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
@@ -204,14 +205,16 @@ void add_plan_verb(CLI::App& app, Action& action) {
       ->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("--error", options->error, "Distance by which model and sheet differ in a keyframe [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--keyframes", options->keyframes, "That count as independent")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "plan.json")->required();
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);
+  add_seed_option(*verb, options->common);
+  add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer("Example:\n  flash-sysid plan lift --asset towel.json -o plan.json");
   verb->callback(

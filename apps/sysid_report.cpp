@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "sysid/predictability.h"
@@ -61,7 +62,7 @@ void add_report_verb(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->expected(2);
   verb->add_option("--points", options->points, "Observed points shown a keyframe at most")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 10000000))
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "The file; without it report.html in the folder of the search");
   add_common_options(*verb, options->common);

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
@@ -18,6 +19,8 @@ namespace flash {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kSmallestVoxel = 1e-4;  // below it, the cells of a cloud cannot be numbered [m]
 
 struct SegmentOptions {
   CommonOptions common;
@@ -55,6 +58,7 @@ std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
     files.extrinsics = of_view(options.extrinsics, view, count, false, "--extrinsics", none);
     const double scale = of_view(options.depth_scales, view, count, true, "--depth-scale", 0.0);
     if (scale > 0) files.depth_scale = scale;
+    files.accept_unusable = options.common.force;
     views.push_back(sysid::open_raw_view(options.views[view], files));
   }
   const bool clouds = std::none_of(views.begin(), views.end(), [](const auto& view) { return view.camera; });
@@ -74,23 +78,11 @@ std::vector<double> times_of(const SegmentOptions& options, std::size_t frames) 
   return data::frame_times(times.empty() ? "rate:1" : times, frames);
 }
 
-void expect_within(const char* option, double value, double low, double high, const char* unit,
-                   bool zero = false) {
-  if ((value >= low && value <= high) || (zero && value == 0)) return;
-  throw data::InputError(std::string(option) + ": found " + data::format_short(value) + ", expected " +
-                         (zero ? "0 or " : "") + data::format_short(low) + " to " + data::format_short(high) +
-                         unit);
-}
-
 void check_lengths(const SegmentOptions& options) {
   const sysid::SegmentSettings& segment = options.settings.segment;
-  expect_within("--voxel", segment.voxel, 1e-4, 0.1, " m", true);
-  expect_within("--cluster-gap", segment.cluster_gap, 1e-4, 0.1, " m");
-  expect_within("--clearance", segment.table_clearance, 0, 0.5, " m");
-  expect_within("--arm-radius", options.settings.arm_radius, 0, 1, " m");
-  expect_within("--table-height", options.table_height, -20, 20, " m");
-  for (const double scale : options.depth_scales)
-    expect_within("--depth-scale", scale, 1e-7, 1, " m a count");
+  if (segment.voxel > 0 && segment.voxel < kSmallestVoxel)
+    throw data::InputError("--voxel: found " + data::format_short(segment.voxel) +
+                           ", expected 0 or at least " + data::format_short(kSmallestVoxel) + " m");
   for (int axis = 0; axis < 3; ++axis) {
     const double low = segment.crop.min[axis], high = segment.crop.max[axis];
     if (!(low < high))
@@ -132,6 +124,10 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
   std::size_t points = 0;
   for (const sysid::Segmentation& frame : segmented.frames)
     points += static_cast<std::size_t>(frame.cloth.rows());
+  std::vector<std::string> warnings;
+  for (const sysid::RawView& view : views)
+    warnings.insert(warnings.end(), view.warnings.begin(), view.warnings.end());
+  for (const std::string& warning : warnings) warn(warning);
   const std::string picture = (fs::path(options.out) / segmented.picture).string();
   if (options.common.json) {
     nlohmann::ordered_json json = {{"clouds", segmented.clouds},
@@ -178,7 +174,7 @@ void add_segment_verb(CLI::App& app, Action& action) {
   CLI::Option* times = verb->add_option(
       "--times", options->times, "rate:HZ, rate:HZ:START, or a CSV with one time a frame, as for import");
   verb->add_option("--rate", options->rate, "Frames a second from 0 s; short for --times rate:HZ")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->excludes(times);
   verb->add_option("--masks", options->masks, "Folder of masks of the depth images' names, one a view");
   verb->add_option(
@@ -189,27 +185,35 @@ void add_segment_verb(CLI::App& app, Action& action) {
                    "extrinsics.json or .tum there");
   verb->add_option("--depth-scale", options->depth_scales,
                    "Metres a count, one a view or one for all; without it 0.001")
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--crop-min", options->low, "x,y,z of the box to keep [m]")->delimiter(',')->expected(3);
-  verb->add_option("--crop-max", options->high, "x,y,z of the box to keep [m]")->delimiter(',')->expected(3);
+      ->check(number_between(1e-7, 1));
+  verb->add_option("--crop-min", options->low, "x,y,z of the box to keep [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(any_number());
+  verb->add_option("--crop-max", options->high, "x,y,z of the box to keep [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(any_number());
   verb->add_option("--arm-radius", options->settings.arm_radius, "[m]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_between(0, 1))
       ->capture_default_str();
   verb->add_option("--clearance", segment.table_clearance,
                    "Cloth is kept from this height above the table [m]")
+      ->check(number_between(0, 0.5))
       ->capture_default_str();
   verb->add_option("--cluster-gap", segment.cluster_gap, "Points closer than this belong together [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(number_between(1e-4, 0.1))
       ->capture_default_str();
   verb->add_option("--voxel", segment.voxel, "One point a cell of this edge [m]; 0: every point")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_between(0, 0.1))
       ->capture_default_str();
   CLI::Option* height =
       verb->add_option("--table-height", options->table_height,
-                       "Of a level table [m]; without it one is sought, beyond the crop too");
+                       "Of a level table [m]; without it one is sought, beyond the crop too")
+          ->check(number_between(-20, 20));
   verb->add_flag("--no-table", options->no_table, "There is no table in view")->excludes(height);
   verb->add_option("-o,--out", options->out, "Folder for frames/ and segment.png")->required();
-  add_common_options(*verb, options->common);
+  add_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer("Example:\n  flash-sysid segment raw/camera --trajectory gripper.tum --rate 10 -o segmented");
   verb->callback(
       [verb, options, &action] { action = [verb, options] { return run_segment(*verb, *options); }; });

@@ -8,6 +8,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/extrinsics.h"
 #include "data/frame_files.h"
 #include "data/json_reader.h"
 #include "data/lying_sheet.h"
@@ -242,7 +243,10 @@ void import_frames(const ImportOptions& options, Recording& recording) {
   RecordedCamera camera;
   camera.intrinsics = load_camera_intrinsics(options.intrinsics);
   camera.intrinsics_path = options.intrinsics;
-  camera.base_from_camera = load_extrinsics(options.extrinsics);
+  const CameraPose pose = load_camera_pose(options.extrinsics, options.accept_unusable);
+  camera.base_from_camera = pose.transform.T;
+  for (const std::string& warning : pose.warnings)
+    recording.notices.push_back(options.extrinsics + ": " + warning);
   camera.depth_scale = options.depth_scale;
   recording.camera = camera;
 }
@@ -274,20 +278,6 @@ void copy_files(const fs::path& out, Recording& recording) {
 }
 
 }  // namespace
-
-Eigen::Isometry3d load_extrinsics(const std::string& path) {
-  if (lower_extension(path) != ".json") return load_trajectory(path).poses.front();
-  const nlohmann::json json = load_json(path);
-  const JsonObject file(json, path);
-  if (file.string("schema", "") != "flash-extrinsics/1") throw file.error("schema", "\"flash-extrinsics/1\"");
-  const JsonObject transform = file.object("transform");
-  transform.expect_fields({"parent", "child", "translation", "rotation_xyzw"});
-  Eigen::Matrix<double, 7, 1> pose;
-  pose.head<3>() = Eigen::Vector3d(transform.vector("translation", 3));
-  pose.tail<4>() = Eigen::Vector4d(transform.vector("rotation_xyzw", 4));
-  if (std::abs(pose.tail<4>().norm() - 1) > 1e-3) throw transform.error("rotation_xyzw", "a unit quaternion");
-  return from_vector(pose);
-}
 
 Recording import_recording(const ImportOptions& options) {
   const fs::path out(options.out);

@@ -42,6 +42,7 @@ struct ImportOptions {
   std::string name;  ///< empty: the folder's
   std::string out;   ///< folder to make
   bool overwrite = false;
+  bool accept_unusable = false;  ///< extrinsics that flash-calib ended with exit code 3
 };
 
 /// Writes out/recording.json with its frames, trajectory and camera copied beside it, and loads it back to
@@ -49,8 +50,5 @@ struct ImportOptions {
 /// along `heading`; notices say what was guessed, and where first clouds, of a sheet that still lies, fit it
 /// better with its sides changed over. Throws InputError, and leaves nothing behind, where the check fails.
 Recording import_recording(const ImportOptions& options);
-
-/// T_base_camera of an extrinsics file.
-Eigen::Isometry3d load_extrinsics(const std::string& path);
 
 }  // namespace flash::data

@@ -32,7 +32,9 @@ struct FitResult {
   CandidateResult best;        ///< scored there; values as above
   Eigen::MatrixXd covariance;  ///< of the axes' coordinates; empty where a direction is not determined
   std::vector<FitStep> path;   ///< in order
-  std::string termination;     ///< in words, of the optimizer
+  bool refined = true;         ///< false: no step was taken from the start of Levenberg-Marquardt,
+  bool stuck = false;          ///< though it is no minimum: it is at the end of a range, or motions diverge
+  std::string termination;     ///< in words: why it ended, and which values stand at the end of their range
 };
 
 /// Levenberg-Marquardt (Ceres, trust region, box) over the logarithms of logarithmic axes, from `start` or

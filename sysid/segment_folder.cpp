@@ -11,8 +11,8 @@
 
 #include "data/depth_image.h"
 #include "data/error.h"
+#include "data/extrinsics.h"
 #include "data/frame_files.h"
-#include "data/import.h"
 #include "data/mesh_io.h"
 #include "data/staged_folder.h"
 #include "data/text.h"
@@ -124,11 +124,14 @@ RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
   for (const char* name : {"extrinsics.json", "extrinsics.tum"})
     if (const fs::path path = fs::path(folder) / name; extrinsics.empty() && fs::exists(path))
       extrinsics = path.string();
-  if (!extrinsics.empty())
-    view.base_from_camera = data::load_extrinsics(extrinsics);
-  else if (!clouds)
+  if (!extrinsics.empty()) {
+    const data::CameraPose pose = data::load_camera_pose(extrinsics, given.accept_unusable);
+    view.base_from_camera = pose.transform.T;
+    for (const std::string& warning : pose.warnings) view.warnings.push_back(extrinsics + ": " + warning);
+  } else if (!clouds) {
     throw data::input_error((fs::path(folder) / "extrinsics.json").string(), "file",
                             "missing: depth images need the pose of their camera, here or as --extrinsics");
+  }
   return view;
 }
 
@@ -163,6 +166,8 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
   SegmentedFolder result;
   if (settings.gripper)
     result.warnings = data::compare_clocks(times, *settings.gripper, settings.gripper_path);
+  for (const RawView& view : views)
+    result.warnings.insert(result.warnings.end(), view.warnings.begin(), view.warnings.end());
   if (settings.table_height)
     result.table = FoundTable{{{0, 0, *settings.table_height}, settings.segment.up}, 0, 0, 0};
   else if (settings.find_table)

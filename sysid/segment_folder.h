@@ -18,6 +18,7 @@ struct RawView {
   std::optional<data::CameraIntrinsics> camera;  ///< of depth images; clouds need none
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< T_base_camera
   double depth_scale = 0.001;                                          ///< [m] a count
+  std::vector<std::string> warnings;                                   ///< of the calibration of the camera
 };
 
 /// What is not found in a view's folder, or counts in its place; empty where not given. As for `import`.
@@ -27,6 +28,7 @@ struct RawViewFiles {
   std::string
       extrinsics;  ///< T_base_camera: "flash-extrinsics/1" JSON, or a TUM file whose first pose counts
   std::optional<double> depth_scale;  ///< [m] a count
+  bool accept_unusable = false;       ///< extrinsics that flash-calib ended with exit code 3
 };
 
 /// Finds what a folder holds: clouds in it (or in clouds/, frames/), else depth images in depth/ (or in it)

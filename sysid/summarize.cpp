@@ -8,6 +8,7 @@
 #include "data/procedural_mesh.h"
 #include "data/sha256.h"
 #include "data/text.h"
+#include "sysid/registration_parameter.h"
 #include "sysid/separate_regions.h"
 
 namespace flash::sysid {
@@ -68,7 +69,8 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
 }
 
 std::vector<std::string> warnings_of(const Summary& summary, const CandidateResult& best,
-                                     const GridSettings& settings) {
+                                     const std::vector<CandidateResult>& candidates,
+                                     const std::vector<Replay>& replays, const GridSettings& settings) {
   std::vector<std::string> warnings;
   const std::size_t found = static_cast<std::size_t>(summary.candidates);
   for (const ParameterFinding& finding : summary.parameters) {
@@ -79,9 +81,18 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
       warnings.push_back(finding.name + ": the best value is at the edge of the searched range");
   }
   for (std::size_t r = 0; r < best.recordings.size(); ++r)
-    for (const std::string& bound : best.recordings[r].bounds_hit)
-      warnings.push_back(summary.recordings[r].name + ": " + bound +
-                         " is at its bound; widen `nuisance` in recording.json");
+    for (const RegistrationParameter& parameter : registration_parameters) {
+      if (!is_at_bound(best.recordings[r].bounds_hit, parameter)) continue;
+      const auto count =
+          std::count_if(candidates.begin(), candidates.end(), [&](const CandidateResult& candidate) {
+            return r < candidate.recordings.size() &&
+                   is_at_bound(candidate.recordings[r].bounds_hit, parameter);
+          });
+      warnings.push_back(summary.recordings[r].name + ": " +
+                         at_bound_text(parameter, replays[r].recording.nuisance) +
+                         " (the best candidate and " + std::to_string(count) + " of all " +
+                         std::to_string(candidates.size()) + " end at it)");
+    }
   if (summary.unconverged > 0)
     warnings.push_back(data::format_count(static_cast<std::size_t>(summary.unconverged)) + " of " +
                        data::format_count(found) + " candidates did not converge in every step");
@@ -171,7 +182,7 @@ Summary summarize(const GridResults& results, const GridVerdict& verdict, const 
   summary.fixed = fixed_of(summary, settings);
   for (std::size_t r = 0; r < replays.size(); ++r)
     summary.recordings.push_back(summarize_recording(replays[r], best.recordings[r], verdict, nuisance));
-  summary.warnings = warnings_of(summary, best, settings);
+  summary.warnings = warnings_of(summary, best, results.candidates, replays, settings);
   if (const std::string warning = warning_of_regions(results, verdict.level95); !warning.empty())
     summary.warnings.push_back(warning);
   if (const std::string reason = reason_unusable(summary, best); !reason.empty()) {

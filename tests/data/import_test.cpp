@@ -1,6 +1,7 @@
 #include "data/import.h"
 
 #include <gtest/gtest.h>
+#include "data/extrinsics.h"
 
 #include <cmath>
 #include <numbers>
@@ -118,8 +119,19 @@ TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
   folder_.write("camera.json",
                 R"({"schema": "flash-extrinsics/1", "setup": "eye-to-hand", "transform": {"parent": "base",
     "child": "camera", "translation": [0.5, 0.24, 1.06], "rotation_xyzw": [1, 0, 0, 0]}})");
-  EXPECT_TRUE(load_extrinsics(folder_ / "camera.json").isApprox(load_extrinsics(folder_ / "camera.tum")));
+  EXPECT_TRUE(load_camera_pose(folder_ / "camera.json", false)
+                  .transform.T.isApprox(load_camera_pose(folder_ / "camera.tum", false).transform.T));
   options_.overwrite = true;
+  folder_.write(
+      "camera.json",
+      R"({"schema": "flash-extrinsics/1", "exit_code": 3, "warnings": ["one axis only"], "transform": {
+    "translation": [0.5, 0.24, 1.06], "rotation_xyzw": [1, 0, 0, 0]}})");
+  options_.extrinsics = folder_ / "camera.json";
+  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("cannot be used (one axis only)"),
+            std::string::npos);
+  options_.accept_unusable = true;
+  const std::vector<std::string> said = import_recording(options_).notices;
+  EXPECT_NE(std::find(said.begin(), said.end(), (folder_ / "camera.json") + ": one axis only"), said.end());
   options_.extrinsics.clear();
   EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
             "import: --depth needs --intrinsics and --extrinsics");

@@ -101,6 +101,22 @@ TEST_F(SegmentFolder, DepthImagesBecomeTheLiftedPatchInTheBaseFrame) {
   EXPECT_TRUE(fs::exists(folder("out") + "/segment.png"));
 }
 
+TEST_F(SegmentFolder, CamerasThatCannotBeUsedAreRefusedUnlessAccepted) {
+  write_depth_view(folder("raw"), {0.1});
+  std::ofstream(folder("raw") + "/extrinsics.json")
+      << R"({"schema": "flash-extrinsics/1", "exit_code": 3, "warnings": ["one axis only"],
+             "transform": {"translation": [0.5, 0.1, 1.07], "rotation_xyzw": [1, 0, 0, 0]}})";
+  EXPECT_THROW(open_raw_view(folder("raw")), data::InputError);
+  RawViewFiles files;
+  files.accept_unusable = true;
+  const RawView accepted = open_raw_view(folder("raw"), files);
+  const std::vector<std::string> said{folder("raw") + "/extrinsics.json: one axis only"};
+  EXPECT_EQ(accepted.warnings, said);
+  SegmentFolderSettings settings;
+  settings.find_table = false;
+  EXPECT_EQ(segment_folder({accepted}, {0.0}, settings, folder("out")).warnings, said);
+}
+
 TEST_F(SegmentFolder, ViewsAreMergedFrameByFrame) {
   write_depth_view(folder("a"), {0.1});
   fs::create_directories(folder("b"));
