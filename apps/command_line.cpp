@@ -1,15 +1,32 @@
 #include "apps/command_line.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
 #include <exception>
 #include <iostream>
 #include <string>
+#include <string_view>
 
 #include "data/error.h"
 
 namespace flash {
 namespace {
+
+// A signal handler reaches nothing but what stands here.
+std::atomic<bool> stop_asked = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+constexpr std::string_view kStopping = "\nstopping after this step; Ctrl-C again ends the program now\n";
+
+void ask_to_stop(int signal) {
+  if (stop_asked.exchange(true)) _exit(128 + signal);
+  const int before = errno;
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kStopping.data(), kStopping.size());
+  errno = before;
+}
 
 // Messages of libraries may span lines; users and scripts read one.
 int report(const std::string& name, std::string message, int code) {
@@ -39,6 +56,15 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
     return report(app.get_name(), std::string(error.what()) + " (see --help)", exit_bad_input);
   }
   return run_tool(app.get_name().c_str(), body);
+}
+
+const std::atomic<bool>& stop_on_signals() {
+  struct sigaction action = {};
+  action.sa_handler = ask_to_stop;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  return stop_asked;
 }
 
 }  // namespace flash

@@ -177,7 +177,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
     ProgressLine line(options.common);
     complete = sysid::grid_search(
         replays, settings, store, [&](const sysid::Progress& progress) { line.show(progress); },
-        &stop_on_interrupt());
+        &stop_on_signals());
   }
 
   if (!complete) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -17,14 +16,6 @@
 
 namespace flash {
 namespace {
-
-std::atomic<bool> interrupted = false;  // a signal handler reaches nothing else
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-void on_interrupt(int signal) {
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
-}
 
 std::string duration_text(double seconds) {
   char text[32];
@@ -220,12 +211,6 @@ void ProgressLine::show(const sysid::Progress& progress) {
                 progress.done, progress.total, progress.candidates_per_second,
                 duration_text(progress.seconds_left).c_str(), 1000 * progress.best_score);
   std::cerr << line << std::flush;
-}
-
-const std::atomic<bool>& stop_on_interrupt() {
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  return interrupted;
 }
 
 }  // namespace flash

@@ -1,6 +1,5 @@
 #pragma once
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <string>
 #include <vector>
 
@@ -77,8 +76,5 @@ class ProgressLine {
   bool visible_;
   bool drawn_ = false;
 };
-
-/// Set by Ctrl-C from now on; a second Ctrl-C ends the program at once.
-const std::atomic<bool>& stop_on_interrupt();
 
 }  // namespace flash
