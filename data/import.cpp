@@ -179,6 +179,18 @@ Eigen::Isometry3d start_pose(const Points& rest, const std::array<int, 2>& corne
   return pose;
 }
 
+/// When the grasp acts at the latest: the first keyframe, or before it when the gripper sets off.
+double grasp_time(const Trajectory& trajectory, double first_keyframe) {
+  constexpr double kStill = 1e-3;  // [m]
+  const Eigen::Vector3d start = trajectory.poses.front().translation();
+  double last = trajectory.times.front();
+  for (std::size_t i = 0; i < trajectory.times.size(); ++i) {
+    if ((trajectory.poses[i].translation() - start).norm() > kStill) break;
+    last = trajectory.times[i];
+  }
+  return std::min(first_keyframe, last);
+}
+
 std::string copied(const std::string& file, const fs::path& to) {
   write_atomically(to.string(), read_file(file));
   return to.string();
@@ -267,6 +279,7 @@ Recording import_recording(const ImportOptions& options) {
   recording.trajectories["gripper"] = trajectory;
 
   import_frames(options, out, recording);
+  recording.grasps[0].from = grasp_time(trajectory, recording.keyframes.front().time);
   recording.trajectory_paths["gripper"] = (out / "gripper.tum").string();
   save_tum(trajectory, recording.trajectory_paths["gripper"]);
   if (!is_mesh_spec(recording.mesh_spec))

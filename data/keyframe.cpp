@@ -123,7 +123,7 @@ std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std
     largest = std::max(largest, diagonal(keyframe.cloud));
     if (keyframe.cloud.rows() == 0 && keyframe.contour.rows() == 0 && keyframe.markers.rows() == 0 &&
         !keyframe.force) {
-      empty += (empty.empty() ? "" : ", ") + format_short(recorded.time);
+      empty += (empty.empty() ? "" : ", ") + format_clock(recording.origin + recorded.time);
       ++empty_count;
     }
   }
