@@ -14,6 +14,7 @@
 #include "data/json_reader.h"
 #include "data/text.h"
 #include "sysid/fit.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/parameter_label.h"
 #include "sysid/summary.h"
 
@@ -116,8 +117,7 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
 
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   choose_device(options.common);
-  std::vector<data::Recording> recordings;
-  for (const std::string& path : options.recordings) recordings.push_back(data::load_recording(path));
+  const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const sysid::Summary found = sysid::load_summary((fs::path(options.start) / "summary.json").string());
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.asset : options.asset, recordings.front());
@@ -128,6 +128,11 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
         sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common))));
   std::vector<std::string> notices;
   settings.grid.base = material_base(asset, replays.front().sheet.rest, notices);
+  const std::size_t batch =
+      std::max<std::size_t>(2 * settings.start.size() + 1, settings.global.generations > 0 ? 16 : 0);
+  sysid::check_job(
+      replays, static_cast<double>(batch) * (options.iterations + static_cast<double>(options.generations)),
+      sysid::estimate_batch(replays, batch));
   check_output(options.out, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 

@@ -11,6 +11,7 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/overlay.h"
 #include "sysid/overlay_image.h"
 
@@ -125,6 +126,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
     axes.push_back(sysid::parse_fixed(assignment));
     values.push_back(axes.back().values.front());
   }
+  sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1));
   check_output(options.out, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 

@@ -82,7 +82,9 @@ Axis parse_axis(const std::string& name, const std::string& specification) {
     for (const std::string_view word : data::split(specification, ","))
       axis.values.push_back(number(option, word));
     std::sort(axis.values.begin(), axis.values.end());
-    axis.values.erase(std::unique(axis.values.begin(), axis.values.end()), axis.values.end());
+    const auto twice = std::adjacent_find(axis.values.begin(), axis.values.end());
+    if (twice != axis.values.end())
+      throw data::InputError(option + ": " + data::format_short(*twice) + " is given twice");
   } else {
     const std::vector<std::string_view> parts = data::split(specification, ":");
     axis.logarithmic = parts.size() == 4 && parts[3] == "log";
@@ -143,6 +145,12 @@ std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes
   return candidates;
 }
 
+double count_candidates(const std::vector<Axis>& axes) {
+  double count = 1;
+  for (const Axis& axis : axes) count *= static_cast<double>(axis.values.size());
+  return count;
+}
+
 void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) {
   bool young = false, poisson = false;
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -151,6 +159,15 @@ void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) 
     }
     young = young || (axes[i].name == "young" && axes[i].values.size() > 1);
     poisson = poisson || (axes[i].name == "poisson" && axes[i].values.size() > 1);
+  }
+  constexpr double kMostCandidates = 1e6;
+  if (count_candidates(axes) > kMostCandidates) {
+    std::string names;
+    for (const Axis& axis : axes)
+      if (axis.values.size() > 1) names += (names.empty() ? "--" : ", --") + axis.name;
+    throw data::InputError(
+        names + ": found " + data::format_short(count_candidates(axes)) + " candidates, expected at most " +
+        data::format_count(static_cast<std::size_t>(kMostCandidates)) + ": search fewer values");
   }
   if (constitutive == data::Constitutive::tri_arap && young && poisson) {
     throw data::InputError(

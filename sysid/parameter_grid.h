@@ -30,7 +30,7 @@ const std::vector<ParameterInfo>& known_parameters();
 
 /// "low:high:count:log", "low:high:count" (evenly), "a,b,c" or one value.
 /// Throws data::InputError naming the option: unknown parameter (with the nearest known), malformed, out of
-/// range.
+/// range, a value given twice.
 Axis parse_axis(const std::string& name, const std::string& specification);
 
 /// "friction=0.3" of `--fix`, an axis of one value.
@@ -39,8 +39,12 @@ Axis parse_fixed(const std::string& assignment);
 /// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes);
 
+/// How many cartesian_product makes.
+double count_candidates(const std::vector<Axis>& axes);
+
 /// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
-/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only. Throws data::InputError with the reason.
+/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; more than a million candidates. Throws
+/// data::InputError with the reason.
 void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive);
 
 /// What candidates are built on: the asset's material and how `young` and `bending` are understood.
