@@ -16,6 +16,7 @@
 #include "data/mesh_io.h"
 #include "data/text.h"
 #include "sysid/depth_camera.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/replay.h"
 
 namespace flash::sysid {
@@ -112,7 +113,8 @@ void check(const SynthSettings& settings) {
   within("--noise", settings.depth_noise, 0, kFarthest, " m");
   for (int k = 0; k < 3; ++k) {
     within("--offset", settings.cloud_offset[k], -kFarthest, kFarthest, " m");
-    if (settings.displacement) within("--displacement", (*settings.displacement)[k], -kFarthest, kFarthest, " m");
+    if (settings.displacement)
+      within("--displacement", (*settings.displacement)[k], -kFarthest, kFarthest, " m");
     for (const SynthCamera& camera : settings.cameras)
       within("--camera", camera.base_from_camera.translation()[k], -kFarthest, kFarthest, " m");
   }
@@ -239,6 +241,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   replay.settings.clamp_slopes = settings.clamp_slopes;
   if (settings.clamp_slopes) stiffen_clamped(replay);
   replay.steps = steps_in(settings.duration + settings.rest, solver.time_step);
+  check_job({replay}, 1, estimate_batch({replay}, 1));
   const sim::Rollout rollout = std::move(
       sim::simulate(replay.sheet, {make_environment(replay, {material, {}})}, replay.steps, solver, 1)
           .front());
