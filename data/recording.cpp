@@ -345,6 +345,9 @@ Recording load_recording(const std::string& path) {
   file.expect_fields({"schema", "name", "kind", "note", "gravity", "object", "table", "trajectories",
                       "grasps", "camera", "crop", "keyframes", "nuisance"});
   recording.name = file.string("name");
+  if (std::any_of(recording.name.begin(), recording.name.end(),
+                  [](unsigned char c) { return c < ' ' || c == 0x7f; }))
+    throw file.error("name", "a text in one line");
   recording.kind = file.string("kind", recording.kind);
   const std::vector<std::string> kinds = {"corner_lift", "hang",       "bar_pull", "bias_pull",
                                           "drag",        "cantilever", "free"};

@@ -191,9 +191,9 @@ bool is_visible(const Eigen::Vector3d& point, const DepthView& view, const Synth
   const Eigen::Vector3d seen = camera.base_from_camera.inverse() * point;
   const auto pixel = data::project(camera.intrinsics, seen);
   if (!pixel) return false;
-  const auto u = static_cast<Eigen::Index>(std::lround(pixel->x())),
-             v = static_cast<Eigen::Index>(std::lround(pixel->y()));
-  if (u < 0 || v < 0 || u >= view.depth.cols() || v >= view.depth.rows()) return false;
+  const double column = std::round(pixel->x()), row = std::round(pixel->y());
+  if (!(column >= 0 && row >= 0 && column < view.depth.cols() && row < view.depth.rows())) return false;
+  const auto u = static_cast<Eigen::Index>(column), v = static_cast<Eigen::Index>(row);
   return seen.z() < view.depth(v, u) + 0.005;
 }
 

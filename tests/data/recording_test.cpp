@@ -99,6 +99,13 @@ TEST_F(RecordingFiles, TimesCountFromItsStartWhateverTheClock) {
   }
 }
 
+TEST_F(RecordingFiles, ItsNameIsOneLine) {
+  json_["name"] = "two\nlines";
+  EXPECT_NE(message().find("name: found"), std::string::npos);
+  json_["name"] = "../../anything else";
+  EXPECT_EQ(message(), "");
+}
+
 TEST_F(RecordingFiles, TimesOfAnotherClockAndSenselessBoundsAreNamed) {
   json_["grasps"][0]["from"] = -1e12;
   EXPECT_NE(message().find("grasps[0].from: found -1e+12 s, expected a time by the clock of the keyframes"),
