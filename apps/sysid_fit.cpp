@@ -1,10 +1,12 @@
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "apps/command_line.h"
 #include "apps/sysid_options.h"
@@ -137,13 +139,16 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   for (const std::string& notice : notices) say(options.common, notice);
 
   const std::vector<sysid::Axis>& axes = settings.grid.axes;
-  int generation = 0;
+  int generation = 0, iteration = 0;
+  auto last = std::chrono::steady_clock::now();
   const sysid::FitResult result = sysid::fit(replays, settings, [&](const sysid::FitStep& step) {
-    std::string line = step.stage == sysid::FitStage::global
-                           ? "generation " + std::to_string(++generation) + " of " +
-                                 std::to_string(options.generations) + ": cost "
-                           : "cost ";
-    line += data::format_short(step.cost);
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - std::exchange(last, now)).count();
+    std::string line =
+        step.stage == sysid::FitStage::global
+            ? "generation " + std::to_string(++generation) + " of " + std::to_string(options.generations)
+            : "step " + std::to_string(iteration++) + " of at most " + std::to_string(options.iterations);
+    line += ", took " + data::format_short(seconds) + " s: cost " + data::format_short(step.cost);
     for (std::size_t k = 0; k < axes.size(); ++k)
       line += "  " + axes[k].name + " " + data::format_short(step.values[k]);
     say(options.common, line + (step.accepted ? "" : "  (left)"));
