@@ -84,6 +84,8 @@ std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::Materi
   return axes;
 }
 
+constexpr double kMotion = 2.0, kLongestExperiment = 3.0;  // of the experiments that synth knows [s]
+
 // A sheet of the recording's size in each of the experiments that synth knows, seen by two cameras.
 data::Recording virtual_recording(const std::string& kind, const data::Recording& like,
                                   const data::SheetMaterial& material, const sim::SolverSettings& solver,
@@ -91,8 +93,8 @@ data::Recording virtual_recording(const std::string& kind, const data::Recording
   sysid::SynthSettings settings;
   settings.name = kind;
   settings.kind = kind;
-  settings.duration = 2.0;
-  settings.rest = kind == "hang" ? 1.0 : 0.0;
+  settings.duration = kMotion;
+  settings.rest = kind == "hang" ? kLongestExperiment - kMotion : 0.0;
   settings.depth_noise = 0;
   settings.forces = kind == "bar_pull" || kind == "bias_pull" || kind == "drag";
   settings.seed = seed;
@@ -168,6 +170,7 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     settings.at.push_back(
         std::clamp(current_value(settings.grid.base, axis.name), axis.values.front(), axis.values.back()));
   check_output(options.out, options.common);
+  sysid::steps_in(kLongestExperiment, options.replay.time_step);  // refused before anything is simulated
 
   const ScratchFolder scratch;
   const data::SheetMaterial material = sysid::candidate_at(settings.at, settings.grid).material;

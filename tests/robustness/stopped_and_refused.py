@@ -50,7 +50,7 @@ def stops(sysid, root, asset, recording, run):
         "grid": [recording, *common, *AXES, *LONG],
         "replay": [recording, *common, *LONG],
         "fit": [recording, *common, "--start", run, *LONG],
-        "plan": [recording, *common, *LONG],
+        "plan": [recording, *common, "--time-step", "4e-6"],
         "synth": [*common, "--duration", "0.6", "--mesh", "sheet:0.2x0.2:0.02", "--time-step", "3e-6"],
     }
     for verb, words in jobs.items():
@@ -147,6 +147,7 @@ def refusals(sysid, root, asset, recording):
         ([*grid, *axis, "--tolerance", "1e-300"], "--tolerance"),
         ([*grid, "--bending", "1e-4,1e-4"], "--bending: 0.0001 is given twice"),
         ([*grid, *axis, "--from", "3"], "--from, --to: "),
+        (["plan", recording, "--asset", asset, "--time-step", "2e-6"], "--time-step: found 2e-06 s"),
         ([*synth, "--rate", "1e9"], "--rate: found 1e+09"),
         ([*synth, "--duration", "1e9"], "--duration: found 1e+09"),
         ([*synth, "--camera", "nan,0,0"], "--camera"),
