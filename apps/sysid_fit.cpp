@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -7,6 +8,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
@@ -17,6 +19,7 @@
 #include "data/json_reader.h"
 #include "data/text.h"
 #include "sysid/fit.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/parameter_label.h"
 #include "sysid/summary.h"
 
@@ -142,8 +145,7 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
 
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   choose_device(options.common);
-  std::vector<data::Recording> recordings;
-  for (const std::string& path : options.recordings) recordings.push_back(data::load_recording(path));
+  const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const sysid::Summary found = sysid::load_summary((fs::path(options.start) / "summary.json").string());
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.asset : options.asset, recordings.front());
@@ -154,17 +156,25 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
         sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common))));
   std::vector<std::string> notices;
   settings.grid.base = material_base(asset, replays.front().sheet.rest, notices);
+  const std::size_t batch =
+      std::max<std::size_t>(2 * settings.start.size() + 1, settings.global.generations > 0 ? 16 : 0);
+  sysid::check_job(
+      replays, static_cast<double>(batch) * (options.iterations + static_cast<double>(options.generations)),
+      sysid::estimate_batch(replays, batch));
   check_output(options.out, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 
   const std::vector<sysid::Axis>& axes = settings.grid.axes;
-  int generation = 0;
+  int generation = 0, iteration = 0;
+  auto last = std::chrono::steady_clock::now();
   const sysid::FitResult result = sysid::fit(replays, settings, [&](const sysid::FitStep& step) {
-    std::string line = step.stage == sysid::FitStage::global
-                           ? "generation " + std::to_string(++generation) + " of " +
-                                 std::to_string(options.generations) + ": cost "
-                           : "cost ";
-    line += data::format_short(step.cost);
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - std::exchange(last, now)).count();
+    std::string line =
+        step.stage == sysid::FitStage::global
+            ? "generation " + std::to_string(++generation) + " of " + std::to_string(options.generations)
+            : "step " + std::to_string(iteration++) + " of at most " + std::to_string(options.iterations);
+    line += ", took " + data::format_short(seconds) + " s: cost " + data::format_short(step.cost);
     for (std::size_t k = 0; k < axes.size(); ++k)
       line += "  " + axes[k].name + " " + data::format_short(step.values[k]);
     say(options.common, line + (step.accepted ? "" : "  (left)"));

@@ -8,13 +8,17 @@
 #include <filesystem>
 #include <iostream>
 #include <limits>
+#include <map>
 #include <optional>
 #include <thread>
 
+#include "apps/command_line.h"
 #include "apps/option_checks.h"
 #include "data/error.h"
 #include "data/text.h"
 #include "sim/sheet.h"
+#include "sysid/recording_names.h"
+#include "sysid/summarize.h"
 
 namespace flash {
 namespace {
@@ -81,7 +85,7 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
       ->check(whole_number(1, 10000))
       ->capture_default_str();
   group.add_option("--tolerance", options.tolerance, "On the residual |r| / |M g|")
-      ->check(positive_number())
+      ->check(number_from(1e-12))  // of numbers with 16 digits
       ->capture_default_str();
   group.add_option("--grasp-shape", options.grasp_shape, "In place of the recording's")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}));
@@ -91,8 +95,10 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
       ->check(positive_number());
   group.add_flag("--clamp-slopes", options.clamp_slopes,
                  "A clamped patch does not bend: it holds the sheet's slope as well as its place");
-  group.add_option("--from", options.from, "Keyframes before do not count [s]")->check(any_number());
-  group.add_option("--to", options.to, "Keyframes after do not count [s]")->check(any_number());
+  group.add_option("--from", options.from, "Keyframes before do not count, from the recording's start [s]")
+      ->check(any_number());
+  group.add_option("--to", options.to, "Keyframes after do not count, from the recording's start [s]")
+      ->check(any_number());
   group.add_option("--distance", options.distance, "How point distances become one number")
       ->check(CLI::IsMember({"mean", "trimmed", "huber"}))
       ->capture_default_str();
@@ -127,6 +133,7 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
   if (options.grasp_shape == "clamp") settings.grasp_shape = data::GraspShape::clamp;
   if (options.grasp_shape == "point") settings.grasp_shape = data::GraspShape::point;
   if (options.grasp_shape == "pinch") settings.grasp_shape = data::GraspShape::pinch;
+  settings.solver.stop = &stop_on_signals();
   if (verb.count("--from") > 0) settings.score_from = options.from;
   if (verb.count("--to") > 0) settings.score_to = options.to;
   return settings;
@@ -208,6 +215,31 @@ void check_output(const std::string& path, const CommonOptions& options) {
   throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
 }
 
+std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,
+                                             const CommonOptions& options) {
+  std::vector<data::Recording> recordings;
+  std::map<std::string, std::string> known;  // sources by content
+  std::vector<std::string> names;
+  for (const std::string& path : paths) {
+    recordings.push_back(data::load_recording(path));
+    const data::Recording& recording = recordings.back();
+    names.push_back(recording.name);
+    if (paths.size() == 1) break;
+    const auto [same, is_new] = known.emplace(sysid::recording_sha256(recording), recording.source);
+    if (!is_new)
+      throw data::InputError(recording.source + ": is the same recording as " + same->second +
+                             ", expected each once: twice would count as two trials");
+  }
+  names = sysid::told_apart(names);
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    if (names[r] == recordings[r].name) continue;
+    say(options, recordings[r].source + ": is called " + names[r] + " here, as another recording is named " +
+                     recordings[r].name + " too");
+    recordings[r].name = names[r];
+  }
+  return recordings;
+}
+
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording) {
   if (!path.empty()) return data::load_asset(path);
   if (recording.asset.empty())
@@ -228,20 +260,30 @@ sysid::MaterialBase material_base(const data::Asset& asset, const data::Triangle
 }
 
 ProgressLine::ProgressLine(const CommonOptions& options)
-    : visible_(!options.quiet && isatty(STDERR_FILENO) != 0) {}
+    : visible_(!options.quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
 
 ProgressLine::~ProgressLine() {
   if (drawn_) std::cerr << '\n';
 }
 
+bool ProgressLine::due(const sysid::Progress& progress) {
+  if (terminal_ || progress.done == progress.total) return true;
+  const int tenths = 10 * progress.done / std::max(1, progress.total);
+  const double since = std::chrono::duration<double>(Clock::now() - last_).count();
+  if (since < 30 && (tenths == tenths_ || since < 1)) return false;
+  tenths_ = tenths;
+  return true;
+}
+
 void ProgressLine::show(const sysid::Progress& progress) {
-  if (!visible_) return;
-  drawn_ = true;
+  if (!visible_ || !due(progress)) return;
+  last_ = Clock::now();
+  drawn_ = terminal_;
   char line[160];
-  std::snprintf(line, sizeof line, "\r%d of %d candidates, %.2f/s, %s left, best %.2f mm\033[K",
-                progress.done, progress.total, progress.candidates_per_second,
-                duration_text(progress.seconds_left).c_str(), 1000 * progress.best_score);
-  std::cerr << line << std::flush;
+  std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, %s left, best %.2f mm", progress.done,
+                progress.total, progress.candidates_per_second, duration_text(progress.seconds_left).c_str(),
+                1000 * progress.best_score);
+  std::cerr << (terminal_ ? "\r" : "") << line << (terminal_ ? "\033[K" : "\n") << std::flush;
 }
 
 }  // namespace flash

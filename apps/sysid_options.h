@@ -1,5 +1,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -70,6 +71,11 @@ std::string choose_device(const CommonOptions& options);
 /// --force is not given.
 void check_output(const std::string& path, const CommonOptions& options);
 
+/// The recordings in the folders, told apart by name (a warning says where one was renamed). Throws
+/// data::InputError where two of them are the same.
+std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,
+                                             const CommonOptions& options);
+
 /// The asset named on the command line or, without one, by the recording.
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
 
@@ -77,7 +83,8 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
                                   std::vector<std::string>& notices);
 
-/// A line of progress with rate and time left, drawn over itself; silent when stderr is no terminal.
+/// Progress with rate and time left on stderr: one line drawn over itself on a terminal, elsewhere a line
+/// each tenth of the way (at most one a second) or half a minute. Silent with --quiet.
 class ProgressLine {
  public:
   explicit ProgressLine(const CommonOptions& options);
@@ -85,8 +92,13 @@ class ProgressLine {
   void show(const sysid::Progress& progress);
 
  private:
-  bool visible_;
+  using Clock = std::chrono::steady_clock;
+  bool due(const sysid::Progress& progress);
+
+  bool visible_, terminal_;
   bool drawn_ = false;
+  int tenths_ = 0;  ///< of the way, at the last line
+  Clock::time_point last_ = Clock::now();
 };
 
 }  // namespace flash

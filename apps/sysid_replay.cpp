@@ -11,6 +11,7 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/overlay.h"
 #include "sysid/overlay_image.h"
 #include "sysid/registration_parameter.h"
@@ -124,6 +125,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   sysid::check_grasp_axes(axes, {replay});
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
+  sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1));
   check_output(options.out, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 

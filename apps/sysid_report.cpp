@@ -9,6 +9,7 @@
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "sysid/predictability.h"
+#include "sysid/recording_names.h"
 #include "sysid/report.h"
 
 namespace flash {
@@ -31,9 +32,12 @@ int run_report(const ReportOptions& options) {
   for (const sysid::SummaryRecording& recording : summary.recordings) horizons.push_back(recording.horizon_s);
   if (!horizons.empty()) sysid::drop_beyond_horizons(horizons, results);
   std::vector<sysid::Overlay> overlays;
-  for (const sysid::SummaryRecording& recording : summary.recordings) {
-    const fs::path folder = fs::path(options.run) / "best" / recording.name;
-    if (fs::exists(folder)) overlays.push_back(sysid::load_overlay(folder.string()));
+  const std::vector<std::string> folders = sysid::file_names(results.recordings);
+  for (std::size_t r = 0; r < folders.size(); ++r) {
+    const fs::path folder = fs::path(options.run) / "best" / folders[r];
+    if (!fs::exists(folder)) continue;
+    overlays.push_back(sysid::load_overlay(folder.string()));
+    overlays.back().name = results.recordings[r];
   }
   sysid::ReportSettings settings;
   settings.max_cloud_points = options.points;

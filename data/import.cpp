@@ -209,6 +209,18 @@ void check_as_file(const Recording& recording, const std::string& path) {
   }
 }
 
+/// When the grasp acts at the latest: the first keyframe, or before it when the gripper sets off.
+double grasp_time(const Trajectory& trajectory, double first_keyframe) {
+  constexpr double kStill = 1e-3;  // [m]
+  const Eigen::Vector3d start = trajectory.poses.front().translation();
+  double last = trajectory.times.front();
+  for (std::size_t i = 0; i < trajectory.times.size(); ++i) {
+    if ((trajectory.poses[i].translation() - start).norm() > kStill) break;
+    last = trajectory.times[i];
+  }
+  return std::min(first_keyframe, last);
+}
+
 std::string copied(const std::string& file, const fs::path& to) {
   write_atomically(to.string(), read_file(file));
   return to.string();
@@ -305,6 +317,7 @@ Recording import_recording(const ImportOptions& options) {
   recording.trajectory_paths["gripper"] = options.trajectory;
 
   import_frames(options, recording);
+  recording.grasps[0].from = grasp_time(trajectory, recording.keyframes.front().time);
   std::vector<double> times;
   for (const RecordedKeyframe& keyframe : recording.keyframes) times.push_back(keyframe.time);
   std::vector<std::string> notices = recording.notices;

@@ -113,7 +113,9 @@ Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recor
 
 /// Keyframes without a point, and whether that is as it should be: a sheet that still lies is below the crop.
 std::string empty_notice(const Recording& recording, const std::vector<std::size_t>& empty) {
-  const auto time = [&](std::size_t k) { return format_short(recording.keyframes[k].time); };
+  const auto time = [&](std::size_t k) {
+    return format_clock(recording.origin + recording.keyframes[k].time);
+  };
   const bool only_first = empty.back() + 1 == empty.size();
   double highest = recording.table_point.z();
   for (const auto& [name, trajectory] : recording.trajectories)

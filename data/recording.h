@@ -76,6 +76,8 @@ struct RecordedCamera {
 struct Recording {
   std::string source;  ///< path of recording.json
   std::string name;
+  double origin = 0;  ///< time by the file's clock at which the recording starts: its first grasp or
+                      ///< keyframe. Every time below counts from there [s]
   std::string kind =
       "free";  ///< documents only: corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free
   Eigen::Vector3d gravity{0, 0, -9.81};                                ///< [m/s^2]
@@ -100,8 +102,9 @@ struct Recording {
 };
 
 /// Reads recording.json (or its folder), its mesh and trajectories and checks them: field by field, times
-/// sorted and overlapping, plausible sizes, the grasp on the mesh. Clouds are checked by load_keyframes.
-/// Throws InputError.
+/// sorted and overlapping, plausible sizes and durations, the grasp on the mesh. A grasp without `from`
+/// begins with the first keyframe or pose of its gripper. Clouds are checked by load_keyframes. Throws
+/// InputError.
 Recording load_recording(const std::string& path);
 
 /// Points of the observation that lie in the crop box, base frame [m].

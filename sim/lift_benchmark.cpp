@@ -129,7 +129,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
       counts[e].solves += report.solves;
       counts[e].factorizations += report.factorizations;
       counts[e].converged += report.converged;
-      counts[e].residual_max = std::max(counts[e].residual_max, report.residual);
+      counts[e].residual_max = worst(counts[e].residual_max, report.residual);
       if (k == benchmark.steps / 2) counts[e].middle = environment.state.positions;
     }
   });

@@ -226,8 +226,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       bool converged = true;
       for (const StepReport& report : reports) {
         converged = converged && report.converged;
-        summary.residual_max = std::max(summary.residual_max, report.residual);
-        summary.penetration_max = std::max(summary.penetration_max, report.penetration_max);
+        summary.residual_max = worst(summary.residual_max, report.residual);
+        summary.penetration_max = worst(summary.penetration_max, report.penetration_max);
         summary.iterations += report.iterations;
       }
       summary.unconverged_steps += !converged;

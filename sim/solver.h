@@ -1,4 +1,6 @@
 #pragma once
+#include <atomic>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -16,6 +18,7 @@ struct SolverSettings {
   int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
   double exit_speed = 1.0;      ///< at which vertices that start inside an obstacle come out, at most [m/s]
   int halvings = 6;  ///< a step that cannot be solved is repeated in two halves, each so again, so often
+  const std::atomic<bool>* stop = nullptr;  ///< once set, simulate ends before its next step
 };
 
 /// How one step of one environment went.
@@ -71,8 +74,13 @@ struct Rollout {
   std::vector<StepReport> reports;
 };
 
+/// The larger one; infinity where either is not a number, which std::max may lose.
+inline double worst(double a, double b) {
+  return a >= b ? a : b >= a ? b : std::numeric_limits<double>::infinity();
+}
+
 /// Runs `steps` steps of each environment, environments spread over `threads`. Result i equals environment i
-/// alone, bitwise.
+/// alone, bitwise. Throws what a worker threw, and data::Stopped where settings.stop ended it.
 std::vector<Rollout> simulate(const Sheet& sheet, std::vector<Environment> environments, int steps,
                               const SolverSettings& settings, int threads);
 

@@ -64,7 +64,16 @@ class Residuals : public ceres::CostFunction {
     mutable_parameter_block_sizes()->push_back(static_cast<int>(settings.grid.axes.size()));
   }
 
+  /// No exception passes through Ceres; what asked to stop ends the next simulation too.
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    try {
+      return evaluate(parameters, residuals, jacobians);
+    } catch (const data::Stopped&) {
+      return false;
+    }
+  }
+
+  bool evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
     const std::vector<Axis>& axes = settings_.grid.axes;
     const auto count = static_cast<Eigen::Index>(axes.size());
     const std::vector<double> values = values_at(axes, parameters[0]);

@@ -44,7 +44,8 @@ struct FitResult {
 /// not their square, from the median of those at the stage's start. Derivatives are finite differences, all
 /// parameters in one batch of environments. With sigma^2 the mean square there and n keyframes the
 /// cost is n / 2 mean square / sigma^2 plus half the squared deviations from the priors. `report` is called
-/// after each step. Throws data::InputError where the simulation diverges at `start`.
+/// after each step. Throws data::InputError where the simulation diverges at `start`, and
+/// data::Stopped where the replays' solver settings ask for it.
 FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
               const std::function<void(const FitStep&)>& report = {});
 

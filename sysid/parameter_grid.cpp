@@ -148,6 +148,12 @@ std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes
   return candidates;
 }
 
+double count_candidates(const std::vector<Axis>& axes) {
+  double count = 1;
+  for (const Axis& axis : axes) count *= static_cast<double>(axis.values.size());
+  return count;
+}
+
 void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) {
   bool young = false, poisson = false;
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -156,6 +162,15 @@ void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) 
     }
     young = young || (axes[i].name == "young" && axes[i].values.size() > 1);
     poisson = poisson || (axes[i].name == "poisson" && axes[i].values.size() > 1);
+  }
+  constexpr double kMostCandidates = 1e6;
+  if (count_candidates(axes) > kMostCandidates) {
+    std::string names;
+    for (const Axis& axis : axes)
+      if (axis.values.size() > 1) names += (names.empty() ? "" : ", ") + option_of(axis.name);
+    throw data::InputError(
+        names + ": found " + data::format_short(count_candidates(axes)) + " candidates, expected at most " +
+        data::format_count(static_cast<std::size_t>(kMostCandidates)) + ": search fewer values");
   }
   if (constitutive == data::Constitutive::tri_arap && young && poisson) {
     throw data::InputError(

@@ -36,7 +36,7 @@ void check_parameter(const std::string& option, const std::string& name);
 
 /// "low:high:count:log", "low:high:count" (evenly), "a,b,c" or one value.
 /// Throws data::InputError naming the option: unknown parameter (with the nearest known), malformed, out of
-/// range.
+/// range, a value given twice.
 Axis parse_axis(const std::string& name, const std::string& specification);
 
 /// "friction=0.3", an axis of one value. Throws data::InputError naming `option`, that which was used.
@@ -45,8 +45,12 @@ Axis parse_fixed(const std::string& assignment, const std::string& option = "--f
 /// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes);
 
+/// How many cartesian_product makes.
+double count_candidates(const std::vector<Axis>& axes);
+
 /// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
-/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only. Throws data::InputError with the reason.
+/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; more than a million candidates. Throws
+/// data::InputError with the reason.
 void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive);
 
 /// Refuses grasp_depth, grasp_direction and grasp_pitch where no grasp of the recordings is a pinch: nothing

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "data/asset.h"
 #include "data/atomic_file.h"
@@ -80,6 +81,15 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
     if (finding.edge != RangeEdge::none && finding.identifiable == Identifiable::yes)
       warnings.push_back(finding.name + ": the best value is at the edge of the searched range");
   }
+  const auto claims_bending = [](const ParameterFinding& finding) {
+    return finding.name == "bending" && finding.identifiable != Identifiable::no;
+  };
+  if (std::any_of(summary.parameters.begin(), summary.parameters.end(), claims_bending))
+    for (const Replay& replay : replays)
+      if (replay.recording.gravity.isZero())
+        warnings.push_back(replay.recording.name +
+                           ": gravity is zero in recording.json: what is said of bending rests on inertia "
+                           "alone, and is wrong where the sheet had weight");
   for (std::size_t r = 0; r < best.recordings.size(); ++r)
     for (const RegistrationParameter& parameter : registration_parameters) {
       if (!is_at_bound(best.recordings[r].bounds_hit, parameter)) continue;
@@ -124,6 +134,9 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
   texts["mesh"] = replay.recording.mesh_spec + " (" +
                   data::format_count(static_cast<std::size_t>(replay.sheet.rest.vertices.rows())) +
                   " vertices)";
+  texts["object_mesh"] = data::is_mesh_spec(replay.object_mesh)
+                             ? replay.object_mesh
+                             : std::filesystem::absolute(replay.object_mesh).lexically_normal().string();
   texts["constitutive"] = data::to_string(settings.base.material.constitutive);
   texts["bending_model"] = data::to_string(settings.base.material.bending_model);
   texts["time_step_s"] = data::format_number(replay.settings.solver.time_step);

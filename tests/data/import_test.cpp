@@ -9,6 +9,7 @@
 #include "data/atomic_file.h"
 #include "data/depth_image.h"
 #include "data/mesh_io.h"
+#include "data/text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -38,6 +39,23 @@ class ImportFiles : public testing::Test {
   TemporaryFolder folder_;
   ImportOptions options_;
 };
+
+// The gripper stands still for 3 s, then lifts; the clouds begin at 2 s.
+TEST_F(ImportFiles, TheGraspBeginsByTheClockOfTheFilesWhenTheGripperSetsOff) {
+  const auto grasp_of = [&](double first_pose, double first_cloud) {
+    const auto pose = [&](double t, const char* y) {
+      return format_number(first_pose + t) + ",0.5," + y + ",0.052,0,0,0,1\n";
+    };
+    folder_.write("tcp.csv", "t,tx,ty,tz,qx,qy,qz,qw\n" + pose(0, "0.1") + pose(3, "0.1") + pose(4, "0.15"));
+    options_.times = "rate:10:" + format_number(first_cloud);
+    options_.overwrite = true;
+    const Recording recording = import_recording(options_);
+    return recording.origin + recording.grasps[0].from;
+  };
+  EXPECT_EQ(grasp_of(1.764e9, 1.764e9 + 2), 1.764e9 + 2);
+  EXPECT_EQ(grasp_of(1000, 1003.5), 1003);
+  EXPECT_EQ(grasp_of(0, 0), 0);
+}
 
 TEST_F(ImportFiles, CloudsAndATrajectoryBecomeARecording) {
   options_.nuisance.offset.setConstant(0.06);

@@ -38,6 +38,12 @@ TEST(ParameterGrid, NamesWhatIsWrong) {
             std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("bending", "0:1:3:log"); }).find("logarithmic"), std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("young", "5:2:3"); }).find("not below"), std::string::npos);
+  const std::vector<Axis> many = {parse_axis("bending", "1e-6:1e-3:100000"),
+                                  parse_axis("friction", "0.1:1:100000")};
+  EXPECT_NE(message_of([&] {
+              check_axes(many, data::Constitutive::tri_corotated);
+            }).find("--bending, --friction: found 1e+10 candidates, expected at most 1,000,000"),
+            std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("poisson", "0.7"); }).find("expected -0.99 to 0.5"),
             std::string::npos);
   EXPECT_NE(message_of([] { parse_fixed("friction"); }).find("name=value"), std::string::npos);
