@@ -90,12 +90,12 @@ void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies
 }
 
 std::string log_row(int step, double time, const std::vector<StepReport>& reports) {
-  StepReport worst, sum;
+  StepReport largest, sum;
   bool converged = true;
   for (const StepReport& r : reports) {
-    worst.residual = std::max(worst.residual, r.residual);
-    worst.penetration_max = std::max(worst.penetration_max, r.penetration_max);
-    worst.complementarity = std::max(worst.complementarity, r.complementarity);
+    largest.residual = worst(largest.residual, r.residual);
+    largest.penetration_max = worst(largest.penetration_max, r.penetration_max);
+    largest.complementarity = worst(largest.complementarity, r.complementarity);
     sum.iterations += r.iterations;
     sum.kinetic += r.kinetic;
     sum.membrane += r.membrane;
@@ -104,9 +104,9 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
     converged = converged && r.converged;
   }
   std::string row = std::to_string(step) + "," + time_text(time);
-  row += "," + data::format_number(worst.residual) + "," + std::to_string(sum.iterations);
-  for (double value :
-       {worst.penetration_max, worst.complementarity, sum.kinetic, sum.membrane + sum.bending, sum.potential})
+  row += "," + data::format_number(largest.residual) + "," + std::to_string(sum.iterations);
+  for (double value : {largest.penetration_max, largest.complementarity, sum.kinetic,
+                       sum.membrane + sum.bending, sum.potential})
     row += "," + data::format_number(value);
   row += converged ? ",1" : ",0";
   return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "\n";

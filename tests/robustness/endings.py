@@ -72,7 +72,7 @@ def refusals(sim, sysid, calib):
         ([*run, "short.json", "--steps", "-1", "-o", "out"], ["--steps", "found \"-1\"", "from 0 to 1,000,000"]),
         ([*run, "short.json", "--duration", "1e9", "-o", "out"], ["--duration", "1,000,000 steps"]),
         ([*run, "short.json", "-o", ""], ["--out", "found \"\""]),
-        ([*run, "loop", "-o", "out"], ["loop: Too many levels of symbolic links"]),
+        ([*run, "loop", "-o", "out"], ["loop: cannot be read: Too many levels of symbolic links"]),
         ([*run, "short.json", "-o", "loop/out"], ["loop/out", "Too many levels of symbolic links"]),
         ([*run, "short.json", "-o", long], [long, "File name too long"]),
         ([*run, "short.json", "-o", "short.json/out"], ["short.json/out", "Not a directory"]),
