@@ -6,20 +6,21 @@
 #include <iostream>
 #include <map>
 
+#include "apps/option_checks.h"
 #include "data/error.h"
 #include "data/text.h"
 
 namespace flash {
 
-void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options) {
+void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options, const char* force) {
   CLI::App& group = *verb.add_option_group("Common");
   group.add_flag("--json", options.json, "Print the result as JSON on stdout");
   CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
   group.add_flag("--verbose", options.verbose, "Print every notice, and the time of each part")
       ->excludes(quiet);
-  group.add_flag("--force", options.force, "Overwrite what is there");
+  group.add_flag("--force", options.force, force);
   group.add_option("--threads", options.threads, "0: one a processor")
-      ->check(CLI::NonNegativeNumber)
+      ->check(thread_number())
       ->capture_default_str();
 }
 
@@ -35,7 +36,7 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   group.add_option("--camera", choice.camera,
                    "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain");
   group.add_option("--depth-scale", choice.depth_scale, "Metres a count of the depth pictures")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");
 }

@@ -18,7 +18,10 @@ struct CalibCommonOptions {
   bool force = false;
   int threads = 0;  ///< 0: one a processor
 };
-void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options);
+void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options,
+                              const char* force = "Overwrite what is there");
+inline constexpr const char* force_covers_calibrations =
+    "Overwrite what is there; use a calibration that handeye ended with exit code 3";
 
 /// Which pictures, poses and intrinsics, and what is to be seen in them.
 struct DatasetChoice {

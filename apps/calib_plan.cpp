@@ -8,6 +8,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "calib/calibrate_images.h"
 #include "calib/extrinsics.h"
 #include "data/atomic_file.h"
@@ -92,12 +93,16 @@ void add_plan_verb(CLI::App& app, Action& action) {
   verb->add_option("--setup", options->setup, "Where the dataset does not say")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
   verb->add_option("--poses", options->settings.poses, "How many")
-      ->check(CLI::Range(1, 100))
+      ->check(whole_number(1, 100))
       ->capture_default_str();
-  verb->add_option("--lower", options->lower, "Least x y z of the gripper in the base [m]")->expected(3);
-  verb->add_option("--upper", options->upper, "Greatest x y z of the gripper in the base [m]")->expected(3);
+  verb->add_option("--lower", options->lower, "Least x y z of the gripper in the base [m]")
+      ->expected(3)
+      ->check(any_number());
+  verb->add_option("--upper", options->upper, "Greatest x y z of the gripper in the base [m]")
+      ->expected(3)
+      ->check(any_number());
   verb->add_option("--reach", options->settings.reach, "Beyond the poses used, where the bounds allow [m]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_from(0))
       ->capture_default_str();
   verb->add_option("--criterion", options->criterion,
                    "trace: sum of variances; determinant: volume of the region")

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -7,6 +8,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "calib/calibrate_images.h"
 #include "calib/register.h"
 #include "data/atomic_file.h"
@@ -39,9 +41,21 @@ std::string target_text(const std::string& target, const std::string& calibratio
   return fs::is_regular_file(beside) ? beside.string() : target;
 }
 
+/// What the calibrations of the members say against themselves.
+struct Doubts {
+  std::vector<std::string> warnings = {};  ///< each with the file or dataset it is of, once
+  bool unusable = false;                   ///< one cannot be used, and --force did not say to take it
+
+  void add(const std::string& source, const std::vector<std::string>& more) {
+    for (const std::string& warning : more)
+      if (std::find(warnings.begin(), warnings.end(), source + ": " + warning) == warnings.end())
+        warnings.push_back(source + ": " + warning);
+  }
+};
+
 calib::CellMember member_of(const std::string& arm, const std::string& camera, const DatasetChoice& choice,
-                            const std::string& setup, const RegisterOptions& options,
-                            bool time_offset = false) {
+                            const std::string& setup, const RegisterOptions& options, bool time_offset,
+                            calib::Calibration& calibration) {
   const calib::Dataset dataset = load_dataset(choice);
   const calib::Target target = target_of(choice, dataset);
   if (setup.empty() && !dataset.setup)
@@ -61,6 +75,7 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
       warn_calib(choice.path + ": " + std::to_string(all - used) + " of " + std::to_string(all) +
                  " views were not used; flash-calib handeye names them");
   }
+  calibration = solved.calibration;
   return calib::cell_member(arm, camera, dataset, target, solved.calibration);
 }
 
@@ -75,11 +90,12 @@ calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const Reg
   return calib::solve_cell(members, settings, options.target_size);
 }
 
-calib::Cell cell_of_arms(const RegisterOptions& options) {
+calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
   std::vector<calib::Extrinsics> calibrations;
   std::vector<std::string> arms;
   for (const std::string& path : options.calibrations) {
-    calibrations.push_back(calib::load_extrinsics(path));
+    calibrations.push_back(calib::load_extrinsics(path, options.common.force));
+    doubts.add(path, calibrations.back().warnings);
     arms.push_back(name_of(path));
   }
   const calib::Cell composed = calib::compose_cell(arms, calibrations);
@@ -104,13 +120,16 @@ calib::Cell cell_of_arms(const RegisterOptions& options) {
     choice.cache = options.cache;
     choice.no_depth = options.no_depth || !inputs.depth;
     if (inputs.depth) choice.depth_scale = inputs.depth->scale;
+    calib::Calibration again;
     members.push_back(member_of(arms[i], "camera", choice, calib::to_string(calibrations[i].setup), options,
-                                inputs.time_offset.has_value()));
+                                inputs.time_offset.has_value(), again));
+    doubts.add(file, again.warnings);
+    doubts.unusable = doubts.unusable || (!again.usable && calibrations[i].usable);
   }
   return solved_cell(members, options);
 }
 
-calib::Cell cell_of_cameras(const RegisterOptions& options) {
+calib::Cell cell_of_cameras(const RegisterOptions& options, Doubts& doubts) {
   std::vector<calib::CellMember> members;
   for (const std::string& path : options.cameras) {
     DatasetChoice choice;
@@ -119,7 +138,10 @@ calib::Cell cell_of_cameras(const RegisterOptions& options) {
     choice.cache = options.cache;
     choice.depth_scale = options.depth_scale;
     choice.no_depth = options.no_depth;
-    members.push_back(member_of("base", name_of(path), choice, options.setup, options));
+    calib::Calibration calibration;
+    members.push_back(member_of("base", name_of(path), choice, options.setup, options, false, calibration));
+    doubts.add(path, calibration.warnings);
+    doubts.unusable = doubts.unusable || !calibration.usable;
   }
   return solved_cell(members, options);
 }
@@ -155,18 +177,24 @@ int run_register(const RegisterOptions& options) {
   if (options.calibrations.size() + options.cameras.size() < 2)
     throw data::InputError("register: found one calibration, expected two or more");
   if (!options.out.empty()) check_calib_output(options.out, options.common);
-  const calib::Cell cell = options.cameras.empty() ? cell_of_arms(options) : cell_of_cameras(options);
+  Doubts doubts;
+  calib::Cell cell =
+      options.cameras.empty() ? cell_of_arms(options, doubts) : cell_of_cameras(options, doubts);
+  cell.notices.insert(cell.notices.begin(), doubts.warnings.begin(), doubts.warnings.end());
+  const int exit_code = doubts.unusable ? exit_unusable : exit_done;
   std::optional<Eigen::Vector3d> workspace;
   if (!options.workspace.empty())
     workspace = Eigen::Vector3d(options.workspace[0], options.workspace[1], options.workspace[2]);
-  const std::string text = data::format_json(calib::to_json(cell, workspace));
+  nlohmann::ordered_json json = calib::to_json(cell, workspace);
+  json["exit_code"] = exit_code;
+  const std::string text = data::format_json(json);
   if (!options.out.empty()) data::write_atomically(options.out, text);
   for (const std::string& notice : cell.notices) warn_calib(notice);
   if (options.common.json)
     std::cout << text;
   else
     print(cell, options);
-  return exit_done;
+  return exit_code;
 }
 
 }  // namespace
@@ -183,17 +211,18 @@ void add_register_verb(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
   verb->add_option("--workspace", options->workspace,
                    "Point in the first base where the uncertainty is stated [m]")
-      ->expected(3);
+      ->expected(3)
+      ->check(any_number());
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
   add_target_size_option(*verb, options->target_size);
   verb->add_option("--depth-scale", options->depth_scale, "Metres a count of the depth pictures of --cameras")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_flag("--no-depth", options->no_depth, "Leave depth pictures out");
   verb->add_option("--cache", options->cache, "Folder that keeps corners found, for the next run");
   verb->add_option("-o,--out", options->out, "File for the cell, JSON");
-  add_calib_common_options(*verb, options->common);
+  add_calib_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
       "Examples:\n"
       "  flash-calib register left.json right.json --workspace 0.4 0 0.1 -o cell.json\n"

@@ -96,8 +96,9 @@ nlohmann::ordered_json cloud_json(const calib::Accumulation& clouds) {
   return json;
 }
 
-nlohmann::ordered_json result_json(const ValidateOptions& options, const calib::ProjectionCheck& check,
-                                   bool pixels, const std::optional<calib::Accumulation>& clouds) {
+nlohmann::ordered_json result_json(const ValidateOptions& options, const std::vector<std::string>& warnings,
+                                   const calib::ProjectionCheck& check, bool pixels,
+                                   const std::optional<calib::Accumulation>& clouds) {
   nlohmann::ordered_json json;
   json["schema"] = "flash-validation/1";
   json["extrinsics"] = options.extrinsics;
@@ -116,6 +117,7 @@ nlohmann::ordered_json result_json(const ValidateOptions& options, const calib::
                              {"mm", view.mm},
                              {"deg", view.deg}});
   if (clouds) json["clouds"] = cloud_json(*clouds);
+  json["warnings"] = warnings;  // of the calibration
   return json;
 }
 
@@ -135,7 +137,8 @@ void print_table(const calib::ProjectionCheck& check, const std::optional<calib:
 
 int run_validate(const ValidateOptions& options) {
   if (!options.out.empty()) check_calib_output(options.out, options.common);
-  const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics);
+  const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.common.force);
+  for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::Dataset dataset = load_dataset(options.dataset);
   const bool pairs = dataset.frames.front().T_camera_target.has_value();
   const calib::Target target = pairs ? calib::Target() : target_of(options.dataset, dataset);
@@ -160,7 +163,8 @@ int run_validate(const ValidateOptions& options) {
 
   const std::optional<calib::Accumulation> clouds =
       pairs ? std::nullopt : accumulate(dataset, extrinsics, views, check);
-  const std::string text = data::format_json(result_json(options, check, !pairs, clouds)) + '\n';
+  const std::string text =
+      data::format_json(result_json(options, extrinsics.warnings, check, !pairs, clouds)) + '\n';
   if (!options.out.empty()) {
     data::write_atomically((fs::path(options.out) / "validation.json").string(), text);
     draw_views(views, check, options.out);
@@ -188,7 +192,7 @@ void add_validate_verb(CLI::App& app, Action& action) {
   verb->add_flag("--refit-target", options->refit_target,
                  "The target stands elsewhere than at the calibration");
   verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");
-  add_calib_common_options(*verb, options->common);
+  add_calib_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
       "Example:\n"
       "  flash-calib validate another_recording --target chessboard:9x6:0.025 --extrinsics camera.json -o "

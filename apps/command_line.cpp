@@ -1,15 +1,41 @@
 #include "apps/command_line.h"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
 #include <exception>
+#include <filesystem>
 #include <iostream>
+#include <new>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <system_error>
+#include <vector>
 
 #include "data/error.h"
+#include "data/json_reader.h"
 
 namespace flash {
 namespace {
+
+// A signal handler reaches nothing but what stands here.
+std::atomic<bool> stop_asked = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+constexpr std::string_view kStopping = "\nstopping after this step; Ctrl-C again ends the program now\n";
+
+void ask_to_stop(int signal) {
+  if (stop_asked.exchange(true)) _exit(128 + signal);
+  const int before = errno;
+  [[maybe_unused]] const ssize_t written = ::write(STDERR_FILENO, kStopping.data(), kStopping.size());
+  errno = before;
+}
 
 // Messages of libraries may span lines; users and scripts read one.
 int report(const std::string& name, std::string message, int code) {
@@ -19,26 +45,130 @@ int report(const std::string& name, std::string message, int code) {
   return code;
 }
 
+/// Whether a file system refused the path itself, which the user gave: otherwise it is full or broken.
+bool refuses_path(const std::error_code& code) {
+  const std::vector<std::errc> of_paths = {std::errc::too_many_symbolic_link_levels,
+                                           std::errc::filename_too_long,
+                                           std::errc::read_only_file_system,
+                                           std::errc::permission_denied,
+                                           std::errc::operation_not_permitted,
+                                           std::errc::not_a_directory,
+                                           std::errc::is_a_directory,
+                                           std::errc::no_such_file_or_directory,
+                                           std::errc::file_exists,
+                                           std::errc::directory_not_empty};
+  return std::any_of(of_paths.begin(), of_paths.end(), [&](std::errc known) { return code == known; });
+}
+
+/// "PATH: Too many levels of symbolic links".
+std::string message_of(const std::system_error& error) {
+  const auto* const of_files = dynamic_cast<const std::filesystem::filesystem_error*>(&error);
+  if (of_files == nullptr || of_files->path1().empty()) return error.what();
+  const std::string second = of_files->path2().empty() ? "" : " -> " + of_files->path2().string();
+  return of_files->path1().string() + second + ": " + error.code().message();
+}
+
+/// A standard stream that is closed would be opened again as the first file of the program, and the result
+/// written into it. Its place is taken by one that nothing can be written to, or read from.
+void occupy_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (::fcntl(stream, F_GETFD) < 0 && errno == EBADF)
+      static_cast<void>(::open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_WRONLY));
+}
+
+/// `code` where standard output has taken all of the result.
+int delivered(const std::string& name, int code) {
+  if (code != exit_done && code != exit_unusable) return code;
+  errno = 0;
+  std::cout.flush();
+  const bool taken = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
+  if (taken) return code;
+  return report(name,
+                "the result cannot be written to standard output" +
+                    (errno != 0 ? std::string(": ") + std::strerror(errno) : ""),
+                exit_failed);
+}
+
+/// CLI11 would only say that a verb is missing.
+void check_verb(const CLI::App& app, int argc, char** argv) {
+  std::vector<std::string> verbs;
+  for (const CLI::App* verb : app.get_subcommands(nullptr)) verbs.push_back(verb->get_name());
+  if (argc < 2 || argv[1][0] == '-' || std::find(verbs.begin(), verbs.end(), argv[1]) != verbs.end()) return;
+  const std::string nearest = data::nearest_name(argv[1], verbs);
+  throw data::InputError(std::string(argv[1]) + ": unknown verb" +
+                         (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)"));
+}
+
+void collect_options(const CLI::App& app, std::vector<std::string>& names) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* group : app.get_subcommands(nullptr)) collect_options(*group, names);
+}
+
+/// What CLI11 found wrong with the command line; for a long option that the verb does not have, the nearest.
+std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
+  std::vector<std::string> known;
+  for (const CLI::App* verb : app.get_subcommands()) collect_options(*verb, known);
+  for (int i = 2; i < argc && dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr; ++i) {
+    const std::string word(argv[i], std::strcspn(argv[i], "="));
+    if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
+    const std::string nearest = data::nearest_name(word, known);
+    return word + ": unknown option" +
+           (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)");
+  }
+  return std::string(error.what()) + " (see --help)";
+}
+
+/// An empty text is never meant: "-o ''" would write into the working folder.
+void check_no_empty_value(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options()) {
+    const std::vector<std::string>& values = option->results();
+    if (std::find(values.begin(), values.end(), "") != values.end())
+      throw data::InputError(option->get_name() + ": found \"\", expected a value");
+  }
+  for (const CLI::App* part : app.get_subcommands(nullptr)) check_no_empty_value(*part);
+}
+
 }  // namespace
 
 int run_tool(const char* name, const std::function<int()>& body) {
   try {
-    return body();
+    return delivered(name, body());
   } catch (const data::InputError& error) {
     return report(name, error.what(), exit_bad_input);
+  } catch (const std::system_error& error) {
+    return report(name, message_of(error), refuses_path(error.code()) ? exit_bad_input : exit_failed);
+  } catch (const std::bad_alloc&) {
+    return report(name, "there is not enough memory for a job of this size", exit_failed);
+  } catch (const std::length_error&) {
+    return report(name, "there is not enough memory for a job of this size", exit_failed);
   } catch (const std::exception& error) {
     return report(name, error.what(), exit_failed);
   }
 }
 
 int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& body) {
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    return report(app.get_name(), std::string(error.what()) + " (see --help)", exit_bad_input);
-  }
-  return run_tool(app.get_name().c_str(), body);
+  occupy_closed_streams();
+  return run_tool(app.get_name().c_str(), [&] {
+    check_verb(app, argc, argv);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::ParseError& error) {
+      if (error.get_exit_code() == 0) return app.exit(error);
+      return report(app.get_name(), wrong_words(app, error, argc, argv), exit_bad_input);
+    }
+    check_no_empty_value(app);
+    return body();
+  });
+}
+
+const std::atomic<bool>& stop_on_signals() {
+  struct sigaction action = {};
+  action.sa_handler = ask_to_stop;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  return stop_asked;
 }
 
 }  // namespace flash

@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <functional>
 
 namespace CLI {
@@ -11,12 +12,17 @@ namespace flash {
 /// used.
 enum ExitCode { exit_done = 0, exit_failed = 1, exit_bad_input = 2, exit_unusable = 3 };
 
-/// Runs the body of a tool and returns its exit code. data::InputError becomes 2 and any other exception 1,
-/// each as the one line "name: message" on stderr.
+/// Runs the body of a tool and returns its exit code. data::InputError and paths that the file system refuses
+/// become 2 and any other exception, data::Stopped too, becomes 1, each as the one line "name: message" on
+/// stderr. A result that standard output did not take, because it is full or closed, becomes 1 as well.
 int run_tool(const char* name, const std::function<int()>& body);
 
-/// Parses the command line of `app`, then runs `body`. Help and version print and return 0; a parse error
-/// returns 2 with one line on stderr.
+/// Parses the command line of `app`, then runs `body`. Help and version print and return 0; an unknown verb,
+/// a parse error or an empty value returns 2 with one line on stderr.
 int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& body);
+
+/// From now on Ctrl-C and SIGTERM set the flag that this returns, and say at once on stderr that the program
+/// stops after the step in work. A second signal ends the program there, with the exit code 128 + signal.
+const std::atomic<bool>& stop_on_signals();
 
 }  // namespace flash

@@ -6,12 +6,14 @@
 int main(int argc, char** argv) {
   CLI::App app("Simulates sheets by implicit Euler with contact, friction and grasps.", "flash-sim");
   app.set_version_flag("--version", FLASH_VERSION);
+  app.set_config("--config", "", "Read options from a TOML file; the command line counts more");
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"
       "  flash-sim run scene.json -o out\n"
       "  flash-sim bench --vertices 1000 --envs 64 --steps 250 --threads 2\n"
-      "Exit codes: 0 done; 1 failed; 2 bad usage or input; 3 finished, but the steps did not converge.");
+      "Exit codes: 0 done; 1 failed; 2 bad usage or input; 3 finished, but more than 1 % of "
+      "the steps did not converge.");
   flash::Action action;
   flash::add_run_verb(app, action);
   flash::add_bench_verb(app, action);

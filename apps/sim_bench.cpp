@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
 #include "sim/lift_benchmark.h"
 
@@ -20,7 +21,7 @@ struct BenchOptions {
 int bench(BenchOptions options) {
   sim::LiftBenchmark& benchmark = options.benchmark;
   if (benchmark.threads == 0) benchmark.threads = int(std::max(1u, std::thread::hardware_concurrency()));
-  const sim::LiftBenchmarkResult result = sim::run_lift_benchmark(benchmark);
+  const sim::LiftBenchmarkResult result = sim::run_lift_benchmark(benchmark, stop_on_signals());
   double accounted = 0;
   for (const sim::BenchmarkPhase& phase : result.phases)
     accounted += phase.calls_per_step * phase.milliseconds_per_call;
@@ -46,7 +47,7 @@ int bench(BenchOptions options) {
               benchmark.environments, benchmark.steps, benchmark.threads, result.wall_seconds);
   std::printf("converged %.2f %% of the steps, worst residual %.2g, %.2f Newton iterations a step\n",
               100 * result.converged_share, result.residual_max, result.iterations);
-  std::printf("%-20s %10s %10s %10s\n", "thread time a step", "calls", "ms a call", "ms");
+  std::printf("%-21s %9s %10s %10s\n", "time a step, 1 thread", "calls", "ms a call", "ms");
   for (const sim::BenchmarkPhase& phase : result.phases)
     std::printf("%-20s %10.2f %10.4f %10.3f\n", phase.name.c_str(), phase.calls_per_step,
                 phase.milliseconds_per_call, phase.calls_per_step * phase.milliseconds_per_call);
@@ -63,17 +64,17 @@ void add_bench_verb(CLI::App& app, Action& action) {
   sim::LiftBenchmark& benchmark = options->benchmark;
   benchmark.threads = 0;
   verb.footer("Example:\n  flash-sim bench --vertices 1000 --envs 64 --steps 250 --threads 2");
-  const auto count = [&](const char* name, int& value, const char* text) {
-    verb.add_option(name, value, text)->check(CLI::PositiveNumber)->capture_default_str();
+  const auto count = [&](const char* name, int& value, const char* text, long low) {
+    verb.add_option(name, value, text)->check(whole_number(low, 1'000'000))->capture_default_str();
   };
   const auto positive = [&](const char* name, double& value, const char* text) {
-    verb.add_option(name, value, text)->check(CLI::PositiveNumber)->capture_default_str();
+    verb.add_option(name, value, text)->check(positive_number())->capture_default_str();
   };
-  count("--vertices", benchmark.vertices, "Of the towel, about");
-  count("--envs", benchmark.environments, "Materials");
-  count("--steps", benchmark.steps, "A material");
-  verb.add_option("--threads", benchmark.threads, "0: one a processor")
-      ->check(CLI::NonNegativeNumber)
+  count("--vertices", benchmark.vertices, "Approximate number of vertices of the towel", 4);
+  count("--envs", benchmark.environments, "Number of materials", 1);
+  count("--steps", benchmark.steps, "Time steps per material", 1);
+  verb.add_option("--threads", benchmark.threads, "Materials that run at the same time; 0: one a processor")
+      ->check(thread_number())
       ->capture_default_str();
   positive("--time-step", benchmark.time_step, "[s]");
   positive("--tolerance", benchmark.tolerance, "On the residual |r| / |M g|");

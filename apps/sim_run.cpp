@@ -1,17 +1,17 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
 #include "data/error.h"
 #include "data/scene.h"
@@ -24,15 +24,9 @@ namespace {
 struct RunOptions {
   std::string scene, out, device = "auto";
   int threads = 0, steps = -1;
+  std::optional<double> duration;  // [s]
   bool quiet = false, verbose = false, json = false, force = false;
 };
-
-std::atomic<bool> interrupted = false;  // a signal handler reaches nothing else
-
-void on_interrupt(int signal) {
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
-}
 
 /// Rate and time left, drawn over itself, once a run has taken two seconds.
 class ProgressLine {
@@ -74,6 +68,26 @@ void print_json(const sim::SceneSummary& summary, const std::string& out, int ex
   std::cout << json.dump(2) << '\n';
 }
 
+int steps_to_run(const RunOptions& options, const data::Scene& scene) {
+  if (!options.duration) return options.steps;
+  const int steps = data::steps_of(*options.duration, scene.time_step);
+  if (steps < 0)
+    throw data::InputError("--duration: found " + data::format_short(*options.duration) +
+                           " s, expected at most the " +
+                           data::format_short(data::max_steps * scene.time_step) + " s of " +
+                           data::format_count(data::max_steps) + " steps");
+  return steps;
+}
+
+/// What a run that was stopped leaves, and how to go on.
+void say_what_is_left(const sim::SceneSummary& summary, int steps, const std::string& out) {
+  std::cerr << "flash-sim: stopped after " << data::format_count(std::size_t(summary.steps)) << " of "
+            << data::format_count(std::size_t(steps)) << " steps; " << out << " holds their "
+            << data::format_count(std::size_t(summary.frames))
+            << " frames, log.csv and forces.csv; a run begins again from the start, with --force in the same "
+               "folder\n";
+}
+
 int run(const RunOptions& options) {
   if (options.device == "cuda")
     throw data::InputError("--device cuda: this program has no CUDA backend; use --device cpu or auto");
@@ -82,13 +96,10 @@ int run(const RunOptions& options) {
       !(fs::is_directory(options.out) && fs::is_empty(options.out)))
     throw data::InputError(options.out + ": exists already; choose another -o, or --force to overwrite");
   const data::Scene scene = data::load_scene(options.scene);
-  if (options.force) fs::remove_all(fs::path(options.out) / "frames");
-
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
+  const std::atomic<bool>& stop = stop_on_signals();
   ProgressLine progress(!options.quiet);
   sim::SceneRun settings;
-  settings.steps = options.steps;
+  settings.steps = steps_to_run(options, scene);
   settings.threads =
       options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   settings.notice = [&](const std::string& notice) {
@@ -96,10 +107,12 @@ int run(const RunOptions& options) {
   };
   settings.progress = [&](int done, int steps) {
     progress.show(done, steps);
-    return !interrupted;
+    return !stop;
   };
   const sim::SceneSummary summary = sim::run_scene(scene, settings, options.out);
 
+  if (summary.interrupted)
+    say_what_is_left(summary, settings.steps < 0 ? scene.steps : settings.steps, options.out);
   // One step in a hundred may stay above the tolerance without spoiling a motion.
   const bool unusable = 100 * summary.unconverged_steps > summary.steps || !summary.at_rest;
   const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
@@ -108,8 +121,9 @@ int run(const RunOptions& options) {
               << data::format_short(summary.last_motion) << " m a step; allow more steps or longer ones\n";
   if (summary.unconverged_steps > 0)
     std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps
-              << " steps did not converge; worst residual " << data::format_short(summary.residual_max)
-              << " (see " << (fs::path(options.out) / "log.csv").string() << ")\n";
+              << " steps did not converge (1 in 100 is accepted); worst residual "
+              << data::format_short(summary.residual_max) << " (see "
+              << (fs::path(options.out) / "log.csv").string() << ")\n";
   if (options.json) {
     print_json(summary, options.out, exit_code);
   } else if (!options.quiet) {
@@ -128,16 +142,23 @@ int run(const RunOptions& options) {
 void add_run_verb(CLI::App& app, Action& action) {
   CLI::App& verb = *app.add_subcommand("run", "Run a scene; write its frames, log.csv and forces.csv");
   const auto options = std::make_shared<RunOptions>();
-  verb.footer("Example:\n  flash-sim run scene.json -o out");
+  verb.footer(
+      "Up to 1 % of the steps may end above the tolerance; with more of them the exit code is 3.\n"
+      "A scene that names neither steps nor duration runs 100 steps.\n"
+      "Example:\n  flash-sim run scene.json -o out");
   verb.add_option("scene", options->scene, "Scene file (.json)")->required();
   verb.add_option("-o,--out", options->out, "Folder to write")->required();
   verb.add_option("--device", options->device, "Where the simulation runs")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->capture_default_str();
-  verb.add_option("--threads", options->threads, "Objects stepped at once; 0: one a processor")
-      ->check(CLI::NonNegativeNumber)
+  verb.add_option("--threads", options->threads, "Objects that step at the same time; 0: one a processor")
+      ->check(thread_number())
       ->capture_default_str();
-  verb.add_option("--steps", options->steps, "In place of the scene's")->check(CLI::NonNegativeNumber);
+  verb.add_option("--steps", options->steps, "In place of the scene's")
+      ->check(whole_number(0, data::max_steps));
+  verb.add_option("--duration", options->duration, "In place of the scene's [s]")
+      ->check(number_from(0))
+      ->excludes("--steps");
   verb.add_flag("--json", options->json, "Print the summary as JSON on stdout");
   CLI::Option* quiet = verb.add_flag("--quiet", options->quiet, "Print nothing but errors and warnings");
   verb.add_flag("--verbose", options->verbose, "Print every notice (the default)")->excludes(quiet);

@@ -10,6 +10,7 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/text.h"
 #include "sim/sheet.h"
 #include "sysid/export_asset.h"
 
@@ -34,6 +35,17 @@ int run_export(const ExportOptions& options) {
   std::vector<std::string> notices;
   const data::TriangleMesh mesh = data::load_asset_mesh(tuned);
   const double area = sim::make_sheet(mesh).vertex_area.sum();
+  if (!summary.settings.contains("object_mesh")) {
+    warn(
+        "summary.json is of an earlier program and does not say which sheet was identified: mesh and mass "
+        "are "
+        "those of " +
+        base.source);
+  } else if (tuned.mesh != base.mesh) {
+    say(options.common, "mesh and mass are those of the sheet in the recording, " + tuned.mesh + " (" +
+                            data::format_short(area * *tuned.areal_density) + " kg), not those of " +
+                            base.source);
+  }
   const auto format =
       options.format == "published" ? data::AssetFormat::published : data::AssetFormat::flash_1;
   data::save_asset(data::express_as(tuned, format, area, notices), options.out);
@@ -60,7 +72,10 @@ void add_export_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "The asset file")->required();
   add_common_options(*verb, options->common);
-  verb->footer("Example:\n  flash-sysid export run -o tuned.json");
+  verb->footer(
+      "Exit code 3: the asset is written, but the search behind it ended with 3, for the reason that is "
+      "said.\n"
+      "Example:\n  flash-sysid export run -o tuned.json");
   verb->callback([options, &action] { action = [options] { return run_export(*options); }; });
 }
 

@@ -1,12 +1,17 @@
 #include <algorithm>
+#include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
@@ -14,6 +19,7 @@
 #include "data/json_reader.h"
 #include "data/text.h"
 #include "sysid/fit.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/parameter_label.h"
 #include "sysid/summary.h"
 
@@ -28,7 +34,8 @@ struct FitOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::string start;
-  std::vector<std::string> freeze, priors, fixed;
+  std::vector<std::string> freeze, priors;
+  FixedTexts fixed;
   int iterations = 15;
   int generations = 0;
   std::string out;
@@ -38,11 +45,31 @@ bool contains(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+// A parameter that was not searched stays as it was in the search.
+void hold(const std::string& name, const sysid::Summary& found, std::vector<sysid::Axis>& fixed) {
+  const auto value = found.best.find(name);
+  if (value == found.best.end())
+    sysid::check_parameter("--freeze " + name, name);
+  else if (std::none_of(fixed.begin(), fixed.end(),
+                        [&](const sysid::Axis& axis) { return axis.name == name; }))
+    fixed.push_back({name, {value->second}, false});
+}
+
+// 95 % of a normal distribution, within the range; empty where the covariance is.
+std::optional<std::array<double, 2>> interval_of(const sysid::FitResult& result, const sysid::Axis& axis,
+                                                 std::size_t k) {
+  if (result.covariance.size() == 0) return std::nullopt;
+  const auto i = static_cast<Eigen::Index>(k);
+  const double reach = 1.96 * std::sqrt(result.covariance(i, i)), value = result.values[k];
+  const double low = axis.logarithmic ? value * std::exp(-reach) : value - reach;
+  const double high = axis.logarithmic ? value * std::exp(reach) : value + reach;
+  return std::array<double, 2>{std::max(low, axis.values.front()), std::min(high, axis.values.back())};
+}
+
 // What the search looked for, over the range it searched; frozen ones stay where it found them.
 sysid::FitSettings fit_settings(const FitOptions& options, const sysid::Summary& found) {
   sysid::FitSettings settings;
-  for (const std::string& assignment : options.fixed)
-    settings.grid.fixed.push_back(sysid::parse_fixed(assignment));
+  settings.grid.fixed = parse_fixed(options.fixed);
   const auto is_fixed = [&](const std::string& name) {
     return std::any_of(settings.grid.fixed.begin(), settings.grid.fixed.end(),
                        [&](const sysid::Axis& axis) { return axis.name == name; });
@@ -64,8 +91,7 @@ sysid::FitSettings fit_settings(const FitOptions& options, const sysid::Summary&
     settings.start.push_back(value);
   }
   for (const std::string& name : options.freeze)
-    if (!contains(searched, name))
-      throw data::InputError("--freeze: " + name + ": the search in " + options.start + " did not search it");
+    if (!contains(searched, name)) hold(name, found, settings.grid.fixed);
   if (settings.grid.axes.empty()) throw data::InputError("--freeze, --fix: no parameter is left to fit");
   for (const std::string& text : options.priors) {
     settings.priors.push_back(sysid::parse_prior(text));
@@ -89,6 +115,8 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
     nlohmann::ordered_json parameter;
     parameter["estimate"] = result.values[k];
     parameter["start"] = settings.start[k];
+    const auto interval = interval_of(result, axes[k], k);
+    parameter["interval95"] = interval ? nlohmann::ordered_json(*interval) : nlohmann::ordered_json(nullptr);
     if (result.covariance.size() > 0) {
       const auto i = static_cast<Eigen::Index>(k);
       parameter["spread"] = std::sqrt(result.covariance(i, i));
@@ -101,6 +129,7 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
   for (const sysid::Axis& axis : settings.grid.fixed) json["fixed"][axis.name] = axis.values.front();
   json["score"] = result.best.score;
   json["converged"] = result.best.converged;
+  json["refined"] = result.refined;
   json["termination"] = result.termination;
   json["path"] = nlohmann::ordered_json::array();
   for (const sysid::FitStep& step : result.path) {
@@ -116,8 +145,7 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
 
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   choose_device(options.common);
-  std::vector<data::Recording> recordings;
-  for (const std::string& path : options.recordings) recordings.push_back(data::load_recording(path));
+  const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const sysid::Summary found = sysid::load_summary((fs::path(options.start) / "summary.json").string());
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.asset : options.asset, recordings.front());
@@ -128,17 +156,25 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
         sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common))));
   std::vector<std::string> notices;
   settings.grid.base = material_base(asset, replays.front().sheet.rest, notices);
+  const std::size_t batch =
+      std::max<std::size_t>(2 * settings.start.size() + 1, settings.global.generations > 0 ? 16 : 0);
+  sysid::check_job(
+      replays, static_cast<double>(batch) * (options.iterations + static_cast<double>(options.generations)),
+      sysid::estimate_batch(replays, batch));
   check_output(options.out, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 
   const std::vector<sysid::Axis>& axes = settings.grid.axes;
-  int generation = 0;
+  int generation = 0, iteration = 0;
+  auto last = std::chrono::steady_clock::now();
   const sysid::FitResult result = sysid::fit(replays, settings, [&](const sysid::FitStep& step) {
-    std::string line = step.stage == sysid::FitStage::global
-                           ? "generation " + std::to_string(++generation) + " of " +
-                                 std::to_string(options.generations) + ": cost "
-                           : "cost ";
-    line += data::format_short(step.cost);
+    const auto now = std::chrono::steady_clock::now();
+    const double seconds = std::chrono::duration<double>(now - std::exchange(last, now)).count();
+    std::string line =
+        step.stage == sysid::FitStage::global
+            ? "generation " + std::to_string(++generation) + " of " + std::to_string(options.generations)
+            : "step " + std::to_string(iteration++) + " of at most " + std::to_string(options.iterations);
+    line += ", took " + data::format_short(seconds) + " s: cost " + data::format_short(step.cost);
     for (std::size_t k = 0; k < axes.size(); ++k)
       line += "  " + axes[k].name + " " + data::format_short(step.values[k]);
     say(options.common, line + (step.accepted ? "" : "  (left)"));
@@ -150,15 +186,21 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   } else {
     for (std::size_t k = 0; k < axes.size(); ++k) {
       const std::string unit = sysid::parameter_label(axes[k].name, asset.thickness.has_value()).unit;
-      std::printf("%-16s %s %s\n", axes[k].name.c_str(), data::format_short(result.values[k]).c_str(),
-                  unit.c_str());
+      const auto interval = interval_of(result, axes[k], k);
+      std::printf("%-16s %s%s%s  (%s)\n", axes[k].name.c_str(), data::format_short(result.values[k]).c_str(),
+                  unit.empty() ? "" : " ", unit.c_str(),
+                  interval ? ("95 %: " + data::format_short((*interval)[0]) + " to " +
+                              data::format_short((*interval)[1]) + ", by the scatter of the residuals alone")
+                                 .c_str()
+                           : "the recordings do not determine it");
     }
     std::printf("%.3f mm from the observed points; %s\n%s\n", 1000 * result.best.score,
                 result.termination.c_str(), (fs::path(options.out) / "fit.json").c_str());
   }
   if (!result.best.converged)
     warn("the fitted candidate missed a step: raise --iterations or lower --time-step");
-  return result.best.converged ? exit_done : exit_unusable;
+  if (result.stuck) warn(result.termination);
+  return result.best.converged && !result.stuck ? exit_done : exit_unusable;
 }
 
 }  // namespace
@@ -170,23 +212,27 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
   verb->add_option("--start", options->start, "Folder of the search to start from")->required();
   verb->add_option("--asset", options->asset, "The object; without one, that of the search");
-  verb->add_option("--freeze", options->freeze, "Parameters that stay where the search found them")
+  verb->add_option("--freeze", options->freeze,
+                   "Parameters that stay where the search found them, or held them")
       ->delimiter(',');
   verb->add_option("--prior", options->priors,
                    "What is known beforehand, as bending=1e-5:2 (factor, one sigma)")
       ->allow_extra_args(false);
-  verb->add_option("--fix", options->fixed, "A measured constant, as friction=0.3")->allow_extra_args(false);
+  add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3");
   verb->add_option("--steps", options->iterations, "Of the optimizer at most")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 10000))
       ->capture_default_str();
   verb->add_option("--global", options->generations,
                    "Generations of a search over the whole ranges before, of 16 candidates each; 0: none")
-      ->check(CLI::Range(0, 10000))
+      ->check(whole_number(0, 10000))
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "Folder for fit.json")->required();
   add_replay_options(*verb, options->replay);
+  add_seed_option(*verb, options->common);
+  add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
+      "Exit code 3: a step did not converge, or nothing was refined, for the reason that is said.\n"
       "Example:\n  flash-sysid fit lift --start run --freeze poisson --prior bending=1e-5:2 -o fitted");
   verb->callback([verb, options, &action] { action = [verb, options] { return run_fit(*verb, *options); }; });
 }

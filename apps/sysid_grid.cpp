@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
@@ -16,6 +17,7 @@
 #include "sysid/memory_estimate.h"
 #include "sysid/overlay.h"
 #include "sysid/parameter_label.h"
+#include "sysid/recording_names.h"
 #include "sysid/report.h"
 #include "sysid/summarize.h"
 
@@ -30,7 +32,7 @@ struct GridOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::vector<std::pair<std::string, std::string>> axes;
-  std::vector<std::string> fixed;
+  FixedTexts fixed;
   int envs = 64;
   double repeatability = 0;  ///< [m]; 0: the residual stands for it
   bool no_solver_check = false;
@@ -57,19 +59,11 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   for (const auto& [name, text] : options.axes) settings.axes.push_back(sysid::parse_axis(name, text));
   if (settings.axes.empty())
     throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
-  for (const std::string& assignment : options.fixed)
-    settings.fixed.push_back(sysid::parse_fixed(assignment));
+  settings.fixed = parse_fixed(options.fixed);
   std::vector<sysid::Axis> all = settings.axes;
   all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
   sysid::check_axes(all, base.material.constitutive);
   return settings;
-}
-
-void clear_results(const std::string& folder) {
-  for (const char* file :
-       {"results.csv", "registrations.csv", "keyframes.csv", "grid.json", "summary.json", "report.html"})
-    fs::remove(fs::path(folder) / file);
-  fs::remove_all(fs::path(folder) / "best");
 }
 
 std::string value_text(const sysid::ParameterFinding& finding, const std::string& unit) {
@@ -127,11 +121,12 @@ std::vector<sysid::Overlay> keep_best(const sysid::GridResults& results, const s
   const auto better = [](const auto& a, const auto& b) { return a.score < b.score; };
   const sysid::CandidateResult& best =
       *std::min_element(results.candidates.begin(), results.candidates.end(), better);
+  const std::vector<std::string> folders = sysid::file_names(results.recordings);
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const sysid::ReplayResult motion =
         std::move(sysid::run(replays[r], {sysid::candidate_of(best, settings)}).front());
     overlays.push_back(sysid::make_overlay(replays[r], motion.motion, best.recordings[r]));
-    sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / overlays.back().name).string());
+    sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / folders[r]).string());
   }
   return overlays;
 }
@@ -144,47 +139,11 @@ void write_results(const sysid::Summary& summary, const sysid::GridResults& resu
   sysid::write_report(summary, results, overlays, report, (fs::path(options.out) / "report.html").string());
 }
 
-int run_grid(const CLI::App& verb, const GridOptions& options) {
-  const auto begin = std::chrono::steady_clock::now();
-  const std::string device = choose_device(options.common);
-  std::vector<data::Recording> recordings;
-  for (const std::string& path : options.recordings) recordings.push_back(data::load_recording(path));
-  const data::Asset asset = load_asset_for(options.asset, recordings.front());
-  const int threads = thread_count(options.common);
-  std::vector<sysid::Replay> replays =
-      make_replays(recordings, replay_settings(verb, options.replay, threads), options.common);
-
-  std::vector<std::string> notices;
-  const sysid::GridSettings settings =
-      grid_settings(options, material_base(asset, replays.front().sheet.rest, notices), threads);
-  if (options.common.force && !options.resume) clear_results(options.out);
-  sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
-                            sysid::fingerprint(replays, settings), options.resume);
-  for (const std::string& notice : notices) say(options.common, notice);
-  const double memory = sysid::estimate_memory(replays, settings, !options.no_solver_check).total();
-  say(options.common,
-      data::format_count(sysid::cartesian_product(settings.axes).size()) + " candidates, " +
-          data::format_count(static_cast<std::size_t>(replays.front().sheet.rest.vertices.rows())) +
-          " vertices, " + std::to_string(threads) + " threads, about " +
-          data::format_count(static_cast<std::size_t>(std::ceil(memory / 1e6))) + " MB of memory");
-  if (sysid::physical_memory() > 0 && memory > sysid::physical_memory())
-    warn("this machine has " + data::format_count(static_cast<std::size_t>(sysid::physical_memory() / 1e6)) +
-         " MB of memory: " + (options.rollouts.empty() ? "a coarser --mesh" : "fewer values") +
-         (threads > 1 ? " or fewer --threads are needed"
-                      : (options.rollouts.empty() ? " is needed" : " are needed")));
-  bool complete = false;
-  {
-    ProgressLine line(options.common);
-    complete = sysid::grid_search(
-        replays, settings, store, [&](const sysid::Progress& progress) { line.show(progress); },
-        &stop_on_interrupt());
-  }
-
-  if (!complete) {
-    warn("stopped after " + data::format_count(store.results().candidates.size()) + " candidates, kept in " +
-         options.out + "; --resume goes on");
-    return exit_failed;
-  }
+// Judges what was found and writes the answer.
+int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
+             const sysid::GridSettings& settings, const sysid::ResultsStore& store,
+             const GridOptions& options, const std::string& device,
+             std::chrono::steady_clock::time_point begin) {
   sysid::GridResults results = store.results();
   sysid::JudgeSettings judge;
   if (options.repeatability > 0) judge.repeatability = options.repeatability;
@@ -205,6 +164,56 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   return summary.exit_code;
 }
 
+int run_grid(const CLI::App& verb, const GridOptions& options) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::string device = choose_device(options.common);
+  const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
+  const data::Asset asset = load_asset_for(options.asset, recordings.front());
+  const int threads = thread_count(options.common);
+  std::vector<sysid::Replay> replays =
+      make_replays(recordings, replay_settings(verb, options.replay, threads), options.common);
+
+  std::vector<std::string> notices;
+  const sysid::GridSettings settings =
+      grid_settings(options, material_base(asset, replays.front().sheet.rest, notices), threads);
+  sysid::check_grasp_axes(settings.axes, replays);
+  sysid::check_grasp_axes(settings.fixed, replays);
+  if (!options.no_solver_check)  // which halves the step
+    for (const sysid::Replay& replay : replays)
+      sysid::steps_in(2.0 * replay.steps * options.replay.time_step, options.replay.time_step);
+  const sysid::MemoryEstimate memory = sysid::estimate_memory(replays, settings, !options.no_solver_check);
+  sysid::check_job(replays, sysid::count_candidates(settings.axes), memory);
+  sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
+                            sysid::fingerprint(replays, settings),
+                            options.resume         ? sysid::Existing::resume
+                            : options.common.force ? sysid::Existing::replace
+                                                   : sysid::Existing::refuse);
+  for (const std::string& notice : notices) say(options.common, notice);
+  say(options.common,
+      data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) + " candidates, " +
+          data::format_count(static_cast<std::size_t>(replays.front().sheet.rest.vertices.rows())) +
+          " vertices, " + std::to_string(threads) + " threads, about " +
+          data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) + " MB of memory");
+  const auto kept = [&] {
+    warn("stopped with " + data::format_count(store.results().candidates.size()) + " of " +
+         data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) +
+         " candidates, kept in " + options.out + "; --resume goes on");
+    return exit_failed;
+  };
+  try {
+    {
+      ProgressLine line(options.common);
+      if (!sysid::grid_search(
+              replays, settings, store, [&](const sysid::Progress& progress) { line.show(progress); },
+              &stop_on_signals()))
+        return kept();
+    }
+    return conclude(asset, replays, settings, store, options, device, begin);
+  } catch (const data::Stopped&) {
+    return kept();
+  }
+}
+
 }  // namespace
 
 void add_grid_verb(CLI::App& app, Action& action) {
@@ -214,13 +223,12 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
-  verb->add_option("--fix", options->fixed, "A measured constant, as friction=0.3; carried into the asset")
-      ->allow_extra_args(false);
+  add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3; carried into the asset");
   verb->add_option("--envs", options->envs, "Candidates a batch")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 100000))
       ->capture_default_str();
   verb->add_option("--repeatability", options->repeatability, "Trial-to-trial distance of a keyframe [m]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   verb->add_option("--map", options->map, "The two parameters of the report's score map")
       ->delimiter(',')
       ->expected(2);
@@ -232,6 +240,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);
+  add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
       "Example:\n"

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
@@ -21,7 +22,7 @@ struct ImportVerbOptions {
   CommonOptions common;
   data::ImportOptions import;
   std::vector<std::string> offset;
-  std::string shape = "clamp";
+  std::string shape = "clamp", tool_at = "corner";
   double within = 0, table_height = 0, heading_degrees = 0;
 };
 
@@ -32,8 +33,9 @@ Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
     const std::size_t word = words.size() == 1 ? 0 : static_cast<std::size_t>(k);
     const auto number =
         words.size() == 1 || words.size() == 3 ? data::parse_number(words[word]) : std::nullopt;
-    if (!number || *number < 0)
-      throw data::InputError("--offset: expected one bound or three, x,y,z, in metres, as 0.06");
+    if (!number || !(*number >= 0) || !std::isfinite(*number))
+      throw data::InputError("--offset: found \"" + (words.empty() ? "" : words[word]) +
+                             "\", expected one bound or three, x,y,z, in metres, as 0.06");
     bounds[k] = *number;
   }
   return bounds;
@@ -41,8 +43,9 @@ Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
 
 int run_import(const CLI::App& verb, ImportVerbOptions options) {
   data::ImportOptions& import = options.import;
-  import.overwrite = options.common.force;
+  import.overwrite = import.accept_unusable = options.common.force;
   if (!options.offset.empty()) import.nuisance.offset = parse_bounds(options.offset);
+  import.tool_at_patch = options.tool_at == "patch";
   if (options.shape == "point") import.shape = data::GraspShape::point;
   if (options.shape == "pinch") import.shape = data::GraspShape::pinch;
   if (verb.count("--within") > 0) import.within = options.within;
@@ -81,20 +84,26 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--extrinsics", import.extrinsics, "T_base_camera: flash-extrinsics/1, or a TUM file")
       ->needs(depth);
   verb->add_option("--depth-scale", import.depth_scale, "Metres a count")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--trajectory", import.trajectory, "T_base_gripper, TUM or CSV")->required();
-  verb->add_option("--times", import.times, "rate:HZ, rate:HZ:START, or a CSV with one time a frame")
-      ->capture_default_str();
-  CLI::Option* sheet = verb->add_option("--sheet", import.sheet, "WIDTHxHEIGHT [m], as 0.278x0.278");
+  verb->add_option("--times", import.times,
+                   "rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
+  CLI::Option* sheet =
+      verb->add_option("--sheet", import.sheet,
+                       "WIDTHxHEIGHT [m], as 0.3x0.24; from corner 0,0 or 1,1, seen from above, the "
+                       "width is on the right hand");
   verb->add_option("--mesh", import.mesh, "Mesh specification or file, in place of --sheet")->excludes(sheet);
   verb->add_option("--cell", import.cell, "Of the sheet's mesh [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--grasp", import.grasp, "corner, corner:I,J, vertices:A,B,... or position")
       ->capture_default_str();
   verb->add_option("--within", options->within, "Size of the grasped patch [m]; without it 1.2 cells")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
+  verb->add_option("--tool-at", options->tool_at, "What is under the tool centre point at the start")
+      ->check(CLI::IsMember({"corner", "patch"}))
+      ->capture_default_str();
   verb->add_option("--shape", options->shape, "How the patch sits in the fingers")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}))
       ->capture_default_str();
@@ -102,25 +111,27 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--crop-y", import.crop_y, "LOW:HIGH [m], either may be empty");
   verb->add_option("--crop-z", import.crop_z, "LOW:HIGH [m], either may be empty, as 0.075:");
   verb->add_option("--table-height", options->table_height,
-                   "[m]; without it from the gripper's start and the crop");
+                   "[m]; without it from the gripper's start and the crop")
+      ->check(any_number());
   verb->add_option("--heading", options->heading_degrees,
-                   "Of the diagonal from the grasped corner, from x [deg]; without it towards the clouds");
+                   "Of the diagonal from the grasped corner, from x [deg]; without it towards the clouds")
+      ->check(any_number());
   verb->add_option("--offset", options->offset, "Bound on the camera's offset, one or x,y,z [m]")
-      ->delimiter(',');
-  verb->add_option("--yaw", import.nuisance.yaw, "Bound on the camera's yaw [rad]")
-      ->check(CLI::NonNegativeNumber);
+      ->delimiter(',')
+      ->check(number_from(0));
+  verb->add_option("--yaw", import.nuisance.yaw, "Bound on the camera's yaw [rad]")->check(number_from(0));
   verb->add_option("--clock", import.nuisance.time, "Bound on the camera's clock against the robot's [s]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   verb->add_option("--start-yaw", import.nuisance.start_yaw, "Bound on the sheet's turn on the table [rad]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   verb->add_option("--table-error", import.nuisance.table_height, "Bound on the table's height [m]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(number_from(0));
   verb->add_option("--asset", import.asset, "The object");
   verb->add_option("--kind", import.kind, "corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free")
       ->capture_default_str();
   verb->add_option("--name", import.name, "Without it the folder's");
   verb->add_option("-o,--out", import.out, "Folder of the recording")->required();
-  add_common_options(*verb, options->common);
+  add_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
       "Example:\n"
       "  flash-sysid import clouds --trajectory tcp.tum --times rate:10 --sheet 0.278x0.278 --grasp corner "

@@ -4,27 +4,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <limits>
+#include <map>
 #include <optional>
 #include <thread>
 
+#include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "data/error.h"
 #include "data/text.h"
 #include "sim/sheet.h"
+#include "sysid/recording_names.h"
+#include "sysid/summarize.h"
 
 namespace flash {
 namespace {
-
-std::atomic<bool> interrupted = false;  // a signal handler reaches nothing else
-static_assert(std::atomic<bool>::is_always_lock_free);
-
-void on_interrupt(int signal) {
-  interrupted = true;
-  std::signal(signal, SIG_DFL);
-}
 
 std::string duration_text(double seconds) {
   char text[32];
@@ -57,17 +54,25 @@ void set_sigma(const std::string& assignment, sysid::Objective& objective) {
 
 }  // namespace
 
-void add_common_options(CLI::App& verb, CommonOptions& options) {
+void add_common_options(CLI::App& verb, CommonOptions& options, const char* force) {
   CLI::App& group = *verb.add_option_group("Common");
   group.add_flag("--json", options.json, "Print the result as JSON on stdout");
   CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
   group.add_flag("--verbose", options.verbose, "Print every notice")->excludes(quiet);
-  group.add_flag("--force", options.force, "Overwrite what is there");
-  group.add_option("--seed", options.seed, "Of everything random")->capture_default_str();
+  group.add_flag("--force", options.force, force);
   group.add_option("--threads", options.threads, "0: one a processor")
-      ->check(CLI::NonNegativeNumber)
+      ->check(thread_number())
       ->capture_default_str();
-  group.add_option("--device", options.device, "Where the simulation runs")
+}
+
+void add_seed_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--seed", options.seed, "Random seed: the same one gives the same result")
+      ->check(whole_number(0, std::numeric_limits<unsigned>::max()))
+      ->capture_default_str();
+}
+
+void add_device_option(CLI::App& verb, CommonOptions& options) {
+  verb.add_option("--device", options.device, "Where the simulation runs")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->capture_default_str();
 }
@@ -75,33 +80,33 @@ void add_common_options(CLI::App& verb, CommonOptions& options) {
 void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   CLI::App& group = *verb.add_option_group("Replay and score");
   group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
-  group.add_option("--time-step", options.time_step, "[s]")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  group.add_option("--time-step", options.time_step, "[s]")->check(positive_number())->capture_default_str();
   group.add_option("--iterations", options.iterations, "Of the solver, a step at most")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 10000))
       ->capture_default_str();
   group.add_option("--tolerance", options.tolerance, "On the residual |r| / |M g|")
-      ->check(CLI::PositiveNumber)
+      ->check(number_from(1e-12))  // of numbers with 16 digits
       ->capture_default_str();
   group.add_option("--grasp-shape", options.grasp_shape, "In place of the recording's")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}));
   group
       .add_option("--grasp-within", options.grasp_within,
                   "Size of the grasped patch in place of the recording's [m]")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   group.add_flag("--clamp-slopes", options.clamp_slopes,
                  "A clamped patch does not bend: it holds the sheet's slope as well as its place");
-  group.add_option("--from", options.from, "Keyframes before do not count [s]");
-  group.add_option("--to", options.to, "Keyframes after do not count [s]");
+  group.add_option("--from", options.from, "Keyframes before do not count, from the recording's start [s]")
+      ->check(any_number());
+  group.add_option("--to", options.to, "Keyframes after do not count, from the recording's start [s]")
+      ->check(any_number());
   group.add_option("--distance", options.distance, "How point distances become one number")
       ->check(CLI::IsMember({"mean", "trimmed", "huber"}))
       ->capture_default_str();
   group.add_option("--trim", options.trim, "trimmed: share of the largest distances left out")
-      ->check(CLI::Range(0.0, 0.5))
+      ->check(number_between(0, 0.5))
       ->capture_default_str();
   group.add_option("--huber", options.huber, "huber: where the distance stops counting in full [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   group
       .add_option("--sigma", options.sigmas,
@@ -128,6 +133,7 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
   if (options.grasp_shape == "clamp") settings.grasp_shape = data::GraspShape::clamp;
   if (options.grasp_shape == "point") settings.grasp_shape = data::GraspShape::point;
   if (options.grasp_shape == "pinch") settings.grasp_shape = data::GraspShape::pinch;
+  settings.solver.stop = &stop_on_signals();
   if (verb.count("--from") > 0) settings.score_from = options.from;
   if (verb.count("--to") > 0) settings.score_to = options.to;
   return settings;
@@ -153,14 +159,37 @@ void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, st
   CLI::App& group =
       *verb.add_option_group("Searched parameters", "low:high:count[:log], a list a,b,c, or one value");
   for (const sysid::ParameterInfo& info : sysid::known_parameters()) {
-    std::string dashed = info.name;
-    std::replace(dashed.begin(), dashed.end(), '_', '-');
-    const std::string flags = dashed == info.name ? "--" + info.name : "--" + dashed + ",--" + info.name;
     const std::string unit = info.unit.empty() ? "" : " [" + info.unit + "]";
-    group.add_option_function<std::string>(
-        flags, [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
-        info.meaning + unit);
+    const auto add = [&](CLI::App& to, const std::string& option) {
+      return to.add_option_function<std::string>(
+          option, [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
+          info.meaning + unit);
+    };
+    const std::string option = sysid::option_of(info.name);
+    add(group, option);
+    if (option != "--" + info.name) add(verb, "--" + info.name)->group("");  // as files call it
   }
+}
+
+void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& meaning) {
+  const auto add = [&](const std::string& name) {
+    return verb
+        .add_option_function<std::vector<std::string>>(
+            name,
+            [&fixed, name](const std::vector<std::string>& texts) {
+              for (const std::string& text : texts) fixed.emplace_back(name, text);
+            },
+            meaning)
+        ->allow_extra_args(false);
+  };
+  add("--fix");
+  add("--set")->group("");
+}
+
+std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed) {
+  std::vector<sysid::Axis> axes;
+  for (const auto& [option, text] : fixed) axes.push_back(sysid::parse_fixed(text, option));
+  return axes;
 }
 
 void say(const CommonOptions& options, const std::string& line) {
@@ -186,6 +215,31 @@ void check_output(const std::string& path, const CommonOptions& options) {
   throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
 }
 
+std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,
+                                             const CommonOptions& options) {
+  std::vector<data::Recording> recordings;
+  std::map<std::string, std::string> known;  // sources by content
+  std::vector<std::string> names;
+  for (const std::string& path : paths) {
+    recordings.push_back(data::load_recording(path));
+    const data::Recording& recording = recordings.back();
+    names.push_back(recording.name);
+    if (paths.size() == 1) break;
+    const auto [same, is_new] = known.emplace(sysid::recording_sha256(recording), recording.source);
+    if (!is_new)
+      throw data::InputError(recording.source + ": is the same recording as " + same->second +
+                             ", expected each once: twice would count as two trials");
+  }
+  names = sysid::told_apart(names);
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    if (names[r] == recordings[r].name) continue;
+    say(options, recordings[r].source + ": is called " + names[r] + " here, as another recording is named " +
+                     recordings[r].name + " too");
+    recordings[r].name = names[r];
+  }
+  return recordings;
+}
+
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording) {
   if (!path.empty()) return data::load_asset(path);
   if (recording.asset.empty())
@@ -206,26 +260,30 @@ sysid::MaterialBase material_base(const data::Asset& asset, const data::Triangle
 }
 
 ProgressLine::ProgressLine(const CommonOptions& options)
-    : visible_(!options.quiet && isatty(STDERR_FILENO) != 0) {}
+    : visible_(!options.quiet), terminal_(isatty(STDERR_FILENO) != 0) {}
 
 ProgressLine::~ProgressLine() {
   if (drawn_) std::cerr << '\n';
 }
 
-void ProgressLine::show(const sysid::Progress& progress) {
-  if (!visible_) return;
-  drawn_ = true;
-  char line[160];
-  std::snprintf(line, sizeof line, "\r%d of %d candidates, %.2f/s, %s left, best %.2f mm\033[K",
-                progress.done, progress.total, progress.candidates_per_second,
-                duration_text(progress.seconds_left).c_str(), 1000 * progress.best_score);
-  std::cerr << line << std::flush;
+bool ProgressLine::due(const sysid::Progress& progress) {
+  if (terminal_ || progress.done == progress.total) return true;
+  const int tenths = 10 * progress.done / std::max(1, progress.total);
+  const double since = std::chrono::duration<double>(Clock::now() - last_).count();
+  if (since < 30 && (tenths == tenths_ || since < 1)) return false;
+  tenths_ = tenths;
+  return true;
 }
 
-const std::atomic<bool>& stop_on_interrupt() {
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
-  return interrupted;
+void ProgressLine::show(const sysid::Progress& progress) {
+  if (!visible_ || !due(progress)) return;
+  last_ = Clock::now();
+  drawn_ = terminal_;
+  char line[160];
+  std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, %s left, best %.2f mm", progress.done,
+                progress.total, progress.candidates_per_second, duration_text(progress.seconds_left).c_str(),
+                1000 * progress.best_score);
+  std::cerr << (terminal_ ? "\r" : "") << line << (terminal_ ? "\033[K" : "\n") << std::flush;
 }
 
 }  // namespace flash

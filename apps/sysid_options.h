@@ -1,6 +1,6 @@
 #pragma once
 #include <CLI/CLI.hpp>
-#include <atomic>
+#include <chrono>
 #include <string>
 #include <vector>
 
@@ -20,7 +20,12 @@ struct CommonOptions {
   std::string device = "auto";
   int threads = 0;  ///< 0: one a processor
 };
-void add_common_options(CLI::App& verb, CommonOptions& options);
+inline constexpr const char* force_overwrites = "Overwrite what is there";
+inline constexpr const char* force_covers_calibrations =
+    "Overwrite what is there; use a calibration that flash-calib ended with exit code 3";
+void add_common_options(CLI::App& verb, CommonOptions& options, const char* force = force_overwrites);
+void add_seed_option(CLI::App& verb, CommonOptions& options);    ///< of verbs that draw at random
+void add_device_option(CLI::App& verb, CommonOptions& options);  ///< of verbs that simulate
 
 /// How a recording is replayed and scored.
 struct ReplayOptions {
@@ -45,6 +50,13 @@ sysid::ScoreSettings score_settings(const ReplayOptions& options);
 /// Adds --young, --poisson, ...: one option a known parameter, its text kept by name.
 void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values);
 
+/// Constants that were given, with the option that gave them.
+using FixedTexts = std::vector<std::pair<std::string, std::string>>;
+
+/// --fix NAME=VALUE; --set, which some verbs called it, is taken as well.
+void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& meaning);
+std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed);
+
 /// What a verb says to people, on stderr, unless --quiet.
 void say(const CommonOptions& options, const std::string& line);
 void warn(const std::string& line);
@@ -59,6 +71,11 @@ std::string choose_device(const CommonOptions& options);
 /// --force is not given.
 void check_output(const std::string& path, const CommonOptions& options);
 
+/// The recordings in the folders, told apart by name (a warning says where one was renamed). Throws
+/// data::InputError where two of them are the same.
+std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,
+                                             const CommonOptions& options);
+
 /// The asset named on the command line or, without one, by the recording.
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
 
@@ -66,7 +83,8 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
                                   std::vector<std::string>& notices);
 
-/// A line of progress with rate and time left, drawn over itself; silent when stderr is no terminal.
+/// Progress with rate and time left on stderr: one line drawn over itself on a terminal, elsewhere a line
+/// each tenth of the way (at most one a second) or half a minute. Silent with --quiet.
 class ProgressLine {
  public:
   explicit ProgressLine(const CommonOptions& options);
@@ -74,11 +92,13 @@ class ProgressLine {
   void show(const sysid::Progress& progress);
 
  private:
-  bool visible_;
-  bool drawn_ = false;
-};
+  using Clock = std::chrono::steady_clock;
+  bool due(const sysid::Progress& progress);
 
-/// Set by Ctrl-C from now on; a second Ctrl-C ends the program at once.
-const std::atomic<bool>& stop_on_interrupt();
+  bool visible_, terminal_;
+  bool drawn_ = false;
+  int tenths_ = 0;  ///< of the way, at the last line
+  Clock::time_point last_ = Clock::now();
+};
 
 }  // namespace flash

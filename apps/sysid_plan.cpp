@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
@@ -16,6 +17,7 @@
 #include "data/json_reader.h"
 #include "data/text.h"
 #include "sysid/depth_camera.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/parameter_label.h"
 #include "sysid/plan.h"
 #include "sysid/sensitivity.h"
@@ -35,6 +37,18 @@ struct PlanOptions {
   double error = 1e-3;
   double keyframes = 10;
   std::string out;
+};
+
+// Removed whatever ends the program's work.
+struct ScratchFolder {
+  ScratchFolder() = default;
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+  const fs::path path = fs::temp_directory_path() / ("flash-plan-" + std::to_string(getpid()));
 };
 
 // What may be unknown of a cloth (618 fabrics measured: bending 1 to 110 uN m at 5 and 95 %), unless told.
@@ -71,6 +85,8 @@ std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::Materi
   return axes;
 }
 
+constexpr double kMotion = 2.0, kLongestExperiment = 3.0;  // of the experiments that synth knows [s]
+
 // A sheet of the recording's size in each of the experiments that synth knows, seen by two cameras.
 data::Recording virtual_recording(const std::string& kind, const data::Recording& like,
                                   const data::SheetMaterial& material, const sim::SolverSettings& solver,
@@ -78,8 +94,8 @@ data::Recording virtual_recording(const std::string& kind, const data::Recording
   sysid::SynthSettings settings;
   settings.name = kind;
   settings.kind = kind;
-  settings.duration = 2.0;
-  settings.rest = kind == "hang" ? 1.0 : 0.0;
+  settings.duration = kMotion;
+  settings.rest = kind == "hang" ? kLongestExperiment - kMotion : 0.0;
   settings.depth_noise = 0;
   settings.forces = kind == "bar_pull" || kind == "bias_pull" || kind == "drag";
   settings.seed = seed;
@@ -140,8 +156,7 @@ nlohmann::ordered_json plan_json(const std::vector<sysid::PlannedExperiment>& ex
 int run_plan(const CLI::App& verb, const PlanOptions& options) {
   choose_device(options.common);
   const int threads = thread_count(options.common);
-  std::vector<data::Recording> recordings;
-  for (const std::string& path : options.recordings) recordings.push_back(data::load_recording(path));
+  std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const data::Asset asset = load_asset_for(options.asset, recordings.front());
   const sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   if (!replay.mesh.empty()) recordings.front() = sysid::make_replay(recordings.front(), replay).recording;
@@ -156,23 +171,27 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     settings.at.push_back(
         std::clamp(current_value(settings.grid.base, axis.name), axis.values.front(), axis.values.back()));
   check_output(options.out, options.common);
+  sysid::steps_in(kLongestExperiment, options.replay.time_step);  // refused before anything is simulated
 
-  const fs::path scratch = fs::temp_directory_path() / ("flash-plan-" + std::to_string(getpid()));
+  const ScratchFolder scratch;
   const data::SheetMaterial material = sysid::candidate_at(settings.at, settings.grid).material;
   std::vector<sysid::PlannedExperiment> experiments;
-  for (const data::Recording& recording : recordings)
-    experiments.push_back(sysid::plan_experiment(
-        recording.name, {sysid::make_replay(data::load_recording(recording.source), replay)}, settings));
+  for (const data::Recording& recording : recordings) {
+    const std::vector<sysid::Replay> replays = {
+        sysid::make_replay(data::load_recording(recording.source), replay)};
+    const std::size_t batch = 2 * settings.at.size() + 1;
+    sysid::check_job(replays, static_cast<double>(batch), sysid::estimate_batch(replays, batch));
+    experiments.push_back(sysid::plan_experiment(recording.name, replays, settings));
+  }
   for (const char* kind : {"corner_lift", "hang", "bar_pull", "bias_pull", "drag"}) {
     say(options.common, std::string("simulating ") + kind);
     const data::Recording made = virtual_recording(kind, recordings.front(), material, replay.solver,
-                                                   (scratch / kind).string(), options.common.seed);
+                                                   (scratch.path / kind).string(), options.common.seed);
     sysid::ReplaySettings own;
     own.solver = replay.solver;
     own.threads = threads;
     experiments.push_back(sysid::plan_experiment(kind, {sysid::make_replay(made, own)}, settings));
   }
-  fs::remove_all(scratch);
   const std::vector<sysid::Axis>& axes = settings.grid.axes;
   const std::string text = data::format_json(plan_json(experiments, axes, options));
   data::write_atomically(options.out, text);
@@ -204,14 +223,16 @@ void add_plan_verb(CLI::App& app, Action& action) {
       ->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("--error", options->error, "Distance by which model and sheet differ in a keyframe [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--keyframes", options->keyframes, "That count as independent")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "plan.json")->required();
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);
+  add_seed_option(*verb, options->common);
+  add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer("Example:\n  flash-sysid plan lift --asset towel.json -o plan.json");
   verb->callback(

@@ -11,8 +11,10 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/overlay.h"
 #include "sysid/overlay_image.h"
+#include "sysid/registration_parameter.h"
 
 namespace flash {
 namespace {
@@ -24,7 +26,7 @@ struct ReplayVerbOptions {
   ReplayOptions replay;
   std::string recording;
   std::string asset;
-  std::vector<std::string> set;
+  FixedTexts fixed;
   std::vector<int> frames;
   bool every_step = false;
   std::string out;
@@ -119,12 +121,11 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;
   const sysid::MaterialBase base = material_base(asset, replay.sheet.rest, notices);
-  std::vector<sysid::Axis> axes;
+  const std::vector<sysid::Axis> axes = parse_fixed(options.fixed);
+  sysid::check_grasp_axes(axes, {replay});
   std::vector<double> values;
-  for (const std::string& assignment : options.set) {
-    axes.push_back(sysid::parse_fixed(assignment));
-    values.push_back(axes.back().values.front());
-  }
+  for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
+  sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1));
   check_output(options.out, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 
@@ -152,8 +153,9 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (!result.converged)
     warn("not converged in " + data::format_short(100 * motion.unconverged_share) +
          " % of the steps (residual " + data::format_short(result.residual_max) + ")");
-  for (const std::string& bound : result.recordings.front().bounds_hit)
-    warn(bound + " is at its bound; widen `nuisance` in recording.json");
+  for (const sysid::RegistrationParameter& parameter : sysid::registration_parameters)
+    if (sysid::is_at_bound(result.recordings.front().bounds_hit, parameter))
+      warn(sysid::at_bound_text(parameter, recording.nuisance));
   if (options.common.json) {
     std::cout << result_json(result, motion).dump(2) << '\n';
   } else {
@@ -177,8 +179,7 @@ void add_replay_verb(CLI::App& app, Action& action) {
       "replay", "Replay one set of parameters: meshes, scores and pictures over the observation");
   verb->add_option("recording", options->recording, "Folder with recording.json")->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
-  verb->add_option("--set", options->set, "A parameter in place of the asset's, as bending=1e-4")
-      ->allow_extra_args(false);
+  add_fixed_options(*verb, options->fixed, "A parameter in place of the asset's, as bending=1e-4");
   verb->add_option("--frames", options->frames,
                    "Keyframes to draw, counted from 0, each and together in sequence.png; without it six")
       ->delimiter(',');
@@ -186,9 +187,10 @@ void add_replay_verb(CLI::App& app, Action& action) {
   verb->add_option("-o,--out", options->out, "Folder for meshes, clouds, overlay.csv and pictures")
       ->required();
   add_replay_options(*verb, options->replay);
+  add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
-      "Example:\n  flash-sysid replay lift_a --asset towel.json --set bending=1e-4 --frames 12,16,20,24 -o "
+      "Example:\n  flash-sysid replay lift_a --asset towel.json --fix bending=1e-4 --frames 12,16,20,24 -o "
       "overlay");
   verb->callback(
       [verb, options, &action] { action = [verb, options] { return run_replay(*verb, *options); }; });

@@ -5,9 +5,11 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "sysid/predictability.h"
+#include "sysid/recording_names.h"
 #include "sysid/report.h"
 
 namespace flash {
@@ -30,9 +32,12 @@ int run_report(const ReportOptions& options) {
   for (const sysid::SummaryRecording& recording : summary.recordings) horizons.push_back(recording.horizon_s);
   if (!horizons.empty()) sysid::drop_beyond_horizons(horizons, results);
   std::vector<sysid::Overlay> overlays;
-  for (const sysid::SummaryRecording& recording : summary.recordings) {
-    const fs::path folder = fs::path(options.run) / "best" / recording.name;
-    if (fs::exists(folder)) overlays.push_back(sysid::load_overlay(folder.string()));
+  const std::vector<std::string> folders = sysid::file_names(results.recordings);
+  for (std::size_t r = 0; r < folders.size(); ++r) {
+    const fs::path folder = fs::path(options.run) / "best" / folders[r];
+    if (!fs::exists(folder)) continue;
+    overlays.push_back(sysid::load_overlay(folder.string()));
+    overlays.back().name = results.recordings[r];
   }
   sysid::ReportSettings settings;
   settings.max_cloud_points = options.points;
@@ -61,7 +66,7 @@ void add_report_verb(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->expected(2);
   verb->add_option("--points", options->points, "Observed points shown a keyframe at most")
-      ->check(CLI::PositiveNumber)
+      ->check(whole_number(1, 10000000))
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "The file; without it report.html in the folder of the search");
   add_common_options(*verb, options->common);

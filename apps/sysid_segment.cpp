@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -5,9 +7,11 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
+#include "data/frame_files.h"
 #include "data/text.h"
 #include "sysid/segment_folder.h"
 
@@ -16,53 +20,138 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kSmallestVoxel = 1e-4;  // below it, the cells of a cloud cannot be numbered [m]
+
 struct SegmentOptions {
   CommonOptions common;
   std::vector<std::string> views;
-  std::string trajectory;
-  double rate = 10;
+  std::vector<std::string> masks, intrinsics, extrinsics;  ///< none, or one a view; lenses also one for all
+  std::vector<double> depth_scales;
+  std::string trajectory, times;
+  double rate = 0, table_height = 0;
   std::vector<double> low, high;
   bool no_table = false;
   sysid::SegmentFolderSettings settings;
   std::string out;
 };
 
-std::vector<double> even_times(std::size_t count, double rate) {
-  std::vector<double> times(count);
-  for (std::size_t i = 0; i < count; ++i) times[i] = static_cast<double>(i) / rate;
-  return times;
+/// The view's own value; where one stands for all, that.
+template <class Value>
+Value of_view(const std::vector<Value>& values, std::size_t view, std::size_t views, bool one_for_all,
+              const char* option, const Value& absent) {
+  if (values.empty()) return absent;
+  if (values.size() == views) return values[view];
+  if (one_for_all && values.size() == 1) return values[0];
+  throw data::InputError(std::string(option) + ": found " + std::to_string(values.size()) + ", expected " +
+                         (one_for_all ? "one or " : "") + std::to_string(views) +
+                         (views == 1 ? " for the one view" : ", one a view"));
 }
 
-int run_segment(SegmentOptions options) {
+std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
   std::vector<sysid::RawView> views;
-  for (const std::string& folder : options.views) views.push_back(sysid::open_raw_view(folder));
-  options.settings.find_table = !options.no_table;
-  if (!options.trajectory.empty()) options.settings.gripper = data::load_tum(options.trajectory);
-  if (!options.low.empty())
-    options.settings.segment.crop.min = Eigen::Map<const Eigen::Vector3d>(options.low.data());
+  const std::size_t count = options.views.size();
+  for (std::size_t view = 0; view < count; ++view) {
+    sysid::RawViewFiles files;
+    const std::string none;
+    files.masks = of_view(options.masks, view, count, false, "--masks", none);
+    files.intrinsics = of_view(options.intrinsics, view, count, true, "--intrinsics", none);
+    files.extrinsics = of_view(options.extrinsics, view, count, false, "--extrinsics", none);
+    const double scale = of_view(options.depth_scales, view, count, true, "--depth-scale", 0.0);
+    if (scale > 0) files.depth_scale = scale;
+    files.accept_unusable = options.common.force;
+    views.push_back(sysid::open_raw_view(options.views[view], files));
+  }
+  const bool clouds = std::none_of(views.begin(), views.end(), [](const auto& view) { return view.camera; });
+  if (clouds && !options.depth_scales.empty())
+    throw data::InputError("--depth-scale: the views hold clouds, expected depth images");
+  return views;
+}
+
+/// One a frame. Without a gripper they do not count, and need not be known.
+std::vector<double> times_of(const SegmentOptions& options, std::size_t frames) {
+  std::string times = options.times;
+  if (options.rate > 0) times = "rate:" + data::format_number(options.rate);
+  if (times.empty() && !options.trajectory.empty())
+    throw data::InputError(
+        "--trajectory: the frames need times by its clock, expected --times FILE.csv or rate:HZ:START, or "
+        "--rate HZ where the first frame is at 0 s");
+  return data::frame_times(times.empty() ? "rate:1" : times, frames);
+}
+
+void check_lengths(const SegmentOptions& options) {
+  const sysid::SegmentSettings& segment = options.settings.segment;
+  if (segment.voxel > 0 && segment.voxel < kSmallestVoxel)
+    throw data::InputError("--voxel: found " + data::format_short(segment.voxel) +
+                           ", expected 0 or at least " + data::format_short(kSmallestVoxel) + " m");
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = segment.crop.min[axis], high = segment.crop.max[axis];
+    if (!(low < high))
+      throw data::InputError(std::string("--crop-min: found ") + "xyz"[axis] + " = " +
+                             data::format_short(low) + ", expected less than " + data::format_short(high) +
+                             " of --crop-max");
+  }
+}
+
+/// Files are never written over those that they are made from.
+void check_places(const std::vector<sysid::RawView>& views, const std::string& out) {
+  for (const sysid::RawView& view : views) {
+    const fs::path folder = fs::weakly_canonical(fs::path(view.files.front()).parent_path());
+    if (folder == fs::weakly_canonical(fs::path(out) / "frames"))
+      throw data::InputError("-o: " + folder.string() + " holds the raw frames; choose another folder");
+  }
+}
+
+int run_segment(const CLI::App& verb, SegmentOptions options) {
+  sysid::SegmentFolderSettings& settings = options.settings;
+  if (!options.low.empty()) settings.segment.crop.min = Eigen::Map<const Eigen::Vector3d>(options.low.data());
   if (!options.high.empty())
-    options.settings.segment.crop.max = Eigen::Map<const Eigen::Vector3d>(options.high.data());
+    settings.segment.crop.max = Eigen::Map<const Eigen::Vector3d>(options.high.data());
+  check_lengths(options);
+  const std::vector<sysid::RawView> views = open_views(options);
+  settings.find_table = !options.no_table;
+  if (verb.count("--table-height") > 0) settings.table_height = options.table_height;
+  if (!options.trajectory.empty()) {
+    settings.gripper = data::load_trajectory(options.trajectory);
+    settings.gripper_path = options.trajectory;
+    for (const std::string& jumps : data::find_jumps(*settings.gripper, options.trajectory)) warn(jumps);
+  }
   check_output(options.out, options.common);
-  const sysid::SegmentedFolder segmented = sysid::segment_folder(
-      views, even_times(views.front().files.size(), options.rate), options.settings, options.out);
+  check_places(views, options.out);
+  const sysid::SegmentedFolder segmented =
+      sysid::segment_folder(views, times_of(options, views.front().files.size()), settings, options.out);
+  for (const std::string& warning : segmented.warnings) warn(warning);
 
   std::size_t points = 0;
   for (const sysid::Segmentation& frame : segmented.frames)
     points += static_cast<std::size_t>(frame.cloth.rows());
+  std::vector<std::string> warnings;
+  for (const sysid::RawView& view : views)
+    warnings.insert(warnings.end(), view.warnings.begin(), view.warnings.end());
+  for (const std::string& warning : warnings) warn(warning);
   const std::string picture = (fs::path(options.out) / segmented.picture).string();
   if (options.common.json) {
-    nlohmann::ordered_json json = {
-        {"clouds", segmented.clouds}, {"picture", picture}, {"points", points}, {"table", nullptr}};
+    nlohmann::ordered_json json = {{"clouds", segmented.clouds},
+                                   {"picture", picture},
+                                   {"points", points},
+                                   {"table", nullptr},
+                                   {"warnings", segmented.warnings}};
     if (segmented.table) {
-      const Eigen::Vector3d &p = segmented.table->point, &n = segmented.table->normal;
-      json["table"] = {{"point", {p.x(), p.y(), p.z()}}, {"normal", {n.x(), n.y(), n.z()}}};
+      const Eigen::Vector3d &p = segmented.table->plane.point, &n = segmented.table->plane.normal;
+      json["table"] = {{"point", {p.x(), p.y(), p.z()}},
+                       {"normal", {n.x(), n.y(), n.z()}},
+                       {"tilt_deg", segmented.table->tilt * 180 / M_PI},
+                       {"frames", segmented.table->frames},
+                       {"agreeing", segmented.table->agreeing}};
     }
     std::cout << json.dump(2) << '\n';
   } else {
-    if (segmented.table)
-      std::printf("table through %.4f %.4f %.4f m, normal %.4f %.4f %.4f\n", segmented.table->point.x(),
-                  segmented.table->point.y(), segmented.table->point.z(), segmented.table->normal.x(),
-                  segmented.table->normal.y(), segmented.table->normal.z());
+    if (segmented.table && segmented.table->frames > 0) {
+      const Eigen::Vector3d &p = segmented.table->plane.point, &n = segmented.table->plane.normal;
+      std::printf(
+          "table through %.4f %.4f %.4f m, normal %.4f %.4f %.4f, %.1f deg from z, in %d of %d frames\n",
+          p.x(), p.y(), p.z(), n.x(), n.y(), n.z(), segmented.table->tilt * 180 / M_PI,
+          segmented.table->agreeing, segmented.table->frames);
+    }
     std::printf("%zu frames, %s points of cloth\n%s\n", segmented.clouds.size(),
                 data::format_count(points).c_str(), picture.c_str());
   }
@@ -81,29 +170,53 @@ void add_segment_verb(CLI::App& app, Action& action) {
           "Folders of raw frames, one a camera: clouds, or depth/ with camera_info.yaml and extrinsics.json")
       ->required();
   verb->add_option("--trajectory", options->trajectory,
-                   "T_base_gripper, TUM: the arm above the gripper is cut away");
-  verb->add_option("--rate", options->rate, "Frames a second")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  verb->add_option("--crop-min", options->low, "x,y,z of the box to keep [m]")->delimiter(',')->expected(3);
-  verb->add_option("--crop-max", options->high, "x,y,z of the box to keep [m]")->delimiter(',')->expected(3);
+                   "T_base_gripper, TUM or CSV: the arm above the gripper is cut away");
+  CLI::Option* times = verb->add_option(
+      "--times", options->times, "rate:HZ, rate:HZ:START, or a CSV with one time a frame, as for import");
+  verb->add_option("--rate", options->rate, "Frames a second from 0 s; short for --times rate:HZ")
+      ->check(positive_number())
+      ->excludes(times);
+  verb->add_option("--masks", options->masks, "Folder of masks of the depth images' names, one a view");
+  verb->add_option(
+      "--intrinsics", options->intrinsics,
+      "camera_info or OpenCV YAML, one a view or one for all; without it camera_info.yaml there");
+  verb->add_option("--extrinsics", options->extrinsics,
+                   "T_base_camera, one a view: flash-extrinsics/1, or a TUM file; without it "
+                   "extrinsics.json or .tum there");
+  verb->add_option("--depth-scale", options->depth_scales,
+                   "Metres a count, one a view or one for all; without it 0.001")
+      ->check(number_between(1e-7, 1));
+  verb->add_option("--crop-min", options->low, "x,y,z of the box to keep [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(any_number());
+  verb->add_option("--crop-max", options->high, "x,y,z of the box to keep [m]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(any_number());
   verb->add_option("--arm-radius", options->settings.arm_radius, "[m]")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_between(0, 1))
       ->capture_default_str();
   verb->add_option("--clearance", segment.table_clearance,
                    "Cloth is kept from this height above the table [m]")
+      ->check(number_between(0, 0.5))
       ->capture_default_str();
   verb->add_option("--cluster-gap", segment.cluster_gap, "Points closer than this belong together [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(number_between(1e-4, 0.1))
       ->capture_default_str();
   verb->add_option("--voxel", segment.voxel, "One point a cell of this edge [m]; 0: every point")
-      ->check(CLI::NonNegativeNumber)
+      ->check(number_between(0, 0.1))
       ->capture_default_str();
-  verb->add_flag("--no-table", options->no_table, "There is no table in view");
+  CLI::Option* height =
+      verb->add_option("--table-height", options->table_height,
+                       "Of a level table [m]; without it one is sought, beyond the crop too")
+          ->check(number_between(-20, 20));
+  verb->add_flag("--no-table", options->no_table, "There is no table in view")->excludes(height);
   verb->add_option("-o,--out", options->out, "Folder for frames/ and segment.png")->required();
-  add_common_options(*verb, options->common);
+  add_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer("Example:\n  flash-sysid segment raw/camera --trajectory gripper.tum --rate 10 -o segmented");
-  verb->callback([options, &action] { action = [options] { return run_segment(*options); }; });
+  verb->callback(
+      [verb, options, &action] { action = [verb, options] { return run_segment(*verb, *options); }; });
 }
 
 }  // namespace flash

@@ -5,6 +5,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/sha256.h"
 #include "data/text.h"
 
@@ -16,7 +17,7 @@ constexpr int kFinderVersion = 1;  // counts changes of what the finders return
 std::optional<Found> read(const std::string& path) {
   if (!std::filesystem::exists(path)) return std::nullopt;
   try {
-    const nlohmann::json json = nlohmann::json::parse(data::read_file(path));
+    const nlohmann::json json = data::load_json(path);
     Found found;
     found.reason = json.at("reason").get<std::string>();
     for (const nlohmann::json& item : json.at("sightings")) {

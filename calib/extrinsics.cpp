@@ -81,16 +81,6 @@ Json depth_json(const DepthUse& depth) {
           {"over_corners_sd", depth.over_corners_sd}};
 }
 
-NamedTransform transform_from(const data::JsonObject& object) {
-  object.expect_fields({"parent", "child", "translation", "rotation_xyzw"});
-  NamedTransform result{.parent = object.string("parent"), .child = object.string("child"), .T = {}};
-  Eigen::Matrix<double, 7, 1> v;
-  v << object.vector("translation", 3), object.vector("rotation_xyzw", 4);
-  if (std::abs(v.tail<4>().norm() - 1) > 1e-3) throw object.error("rotation_xyzw", "a unit quaternion");
-  result.T = data::from_vector(v);
-  return result;
-}
-
 }  // namespace
 
 const char* to_string(Setup setup) { return setup == Setup::eye_in_hand ? "eye-in-hand" : "eye-to-hand"; }
@@ -213,21 +203,17 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   return json;
 }
 
-Extrinsics load_extrinsics(const std::string& path) {
+Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject object(file, path);
-  object.expect_fields(
-      {"schema",      "setup",        "method",        "transform",     "target_pose",
-       "covariance",  "predicted_sd", "sigmas",        "residuals",     "depth",
-       "time_offset", "comparison",   "views",         "observability", "convention_findings",
-       "scale",       "splits",       "smooth_errors", "warnings",      "exit_code",
-       "provenance"});
-  if (object.string("schema") != "flash-extrinsics/1") throw object.error("schema", "flash-extrinsics/1");
+  const data::CameraPose pose = data::read_camera_pose(object, accept_unusable);
   Extrinsics extrinsics;
   extrinsics.setup = parse_setup(object.string("setup"), path, "setup");
   extrinsics.method = object.string("method");
-  extrinsics.transform = transform_from(object.object("transform"));
-  extrinsics.target_pose = transform_from(object.object("target_pose"));
+  extrinsics.transform = pose.transform;
+  extrinsics.warnings = pose.warnings;
+  extrinsics.usable = pose.usable;
+  extrinsics.target_pose = data::read_transform(object.object("target_pose"));
   const nlohmann::json& covariance = object.raw("covariance");
   if (!covariance.is_array() || covariance.size() != 6) throw object.error("covariance", "6 x 6 numbers");
   for (Eigen::Index i = 0; i < 6; ++i) {

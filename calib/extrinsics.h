@@ -7,14 +7,11 @@
 #include "calib/calibrate.h"
 #include "calib/depth_use.h"
 #include "calib/time_offset.h"
+#include "data/extrinsics.h"
 
 namespace flash::calib {
 
-/// A transform between two named frames.
-struct NamedTransform {
-  std::string parent, child;
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();  ///< maps points of the child into the parent
-};
+using data::NamedTransform;
 
 /// What a calibration was made from, so that it can be made again, and what took part beside the corners.
 struct ExtrinsicsInputs {
@@ -41,7 +38,9 @@ struct Extrinsics {
   double target_scale =
       1;  ///< size of the target that transform and target_pose are for, over the stated one
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
-  bool pixels = true;  ///< false: of pose pairs, which have no corners
+  bool pixels = true;                 ///< false: of pose pairs, which have no corners
+  std::vector<std::string> warnings;  ///< of the calibration, worst first
+  bool usable = true;                 ///< false: it ended with exit code 3
   ExtrinsicsInputs inputs;
 };
 
@@ -55,8 +54,9 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
 /// observability, findings, scale, warnings, provenance.
 nlohmann::ordered_json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code);
 
-/// Throws data::InputError naming file, field, what was found and what was expected.
-Extrinsics load_extrinsics(const std::string& path);
+/// Throws data::InputError naming file, field, what was found and what was expected; also where the
+/// calibration ended with exit code 3, unless `accept_unusable`, which is what --force says.
+Extrinsics load_extrinsics(const std::string& path, bool accept_unusable = false);
 
 /// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
 nlohmann::ordered_json to_json(const NamedTransform& transform);

@@ -4,6 +4,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "data/atomic_file.h"
+#include "data/depth_image.h"
 #include "data/error.h"
 
 namespace flash::calib {
@@ -11,8 +12,7 @@ namespace flash::calib {
 namespace {
 
 /// The decoder tells the terminal of a PNG that was cut off; here it is told to the user.
-bool cut_off(const std::string& path) {
-  const std::string file = data::read_file(path);
+bool cut_off(const std::string& file) {
   return file.starts_with("\x89PNG") &&
          file.find("IEND", file.size() - std::min<std::size_t>(file.size(), 64)) == std::string::npos;
 }
@@ -20,7 +20,9 @@ bool cut_off(const std::string& path) {
 }  // namespace
 
 GreyImage load_grey_image(const std::string& path) {
-  if (cut_off(path)) throw data::InputError(path + ": cannot be read as a picture: it ends within its data");
+  const std::string file = data::read_file(path);
+  data::check_png_size(file, path);
+  if (cut_off(file)) throw data::InputError(path + ": cannot be read as a picture: it ends within its data");
   cv::Mat picture;
   try {
     picture = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);

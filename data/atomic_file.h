@@ -11,7 +11,8 @@ void write_atomically(const std::string& path, std::string_view contents);
 /// Removes from `folder` the temporary files of writers that were killed. Only while nobody writes there.
 void remove_leftovers(const std::string& folder);
 
-/// The whole file as bytes. Throws InputError naming the path.
+/// The whole file as bytes. Throws InputError naming the path: a device or a pipe, which may never end, is no
+/// input, and neither is a file above 1 GB.
 std::string read_file(const std::string& path);
 
 /// `path` itself if absolute, else relative to the folder of `referring_file`, the file that names it.

@@ -1,8 +1,9 @@
 #include "data/delaunay.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <utility>
 
 namespace flash::data {
@@ -13,26 +14,44 @@ using Triangle = std::array<int, 3>;
 /// The corner of all triangles outside the hull: a vertex at infinity, so that hull edges need no rounding.
 constexpr int kGhost = -1;
 
-/// Above zero where a, b, c turn counter-clockwise; exactly zero for points on an axis-parallel line.
-double turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c) {
+/// Points on a lattice of 2^30 steps along the longer side of their box: sums and products of its whole
+/// numbers below are exact, which those of doubles are not.
+using Node = Eigen::Matrix<std::int64_t, 2, 1>;
+__extension__ using Exact = __int128;
+
+std::vector<Node> nodes_of(const std::vector<Eigen::Vector2d>& points) {
+  if (points.empty()) return {};
+  Eigen::Vector2d low = points[0], high = points[0];
+  for (const Eigen::Vector2d& point : points) {
+    low = low.cwiseMin(point);
+    high = high.cwiseMax(point);
+  }
+  const double steps = std::ldexp(1.0, 30) / (high - low).maxCoeff();
+  std::vector<Node> nodes;
+  for (const Eigen::Vector2d& point : points)
+    nodes.emplace_back(std::llround(steps * (point - low).x()), std::llround(steps * (point - low).y()));
+  return nodes;
+}
+
+/// Above zero where a, b, c turn counter-clockwise; at most 2^61.
+std::int64_t turn(const Node& a, const Node& b, const Node& c) {
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
-/// Whether p lies inside the circle through the counter-clockwise a, b, c. Four points on a circle but for
-/// rounding are left as they are: either diagonal is Delaunay.
-bool in_circle(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vector2d& c,
-               const Eigen::Vector2d& p) {
-  Eigen::Matrix3d m;
-  m << (a - p).transpose(), (a - p).squaredNorm(), (b - p).transpose(), (b - p).squaredNorm(),
-      (c - p).transpose(), (c - p).squaredNorm();
-  return m.determinant() > 1e-12 * m.col(2).maxCoeff() * m.col(2).maxCoeff();
+/// Whether p lies inside the circle through the counter-clockwise a, b, c; not on it. At most 2^124 is added
+/// up.
+bool in_circle(const Node& a, const Node& b, const Node& c, const Node& p) {
+  return Exact(turn(p, b, c)) * (a - p).squaredNorm() + Exact(turn(p, c, a)) * (b - p).squaredNorm() +
+             Exact(turn(p, a, b)) * (c - p).squaredNorm() >
+         0;
 }
 
 }  // namespace
 
 Triangles delaunay(const std::vector<Eigen::Vector2d>& points) {
   const int n = static_cast<int>(points.size());
-  const auto at = [&](int i) -> const Eigen::Vector2d& { return points[static_cast<std::size_t>(i)]; };
+  const std::vector<Node> nodes = nodes_of(points);
+  const auto at = [&](int i) -> const Node& { return nodes[static_cast<std::size_t>(i)]; };
   int third = 2;
   while (third < n && turn(at(0), at(1), at(third)) == 0) ++third;
   if (third >= n) return {};
@@ -41,8 +60,8 @@ Triangles delaunay(const std::vector<Eigen::Vector2d>& points) {
     const std::size_t ghost = static_cast<std::size_t>(std::find(t.begin(), t.end(), kGhost) - t.begin());
     if (ghost == 3) return in_circle(at(t[0]), at(t[1]), at(t[2]), at(p));
     // The circle through two points and infinity is the half plane beyond the edge, and the edge itself.
-    const Eigen::Vector2d &a = at(t[(ghost + 1) % 3]), &b = at(t[(ghost + 2) % 3]);
-    const double side = turn(a, b, at(p));
+    const Node &a = at(t[(ghost + 1) % 3]), &b = at(t[(ghost + 2) % 3]);
+    const std::int64_t side = turn(a, b, at(p));
     return side > 0 || (side == 0 && (at(p) - a).dot(at(p) - b) < 0);
   };
 

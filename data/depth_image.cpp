@@ -7,6 +7,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/text.h"
 
 namespace flash::data {
 namespace {
@@ -63,6 +64,7 @@ RawPng load_png(const std::string& path, bool expand) {
   const std::string file = read_file(path);
   if (file.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(file.data()), 0, 8) != 0)
     throw InputError(path + ": not a PNG file");
+  check_png_size(file, path);
   ReadState state{file, ""};
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &state, keep_message, ignore_warning);
   png_infop info = png_create_info_struct(png);
@@ -111,6 +113,21 @@ void save_png(int width, int height, int bit_depth, std::vector<std::uint8_t> by
 
 }  // namespace
 
+void check_png_size(std::string_view file, const std::string& path) {
+  constexpr std::uint64_t most_pixels = 256u << 20;
+  constexpr std::size_t at = 16;  // signature, length and name of the chunk IHDR
+  if (!file.starts_with("\x89PNG") || file.size() < at + 8) return;
+  const auto number = [&](std::size_t begin) {
+    std::uint64_t value = 0;
+    for (std::size_t i = begin; i < begin + 4; ++i) value = value << 8 | static_cast<std::uint8_t>(file[i]);
+    return value;
+  };
+  const std::uint64_t width = number(at), height = number(at + 4);
+  if (width * height > most_pixels)
+    throw InputError(path + ": found " + format_count(width) + " x " + format_count(height) +
+                     " pixels, expected at most " + format_count(most_pixels) + " in all");
+}
+
 DepthImage load_depth_image(const std::string& path) {
   const RawPng raw = load_png(path, false);
   if (raw.bit_depth != 16 || raw.channels != 1)
@@ -156,13 +173,23 @@ Points points_from_depth(const DepthImage& depth, const MaskImage& mask, const C
   if (!mask.pixels.empty() && (mask.width != depth.width || mask.height != depth.height))
     throw InputError(source + ": its mask has " + size(mask.width, mask.height) + " pixels, expected " +
                      size(depth.width, depth.height));
+  constexpr double farthest = 1e5;  // nothing that a depth camera sees [m]
+  std::size_t lost = 0;
   std::vector<double> coordinates;
   for (int y = 0; y < depth.height; ++y)
     for (int x = 0; x < depth.width; ++x) {
       if (depth.at(x, y) == 0 || (!mask.pixels.empty() && mask.at(x, y) == 0)) continue;
       const Eigen::Vector3d point = unproject(camera, {x, y}, depth_scale * depth.at(x, y));
-      coordinates.insert(coordinates.end(), point.data(), point.data() + 3);
+      if (point.cwiseAbs().maxCoeff() < farthest)
+        coordinates.insert(coordinates.end(), point.data(), point.data() + 3);
+      else
+        ++lost;
     }
+  const std::size_t measured = lost + coordinates.size() / 3;
+  if (100 * lost > measured)
+    throw InputError(source + ": " + format_count(lost) + " of " + format_count(measured) +
+                     " pixels become points more than 100 km away, or none: check the camera's matrix and "
+                     "distortion, and the depth scale");
   return Eigen::Map<Points>(coordinates.data(), static_cast<Eigen::Index>(coordinates.size() / 3), 3);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "data/camera.h"
@@ -27,6 +28,10 @@ struct Image {
 using DepthImage = Image<std::uint16_t>;  ///< counts along the optical axis; 0: nothing measured
 using MaskImage = Image<std::uint8_t>;    ///< 0: not the object
 
+/// Throws InputError where the header of a PNG promises more than 256 megapixels (2^28): a small file may
+/// unpack to more than there is memory. `file` holds its bytes; any other format passes.
+void check_png_size(std::string_view file, const std::string& path);
+
 /// 16-bit grey PNG. Throws InputError where it is anything else: 8-bit depth has lost its precision.
 DepthImage load_depth_image(const std::string& path);
 void save_depth_image(const DepthImage& image, const std::string& path);
@@ -36,7 +41,8 @@ MaskImage load_mask(const std::string& path);
 void save_mask(const MaskImage& image, const std::string& path);
 
 /// Points in the camera frame [m] of the pixels with depth and, where the mask is not empty, inside it.
-/// depth_scale: metres a count. Throws InputError naming `source` where sizes differ.
+/// depth_scale: metres a count. Pixels that the lens puts nowhere, or more than 100 km away, are left out.
+/// Throws InputError naming `source` where these are more than 1 %, or where sizes differ.
 Points points_from_depth(const DepthImage& depth, const MaskImage& mask, const CameraIntrinsics& camera,
                          double depth_scale, const std::string& source);
 

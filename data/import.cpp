@@ -8,9 +8,13 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/extrinsics.h"
+#include "data/frame_files.h"
 #include "data/json_reader.h"
+#include "data/lying_sheet.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/staged_folder.h"
 #include "data/text.h"
 
 namespace flash::data {
@@ -18,83 +22,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kTimes = "rate:10";  // without any other word
+constexpr double kLargestSheet = 20;       // above it, millimetres were given for metres [m]
+
 InputError option_error(const char* option, const std::string& found, const std::string& expected) {
   return InputError("--" + std::string(option) + ": found \"" + found + "\", expected " + expected);
 }
 
-/// "frame2" before "frame10": runs of digits count as numbers.
-bool natural_less(const std::string& a, const std::string& b) {
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!is_digit(a[i]) || !is_digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
-      ++i, ++j;
-      continue;
-    }
-    const auto digits = [&](const std::string& text, std::size_t& at) {
-      std::size_t begin = at;
-      while (at < text.size() && is_digit(text[at])) ++at;
-      while (begin + 1 < at && text[begin] == '0') ++begin;
-      return text.substr(begin, at - begin);
-    };
-    const std::string m = digits(a, i), n = digits(b, j);
-    if (m.size() != n.size()) return m.size() < n.size();
-    if (m != n) return m < n;
-  }
-  return a.size() - i < b.size() - j;
-}
-
 std::vector<std::string> files_in(const std::string& folder, const std::vector<std::string>& extensions,
                                   const char* option) {
-  if (!fs::is_directory(folder))
-    throw InputError(folder + ": is not a folder, expected one with the files of --" + option);
-  std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && std::find(extensions.begin(), extensions.end(),
-                                             lower_extension(entry.path().string())) != extensions.end())
-      files.push_back(entry.path().string());
+  std::vector<std::string> files = files_in_order(folder, extensions);
   if (files.empty()) throw InputError(folder + ": found no " + extensions.front() + " files for --" + option);
-  std::sort(files.begin(), files.end(), natural_less);
   return files;
-}
-
-std::vector<double> parse_times(const std::string& times, std::size_t frames) {
-  const std::string expected = "rate:HZ, rate:HZ:START or a CSV file with a column t";
-  std::vector<double> result;
-  if (times.starts_with("rate:")) {
-    const std::vector<std::string_view> parts = split(times, ":");
-    const std::optional<double> rate = parts.size() >= 2 ? parse_number(parts[1]) : std::nullopt;
-    const std::optional<double> start = parts.size() == 3 ? parse_number(parts[2]) : 0.0;
-    if (!rate || !start || parts.size() > 3 || !(*rate > 0) || !std::isfinite(*start))
-      throw option_error("times", times, expected);
-    for (std::size_t i = 0; i < frames; ++i) result.push_back(*start + static_cast<double>(i) / *rate);
-    return result;
-  }
-  const std::string text = read_file(times);
-  LineReader lines(text);
-  std::string_view line;
-  lines.next(line);
-  const std::vector<std::string_view> names = split(line, ",");
-  const auto column = std::find_if(names.begin(), names.end(),
-                                   [](std::string_view name) { return name == "t" || name == "t_s"; });
-  if (column == names.end())
-    throw input_error(times, "header", "found \"" + std::string(line) + "\", expected a column t or t_s");
-  const std::size_t index = static_cast<std::size_t>(column - names.begin());
-  while (lines.next(line)) {
-    if (line.empty()) continue;
-    const std::vector<std::string_view> cells = split(line, ",");
-    const std::optional<double> time =
-        cells.size() == names.size() ? parse_number(cells[index]) : std::nullopt;
-    if (!time || !std::isfinite(*time) || (!result.empty() && *time <= result.back()))
-      throw input_error(times, "line " + std::to_string(lines.number()),
-                        "found \"" + std::string(line) + "\", expected strictly increasing times");
-    result.push_back(*time);
-  }
-  if (result.size() != frames)
-    throw InputError(times + ": found " + std::to_string(result.size()) + " times, expected " +
-                     std::to_string(frames) + ", one a frame");
-  return result;
 }
 
 void parse_range(const std::string& range, const char* option, int axis, CropBox& crop) {
@@ -116,6 +55,22 @@ std::string mesh_spec(const ImportOptions& options) {
   if (options.sheet.empty() == options.mesh.empty())
     throw InputError("import: expected either --sheet or --mesh");
   return options.mesh.empty() ? "sheet:" + options.sheet + ":" + format_number(options.cell) : options.mesh;
+}
+
+TriangleMesh load_mesh(const ImportOptions& options, const std::string& spec) {
+  TriangleMesh mesh = is_mesh_spec(spec)
+                          ? parse_mesh_spec(spec, "import", options.mesh.empty() ? "--sheet" : "--mesh")
+                          : load_triangle_mesh(spec);
+  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff();
+  if (size.norm() > kLargestSheet)
+    throw option_error(options.mesh.empty() ? "sheet" : "mesh",
+                       options.mesh.empty() ? options.sheet : options.mesh,
+                       "metres (millimetres read as metres?)");
+  if (options.mesh.empty() && options.cell > size.head<2>().minCoeff())
+    throw option_error(
+        "cell", format_number(options.cell),
+        "at most the shorter side of the sheet, " + format_short(size.head<2>().minCoeff()) + " m");
+  return mesh;
 }
 
 RecordedGrasp parse_grasp(const ImportOptions& options) {
@@ -149,10 +104,9 @@ RecordedGrasp parse_grasp(const ImportOptions& options) {
 
 /// Horizontal direction from the gripper's start to the middle of the cloth: the median over the frames,
 /// which neither stray clusters nor frames that show a rim only can turn far.
-double heading_of_clouds(const Recording& recording, const Eigen::Vector3d& gripper) {
+double heading_of_clouds(const std::vector<Keyframe>& keyframes, const Eigen::Vector3d& gripper) {
   std::vector<double> x, y;
-  std::vector<std::string> notices;
-  for (const Keyframe& keyframe : load_keyframes(recording, notices)) {
+  for (const Keyframe& keyframe : keyframes) {
     if (keyframe.cloud.rows() == 0) continue;
     x.push_back(keyframe.cloud.col(0).mean() - gripper.x());
     y.push_back(keyframe.cloud.col(1).mean() - gripper.y());
@@ -165,18 +119,106 @@ double heading_of_clouds(const Recording& recording, const Eigen::Vector3d& grip
   return x.empty() ? 0.0 : std::atan2(median(y), median(x));
 }
 
-/// Flat on the table, `corner` under the gripper, the diagonal from it along `heading`.
+Eigen::RowVector3d corner_of(const Points& rest, const std::array<int, 2>& corner) {
+  const Eigen::RowVector3d low = rest.colwise().minCoeff(), high = rest.colwise().maxCoeff();
+  return {corner[0] == 0 ? low.x() : high.x(), corner[1] == 0 ? low.y() : high.y(), low.z()};
+}
+
+/// Flat on the table, the point `held` of the rest sheet under the gripper, the diagonal from `corner` along
+/// `heading`.
 Eigen::Isometry3d start_pose(const Points& rest, const std::array<int, 2>& corner,
-                             const Eigen::Vector3d& gripper, double table_height, double heading) {
-  const Eigen::Vector3d low = rest.colwise().minCoeff(), high = rest.colwise().maxCoeff();
-  Eigen::Vector3d from(corner[0] == 0 ? low.x() : high.x(), corner[1] == 0 ? low.y() : high.y(), low.z());
-  const Eigen::Vector2d diagonal = (low + high - 2 * from).head<2>();
+                             const Eigen::RowVector3d& held, const Eigen::Vector3d& gripper,
+                             double table_height, double heading) {
+  const Eigen::RowVector3d diagonal =
+      rest.colwise().minCoeff() + rest.colwise().maxCoeff() - 2 * corner_of(rest, corner);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() =
       Eigen::AngleAxisd(heading - std::atan2(diagonal.y(), diagonal.x()), Eigen::Vector3d::UnitZ())
           .toRotationMatrix();
-  pose.translation() = Eigen::Vector3d(gripper.x(), gripper.y(), table_height) - pose.linear() * from;
+  pose.translation() =
+      Eigen::Vector3d(gripper.x(), gripper.y(), table_height) - pose.linear() * held.transpose();
   return pose;
+}
+
+/// What the clouds of the gripper's first stand show of the sheet that still lies, seen from above; thinned.
+std::vector<Eigen::Vector2d> lying_points(const Recording& recording,
+                                          const std::vector<Keyframe>& keyframes) {
+  constexpr double still = 0.005;  // the gripper has not moved farther [m]
+  constexpr std::size_t most = 1500;
+  const Trajectory& trajectory = recording.trajectories.at("gripper");
+  std::vector<Eigen::Vector2d> points;
+  for (const Keyframe& keyframe : keyframes) {
+    const Eigen::Vector3d moved =
+        pose_at(trajectory, keyframe.time).translation() - trajectory.poses.front().translation();
+    if (moved.norm() > still) break;
+    for (Eigen::Index i = 0; i < keyframe.cloud.rows(); ++i)
+      points.emplace_back(keyframe.cloud.row(i).head<2>().transpose());
+  }
+  const std::size_t step = 1 + points.size() / most;
+  std::vector<Eigen::Vector2d> thinned;
+  for (std::size_t i = 0; i < points.size(); i += step) thinned.push_back(points[i]);
+  return thinned;
+}
+
+/// Whether the first clouds, of a sheet that still lies, fit it better with its sides changed over or turned.
+std::vector<std::string> compare_sides(const Recording& recording, const std::vector<Keyframe>& keyframes,
+                                       double heading) {
+  const Points& rest = recording.mesh.vertices;
+  const std::array<int, 2> corner = *recording.grasps[0].select.corner;
+  const Eigen::RowVector3d size = rest.colwise().maxCoeff() - rest.colwise().minCoeff();
+  const std::vector<Eigen::Vector2d> points = lying_points(recording, keyframes);
+  if (!recording.mesh_spec.starts_with("sheet:")) return {};
+  constexpr std::size_t fewest = 50;  // else it is stray points that show
+  if (points.size() < fewest && size.x() == size.y()) return {};
+  if (points.size() < fewest)
+    return {
+        "import: --sheet: no cloud shows the sheet before the gripper moves, so its sides cannot be "
+        "checked: " +
+        format_short(corner[0] == corner[1] ? size.x() : size.y()) +
+        " m are on the right hand, from the grasped corner and seen from above"};
+  LyingSheet given{(recording.base_from_object * corner_of(rest, corner).transpose()).head<2>(), size.x(),
+                   size.y(), heading};
+  if (corner[0] != corner[1]) std::swap(given.right, given.left);
+  LyingSheet swapped = given;
+  std::swap(swapped.right, swapped.left);
+  const LyingSheet fitted = turned_to(given, points);
+  const double as_given = distance_to(fitted, points);
+  const double as_swapped = distance_to(turned_to(swapped, points), points);
+  constexpr double clear = 0.002;  // below it, noise decides [m]
+  if (as_swapped < 0.5 * as_given && as_given - as_swapped > clear)
+    return {"import: warning: --sheet: with the sides changed over, " + format_short(size.y()) + "x" +
+            format_short(size.x()) + ", the sheet is " + format_short(1000 * as_swapped) +
+            " mm from what the first clouds show of it, as given " + format_short(1000 * as_given) +
+            " mm: change the sides over, or name another corner with --grasp corner:I,J"};
+  constexpr double good = 0.008;  // what a cloud of 10 mm between its points is from its sheet [m]
+  const double turn = (fitted.heading - heading) * 180 / std::numbers::pi;
+  if (as_given > good || std::abs(turn) < 1.5) return {};
+  return {"import: what the first clouds show of the lying sheet fits best with --heading " +
+          format_short(fitted.heading * 180 / std::numbers::pi)};
+}
+
+/// Loads the recording as its users will, which checks it; what is wrong is not yet in a file of the user.
+void check_as_file(const Recording& recording, const std::string& path) {
+  save_recording(recording, path);
+  try {
+    load_recording(path);
+  } catch (const InputError& error) {
+    std::string message = error.what();
+    if (message.starts_with(path)) message.replace(0, path.size(), "import");
+    throw InputError(message);
+  }
+}
+
+/// When the grasp acts at the latest: the first keyframe, or before it when the gripper sets off.
+double grasp_time(const Trajectory& trajectory, double first_keyframe) {
+  constexpr double kStill = 1e-3;  // [m]
+  const Eigen::Vector3d start = trajectory.poses.front().translation();
+  double last = trajectory.times.front();
+  for (std::size_t i = 0; i < trajectory.times.size(); ++i) {
+    if ((trajectory.poses[i].translation() - start).norm() > kStill) break;
+    last = trajectory.times[i];
+  }
+  return std::min(first_keyframe, last);
 }
 
 std::string copied(const std::string& file, const fs::path& to) {
@@ -190,58 +232,64 @@ std::string numbered(std::size_t index, const char* extension) {
   return name;
 }
 
-/// Copies the frames below `out` and names them in the recording.
-void import_frames(const ImportOptions& options, const fs::path& out, Recording& recording) {
+/// Names the frames, where they are, in the recording.
+void import_frames(const ImportOptions& options, Recording& recording) {
   if (options.clouds.empty() == options.depth.empty())
     throw InputError("import: expected either a folder of clouds or --depth");
-  const std::vector<std::string> frames = options.depth.empty()
-                                              ? files_in(options.clouds, {".ply", ".pcd"}, "clouds")
-                                              : files_in(options.depth, {".png"}, "depth");
-  const std::vector<double> times = parse_times(options.times, frames.size());
+  const bool depth = !options.depth.empty();
+  const std::vector<std::string> frames = depth ? files_in(options.depth, {".png"}, "depth")
+                                                : files_in(options.clouds, {".ply", ".pcd"}, "clouds");
+  const std::vector<double> times =
+      frame_times(options.times.empty() ? kTimes : options.times, frames.size());
   for (std::size_t i = 0; i < frames.size(); ++i) {
     RecordedKeyframe keyframe;
     keyframe.time = times[i];
-    if (options.depth.empty()) {
-      keyframe.cloud = (out / "frames" / numbered(i, ".ply")).string();
-      if (lower_extension(frames[i]) == ".ply")
-        copied(frames[i], keyframe.cloud);
-      else
-        save_point_cloud(load_point_cloud(frames[i]), keyframe.cloud);
-    } else {
-      keyframe.depth = copied(frames[i], out / "depth" / numbered(i, ".png"));
-      if (!options.masks.empty())
-        keyframe.mask = copied((fs::path(options.masks) / fs::path(frames[i]).filename()).string(),
-                               out / "mask" / numbered(i, ".png"));
-    }
+    (depth ? keyframe.depth : keyframe.cloud) = frames[i];
+    if (!options.masks.empty())
+      keyframe.mask = (fs::path(options.masks) / fs::path(frames[i]).filename()).string();
     recording.keyframes.push_back(keyframe);
   }
-  if (options.depth.empty()) return;
+  if (!depth) return;
   if (options.intrinsics.empty() || options.extrinsics.empty())
     throw InputError("import: --depth needs --intrinsics and --extrinsics");
   RecordedCamera camera;
   camera.intrinsics = load_camera_intrinsics(options.intrinsics);
-  camera.intrinsics_path = (out / "camera_info.yaml").string();
-  save_camera_info(camera.intrinsics, camera.intrinsics_path);
-  camera.base_from_camera = load_extrinsics(options.extrinsics);
+  camera.intrinsics_path = options.intrinsics;
+  const CameraPose pose = load_camera_pose(options.extrinsics, options.accept_unusable);
+  camera.base_from_camera = pose.transform.T;
+  for (const std::string& warning : pose.warnings)
+    recording.notices.push_back(options.extrinsics + ": " + warning);
   camera.depth_scale = options.depth_scale;
   recording.camera = camera;
 }
 
-}  // namespace
-
-Eigen::Isometry3d load_extrinsics(const std::string& path) {
-  if (lower_extension(path) != ".json") return load_trajectory(path).poses.front();
-  const nlohmann::json json = load_json(path);
-  const JsonObject file(json, path);
-  if (file.string("schema", "") != "flash-extrinsics/1") throw file.error("schema", "\"flash-extrinsics/1\"");
-  const JsonObject transform = file.object("transform");
-  transform.expect_fields({"parent", "child", "translation", "rotation_xyzw"});
-  Eigen::Matrix<double, 7, 1> pose;
-  pose.head<3>() = Eigen::Vector3d(transform.vector("translation", 3));
-  pose.tail<4>() = Eigen::Vector4d(transform.vector("rotation_xyzw", 4));
-  if (std::abs(pose.tail<4>().norm() - 1) > 1e-3) throw transform.error("rotation_xyzw", "a unit quaternion");
-  return from_vector(pose);
+/// Copies all that the recording names below `out`, and names the copies.
+void copy_files(const fs::path& out, Recording& recording) {
+  for (std::size_t i = 0; i < recording.keyframes.size(); ++i) {
+    RecordedKeyframe& keyframe = recording.keyframes[i];
+    if (!keyframe.depth.empty()) keyframe.depth = copied(keyframe.depth, out / "depth" / numbered(i, ".png"));
+    if (!keyframe.mask.empty()) keyframe.mask = copied(keyframe.mask, out / "mask" / numbered(i, ".png"));
+    if (keyframe.cloud.empty()) continue;
+    const std::string copy = (out / "frames" / numbered(i, ".ply")).string();
+    if (lower_extension(keyframe.cloud) == ".ply")
+      copied(keyframe.cloud, copy);
+    else
+      save_point_cloud(load_point_cloud(keyframe.cloud), copy);
+    keyframe.cloud = copy;
+  }
+  if (recording.camera) {
+    recording.camera->intrinsics_path = (out / "camera_info.yaml").string();
+    save_camera_info(recording.camera->intrinsics, recording.camera->intrinsics_path);
+  }
+  for (auto& [name, path] : recording.trajectory_paths) {
+    path = (out / (name + ".tum")).string();
+    save_tum(recording.trajectories.at(name), path);
+  }
+  if (!is_mesh_spec(recording.mesh_spec))
+    recording.mesh_spec = copied(recording.mesh_spec, out / fs::path(recording.mesh_spec).filename());
 }
+
+}  // namespace
 
 Recording import_recording(const ImportOptions& options) {
   const fs::path out(options.out);
@@ -250,64 +298,80 @@ Recording import_recording(const ImportOptions& options) {
     throw InputError(path + ": exists already; choose another folder or --force");
 
   Recording recording;
-  recording.source = path;
+  recording.source = "import";
   recording.name =
       !options.name.empty() ? options.name : fs::weakly_canonical(fs::absolute(out)).filename().string();
   recording.kind = options.kind;
   recording.gravity = options.gravity;
   recording.nuisance = options.nuisance;
   recording.mesh_spec = mesh_spec(options);
-  recording.mesh = is_mesh_spec(recording.mesh_spec) ? parse_mesh_spec(recording.mesh_spec, "import", "sheet")
-                                                     : load_triangle_mesh(recording.mesh_spec);
+  recording.mesh = load_mesh(options, recording.mesh_spec);
   recording.grasps = {parse_grasp(options)};
   parse_range(options.crop_x, "crop-x", 0, recording.crop);
   parse_range(options.crop_y, "crop-y", 1, recording.crop);
   parse_range(options.crop_z, "crop-z", 2, recording.crop);
   const Trajectory trajectory = load_trajectory(options.trajectory);
+  if (trajectory.poses.size() < 2)
+    throw InputError("--trajectory: " + options.trajectory + ": found one pose, expected two or more");
   recording.trajectories["gripper"] = trajectory;
+  recording.trajectory_paths["gripper"] = options.trajectory;
 
-  import_frames(options, out, recording);
-  recording.trajectory_paths["gripper"] = (out / "gripper.tum").string();
-  save_tum(trajectory, recording.trajectory_paths["gripper"]);
-  if (!is_mesh_spec(recording.mesh_spec))
-    recording.mesh_spec = copied(recording.mesh_spec, out / fs::path(recording.mesh_spec).filename());
-  if (!options.asset.empty()) recording.asset = options.asset;
+  import_frames(options, recording);
+  recording.grasps[0].from = grasp_time(trajectory, recording.keyframes.front().time);
+  std::vector<double> times;
+  for (const RecordedKeyframe& keyframe : recording.keyframes) times.push_back(keyframe.time);
+  std::vector<std::string> notices = recording.notices;
+  for (const std::string& line : compare_clocks(times, trajectory, options.trajectory))
+    notices.push_back(line);
 
+  std::vector<std::string> guesses;
+  if (options.times.empty()) guesses.push_back("10 frames a second (--times)");
   const Eigen::Vector3d gripper = trajectory.poses.front().translation();
   double table_height =
       std::min(gripper.z(), std::isfinite(recording.crop.min.z()) ? recording.crop.min.z() : gripper.z());
-  std::vector<std::string> guesses;
   if (options.table_height)
     table_height = *options.table_height;
   else
     guesses.push_back("table height " + format_short(table_height) +
-                      " m, from the gripper's start and the crop (--table)");
+                      " m, from the gripper's start and the crop (--table-height)");
   recording.has_table = true;
   recording.table_point.z() = table_height;
 
   recording.start = recording.mesh.vertices;
-  if (const auto& corner = recording.grasps[0].select.corner) {
-    recording.base_from_object = start_pose(recording.mesh.vertices, *corner, gripper, table_height, 0);
-    recording.start.rowwise() += Eigen::RowVector3d(gripper.x(), gripper.y(), table_height);
-    double heading = options.heading.value_or(0);
-    if (!options.heading) {
-      heading = heading_of_clouds(recording, gripper);
+  const auto& corner = recording.grasps[0].select.corner;
+  if (corner) recording.start.rowwise() += Eigen::RowVector3d(gripper.x(), gripper.y(), table_height);
+  const std::vector<Keyframe> keyframes = load_keyframes(recording, notices);
+  if (corner) {
+    const Points& rest = recording.mesh.vertices;
+    Eigen::RowVector3d held = corner_of(rest, *corner);
+    if (options.tool_at_patch)
+      held = rest(select_vertices(recording, recording.grasps[0]), Eigen::all).colwise().mean();
+    const double heading = options.heading.value_or(heading_of_clouds(keyframes, gripper));
+    recording.base_from_object = start_pose(rest, *corner, held, gripper, table_height, heading);
+    for (const std::string& line : compare_sides(recording, keyframes, heading)) notices.push_back(line);
+    if (!options.heading)
       guesses.push_back("the sheet's diagonal points to " + format_short(heading * 180 / std::numbers::pi) +
-                        " deg from x, where the clouds are (--heading)");
-    }
-    recording.base_from_object = start_pose(recording.mesh.vertices, *corner, gripper, table_height, heading);
-    guesses.push_back("the sheet starts flat on the table, its corner under the gripper");
+                        " deg from x, where the clouds are; a few degrees off are usual: give --heading DEG, "
+                        "or --start-yaw 0.2 here and as an axis of grid");
+    guesses.push_back("the sheet starts flat on the table, " +
+                      std::string(options.tool_at_patch ? "the middle of the grasped patch" : "its corner") +
+                      " under the gripper (--tool-at)");
   }
-  save_recording(recording, path);
-  try {
-    Recording checked = load_recording(path);
-    load_keyframes(checked, checked.notices);
-    for (const std::string& guess : guesses) checked.notices.push_back(path + ": guessed: " + guess);
-    return checked;
-  } catch (const InputError&) {
-    fs::remove(path);
-    throw;
+
+  StagedFolder staged(options.out);
+  copy_files(staged.path(), recording);
+  check_as_file(recording, (fs::path(staged.path()) / "recording.json").string());
+  if (!options.asset.empty()) {
+    if (!fs::exists(options.asset)) throw option_error("asset", options.asset, "a file");
+    // Named as from the place where the recording will stand.
+    recording.asset = (fs::path(staged.path()) / relative_path(options.asset, path)).string();
   }
+  save_recording(recording, (fs::path(staged.path()) / "recording.json").string());
+  staged.publish("recording.json");
+  Recording written = load_recording(path);
+  written.notices.insert(written.notices.end(), notices.begin(), notices.end());
+  for (const std::string& guess : guesses) written.notices.push_back("import: guessed: " + guess);
+  return written;
 }
 
 }  // namespace flash::data

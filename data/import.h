@@ -18,14 +18,16 @@ struct ImportOptions {
   double depth_scale = 0.001;  ///< [m] a count
 
   std::string trajectory;  ///< T_base_gripper, TUM or CSV
-  std::string times =
-      "rate:10";       ///< "rate:HZ", "rate:HZ:START", or a CSV with a column t or t_s, one line a frame
-  std::string sheet;   ///< "WIDTHxHEIGHT" [m]; or
-  std::string mesh;    ///< mesh spec or file
-  double cell = 0.01;  ///< of the sheet [m]
+  std::string times;       ///< "rate:HZ", "rate:HZ:START", or a CSV with a column t or t_s, one line a frame;
+                           ///< empty: 10 a second, and a notice
+  std::string sheet;       ///< "WIDTHxHEIGHT" [m]; or
+  std::string mesh;        ///< mesh spec or file
+  double cell = 0.01;      ///< of the sheet [m]
   std::string grasp =
       "corner";  ///< "corner", "corner:I,J", "vertices:A,B,..." or "position": what is near the gripper
   std::optional<double> within;  ///< [m]; empty: 1.2 cells
+  bool tool_at_patch =
+      false;  ///< the middle of the grasped patch is at the tool centre point, not the corner
   GraspShape shape = GraspShape::clamp;
   std::string crop_x, crop_y, crop_z;  ///< "LOW:HIGH" [m], either side may be empty
   std::optional<double>
@@ -40,15 +42,13 @@ struct ImportOptions {
   std::string name;  ///< empty: the folder's
   std::string out;   ///< folder to make
   bool overwrite = false;
+  bool accept_unusable = false;  ///< extrinsics that flash-calib ended with exit code 3
 };
 
 /// Writes out/recording.json with its frames, trajectory and camera copied beside it, and loads it back to
 /// check it. The start pose is a guess: flat on the table, the grasped corner under the gripper, the diagonal
-/// along `heading`; notices say what was guessed. Throws InputError, and leaves no recording.json, where the
-/// check fails.
+/// along `heading`; notices say what was guessed, and where first clouds, of a sheet that still lies, fit it
+/// better with its sides changed over. Throws InputError, and leaves nothing behind, where the check fails.
 Recording import_recording(const ImportOptions& options);
-
-/// T_base_camera of an extrinsics file.
-Eigen::Isometry3d load_extrinsics(const std::string& path);
 
 }  // namespace flash::data

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <set>
 
 #include "data/atomic_file.h"
 
@@ -30,6 +31,49 @@ std::string shortened(const nlohmann::json& value) {
   if (text.size() > 60) text = text.substr(0, 57) + "...";
   return text;
 }
+
+/// Values are copied, printed and destroyed by recursion, whose depth the stack bounds.
+void check_depth(const std::string& text, const std::string& source) {
+  constexpr int deepest = 256;
+  int depth = 0, line = 1;
+  bool quoted = false, escaped = false;
+  for (const char c : text) {
+    if (c == '"' && !escaped) quoted = !quoted;
+    escaped = quoted && c == '\\' && !escaped;
+    if (c == '\n') ++line;
+    if (quoted) continue;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (depth > deepest)
+      throw input_error(source, "line " + std::to_string(line),
+                        "found more than " + std::to_string(deepest) + " levels of nesting");
+  }
+}
+
+/// Refuses a name that one object gives twice: a plain parser keeps the last without a word.
+class NamesOnce {
+ public:
+  explicit NamesOnce(std::string source) : source_(std::move(source)) {}
+
+  bool operator()(int /*depth*/, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+    if (event == nlohmann::json::parse_event_t::object_start) open_.emplace_back();
+    if (event == nlohmann::json::parse_event_t::object_end) open_.pop_back();
+    if (event != nlohmann::json::parse_event_t::key) return true;
+    open_.back().last = parsed.get<std::string>();
+    if (open_.back().names.insert(open_.back().last).second) return true;
+    std::string field;
+    for (const Object& object : open_) field += (field.empty() ? "" : ".") + object.last;
+    throw input_error(source_, field, "given twice, expected once");
+  }
+
+ private:
+  struct Object {
+    std::set<std::string> names;
+    std::string last;
+  };
+  std::string source_;
+  std::vector<Object> open_;  // from the outermost to the one being read
+};
 
 constexpr std::size_t kLine = 110;
 
@@ -66,8 +110,9 @@ void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t
 }  // namespace
 
 nlohmann::json parse_json(const std::string& text, const std::string& source) {
+  check_depth(text, source);
   try {
-    return nlohmann::json::parse(text);
+    return nlohmann::json::parse(text, NamesOnce(source));
   } catch (const nlohmann::json::exception& error) {
     // "[json.exception.parse_error.101] parse error at line 3, column 5: syntax error while ..."
     std::string message = error.what();
@@ -137,8 +182,9 @@ double JsonObject::number(const char* key) const {
 
 int JsonObject::integer(const char* key) const {
   const double value = raw(key).is_number() ? raw(key).get<double>() : std::nan("");
-  if (!(std::abs(value) <= std::numeric_limits<int>::max()) || value != std::floor(value))
-    throw error(key, "a whole number");
+  if (value != std::floor(value)) throw error(key, "a whole number");
+  if (!(std::abs(value) <= std::numeric_limits<int>::max()))
+    throw error(key, "a whole number of at most 2,147,483,647");
   return static_cast<int>(value);
 }
 

@@ -10,7 +10,8 @@
 
 namespace flash::data {
 
-/// Parses a file or text. Throws InputError with line and column.
+/// Parses a file or text. Throws InputError with line and column, beyond 256 levels of nesting too, or naming
+/// a field that an object gives twice.
 nlohmann::json load_json(const std::string& path);
 nlohmann::json parse_json(const std::string& text, const std::string& source);
 

@@ -84,13 +84,14 @@ void load_markers(const std::string& path, Eigen::Index vertices, Keyframe& keyf
       Eigen::Map<Points>(coordinates.data(), static_cast<Eigen::Index>(coordinates.size() / 3), 3);
 }
 
-Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recorded) {
+/// `left_out` counts points that are not finite.
+Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recorded, std::size_t& left_out) {
   Keyframe keyframe;
   keyframe.time = recorded.time;
   keyframe.force = recorded.force;
   Points cloud;
   if (!recorded.cloud.empty()) {
-    cloud = load_point_cloud(recorded.cloud);
+    cloud = load_point_cloud(recorded.cloud, left_out);
     check_scale(recording, cloud, recorded.cloud);
   } else if (!recorded.depth.empty()) {
     const MaskImage mask = recorded.mask.empty() ? MaskImage{} : load_mask(recorded.mask);
@@ -102,7 +103,7 @@ Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recor
   }
   keyframe.cloud = inside(recording.crop, cloud);
   if (!recorded.contour.empty()) {
-    const Points contour = load_point_cloud(recorded.contour);
+    const Points contour = load_point_cloud(recorded.contour, left_out);
     check_scale(recording, contour, recorded.contour);
     keyframe.contour = inside(recording.crop, contour);
   }
@@ -110,26 +111,50 @@ Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recor
   return keyframe;
 }
 
+/// Keyframes without a point, and whether that is as it should be: a sheet that still lies is below the crop.
+std::string empty_notice(const Recording& recording, const std::vector<std::size_t>& empty) {
+  const auto time = [&](std::size_t k) {
+    return format_clock(recording.origin + recording.keyframes[k].time);
+  };
+  const bool only_first = empty.back() + 1 == empty.size();
+  double highest = recording.table_point.z();
+  for (const auto& [name, trajectory] : recording.trajectories)
+    highest =
+        std::max(highest, pose_at(trajectory, recording.keyframes[empty.back()].time).translation().z());
+  constexpr double lifts_nothing = 0.05;  // a corner held that high leaves most of the sheet on the table [m]
+  const double crop = std::max(recording.crop.min.z(), recording.table_point.z());
+  const bool still_lies = recording.has_table && only_first && highest < crop + lifts_nothing;
+  std::string times;
+  if (only_first && empty.size() > 2)
+    times = time(0) + " to " + time(empty.back());
+  else
+    for (const std::size_t k : empty) times += (times.empty() ? "" : ", ") + time(k);
+  return recording.source + ": " + std::to_string(empty.size()) + " of " +
+         std::to_string(recording.keyframes.size()) +
+         " keyframes have no point inside the crop box (t = " + times + " s)" +
+         (still_lies   ? ": as usual at the beginning of a lift, while the sheet lies on the table"
+          : only_first ? ""
+                       : ": not the first ones only, which a lift explains; check the crop and the clouds");
+}
+
 }  // namespace
 
 std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std::string>& notices) {
   std::vector<Keyframe> keyframes;
-  std::string empty;
-  std::size_t empty_count = 0;
+  std::vector<std::size_t> empty;
+  std::size_t left_out = 0, clouds_with_gaps = 0;
   double largest = 0;
   for (const RecordedKeyframe& recorded : recording.keyframes) {
-    keyframes.push_back(load_keyframe(recording, recorded));
+    const std::size_t left_out_before = left_out;
+    keyframes.push_back(load_keyframe(recording, recorded, left_out));
+    clouds_with_gaps += left_out > left_out_before ? 1 : 0;
     const Keyframe& keyframe = keyframes.back();
     largest = std::max(largest, diagonal(keyframe.cloud));
     if (keyframe.cloud.rows() == 0 && keyframe.contour.rows() == 0 && keyframe.markers.rows() == 0 &&
-        !keyframe.force) {
-      empty += (empty.empty() ? "" : ", ") + format_short(recorded.time);
-      ++empty_count;
-    }
+        !keyframe.force)
+      empty.push_back(keyframes.size() - 1);
   }
-  const std::string of_all =
-      std::to_string(empty_count) + " of " + std::to_string(keyframes.size()) + " keyframes";
-  if (empty_count == keyframes.size())
+  if (empty.size() == keyframes.size())
     throw input_error(
         recording.source, "keyframes",
         "no keyframe has a point inside the crop box, expected points in metres in the base frame");
@@ -138,9 +163,10 @@ std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std
                       "the largest cloud is " + format_short(largest) + " m across, the sheet " +
                           format_short(diagonal(recording.mesh.vertices)) +
                           " m: expected the same unit, metres");
-  if (empty_count > 0)
-    notices.push_back(recording.source + ": " + of_all + " have no point inside the crop box (t = " + empty +
-                      " s)");
+  if (!empty.empty()) notices.push_back(empty_notice(recording, empty));
+  if (left_out > 0)
+    notices.push_back(recording.source + ": " + format_count(left_out) + " points of " +
+                      std::to_string(clouds_with_gaps) + " keyframes are not finite and were left out");
   return keyframes;
 }
 

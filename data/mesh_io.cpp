@@ -47,21 +47,22 @@ double signed_volume(const Points& x, const Eigen::Vector4i& t) {
   return a.cross(b).dot(c) / 6;
 }
 
+Geometry parse(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".ply") return parse_ply(read_file(path), path);
+  if (extension == ".obj") return parse_obj(read_file(path), path);
+  if (extension == ".vtk") return parse_vtk(read_file(path), path);
+  if (extension == ".stl") return parse_stl(read_file(path), path);
+  if (extension == ".tet") return parse_tet(read_file(path), path);
+  if (extension == ".pcd") return {parse_pcd(read_file(path), path), {}, {}};
+  throw InputError(path + ": ending \"" + extension +
+                   "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
+}
+
 }  // namespace
 
 Geometry load_geometry(const std::string& path) {
-  const std::string extension = lower_extension(path);
-  const auto parse = [&]() -> Geometry {
-    if (extension == ".ply") return parse_ply(read_file(path), path);
-    if (extension == ".obj") return parse_obj(read_file(path), path);
-    if (extension == ".vtk") return parse_vtk(read_file(path), path);
-    if (extension == ".stl") return parse_stl(read_file(path), path);
-    if (extension == ".tet") return parse_tet(read_file(path), path);
-    if (extension == ".pcd") return {parse_pcd(read_file(path), path), {}, {}};
-    throw InputError(path + ": ending \"" + extension +
-                     "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
-  };
-  Geometry geometry = parse();
+  Geometry geometry = parse(path);
   check_points(geometry.points, path);
   check_indices(geometry.triangles, geometry.points.rows(), "triangle", path);
   check_indices(geometry.tetrahedra, geometry.points.rows(), "tetrahedron", path);
@@ -126,7 +127,19 @@ TetMesh load_tet_mesh(const std::string& path) {
   return {std::move(geometry.points), std::move(geometry.tetrahedra)};
 }
 
-Points load_point_cloud(const std::string& path) { return load_geometry(path).points; }
+Points load_point_cloud(const std::string& path, std::size_t& left_out) {
+  const Points points = parse(path).points;
+  std::vector<Eigen::Index> finite;
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    if (points.row(i).allFinite()) finite.push_back(i);
+  left_out += static_cast<std::size_t>(points.rows()) - finite.size();
+  return points(finite, Eigen::all);
+}
+
+Points load_point_cloud(const std::string& path) {
+  std::size_t left_out = 0;
+  return load_point_cloud(path, left_out);
+}
 
 void save_triangle_mesh(const TriangleMesh& mesh, const std::string& path) {
   const std::string extension = lower_extension(path);

@@ -1,4 +1,5 @@
 #pragma once
+#include <cstddef>
 #include <string>
 
 #include "data/mesh.h"
@@ -24,8 +25,12 @@ TriangleMesh load_triangle_mesh(const std::string& path);
 /// The tetrahedra of .vtk or .tet; negative ones are turned, flat ones are an error.
 TetMesh load_tet_mesh(const std::string& path);
 
-/// The points of .ply, .pcd, .obj or .vtk. May be empty.
+/// The points of .ply, .pcd, .obj or .vtk; faces do not count. May be empty. Points that are not finite, as
+/// the pixels of an organised cloud that saw nothing, are left out, whatever the format.
 Points load_point_cloud(const std::string& path);
+
+/// The same; adds how many were left out to `left_out`.
+Points load_point_cloud(const std::string& path, std::size_t& left_out);
 
 /// Format by ending: .ply (binary, double), .obj, .vtk (ascii); clouds .ply (binary, float), .pcd. Written
 /// atomically.

@@ -1,5 +1,6 @@
 #include "data/obj.h"
 
+#include <limits>
 #include <vector>
 
 #include "data/error.h"
@@ -52,7 +53,7 @@ Geometry parse_obj(std::string_view text, const std::string& source) {
     for (std::size_t k = 1; k < words.size(); ++k) {
       const std::optional<long> index = parse_integer(words[k].substr(0, words[k].find('/')));
       const long vertices = static_cast<long>(coordinates.size() / 3);
-      if (!index || *index == 0 || *index < -vertices)
+      if (!index || *index == 0 || *index < -vertices || *index > std::numeric_limits<int>::max())
         throw line_error(source, lines, words[k], "a vertex index from 1");
       corners.push_back(to_index(static_cast<double>(*index > 0 ? *index - 1 : vertices + *index)));
     }

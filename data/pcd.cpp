@@ -54,8 +54,18 @@ Header parse_header(std::string_view bytes, const std::string& source) {
       header.types.size() != header.fields.size() || header.counts.size() != header.fields.size() ||
       header.points < 0)
     throw InputError(source + ": PCD header lacks FIELDS, SIZE, TYPE or POINTS, or they differ in length");
-  if (header.data != "ascii" && header.data != "binary")
-    throw input_error(source, "DATA", "found \"" + header.data + "\", expected ascii or binary");
+  const auto expect_at_most = [&](const char* name, const std::vector<long>& values, long most) {
+    for (const long value : values)
+      if (value < 1 || value > most)
+        throw input_error(source, name,
+                          "found " + std::to_string(value) + ", expected 1 to " + std::to_string(most));
+  };
+  expect_at_most("SIZE", header.sizes, 8);
+  expect_at_most("COUNT", header.counts, 1'000'000);
+  if (header.points > 0) expect_at_most("POINTS", {header.points}, 1'000'000'000);
+  if (header.data != "ascii" && header.data != "binary" && header.data != "binary_compressed")
+    throw input_error(source, "DATA",
+                      "found \"" + header.data + "\", expected ascii, binary or binary_compressed");
   return header;
 }
 
@@ -76,65 +86,120 @@ double read_number(const char* bytes, char type, long size, const std::string& s
       std::string("coordinates of type ") + type + std::to_string(size) + ", expected F4 or F8");
 }
 
+/// LZF: a byte c below 32 is followed by c + 1 bytes as they are; any other stands for bytes that came
+/// before: their number less 2 in its upper three bits (7: add the next byte), how far back less 1 in the
+/// lower five and the next byte. Empty unless exactly `size` bytes come out.
+std::string decompress_lzf(std::string_view packed, std::size_t size) {
+  std::string bytes;
+  bytes.reserve(std::min(size, 300 * packed.size()));
+  std::size_t at = 0;
+  const auto next = [&]() -> std::size_t {
+    return at < packed.size() ? static_cast<unsigned char>(packed[at++]) : size + 1;  // beyond every bound
+  };
+  while (at < packed.size()) {
+    const std::size_t control = next();
+    if (control < 32) {
+      if (packed.size() - at < control + 1 || size - bytes.size() < control + 1) return {};
+      bytes.append(packed.substr(at, control + 1));
+      at += control + 1;
+      continue;
+    }
+    const std::size_t length = 2 + (control >> 5) + (control >> 5 == 7 ? next() : 0);
+    const std::size_t back = 1 + ((control & 31) << 8) + next();
+    if (back > bytes.size() || length > size - bytes.size()) return {};
+    for (std::size_t k = 0; k < length; ++k) bytes += bytes[bytes.size() - back];  // may overlap itself
+  }
+  return bytes.size() == size ? bytes : std::string();
+}
+
+/// Where a coordinate stands in the body.
+struct Column {
+  char type = 0;
+  long size = 0;
+  std::size_t index = 0;   ///< ascii: of its word in the line
+  std::size_t offset = 0;  ///< binary: of its first value in the body [bytes]
+  std::size_t stride = 0;  ///< binary: from point to point [bytes]
+};
+
+std::array<Column, 3> columns_of(const Header& header, const std::string& source) {
+  const bool by_field = header.data == "binary_compressed";  // all x, then all y, ...
+  const auto points = static_cast<std::size_t>(header.points);
+  std::array<Column, 3> columns;
+  std::size_t index = 0, offset = 0;
+  for (std::size_t f = 0; f < header.fields.size(); ++f) {
+    const auto size = static_cast<std::size_t>(header.sizes[f]),
+               count = static_cast<std::size_t>(header.counts[f]);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (header.fields[f] == std::string(1, "xyz"[axis]))
+        columns[axis] = {header.types[f], header.sizes[f], index, offset, size * count};
+    index += count;
+    offset += size * count * (by_field ? points : 1);
+  }
+  for (Column& column : columns) {
+    if (column.type == 0) throw input_error(source, "FIELDS", "x, y and z are expected");
+    if (!by_field) column.stride = offset;
+  }
+  return columns;
+}
+
+/// The bytes of all points, unpacked.
+std::string_view binary_body(const Header& header, std::string_view body, const std::string& source,
+                             std::string& unpacked) {
+  std::size_t stride = 0;
+  for (std::size_t f = 0; f < header.fields.size(); ++f)
+    stride += static_cast<std::size_t>(header.sizes[f] * header.counts[f]);
+  const auto points = static_cast<std::size_t>(header.points);
+  const InputError too_short(source + ": ends before its " + format_count(points) + " points are read");
+  if (header.data == "binary_compressed") {
+    std::array<std::uint32_t, 2> sizes{};  // packed, unpacked [bytes]
+    if (body.size() < sizeof sizes) throw too_short;
+    std::memcpy(sizes.data(), body.data(), sizeof sizes);
+    body.remove_prefix(sizeof sizes);
+    if (body.size() < sizes[0]) throw too_short;
+    unpacked = decompress_lzf(body.substr(0, sizes[0]), sizes[1]);
+    if (unpacked.size() != sizes[1]) throw InputError(source + ": its compressed points cannot be unpacked");
+    body = unpacked;
+  }
+  if (body.size() / std::max<std::size_t>(stride, 1) < points) throw too_short;
+  return body;
+}
+
 }  // namespace
 
 Points parse_pcd(std::string_view bytes, const std::string& source) {
   const Header header = parse_header(bytes, source);
-  std::array<std::size_t, 3> field{}, byte_offset{}, column{};
-  std::array<bool, 3> found{};
-  std::size_t stride = 0, columns = 0;
-  for (std::size_t f = 0; f < header.fields.size(); ++f) {
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      if (header.fields[f] == std::string(1, "xyz"[axis])) {
-        field[axis] = f;
-        byte_offset[axis] = stride;
-        column[axis] = columns;
-        found[axis] = true;
-      }
-    stride += static_cast<std::size_t>(header.sizes[f] * header.counts[f]);
-    columns += static_cast<std::size_t>(header.counts[f]);
-  }
-  if (!(found[0] && found[1] && found[2])) throw input_error(source, "FIELDS", "x, y and z are expected");
-
+  const std::array<Column, 3> columns = columns_of(header, source);
   std::string_view body = bytes.substr(header.size);
   std::vector<double> coordinates;
-  const auto append = [&](const std::array<double, 3>& point) {
-    if (std::isfinite(point[0]) && std::isfinite(point[1]) && std::isfinite(point[2]))
-      coordinates.insert(coordinates.end(), point.begin(), point.end());
-  };
-  if (header.data == "binary") {
-    if (body.size() / std::max<std::size_t>(stride, 1) < static_cast<std::size_t>(header.points))
+  if (header.data != "ascii") {
+    std::string unpacked;
+    body = binary_body(header, body, source, unpacked);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(header.points); ++i)
+      for (const Column& column : columns)
+        coordinates.push_back(
+            read_number(body.data() + column.offset + i * column.stride, column.type, column.size, source));
+    return Eigen::Map<Points>(coordinates.data(), header.points, 3);
+  }
+  std::size_t words_expected = 0;
+  for (const long count : header.counts) words_expected += static_cast<std::size_t>(count);
+  LineReader lines(body);
+  std::string_view line;
+  for (long i = 0; i < header.points; ++i) {
+    if (!lines.next(line))
       throw InputError(source + ": ends before its " + format_count(static_cast<std::size_t>(header.points)) +
                        " points are read");
-    for (long i = 0; i < header.points; ++i, body.remove_prefix(stride)) {
-      std::array<double, 3> point;
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        point[axis] = read_number(body.data() + byte_offset[axis], header.types[field[axis]],
-                                  header.sizes[field[axis]], source);
-      append(point);
-    }
-  } else {
-    LineReader lines(body);
-    std::string_view line;
-    for (long i = 0; i < header.points; ++i) {
-      if (!lines.next(line))
-        throw InputError(source + ": ends before its " +
-                         format_count(static_cast<std::size_t>(header.points)) + " points are read");
-      const std::vector<std::string_view> words = split(line);
-      std::array<double, 3> point;
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const std::optional<double> value =
-            words.size() == columns ? parse_number(words[column[axis]]) : std::nullopt;
-        if (!value)
-          throw input_error(
-              source, "point " + std::to_string(i),
-              "found \"" + std::string(line) + "\", expected " + std::to_string(columns) + " numbers");
-        point[axis] = *value;
-      }
-      append(point);
+    const std::vector<std::string_view> words = split(line);
+    for (const Column& column : columns) {
+      const std::optional<double> value =
+          words.size() == words_expected ? parse_number(words[column.index]) : std::nullopt;
+      if (!value)
+        throw input_error(
+            source, "point " + std::to_string(i),
+            "found \"" + std::string(line) + "\", expected " + std::to_string(words_expected) + " numbers");
+      coordinates.push_back(*value);
     }
   }
-  return Eigen::Map<Points>(coordinates.data(), static_cast<Eigen::Index>(coordinates.size() / 3), 3);
+  return Eigen::Map<Points>(coordinates.data(), header.points, 3);
 }
 
 std::string format_pcd(const Points& points) {

@@ -6,8 +6,9 @@
 
 namespace flash::data {
 
-/// PCD 0.7 clouds, DATA ascii or binary; x, y, z in any type, other fields skipped, non-finite points (how
-/// PCD marks the holes of an organised cloud) dropped. Throws InputError naming `source`.
+/// PCD 0.7 clouds, DATA ascii, binary or binary_compressed (LZF); x, y, z in any type, other fields skipped.
+/// Every point is returned, the holes of an organised cloud, which are NaN, too. Throws InputError naming
+/// `source`.
 Points parse_pcd(std::string_view bytes, const std::string& source);
 
 /// Binary, float.

@@ -1,9 +1,9 @@
 #include "data/ply.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <vector>
 
@@ -41,8 +41,10 @@ struct Element {
   std::vector<Property> properties;
 };
 
+enum class Encoding { ascii, little_endian, big_endian };
+
 struct Header {
-  bool ascii = false;
+  Encoding encoding = Encoding::little_endian;
   std::vector<Element> elements;
   std::size_t size = 0;  ///< bytes up to the body
 };
@@ -65,9 +67,15 @@ Header parse_header(std::string_view bytes, const std::string& source) {
       return header;
     }
     if (words[0] == "format") {
-      if (words.size() < 2 || (words[1] != "ascii" && words[1] != "binary_little_endian"))
-        throw fail("format ascii or binary_little_endian");
-      header.ascii = words[1] == "ascii";
+      const std::string_view name = words.size() < 2 ? "" : words[1];
+      if (name == "ascii")
+        header.encoding = Encoding::ascii;
+      else if (name == "binary_little_endian")
+        header.encoding = Encoding::little_endian;
+      else if (name == "binary_big_endian")
+        header.encoding = Encoding::big_endian;
+      else
+        throw fail("format ascii, binary_little_endian or binary_big_endian");
     } else if (words[0] == "element") {
       const std::optional<long> count = words.size() == 3 ? parse_integer(words[2]) : std::nullopt;
       if (!count || *count < 0) throw fail("element NAME COUNT");
@@ -89,10 +97,10 @@ Header parse_header(std::string_view bytes, const std::string& source) {
 /// Numbers of the body one after another.
 class Body {
  public:
-  Body(std::string_view bytes, bool ascii, const std::string& source)
-      : rest_(bytes), ascii_(ascii), source_(source) {}
+  Body(std::string_view bytes, Encoding encoding, const std::string& source)
+      : rest_(bytes), encoding_(encoding), source_(source) {}
 
-  double next(Number type) { return ascii_ ? next_word() : next_binary(type); }
+  double next(Number type) { return encoding_ == Encoding::ascii ? next_word() : next_binary(type); }
 
  private:
   double next_word() {
@@ -110,8 +118,10 @@ class Body {
   template <class T>
   double take() {
     if (rest_.size() < sizeof(T)) throw too_short();
-    T value;
-    std::memcpy(&value, rest_.data(), sizeof(T));
+    std::array<char, sizeof(T)> bytes;
+    std::copy_n(rest_.begin(), sizeof(T), bytes.begin());
+    if (encoding_ == Encoding::big_endian) std::reverse(bytes.begin(), bytes.end());
+    const T value = std::bit_cast<T>(bytes);
     rest_.remove_prefix(sizeof(T));
     return static_cast<double>(value);
   }
@@ -143,7 +153,7 @@ class Body {
   }
 
   std::string_view rest_;
-  bool ascii_;
+  Encoding encoding_;
   const std::string& source_;
 };
 
@@ -208,7 +218,7 @@ void append_bytes(std::string& bytes, T value) {
 
 Geometry parse_ply(std::string_view bytes, const std::string& source) {
   const Header header = parse_header(bytes, source);
-  Body body(bytes.substr(header.size), header.ascii, source);
+  Body body(bytes.substr(header.size), header.encoding, source);
   Geometry geometry;
   bool has_vertices = false;
   for (const Element& element : header.elements) {

@@ -39,6 +39,31 @@ void expect_positive(bool positive, const char* what) {
   if (!positive) throw InputError(std::string("mesh: ") + what);
 }
 
+double smallest_angle(const std::vector<Eigen::Vector2d>& points, const Triangles& triangles) {
+  double smallest = std::numbers::pi;
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const auto corner = [&](int i) { return points[static_cast<std::size_t>(triangles(t, (k + i) % 3))]; };
+      const Eigen::Vector2d a = corner(1) - corner(0), b = corner(2) - corner(0);
+      smallest = std::min(smallest, std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b)));
+    }
+  return smallest;
+}
+
+/// Moves every point from `first` on to the mean of those it shares a triangle with.
+void even_out(const Triangles& triangles, std::size_t first, std::vector<Eigen::Vector2d>& points) {
+  std::vector<Eigen::Vector2d> sum(points.size(), Eigen::Vector2d::Zero());
+  std::vector<int> count(points.size(), 0);
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const auto vertex = static_cast<std::size_t>(triangles(t, k));
+      for (const int other : {triangles(t, (k + 1) % 3), triangles(t, (k + 2) % 3)})
+        sum[vertex] += points[static_cast<std::size_t>(other)];
+      count[vertex] += 2;
+    }
+  for (std::size_t i = first; i < points.size(); ++i) points[i] = sum[i] / count[i];
+}
+
 }  // namespace
 
 TriangleMesh rectangle(const RectangleMesh& s) {
@@ -84,12 +109,12 @@ TriangleMesh delaunay_rectangle(double width, double height, double cell, unsign
   for (int j = 0; j < ny; ++j) points.emplace_back(width, height * j / ny);
   for (int i = nx; i > 0; --i) points.emplace_back(width * i / nx, height);
   for (int j = ny; j > 0; --j) points.emplace_back(0, height * j / ny);
+  const std::size_t border = points.size();
 
   // As many inner points as a grid would have, thrown like darts; each keeps its distance, which shrinks
   // while none fits.
   std::mt19937 generator(seed);
-  const std::size_t wanted =
-      points.size() + static_cast<std::size_t>(nx - 1) * static_cast<std::size_t>(ny - 1);
+  const std::size_t wanted = border + static_cast<std::size_t>(nx - 1) * static_cast<std::size_t>(ny - 1);
   for (double distance = 0.9 * cell; points.size() < wanted; distance *= 0.95)
     for (int attempt = 0; attempt < 200 && points.size() < wanted; ++attempt) {
       const Eigen::Vector2d p(uniform(generator, 0.4 * cell, width - 0.4 * cell),
@@ -100,11 +125,18 @@ TriangleMesh delaunay_rectangle(double width, double height, double cell, unsign
       if (fits) points.push_back(p);
     }
 
+  // Where darts left a thin triangle, the inner points go to the middle of their neighbours.
+  constexpr double thin = 15 * std::numbers::pi / 180;
+  constexpr int most_rounds = 50;
   TriangleMesh mesh;
+  mesh.triangles = delaunay(points);
+  for (int round = 0; round < most_rounds && smallest_angle(points, mesh.triangles) < thin; ++round) {
+    even_out(mesh.triangles, border, points);
+    mesh.triangles = delaunay(points);
+  }
   mesh.vertices.setZero(static_cast<Eigen::Index>(points.size()), 3);
   for (std::size_t i = 0; i < points.size(); ++i)
     mesh.vertices.row(static_cast<Eigen::Index>(i)).head<2>() = points[i].transpose();
-  mesh.triangles = delaunay(points);
   return mesh;
 }
 

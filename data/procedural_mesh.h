@@ -24,7 +24,8 @@ struct RectangleMesh {
 TriangleMesh rectangle(const RectangleMesh& settings);
 
 /// Delaunay triangles over a rectangle: even points on the border, irregular ones within (Bowyer-Watson,
-/// quadratic cost: meant for thousands of vertices at most). `cell` is the wanted edge length [m].
+/// quadratic cost: meant for thousands of vertices at most). `cell` is the wanted edge length [m]. Where both
+/// sides are at least a cell, no angle is below 15 degrees.
 TriangleMesh delaunay_rectangle(double width, double height, double cell, unsigned seed);
 
 /// Disc around the origin in rings of `cell` width [m].

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/frame_files.h"
 #include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
@@ -18,6 +20,12 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Nothing that a robot arm handles is larger: above it, lengths are taken for millimetres [m].
 constexpr double kLargestSize = 20.0;
+
+/// Nothing that is done to a sheet takes longer: above it, times are taken for those of another clock [s].
+constexpr double kLongestRecording = 1e5;
+
+/// Clocks that differ more are not set at all [s].
+constexpr double kLargestClockError = 60.0;
 
 Eigen::Isometry3d read_pose(const JsonObject& object, const char* key) {
   const Eigen::VectorXd pose = object.vector(key, 7);
@@ -96,6 +104,7 @@ void read_trajectories(const JsonObject& file, Recording& recording) {
         throw InputError(
             path + ": reaches " + format_short(pose.translation().norm()) +
             " m from the origin, expected metres in the robot's base frame (millimetres read as metres?)");
+    for (const std::string& jumps : find_jumps(trajectory, path)) recording.notices.push_back(jumps);
     recording.trajectories[name] = trajectory;
     recording.trajectory_paths[name] = path;
   }
@@ -145,7 +154,7 @@ void read_grasps(const JsonObject& file, Recording& recording) {
         known += (known.empty() ? "" : ", ") + name;
       throw object.error("gripper", "a name of trajectories: " + (known.empty() ? "there are none" : known));
     }
-    grasp.from = object.number("from", 0.0);
+    grasp.from = object.number("from", -kInfinity);
     grasp.to = object.number("to", kInfinity);
     if (!(grasp.to > grasp.from)) throw object.error("to", "a time after from, or null");
     grasp.select = read_selection(object, recording.mesh.vertices.rows());
@@ -230,21 +239,27 @@ void read_nuisance(const JsonObject& file, Recording& recording) {
     bounds.offset = object.raw("offset_m").is_number()
                         ? Eigen::Vector3d(Eigen::Vector3d::Constant(object.number("offset_m")))
                         : Eigen::Vector3d(object.vector("offset_m", 3));
-    if (!(bounds.offset.array() >= 0).all()) throw object.error("offset_m", "bounds of 0 or above");
+    if (!(bounds.offset.array() >= 0 && bounds.offset.array() <= kLargestSize).all())
+      throw object.error("offset_m", "bounds of 0 to " + format_short(kLargestSize) + " m");
   }
-  bounds.yaw = object.not_negative("yaw_rad", 0);
-  bounds.time = object.not_negative("time_s", 0);
-  bounds.table_height = object.not_negative("table_height_m", 0);
-  bounds.start_yaw = object.not_negative("start_yaw_rad", 0);
+  const auto bound = [&](const char* key, double largest, const char* unit) {
+    const double value = object.not_negative(key, 0);
+    if (value > largest) throw object.error(key, "a bound of 0 to " + format_short(largest) + unit);
+    return value;
+  };
+  bounds.yaw = bound("yaw_rad", std::numbers::pi, " rad");
+  bounds.time = bound("time_s", kLargestClockError, " s");
+  bounds.table_height = bound("table_height_m", kLargestSize, " m");
+  bounds.start_yaw = bound("start_yaw_rad", std::numbers::pi, " rad");
 }
 
 void check_times(Recording& recording) {
   const double first = recording.keyframes.front().time, last = recording.keyframes.back().time;
   for (const auto& [name, trajectory] : recording.trajectories) {
     const double begin = trajectory.times.front(), end = trajectory.times.back();
-    const std::string spans = "keyframes span " + format_short(first) + " to " + format_short(last) +
-                              " s, trajectory " + name + ' ' + format_short(begin) + " to " +
-                              format_short(end) + " s";
+    const std::string spans = "keyframes span " + format_clock(first) + " to " + format_clock(last) +
+                              " s, trajectory " + name + ' ' + format_clock(begin) + " to " +
+                              format_clock(end) + " s";
     const double slack = recording.nuisance.time;
     if (first > end + slack || last < begin - slack)
       throw input_error(recording.source, "keyframes", spans + ": expected clocks that overlap");
@@ -252,6 +267,36 @@ void check_times(Recording& recording) {
     if (first < begin - slack - 1e-6 || last > end + slack + 1e-6)
       recording.notices.push_back(recording.source + ": " + spans +
                                   ": the gripper stands still outside its trajectory");
+  }
+}
+
+/// Refuses times of another clock, then counts all from the start of the recording.
+void count_from_start(Recording& recording) {
+  const double first = recording.keyframes.front().time, last = recording.keyframes.back().time;
+  if (!(last - first <= kLongestRecording))
+    throw input_error(recording.source, "keyframes",
+                      "found times from " + format_clock(first) + " to " + format_clock(last) +
+                          " s, expected at most " + format_short(kLongestRecording) + " s between them");
+  recording.origin = first;
+  for (std::size_t g = 0; g < recording.grasps.size(); ++g) {
+    RecordedGrasp& grasp = recording.grasps[g];
+    if (std::isinf(grasp.from))
+      grasp.from = std::min(first, recording.trajectories.at(grasp.gripper).times.front());
+    if (!(first - grasp.from <= kLongestRecording))
+      throw input_error(recording.source, "grasps[" + std::to_string(g) + "].from",
+                        "found " + format_clock(grasp.from) + " s, expected a time by the clock of the " +
+                            "keyframes, which start at " + format_clock(first) + " s");
+    recording.origin = std::min(recording.origin, grasp.from);
+  }
+  if (recording.origin == 0) return;
+  // To the microsecond, which is what a double tells of the seconds since 1970.
+  const auto shift = [&](double& time) { time = std::round(1e6 * (time - recording.origin)) / 1e6; };
+  for (RecordedKeyframe& keyframe : recording.keyframes) shift(keyframe.time);
+  for (auto& [name, trajectory] : recording.trajectories)
+    for (double& time : trajectory.times) shift(time);
+  for (RecordedGrasp& grasp : recording.grasps) {
+    shift(grasp.from);
+    shift(grasp.to);
   }
 }
 
@@ -271,7 +316,7 @@ void check_grasps(const Recording& recording) {
     if (nearest > grasp.select.within + offset)
       throw input_error(
           recording.source, "grasps[" + std::to_string(g) + "]",
-          "at t = " + format_short(grasp.from) + " s gripper " + grasp.gripper + " is " +
+          "at t = " + format_clock(recording.origin + grasp.from) + " s gripper " + grasp.gripper + " is " +
               format_short(nearest) + " m from the nearest vertex it should hold, expected at most within " +
               format_short(grasp.select.within) + " m plus nuisance.offset_m " + format_short(offset) +
               " m: check object.start, select and the frame of the trajectory");
@@ -302,6 +347,9 @@ Recording load_recording(const std::string& path) {
   file.expect_fields({"schema", "name", "kind", "note", "gravity", "object", "table", "trajectories",
                       "grasps", "camera", "crop", "keyframes", "nuisance"});
   recording.name = file.string("name");
+  if (std::any_of(recording.name.begin(), recording.name.end(),
+                  [](unsigned char c) { return c < ' ' || c == 0x7f; }))
+    throw file.error("name", "a text in one line");
   recording.kind = file.string("kind", recording.kind);
   const std::vector<std::string> kinds = {"corner_lift", "hang",       "bar_pull", "bias_pull",
                                           "drag",        "cantilever", "free"};
@@ -317,6 +365,7 @@ Recording load_recording(const std::string& path) {
   read_keyframes(file, recording);
   read_nuisance(file, recording);
   check_times(recording);
+  count_from_start(recording);
   check_grasps(recording);
   return recording;
 }

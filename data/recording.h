@@ -76,6 +76,8 @@ struct RecordedCamera {
 struct Recording {
   std::string source;  ///< path of recording.json
   std::string name;
+  double origin = 0;  ///< time by the file's clock at which the recording starts: its first grasp or
+                      ///< keyframe. Every time below counts from there [s]
   std::string kind =
       "free";  ///< documents only: corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free
   Eigen::Vector3d gravity{0, 0, -9.81};                                ///< [m/s^2]
@@ -100,8 +102,9 @@ struct Recording {
 };
 
 /// Reads recording.json (or its folder), its mesh and trajectories and checks them: field by field, times
-/// sorted and overlapping, plausible sizes, the grasp on the mesh. Clouds are checked by load_keyframes.
-/// Throws InputError.
+/// sorted and overlapping, plausible sizes and durations, the grasp on the mesh. A grasp without `from`
+/// begins with the first keyframe or pose of its gripper. Clouds are checked by load_keyframes. Throws
+/// InputError.
 Recording load_recording(const std::string& path);
 
 /// Points of the observation that lie in the crop box, base frame [m].
@@ -116,7 +119,7 @@ struct Keyframe {
 
 /// Loads every keyframe; depth images become points through the camera. Throws InputError where all are
 /// empty, or a cloud is far off the scale of the mesh (millimetres read as metres). `notices` says which are
-/// empty.
+/// empty, whether that is usual, and how many points are not finite.
 std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std::string>& notices);
 
 /// Vertices a grasp takes, in order of index. Throws InputError where there are none.

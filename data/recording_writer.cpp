@@ -17,14 +17,14 @@ Json numbers(const Eigen::Matrix<double, size, 1>& values) {
   return list;
 }
 
-Json grasp_json(const RecordedGrasp& grasp) {
+Json grasp_json(const RecordedGrasp& grasp, double origin) {
   Json select = Json::object();
   if (grasp.select.corner) select["corner"] = *grasp.select.corner;
   if (!grasp.select.vertices.empty()) select["vertices"] = grasp.select.vertices;
   if (grasp.select.position) select["position"] = numbers(*grasp.select.position);
   select["within"] = grasp.select.within;
-  Json json = {{"gripper", grasp.gripper}, {"from", grasp.from}};
-  json["to"] = std::isfinite(grasp.to) ? Json(grasp.to) : Json(nullptr);
+  Json json = {{"gripper", grasp.gripper}, {"from", origin + grasp.from}};
+  json["to"] = std::isfinite(grasp.to) ? Json(origin + grasp.to) : Json(nullptr);
   json["select"] = select;
   json["shape"] = to_string(grasp.shape);
   if (grasp.shape == GraspShape::pinch) {
@@ -56,7 +56,8 @@ void save_recording(const Recording& recording, const std::string& path) {
   json["trajectories"] = Json::object();
   for (const auto& [name, file] : recording.trajectory_paths) json["trajectories"][name] = named(file);
   json["grasps"] = Json::array();
-  for (const RecordedGrasp& grasp : recording.grasps) json["grasps"].push_back(grasp_json(grasp));
+  for (const RecordedGrasp& grasp : recording.grasps)
+    json["grasps"].push_back(grasp_json(grasp, recording.origin));
   if (recording.camera)
     json["camera"] = {{"intrinsics", named(recording.camera->intrinsics_path)},
                       {"T_base_camera", numbers(to_vector(recording.camera->base_from_camera))},
@@ -65,7 +66,7 @@ void save_recording(const Recording& recording, const std::string& path) {
 
   json["keyframes"] = Json::array();
   for (const RecordedKeyframe& keyframe : recording.keyframes) {
-    Json entry = {{"t", keyframe.time}};
+    Json entry = {{"t", recording.origin + keyframe.time}};
     const auto put = [&](const char* key, const std::string& file) {
       if (!file.empty()) entry[key] = named(file);
     };

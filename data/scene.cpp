@@ -285,18 +285,27 @@ void read_pair_friction(const JsonObject& file, Scene& scene) {
 
 void read_duration(const JsonObject& file, Scene& scene) {
   if (file.has("steps") && file.has("duration")) throw file.error("steps", "either steps or duration");
+  scene.steps_by_default = !file.has("steps") && !file.has("duration");
   if (file.has("steps")) {
-    scene.steps = file.integer("steps");
-    if (scene.steps < 0) throw file.error("steps", "a whole number from 0");
+    const double steps = file.number("steps");
+    if (!(steps >= 0 && steps <= max_steps) || steps != std::floor(steps))
+      throw file.error("steps", "a whole number from 0 to " + format_count(max_steps));
+    scene.steps = static_cast<int>(steps);
   }
   if (!file.has("duration")) return;
-  const double steps = file.not_negative("duration") / scene.time_step;
-  if (!(steps < 1e9))
-    throw file.error("duration", "fewer than 1e9 steps of " + format_short(scene.time_step) + " s");
-  scene.steps = static_cast<int>(std::lround(steps));
+  scene.steps = steps_of(file.not_negative("duration"), scene.time_step);
+  if (scene.steps < 0)
+    throw file.error("duration", "at most " + format_count(max_steps) + " steps of " +
+                                     format_short(scene.time_step) + " s, so at most " +
+                                     format_short(max_steps * scene.time_step) + " s");
 }
 
 }  // namespace
+
+int steps_of(double duration, double time_step) {
+  const double steps = std::round(duration / time_step);
+  return steps >= 0 && steps <= max_steps ? static_cast<int>(steps) : -1;
+}
 
 Scene load_scene(const std::string& path) {
   const nlohmann::json json = load_json(path);
@@ -333,8 +342,8 @@ Scene load_scene(const std::string& path) {
   if (file.has("keyframes")) {
     const Eigen::VectorXd times = file.vector("keyframes", -1);
     scene.keyframe_times.assign(times.begin(), times.end());
-    if (!std::is_sorted(times.begin(), times.end()))
-      throw file.error("keyframes", "times in increasing order");
+    if (!std::is_sorted(times.begin(), times.end()) || (times.size() > 0 && times[0] < 0))
+      throw file.error("keyframes", "times from 0 in increasing order");
   }
   return scene;
 }

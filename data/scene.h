@@ -123,7 +123,8 @@ struct Scene {
   std::string source;
   std::string name;
   double time_step = 0.01;               ///< h [s]
-  int steps = 100;                       ///< "steps", or "duration" over the time step
+  int steps = 100;                       ///< "steps", or "duration" over the time step; at most 1e6
+  bool steps_by_default = true;          ///< the file names neither
   Eigen::Vector3d gravity{0, -9.81, 0};  ///< [m/s^2]
   SceneSolver solver;
   std::optional<BendingModel> bending_model;  ///< overrides the assets'
@@ -137,6 +138,12 @@ struct Scene {
   std::optional<double> rest_motion;
   std::vector<std::string> notices;
 };
+
+/// Steps of one simulation at most: what asks for more has another unit, or another clock.
+inline constexpr int max_steps = 1'000'000;
+
+/// How many steps of `time_step` a run of `duration` takes [s]; -1 where they are more than max_steps.
+int steps_of(double duration, double time_step);
 
 /// Throws InputError naming file, field, found and expected; unknown fields name the nearest known one.
 /// Vertex indices are not compared with the meshes, which are not loaded.

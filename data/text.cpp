@@ -61,6 +61,16 @@ std::string format_short(double value) {
   return buffer;
 }
 
+std::string format_clock(double seconds) {
+  if (!(std::abs(seconds) < 1e12)) return format_short(seconds);
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.3f", seconds);
+  std::string text = buffer;
+  text.erase(text.find_last_not_of('0') + 1);
+  if (text.back() == '.') text.pop_back();
+  return text == "-0" ? "0" : text;
+}
+
 std::string format_count(std::size_t count) {
   std::string text = std::to_string(count);
   for (int i = static_cast<int>(text.size()) - 3; i > 0; i -= 3)

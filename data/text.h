@@ -24,6 +24,9 @@ std::string format_number(double value);
 /// Text that a person reads: four significant digits.
 std::string format_short(double value);
 
+/// A time in seconds that a person reads, to the millisecond: "0.033", "1764000000.04".
+std::string format_clock(double seconds);
+
 /// "2,113".
 std::string format_count(std::size_t count);
 

@@ -1,13 +1,15 @@
 #include "sim/lift_benchmark.h"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <functional>
-#include <thread>
 
+#include "data/error.h"
+#include "data/memory_limit.h"
+#include "data/parallel.h"
 #include "data/procedural_mesh.h"
+#include "data/text.h"
 #include "sim/elastic_energy.h"
 #include "sim/solver.h"
 
@@ -73,9 +75,30 @@ double milliseconds_of(const std::function<void()>& work) {
   return 1e3 * seconds_since(start) / count;
 }
 
+void check(const LiftBenchmark& benchmark) {
+  const auto increasing = [](const char* option, double low, double high) {
+    if (!(low <= high))
+      throw data::InputError(std::string("--") + option + "-max: found " + data::format_short(high) +
+                             ", expected at least the " + data::format_short(low) + " of --" + option +
+                             "-min");
+  };
+  increasing("young", benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max);
+  increasing("bending", benchmark.bending_rigidity_min, benchmark.bending_rigidity_max);
+  const int at_once = std::min(benchmark.threads, benchmark.environments);
+  const double needed = solver_bytes_per_vertex * benchmark.vertices * at_once;
+  const double limit = data::memory_limit();
+  if (limit > 0 && needed > limit)
+    throw data::InputError("--vertices: " + data::format_count(static_cast<std::size_t>(benchmark.vertices)) +
+                           " on " + std::to_string(at_once) + " threads take about " +
+                           data::format_count(static_cast<std::size_t>(needed / 1e6)) +
+                           " MB of memory, expected at most the " +
+                           data::format_count(static_cast<std::size_t>(limit / 1e6)) + " MB that there are");
+}
+
 }  // namespace
 
-LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
+LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std::atomic<bool>& stop) {
+  check(benchmark);
   const int cells = std::max(1, int(std::lround(std::sqrt(double(benchmark.vertices)))) - 1);
   data::RectangleMesh rectangle;
   rectangle.width = rectangle.height = side;
@@ -94,28 +117,22 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark) {
     data::Points middle;  // positions halfway
   };
   std::vector<Counts> counts(benchmark.environments);
-  std::atomic<int> next = 0;
-  const auto work = [&] {
-    for (int e = next++; e < benchmark.environments; e = next++) {
-      Environment environment = lift_environment(benchmark, plan->sheet, e);
-      Solver solver(plan, settings);
-      for (int k = 0; k < benchmark.steps; ++k) {
-        const StepReport report = solver.step(environment);
-        counts[e].iterations += report.iterations;
-        counts[e].solves += report.solves;
-        counts[e].factorizations += report.factorizations;
-        counts[e].converged += report.converged;
-        counts[e].residual_max = std::max(counts[e].residual_max, report.residual);
-        if (k == benchmark.steps / 2) counts[e].middle = environment.state.positions;
-      }
-    }
-  };
   const auto start = std::chrono::steady_clock::now();
-  {
-    std::vector<std::jthread> workers;
-    for (int t = 1; t < benchmark.threads; ++t) workers.emplace_back(work);
-    work();
-  }
+  const auto count = static_cast<std::size_t>(benchmark.environments);
+  data::for_each_in_parallel(count, benchmark.threads, [&](std::size_t e) {
+    Environment environment = lift_environment(benchmark, plan->sheet, static_cast<int>(e));
+    Solver solver(plan, settings);
+    for (int k = 0; k < benchmark.steps; ++k) {
+      if (stop) throw data::Stopped();
+      const StepReport report = solver.step(environment);
+      counts[e].iterations += report.iterations;
+      counts[e].solves += report.solves;
+      counts[e].factorizations += report.factorizations;
+      counts[e].converged += report.converged;
+      counts[e].residual_max = worst(counts[e].residual_max, report.residual);
+      if (k == benchmark.steps / 2) counts[e].middle = environment.state.positions;
+    }
+  });
   LiftBenchmarkResult result;
   result.wall_seconds = seconds_since(start);
   result.vertices = plan->pattern.size;

@@ -1,4 +1,5 @@
 #pragma once
+#include <atomic>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,7 @@ struct BenchmarkPhase {
 struct LiftBenchmarkResult {
   int vertices = 0;
   double wall_seconds = 0;
-  double step_milliseconds = 0;  ///< thread time a step and environment
+  double step_milliseconds = 0;  ///< wall time a step and environment, times the threads at work
   double converged_share = 0;    ///< of environment-steps
   double residual_max = 0;
   double iterations = 0;  ///< Newton's, a step
@@ -38,6 +39,8 @@ struct LiftBenchmarkResult {
       phases;  ///< their sum leaves contact, line search and the rest of step_milliseconds
 };
 
-LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark);
+/// Throws data::InputError where a range ends below its start, or where the solvers at work need more memory
+/// than there is; data::Stopped within a step after `stop` is set.
+LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std::atomic<bool>& stop);
 
 }  // namespace flash::sim

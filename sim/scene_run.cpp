@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/memory_limit.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
 #include "sim/projective.h"
@@ -67,13 +69,33 @@ data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
   return mesh;
 }
 
+/// Without the last digits that adding up steps leaves.
+std::string time_text(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.12g", seconds);
+  return text;
+}
+
+void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies) {
+  double vertices = 0;
+  for (const SceneBody& body : bodies) vertices += static_cast<double>(body.sheet.rest.vertices.rows());
+  const double needed = solver_bytes_per_vertex * vertices, limit = data::memory_limit();
+  if (limit > 0 && needed > limit)
+    throw data::input_error(scene.source, "objects",
+                            data::format_count(static_cast<std::size_t>(vertices)) + " vertices take about " +
+                                data::format_count(static_cast<std::size_t>(needed / 1e6)) +
+                                " MB of memory, expected at most the " +
+                                data::format_count(static_cast<std::size_t>(limit / 1e6)) +
+                                " MB that there are; a coarser mesh is needed");
+}
+
 std::string log_row(int step, double time, const std::vector<StepReport>& reports) {
-  StepReport worst, sum;
+  StepReport largest, sum;
   bool converged = true;
   for (const StepReport& r : reports) {
-    worst.residual = std::max(worst.residual, r.residual);
-    worst.penetration_max = std::max(worst.penetration_max, r.penetration_max);
-    worst.complementarity = std::max(worst.complementarity, r.complementarity);
+    largest.residual = worst(largest.residual, r.residual);
+    largest.penetration_max = worst(largest.penetration_max, r.penetration_max);
+    largest.complementarity = worst(largest.complementarity, r.complementarity);
     sum.iterations += r.iterations;
     sum.kinetic += r.kinetic;
     sum.membrane += r.membrane;
@@ -81,10 +103,10 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
     sum.potential += r.potential;
     converged = converged && r.converged;
   }
-  std::string row = std::to_string(step) + "," + data::format_number(time);
-  row += "," + data::format_number(worst.residual) + "," + std::to_string(sum.iterations);
-  for (double value :
-       {worst.penetration_max, worst.complementarity, sum.kinetic, sum.membrane + sum.bending, sum.potential})
+  std::string row = std::to_string(step) + "," + time_text(time);
+  row += "," + data::format_number(largest.residual) + "," + std::to_string(sum.iterations);
+  for (double value : {largest.penetration_max, largest.complementarity, sum.kinetic,
+                       sum.membrane + sum.bending, sum.potential})
     row += "," + data::format_number(value);
   row += converged ? ",1" : ",0";
   return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "\n";
@@ -109,7 +131,7 @@ std::string force_rows(double time, const std::vector<SceneBody>& bodies,
   }
   std::string rows;
   for (const auto& [body, force] : forces) {
-    rows += data::format_number(time) + "," + body;
+    rows += time_text(time) + "," + body;
     for (double component : force) rows += "," + data::format_number(component);
     rows += "\n";
   }
@@ -146,6 +168,10 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   SceneSummary summary;
   summary.notices = scene.notices;
   std::vector<SceneBody> bodies = scene_bodies(scene, summary.notices);
+  check_memory(scene, bodies);
+  if (scene.steps_by_default && run.steps < 0)
+    summary.notices.push_back(scene.source + ": names no length: " + std::to_string(scene.steps) +
+                              " steps are run, the default");
   if (run.notice)
     for (const std::string& notice : summary.notices) run.notice(notice);
 
@@ -154,11 +180,10 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
 
   const int steps = run.steps >= 0 ? run.steps : scene.steps;
   const std::set<int> frames = frames_to_write(scene, steps);
-  const auto write_frame = [&](int step, bool always = false) {
-    if (!always && !frames.count(step)) return;
+  const auto write_frame = [&](int step, const data::TriangleMesh& mesh) {
     char name[32];
     std::snprintf(name, sizeof name, "%06d.ply", step);
-    data::save_triangle_mesh(merged(bodies), (fs::path(output_dir) / "frames" / name).string());
+    data::save_triangle_mesh(mesh, (fs::path(output_dir) / "frames" / name).string());
     ++summary.frames;
   };
   std::string log =
@@ -171,8 +196,13 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   };
 
   std::vector<StepReport> reports(bodies.size());
+  const data::TriangleMesh at_start = merged(bodies);
+  const auto begin_writing = [&] {
+    fs::remove_all(fs::path(output_dir) / "frames");
+    if (frames.count(0)) write_frame(0, at_start);
+  };
   try {
-    write_frame(0);
+    if (steps == 0) begin_writing();
     bool done = false;
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
       bool arrived = true;
@@ -188,6 +218,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         else
           advance(b);
       for (std::future<void>& other : pending) other.get();
+      if (step == 1) begin_writing();  // what the first step refuses leaves nothing behind
 
       const double time = bodies.empty() ? step * scene.time_step : bodies.front().environment.state.time;
       log += log_row(step, time, reports);
@@ -195,8 +226,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       bool converged = true;
       for (const StepReport& report : reports) {
         converged = converged && report.converged;
-        summary.residual_max = std::max(summary.residual_max, report.residual);
-        summary.penetration_max = std::max(summary.penetration_max, report.penetration_max);
+        summary.residual_max = worst(summary.residual_max, report.residual);
+        summary.penetration_max = worst(summary.penetration_max, report.penetration_max);
         summary.iterations += report.iterations;
       }
       summary.unconverged_steps += !converged;
@@ -205,11 +236,12 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         summary.last_motion = scene.time_step * stop_motion(bodies);
         done = summary.at_rest = arrived && summary.last_motion <= *scene.rest_motion;
       }
-      write_frame(step, scene.rest_motion && (done || step == steps));
+      if (frames.count(step) || (scene.rest_motion && (done || step == steps)))
+        write_frame(step, merged(bodies));
       if (run.progress && !run.progress(step, steps)) summary.interrupted = step < steps;
     }
   } catch (...) {
-    write_tables();
+    if (summary.steps > 0) write_tables();
     throw;
   }
   write_tables();

@@ -1,6 +1,5 @@
-#include <atomic>
-#include <thread>
-
+#include "data/error.h"
+#include "data/parallel.h"
 #include "sim/solver.h"
 
 namespace flash::sim {
@@ -9,22 +8,16 @@ std::vector<Rollout> simulate(const Sheet& sheet, std::vector<Environment> envir
                               const SolverSettings& settings, int threads) {
   const auto plan = make_sheet_plan(sheet);
   std::vector<Rollout> rollouts(environments.size());
-  std::atomic<size_t> next = 0;
-  const auto work = [&] {
-    for (size_t e = next++; e < environments.size(); e = next++) {
-      Solver solver(plan, settings);
-      Rollout& rollout = rollouts[e];
+  data::for_each_in_parallel(environments.size(), std::max(1, threads), [&](std::size_t e) {
+    Solver solver(plan, settings);
+    Rollout& rollout = rollouts[e];
+    rollout.positions.push_back(environments[e].state.positions);
+    for (int k = 0; k < steps; ++k) {
+      if (settings.stop != nullptr && *settings.stop) throw data::Stopped();
+      rollout.reports.push_back(solver.step(environments[e]));
       rollout.positions.push_back(environments[e].state.positions);
-      for (int k = 0; k < steps; ++k) {
-        rollout.reports.push_back(solver.step(environments[e]));
-        rollout.positions.push_back(environments[e].state.positions);
-      }
     }
-  };
-  std::vector<std::thread> workers;
-  for (int t = 1; t < threads; ++t) workers.emplace_back(work);
-  work();
-  for (std::thread& worker : workers) worker.join();
+  });
   return rollouts;
 }
 

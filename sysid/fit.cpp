@@ -64,7 +64,16 @@ class Residuals : public ceres::CostFunction {
     mutable_parameter_block_sizes()->push_back(static_cast<int>(settings.grid.axes.size()));
   }
 
+  /// No exception passes through Ceres; what asked to stop ends the next simulation too.
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    try {
+      return evaluate(parameters, residuals, jacobians);
+    } catch (const data::Stopped&) {
+      return false;
+    }
+  }
+
+  bool evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
     const std::vector<Axis>& axes = settings_.grid.axes;
     const auto count = static_cast<Eigen::Index>(axes.size());
     const std::vector<double> values = values_at(axes, parameters[0]);
@@ -166,6 +175,39 @@ class Path : public ceres::IterationCallback {
   const std::function<void(const FitStep&)>& report_;
 };
 
+/// "bending ended at the lower end of its range", for each axis that is there; empty where none is.
+std::string at_ends(const std::vector<Axis>& axes, const std::vector<double>& x) {
+  std::string text;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const double low = coordinate(axes[k], axes[k].values.front());
+    const double high = coordinate(axes[k], axes[k].values.back());
+    const double near = 1e-9 * (high - low);
+    if (x[k] > low + near && x[k] < high - near) continue;
+    text += (text.empty() ? "" : ", ") + axes[k].name + " is at the " +
+            (x[k] <= low + near ? "lower" : "upper") + " end of its range";
+  }
+  return text;
+}
+
+std::string words_of(const ceres::Solver::Summary& summary, bool refined, const std::string& ends) {
+  const std::string steps = std::to_string(summary.num_successful_steps) + " steps";
+  std::string text;
+  if (!refined && summary.termination_type == ceres::FAILURE)
+    text = "nothing was refined: the simulation diverges about the start";
+  else if (!refined && !ends.empty())
+    return "nothing was refined: at the start " + ends +
+           ", and the cost falls only beyond; search a wider range first";
+  else if (!refined)
+    text = "nothing was refined: no step from the start lowers the cost";
+  else if (summary.termination_type == ceres::CONVERGENCE)
+    text = "the cost stands still after " + steps;
+  else if (summary.termination_type == ceres::NO_CONVERGENCE)
+    text = "stopped after " + steps + ", the most that --steps allows, before the cost stood still";
+  else
+    text = "stopped after " + steps + ": the simulation diverges about the values reached";
+  return text + (ends.empty() ? "" : "; " + ends);
+}
+
 /// The best of each generation; the last accepted one is the best of all.
 std::vector<FitStep> search_globally(const std::vector<Replay>& replays, const FitSettings& settings,
                                      const std::function<void(const FitStep&)>& report) {
@@ -219,11 +261,15 @@ FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
   Path path(axes, x, report);
   options.callbacks.push_back(&path);
   ceres::Solver::Summary summary;
+  const std::vector<double> start = x;
   ceres::Solve(options, &problem, &summary);
 
   result.values = values_at(axes, x.data());
   result.path.insert(result.path.end(), path.steps.begin(), path.steps.end());
-  result.termination = summary.message;
+  result.refined = x != start;
+  const std::string ends = at_ends(axes, x);
+  result.stuck = !result.refined && (!ends.empty() || summary.termination_type == ceres::FAILURE);
+  result.termination = words_of(summary, result.refined, ends);
   ceres::Covariance::Options with;
   with.algorithm_type = ceres::DENSE_SVD;
   with.null_space_rank = 0;

@@ -32,7 +32,9 @@ struct FitResult {
   CandidateResult best;        ///< scored there; values as above
   Eigen::MatrixXd covariance;  ///< of the axes' coordinates; empty where a direction is not determined
   std::vector<FitStep> path;   ///< in order
-  std::string termination;     ///< in words, of the optimizer
+  bool refined = true;         ///< false: no step was taken from the start of Levenberg-Marquardt,
+  bool stuck = false;          ///< though it is no minimum: it is at the end of a range, or motions diverge
+  std::string termination;     ///< in words: why it ended, and which values stand at the end of their range
 };
 
 /// Levenberg-Marquardt (Ceres, trust region, box) over the logarithms of logarithmic axes, from `start` or
@@ -42,7 +44,8 @@ struct FitResult {
 /// not their square, from the median of those at the stage's start. Derivatives are finite differences, all
 /// parameters in one batch of environments. With sigma^2 the mean square there and n keyframes the
 /// cost is n / 2 mean square / sigma^2 plus half the squared deviations from the priors. `report` is called
-/// after each step. Throws data::InputError where the simulation diverges at `start`.
+/// after each step. Throws data::InputError where the simulation diverges at `start`, and
+/// data::Stopped where the replays' solver settings ask for it.
 FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
               const std::function<void(const FitStep&)>& report = {});
 

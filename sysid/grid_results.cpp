@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <limits>
@@ -15,6 +16,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/text.h"
 #include "sysid/fingerprint.h"
 
@@ -86,7 +88,6 @@ class Row {
   Row(const std::vector<std::string>& names, std::vector<std::string> fields, std::string place)
       : names_(names), fields_(std::move(fields)), place_(std::move(place)) {}
 
-  const std::string& place() const { return place_; }  ///< file and line
   const std::string& text(const std::string& name) const {
     const auto found = std::find(names_.begin(), names_.end(), name);
     const auto index = static_cast<std::size_t>(found - names_.begin());
@@ -95,8 +96,27 @@ class Row {
   }
   double number(const std::string& name) const {
     const std::optional<double> value = data::parse_number(text(name));
-    if (!value) throw data::InputError(place_ + ": " + name + ": \"" + text(name) + "\" is not a number");
+    if (!value) throw error(name, "a number");
     return *value;
+  }
+  double finite(const std::string& name) const {
+    const double value = number(name);
+    if (!std::isfinite(value)) throw error(name, "a finite number");
+    return value;
+  }
+  /// Infinite where there is none.
+  double not_negative(const std::string& name) const {
+    const double value = number(name);
+    if (!(value >= 0)) throw error(name, "a number of 0 or above");
+    return value;
+  }
+  int index(const std::string& name) const {
+    const int value = data::to_index(number(name));
+    if (value < 0) throw error(name, "a whole number from 0");
+    return value;
+  }
+  data::InputError error(const std::string& name, const std::string& expected) const {
+    return data::InputError(place_ + ": " + name + ": found \"" + text(name) + "\", expected " + expected);
   }
 
  private:
@@ -144,7 +164,8 @@ void keep_lines_of(const std::string& path, const std::set<int>& ids) {
   while (lines.next(line)) {
     const std::optional<long> id = data::parse_integer(line.substr(0, line.find(',')));
     const bool header = lines.number() == 1;
-    if (header || (id && ids.count(static_cast<int>(*id)) > 0)) kept += std::string(line) + '\n';
+    if (header || (id && ids.count(data::to_index(static_cast<double>(*id))) > 0))
+      kept += std::string(line) + '\n';
   }
   if (kept != text) data::write_atomically(path, kept);
 }
@@ -169,13 +190,19 @@ CandidateStatus status_of(const Row& row) {
   for (const auto status : {CandidateStatus::ok, CandidateStatus::unconverged, CandidateStatus::diverged}) {
     if (text == to_string(status)) return status;
   }
-  throw data::InputError(row.place() + ": status: found \"" + text +
-                         "\", expected ok, unconverged or diverged");
+  throw row.error("status", "ok, unconverged or diverged");
+}
+
+void remove_results(const std::string& folder) {
+  for (const char* file :
+       {"grid.json", "results.csv", "registrations.csv", "keyframes.csv", "summary.json", "report.html"})
+    fs::remove(fs::path(folder) / file);
+  fs::remove_all(fs::path(folder) / "best");
 }
 
 nlohmann::json load_grid(const std::string& folder) {
   const std::string path = path_of(folder, "grid.json");
-  const nlohmann::json grid = nlohmann::json::parse(data::read_file(path), nullptr, false);
+  const nlohmann::json grid = data::load_json(path);
   if (!grid.is_object() || grid.value("schema", "") != kSchema || !grid.contains("axes") ||
       !grid.contains("recordings")) {
     throw data::InputError(path + ": schema: expected \"" + kSchema + "\" with axes and recordings");
@@ -203,6 +230,9 @@ GridResults load_grid_results(const std::string& folder) {
   try {
     for (const nlohmann::json& axis : grid.at("axes")) {
       results.axes.push_back({axis.at("name"), axis.at("values").get<std::vector<double>>(), axis.at("log")});
+      if (results.axes.back().values.empty())
+        throw data::input_error(path_of(folder, "grid.json"), "axes.values",
+                                "found none, expected at least one");
     }
     results.recordings = grid.at("recordings").get<std::vector<std::string>>();
   } catch (const nlohmann::json::exception& error) {
@@ -212,18 +242,22 @@ GridResults load_grid_results(const std::string& folder) {
   std::map<int, CandidateResult> found;
   for_each_row(path_of(folder, "results.csv"), [&](const Row& row) {
     CandidateResult result;
-    result.id = static_cast<int>(row.number("id"));
-    for (const Axis& axis : results.axes) result.values.push_back(row.number(axis.name));
-    result.score = row.number("score_m");
+    result.id = row.index("id");
+    for (const Axis& axis : results.axes) {
+      result.values.push_back(row.number(axis.name));
+      if (std::find(axis.values.begin(), axis.values.end(), result.values.back()) == axis.values.end())
+        throw row.error(axis.name, "one of the values of grid.json");
+    }
+    result.score = row.not_negative("score_m");
     result.converged = row.text("converged") == "true";
-    result.residual_max = row.number("residual_max");
-    result.penetration_max = row.number("penetration_max_m");
+    result.residual_max = row.not_negative("residual_max");
+    result.penetration_max = row.not_negative("penetration_max_m");
     result.status = status_of(row);
     result.recordings.resize(results.recordings.size());
     found[result.id] = std::move(result);
   });
   const auto recording_of = [&](const Row& row) -> RecordingScore* {
-    const auto candidate = found.find(static_cast<int>(row.number("id")));
+    const auto candidate = found.find(row.index("id"));
     const auto name = std::find(results.recordings.begin(), results.recordings.end(), row.text("recording"));
     if (candidate == found.end() || name == results.recordings.end()) return nullptr;
     return &candidate->second.recordings[name - results.recordings.begin()];
@@ -231,18 +265,18 @@ GridResults load_grid_results(const std::string& folder) {
   for_each_row(path_of(folder, "registrations.csv"), [&](const Row& row) {
     RecordingScore* recording = recording_of(row);
     if (recording == nullptr) return;
-    recording->score = row.number("score_m");
-    recording->offset = {row.number("offset_x"), row.number("offset_y"), row.number("offset_z")};
-    recording->yaw = row.number("yaw_rad");
-    recording->time_offset = row.number("time_offset_s");
+    recording->score = row.not_negative("score_m");
+    recording->offset = {row.finite("offset_x"), row.finite("offset_y"), row.finite("offset_z")};
+    recording->yaw = row.finite("yaw_rad");
+    recording->time_offset = row.finite("time_offset_s");
     recording->bounds_hit = words_of(row.text("bounds_hit"));
     recording->keyframes.clear();
   });
   for_each_row(path_of(folder, "keyframes.csv"), [&](const Row& row) {
     RecordingScore* recording = recording_of(row);
     if (recording == nullptr) return;
-    const KeyframeScore score{row.number("t"), row.number("score_m"), static_cast<int>(row.number("points")),
-                              row.number("weight")};
+    const KeyframeScore score{row.finite("t"), row.not_negative("score_m"), row.index("points"),
+                              row.not_negative("weight")};
     // A candidate interrupted between its keyframes and its result is computed again: the later line counts.
     const auto same = std::find_if(recording->keyframes.begin(), recording->keyframes.end(),
                                    [&](const KeyframeScore& k) { return k.t == score.t; });
@@ -258,7 +292,7 @@ GridResults load_grid_results(const std::string& folder) {
 
 ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
                            const std::vector<std::string>& recordings, const Fingerprint& fingerprint,
-                           bool resume)
+                           Existing existing)
     : folder_(folder) {
   fs::create_directories(folder);
   lock_ = ::open(path_of(folder, ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -267,10 +301,13 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
     if (::flock(lock_, LOCK_EX | LOCK_NB) != 0)
       throw data::InputError(folder + ": another run is writing to it; wait for it, or name another folder");
     data::remove_leftovers(folder);
-    if (fs::exists(path_of(folder, "grid.json")))
-      go_on(fingerprint, resume);
-    else
+    if (existing == Existing::replace) remove_results(folder);
+    if (!fs::exists(path_of(folder, "grid.json")))
       begin(axes, recordings, fingerprint);
+    else if (existing == Existing::resume)
+      go_on(fingerprint);
+    else
+      throw data::InputError(folder + ": holds results already; go on with --resume, or name another folder");
   } catch (...) {
     ::close(lock_);
     throw;
@@ -294,10 +331,7 @@ void ResultsStore::begin(const std::vector<Axis>& axes, const std::vector<std::s
   data::write_atomically(path_of(folder_, "grid.json"), grid.dump(1) + "\n");  // last: all is there
 }
 
-void ResultsStore::go_on(const Fingerprint& fingerprint, bool resume) {
-  if (!resume) {
-    throw data::InputError(folder_ + ": holds results already; go on with --resume, or name another folder");
-  }
+void ResultsStore::go_on(const Fingerprint& fingerprint) {
   const nlohmann::json grid = load_grid(folder_);
   const auto was = grid.find("fingerprint");
   const std::string changed = was == grid.end() || !was->is_object()

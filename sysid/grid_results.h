@@ -55,6 +55,13 @@ struct GridResults {
 /// What decides the results of a search, by name; see sysid/fingerprint.h.
 using Fingerprint = std::map<std::string, std::string>;
 
+/// What is to become of results that the folder holds already.
+enum class Existing {
+  refuse,
+  resume,  ///< the search goes on from them
+  replace  ///< they are removed, with summary, report and best motions
+};
+
 /// A folder of results that only ever grows: results.csv (one line a candidate; with several recordings its
 /// offsets are those of the first), registrations.csv (one line a candidate and recording) and keyframes.csv
 /// (one line a candidate, recording and keyframe). grid.json holds axes, recordings and the fingerprint of
@@ -65,11 +72,11 @@ using Fingerprint = std::map<std::string, std::string>;
 /// again cuts off what belongs to none.
 class ResultsStore {
  public:
-  /// Creates `folder`, or with `resume` goes on with what it holds. Throws data::InputError where it holds
-  /// results and `resume` is not asked for, or results of another fingerprint (naming what differs), and
-  /// where another process writes to it.
+  /// Creates `folder`, or treats what it holds as `existing` says. Throws data::InputError, with nothing
+  /// changed, where another process writes to it, where it holds results that are to be refused, and where it
+  /// is to go on with results of another fingerprint (naming what differs).
   ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
-               const std::vector<std::string>& recordings, const Fingerprint& fingerprint, bool resume);
+               const std::vector<std::string>& recordings, const Fingerprint& fingerprint, Existing existing);
   ~ResultsStore();
   ResultsStore(const ResultsStore&) = delete;
   ResultsStore& operator=(const ResultsStore&) = delete;
@@ -82,7 +89,7 @@ class ResultsStore {
  private:
   void begin(const std::vector<Axis>& axes, const std::vector<std::string>& recordings,
              const Fingerprint& fingerprint);
-  void go_on(const Fingerprint& fingerprint, bool resume);
+  void go_on(const Fingerprint& fingerprint);
 
   std::string folder_;
   GridResults results_;
@@ -90,7 +97,7 @@ class ResultsStore {
 };
 
 /// Reads a folder written by ResultsStore; a last line cut off by a crash is left out. Throws
-/// data::InputError naming file and line.
+/// data::InputError naming file and line, also for values that no search can have written.
 GridResults load_grid_results(const std::string& folder);
 
 }  // namespace flash::sysid

@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "data/error.h"
 #include "sysid/rollout_store.h"
 
 namespace flash::sysid {
@@ -22,8 +23,8 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
   std::vector<RegistrationProblem> problems;
   for (std::size_t r = 0; r < replays.size(); ++r) {
     result.converged = result.converged && results[r].converged;
-    result.residual_max = std::max(result.residual_max, results[r].residual_max);
-    result.penetration_max = std::max(result.penetration_max, results[r].penetration_max);
+    result.residual_max = sim::worst(result.residual_max, results[r].residual_max);
+    result.penetration_max = sim::worst(result.penetration_max, results[r].penetration_max);
     finite = finite && results[r].finite;
     problems.push_back(registration_problem(replays[r], results[r].motion));
   }
@@ -95,7 +96,10 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
 
   std::vector<Replay> single =
       replays;  // one candidate a thread: the solver is not to spawn threads of its own
-  for (Replay& replay : single) replay.settings.threads = 1;
+  for (Replay& replay : single) {
+    replay.settings.threads = 1;
+    if (stop != nullptr) replay.settings.solver.stop = stop;
+  }
   const std::optional<RolloutStore> kept =
       settings.rollouts.empty() ? std::nullopt : std::optional<RolloutStore>(settings.rollouts);
   const Clock::time_point begin = Clock::now();
@@ -104,18 +108,20 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
   std::size_t next = 0, next_to_write = 0;  // indices into wanted
   std::map<std::size_t, CandidateResult> finished;
   std::exception_ptr failure;
+  bool stopped = false;
   const auto work = [&] {
     std::unique_lock lock(mutex);
     try {
       while (true) {
         // Results are written in order of id: those that come early wait, a batch of them at most.
         written.wait(lock, [&] {
-          return failure || next >= wanted.size() ||
+          return failure || stopped || next >= wanted.size() ||
                  next < next_to_write + static_cast<std::size_t>(settings.envs);
         });
-        if (failure || next >= wanted.size() || (stop != nullptr && stop->load())) return;
+        if (failure || stopped || next >= wanted.size()) return;
         const std::size_t i = next++;
         lock.unlock();
+        if (stop != nullptr && *stop) throw data::Stopped();
         CandidateResult result = score_candidate(single, settings, axes, grid[wanted[i]], kept);
         result.id = wanted[i];
         lock.lock();
@@ -135,6 +141,10 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
         state.seconds_left = (state.total - state.done) / state.candidates_per_second;
         if (progress) progress(state);
       }
+    } catch (const data::Stopped&) {
+      if (!lock.owns_lock()) lock.lock();
+      stopped = true;
+      written.notify_all();
     } catch (...) {
       if (!lock.owns_lock()) lock.lock();
       failure = std::current_exception();

@@ -1,4 +1,5 @@
 #pragma once
+#include "data/memory_limit.h"
 #include "sysid/grid_search.h"
 
 namespace flash::sysid {
@@ -7,6 +8,7 @@ namespace flash::sysid {
 struct MemoryEstimate {
   double program = 60e6;  ///< itself, with what scoring takes; measured
   double simulation = 0;  ///< solvers and motions in work at once, one candidate a thread
+  double steps = 0;       ///< the part of `simulation` that grows with the number of steps
   double kept = 0;        ///< motions over the grid and about its finer mesh, where rollouts are kept
   double total() const { return program + simulation + kept; }
 };
@@ -16,7 +18,12 @@ struct MemoryEstimate {
 MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSettings& settings,
                                bool solver_check);
 
-/// Of this machine [bytes]; 0 where it does not say.
-double physical_memory();
+/// Of `candidates` simulated in one batch (`run`), their motions kept together.
+MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates);
+
+/// Refuses what this machine cannot finish. Throws data::InputError, saying what would help, where the memory
+/// goes beyond `limit` [bytes] (0: unknown), and where `candidates` on every replay take years.
+void check_job(const std::vector<Replay>& replays, double candidates, const MemoryEstimate& memory,
+               double limit = data::memory_limit());
 
 }  // namespace flash::sysid

@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "sysid/parameter_grid.h"
 #include "sysid/parameter_label.h"
 
 namespace flash::sysid {
@@ -42,7 +43,7 @@ std::vector<std::string> next_steps(const Summary& summary) {
   for (const ParameterFinding& finding : summary.parameters) {
     usable = usable || finding.identifiable != Identifiable::no;
     if (finding.edge != RangeEdge::none && finding.identifiable != Identifiable::no)
-      steps.push_back("Widen the range of " + label(summary, finding.name) + " (--" + finding.name +
+      steps.push_back("Widen the range of " + label(summary, finding.name) + " (" + option_of(finding.name) +
                       "): the best value is its " +
                       (finding.edge == RangeEdge::low ? "lowest." : "highest."));
   }

@@ -95,8 +95,9 @@ void draw_cloud(data::Picture& picture, const DepthView& view, const data::Point
     const Eigen::Vector3d seen = camera_from_base * cloud.row(i).transpose();
     const auto pixel = data::project(panel.camera, seen);
     if (!pixel) continue;
-    const auto u = static_cast<int>(std::lround(pixel->x())), v = static_cast<int>(std::lround(pixel->y()));
-    if (u < 0 || v < 0 || u >= picture.width || v >= picture.height) continue;
+    const double column = std::round(pixel->x()), row = std::round(pixel->y());
+    if (!(column >= 0 && row >= 0 && column < picture.width && row < picture.height)) continue;
+    const auto u = static_cast<int>(column), v = static_cast<int>(row);
     const bool hidden = seen.z() > view.depth(v, u) + settings.tolerance;
     draw_disc(picture, pixel->x(), pixel->y(), oversampling * settings.point_radius,
               hidden ? pale_blue : blue);
@@ -105,7 +106,8 @@ void draw_cloud(data::Picture& picture, const DepthView& view, const data::Point
 
 void draw_scale_bar(data::Picture& picture, const Panel& panel, const Eigen::AlignedBox3d& bounds) {
   const double distance = (panel.pose.translation() - bounds.center()).norm();
-  const int length = static_cast<int>(std::lround(0.1 * panel.camera.fx / distance));
+  const double pixels = std::round(0.1 * panel.camera.fx / distance);
+  const int length = static_cast<int>(std::clamp(pixels, 0.0, static_cast<double>(picture.width)));
   const int margin = 16 * oversampling, thickness = 2 * oversampling;
   for (int v = picture.height - margin - thickness; v < picture.height - margin; ++v)
     for (int u = margin; u < std::min(margin + length, picture.width); ++u) picture.at(u, v) = ink;

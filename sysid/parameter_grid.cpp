@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "data/error.h"
+#include "data/json_reader.h"
 #include "data/text.h"
 
 namespace flash::sysid {
@@ -14,29 +15,18 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kTiny = std::numeric_limits<double>::min();
 
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t substituted = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({row[j] + 1, row[j + 1] + 1, substituted});
-    }
-  }
-  return row.back();
-}
-
-const ParameterInfo& info_of(const std::string& name) {
+const ParameterInfo& info_of(const std::string& option, const std::string& name) {
   const std::vector<ParameterInfo>& known = known_parameters();
   const auto found = std::find_if(known.begin(), known.end(), [&](const auto& p) { return p.name == name; });
   if (found != known.end()) return *found;
-  const auto nearest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-    return edit_distance(name, a.name) < edit_distance(name, b.name);
-  });
-  throw data::InputError("--" + name + ": unknown parameter (did you mean \"" + nearest->name + "\"?)");
+  std::vector<std::string> names;
+  for (const ParameterInfo& info : known) names.push_back(info.name);
+  const std::string nearest = data::nearest_name(name, names);
+  std::string all;
+  for (const std::string& other : names) all += (all.empty() ? "" : ", ") + other;
+  throw data::InputError(
+      option + ": unknown parameter " +
+      (nearest.empty() ? "(expected one of " + all + ")" : "(did you mean \"" + nearest + "\"?)"));
 }
 
 double number(const std::string& option, std::string_view word) {
@@ -50,8 +40,9 @@ double number(const std::string& option, std::string_view word) {
 
 void check_range(const std::string& option, const ParameterInfo& info, double value) {
   if (value >= info.low && value <= info.high) return;
-  throw data::InputError(option + ": " + data::format_short(value) + " " + info.unit + " is outside " +
-                         data::format_short(info.low) + " to " + data::format_short(info.high));
+  throw data::InputError(option + ": found " + data::format_short(value) + ", expected " +
+                         data::format_short(info.low) + " to " + data::format_short(info.high) +
+                         (info.unit.empty() ? "" : " " + info.unit));
 }
 
 }  // namespace
@@ -74,15 +65,25 @@ const std::vector<ParameterInfo>& known_parameters() {
   return parameters;
 }
 
+std::string option_of(const std::string& name) {
+  std::string option = "--" + name;
+  std::replace(option.begin(), option.end(), '_', '-');
+  return option;
+}
+
+void check_parameter(const std::string& option, const std::string& name) { info_of(option, name); }
+
 Axis parse_axis(const std::string& name, const std::string& specification) {
-  const ParameterInfo& info = info_of(name);
-  const std::string option = "--" + name;
+  const std::string option = option_of(name);
+  const ParameterInfo& info = info_of(option, name);
   Axis axis{name, {}, false};
   if (specification.find(':') == std::string::npos) {
     for (const std::string_view word : data::split(specification, ","))
       axis.values.push_back(number(option, word));
     std::sort(axis.values.begin(), axis.values.end());
-    axis.values.erase(std::unique(axis.values.begin(), axis.values.end()), axis.values.end());
+    const auto twice = std::adjacent_find(axis.values.begin(), axis.values.end());
+    if (twice != axis.values.end())
+      throw data::InputError(option + ": " + data::format_short(*twice) + " is given twice");
   } else {
     const std::vector<std::string_view> parts = data::split(specification, ":");
     axis.logarithmic = parts.size() == 4 && parts[3] == "log";
@@ -93,8 +94,8 @@ Axis parse_axis(const std::string& name, const std::string& specification) {
     const double low = number(option, parts[0]), high = number(option, parts[1]),
                  count = number(option, parts[2]);
     if (count < 1 || count > 1e6 || count != std::floor(count)) {
-      throw data::InputError(option + ": count " + std::string(parts[2]) +
-                             " is not a whole number of at least 1");
+      throw data::InputError(option + ": found the count " + std::string(parts[2]) +
+                             ", expected a whole number from 1 to 1,000,000");
     }
     if (!(low < high) && !(low == high && count == 1)) {
       throw data::InputError(option + ": low " + std::string(parts[0]) + " is not below high " +
@@ -115,16 +116,20 @@ Axis parse_axis(const std::string& name, const std::string& specification) {
   return axis;
 }
 
-Axis parse_fixed(const std::string& assignment) {
+Axis parse_fixed(const std::string& assignment, const std::string& option) {
   const std::size_t equals = assignment.find('=');
   if (equals == std::string::npos) {
-    throw data::InputError("--fix: \"" + assignment + "\": expected name=value, as friction=0.3");
+    throw data::InputError(option + ": \"" + assignment + "\": expected name=value, as friction=0.3");
   }
   const std::string name = assignment.substr(0, equals);
-  const ParameterInfo& info = info_of(name);
-  const double value = number("--fix " + name, std::string_view(assignment).substr(equals + 1));
-  check_range("--fix " + name, info, value);
-  return {name, {value}, false};
+  const std::string where = option + " " + name;
+  const ParameterInfo& info = info_of(where, name);
+  const std::string_view word = std::string_view(assignment).substr(equals + 1);
+  const std::optional<double> value = data::parse_number(word);
+  if (!value || !std::isfinite(*value))
+    throw data::InputError(where + ": found \"" + std::string(word) + "\", expected a number");
+  check_range(where, info, *value);
+  return {name, {*value}, false};
 }
 
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes) {
@@ -143,14 +148,29 @@ std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes
   return candidates;
 }
 
+double count_candidates(const std::vector<Axis>& axes) {
+  double count = 1;
+  for (const Axis& axis : axes) count *= static_cast<double>(axis.values.size());
+  return count;
+}
+
 void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) {
   bool young = false, poisson = false;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
-      if (axes[i].name == axes[j].name) throw data::InputError("--" + axes[i].name + ": given twice");
+      if (axes[i].name == axes[j].name) throw data::InputError(option_of(axes[i].name) + ": given twice");
     }
     young = young || (axes[i].name == "young" && axes[i].values.size() > 1);
     poisson = poisson || (axes[i].name == "poisson" && axes[i].values.size() > 1);
+  }
+  constexpr double kMostCandidates = 1e6;
+  if (count_candidates(axes) > kMostCandidates) {
+    std::string names;
+    for (const Axis& axis : axes)
+      if (axis.values.size() > 1) names += (names.empty() ? "" : ", ") + option_of(axis.name);
+    throw data::InputError(
+        names + ": found " + data::format_short(count_candidates(axes)) + " candidates, expected at most " +
+        data::format_count(static_cast<std::size_t>(kMostCandidates)) + ": search fewer values");
   }
   if (constitutive == data::Constitutive::tri_arap && young && poisson) {
     throw data::InputError(
@@ -158,6 +178,17 @@ void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) 
         "recording "
         "can tell them apart; fix one (--fix poisson=0.3), or use TRI_COROTATED");
   }
+}
+
+void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& replays) {
+  for (const Replay& replay : replays)
+    for (const data::RecordedGrasp& grasp : replay.recording.grasps)
+      if (replay.settings.grasp_shape.value_or(grasp.shape) == data::GraspShape::pinch) return;
+  for (const Axis& axis : axes)
+    if (axis.name.starts_with("grasp_"))
+      throw data::InputError(option_of(axis.name) +
+                             ": acts on a grasp of the shape pinch, and the recordings have none; choose "
+                             "--grasp-shape pinch, or leave it out");
 }
 
 ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,

@@ -28,20 +28,34 @@ struct ParameterInfo {
 /// grasp_depth, grasp_direction, grasp_pitch.
 const std::vector<ParameterInfo>& known_parameters();
 
+/// How the command line calls a parameter: "--start-yaw" for start_yaw.
+std::string option_of(const std::string& name);
+
+/// Throws data::InputError naming `option` and the nearest known one unless a parameter has that name.
+void check_parameter(const std::string& option, const std::string& name);
+
 /// "low:high:count:log", "low:high:count" (evenly), "a,b,c" or one value.
 /// Throws data::InputError naming the option: unknown parameter (with the nearest known), malformed, out of
-/// range.
+/// range, a value given twice.
 Axis parse_axis(const std::string& name, const std::string& specification);
 
-/// "friction=0.3" of `--fix`, an axis of one value.
-Axis parse_fixed(const std::string& assignment);
+/// "friction=0.3", an axis of one value. Throws data::InputError naming `option`, that which was used.
+Axis parse_fixed(const std::string& assignment, const std::string& option = "--fix");
 
 /// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes);
 
+/// How many cartesian_product makes.
+double count_candidates(const std::vector<Axis>& axes);
+
 /// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
-/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only. Throws data::InputError with the reason.
+/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; more than a million candidates. Throws
+/// data::InputError with the reason.
 void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive);
+
+/// Refuses grasp_depth, grasp_direction and grasp_pitch where no grasp of the recordings is a pinch: nothing
+/// would change with them.
+void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& replays);
 
 /// What candidates are built on: the asset's material and how `young` and `bending` are understood.
 struct MaterialBase {

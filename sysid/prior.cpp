@@ -10,7 +10,7 @@ Prior parse_prior(const std::string& text) {
   const std::size_t colon = text.rfind(':');
   const std::string expected = "expected name=value:factor, as bending=1e-5:2";
   if (colon == std::string::npos) throw data::InputError("--prior: \"" + text + "\": " + expected);
-  const Axis axis = parse_fixed(text.substr(0, colon));
+  const Axis axis = parse_fixed(text.substr(0, colon), "--prior");
   const auto spread = data::parse_number(std::string_view(text).substr(colon + 1));
   const bool factor = axis.values.front() > 0;
   if (!spread || !(*spread > (factor ? 1 : 0)))

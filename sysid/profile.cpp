@@ -476,7 +476,7 @@ GridVerdict profile_grid(const GridResults& results, const ProfileSettings& sett
   verdict.sigma = equivalent_sigma(results, sampling);
   verdict.sigma_source = "residual";
   if (repeatability && verdict.sigma >= *repeatability * (1 - 1e-9)) verdict.sigma_source = "repeatability";
-  const std::size_t freedom = std::clamp<std::size_t>(results.axes.size(), 1, kQuantile95.size());
+  const std::size_t freedom = std::clamp<std::size_t>(searched, 1, kQuantile95.size());
   const double variance_share = kQuantile95[freedom - 1] / std::max(verdict.keyframes, 1);
   verdict.level95 = std::sqrt(verdict.score * verdict.score + variance_share * verdict.sigma * verdict.sigma);
   return verdict;

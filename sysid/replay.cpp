@@ -6,6 +6,8 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/scene.h"
+#include "data/text.h"
 
 namespace flash::sysid {
 namespace {
@@ -109,6 +111,35 @@ void replace_mesh(data::Recording& recording, const std::string& mesh) {
                     recording.base_from_object.translation().transpose();
 }
 
+/// Throws data::InputError where --from and --to leave nothing to score.
+void check_window(const Replay& replay) {
+  if (replay.observations.empty())
+    throw data::input_error(replay.recording.source, "keyframes", "there is none");
+  const auto inside = [&](const Observation& observation) {
+    return observation.t >= replay.settings.score_from && observation.t <= replay.settings.score_to;
+  };
+  if (std::none_of(replay.observations.begin(), replay.observations.end(), inside))
+    throw data::InputError(
+        "--from, --to: " + replay.recording.source + " has no keyframe between; they span " +
+        data::format_clock(replay.observations.front().t) + " to " +
+        data::format_clock(replay.observations.back().t) + " s after the recording's start");
+}
+
+/// Steps from `start` until the last keyframe can have been seen. Throws data::InputError, naming the cause,
+/// where they are more than data::max_steps.
+int count_steps(const data::Recording& recording, double start, double step) {
+  const double first = recording.keyframes.front().time, last = recording.keyframes.back().time;
+  const double duration = last + recording.nuisance.time - start;
+  constexpr double kUsual = 600;  // what takes longer is at fault itself [s]
+  if (duration > kUsual && duration / step > data::max_steps)
+    throw data::input_error(recording.source, first - start > last - first ? "grasps.from" : "keyframes",
+                            "found " + data::format_short(first - start) +
+                                " s before the first keyframe and " + data::format_short(last - first) +
+                                " s to the last, expected at most " + data::format_count(data::max_steps) +
+                                " steps of " + data::format_short(step) + " s: cut off what does not move");
+  return steps_in(duration, step) + 1;
+}
+
 }  // namespace
 
 data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridge, const Eigen::Vector3d& up,
@@ -125,6 +156,16 @@ data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridg
     targets.row(i) = (centre + tilt * (a * along + (height - b[i]) * up)).transpose();
   }
   return targets;
+}
+
+int steps_in(double duration, double step) {
+  // Time stamps since 1970 know a time to 2e-7 s.
+  const double steps = std::ceil(duration / step - 1e-3);
+  if (steps <= data::max_steps) return static_cast<int>(steps);
+  throw data::InputError("--time-step: found " + data::format_short(step) + " s, which makes " +
+                         data::format_short(steps) + " steps of " + data::format_short(duration) +
+                         " s, expected at most " + data::format_count(data::max_steps) + ": take at least " +
+                         data::format_short(1.01 * duration / data::max_steps) + " s");
 }
 
 void stiffen_clamped(Replay& replay) {
@@ -145,6 +186,7 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   Replay replay;
   replay.recording = recording;
   replay.settings = settings;
+  replay.object_mesh = recording.mesh_spec;
   if (!settings.mesh.empty()) replace_mesh(replay.recording, settings.mesh);
   replay.sheet = sim::make_sheet(replay.recording.mesh);
   replay.up = upward(recording);
@@ -167,7 +209,7 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
     observation.weight = weighs ? 1 : 0;
     replay.observations.push_back(std::move(observation));
   }
-  if (replay.observations.empty()) throw data::input_error(recording.source, "keyframes", "there is none");
+  check_window(replay);
 
   replay.beginning = replay.observations.front().t;
   bool closes = false;
@@ -178,9 +220,8 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   if (settings.clamp_slopes) stiffen_clamped(replay);
   const double pre_roll = settings.pre_roll.value_or(closes ? 0.4 : 0.0);
   const double step = settings.solver.time_step;
-  replay.start = replay.beginning - std::ceil(pre_roll / step - 1e-9) * step;
-  const double end = replay.observations.back().t + recording.nuisance.time;
-  replay.steps = static_cast<int>(std::ceil((end - replay.start) / step - 1e-9)) + 1;
+  replay.start = replay.beginning - steps_in(pre_roll, step) * step;
+  replay.steps = count_steps(recording, replay.start, step);
 
   if (recording.grasps.empty()) {
     replay.pivot = replay.recording.start.colwise().mean().transpose();
@@ -257,9 +298,9 @@ std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCand
                                                                  : report.grasp_forces.back());
     int missed = 0;
     for (const sim::StepReport& report : rollout.reports) {
-      missed += !report.converged;
-      result.residual_max = std::max(result.residual_max, report.residual);
-      result.penetration_max = std::max(result.penetration_max, report.penetration_max);
+      missed += !(report.converged && std::isfinite(report.residual));
+      result.residual_max = sim::worst(result.residual_max, report.residual);
+      result.penetration_max = sim::worst(result.penetration_max, report.penetration_max);
     }
     result.converged = missed == 0;
     result.unconverged_share =

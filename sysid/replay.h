@@ -56,6 +56,8 @@ struct ReplayResult {
 /// A recording made ready for simulation: its mesh, the start, the steps to take.
 struct Replay {
   data::Recording recording;
+  std::string
+      object_mesh;  ///< mesh specification or file of the recording itself, whatever settings.mesh says
   sim::Sheet sheet;
   std::shared_ptr<const SheetQueries> queries;  ///< of the sheet at rest
   ReplaySettings settings;
@@ -69,7 +71,11 @@ struct Replay {
   std::vector<std::string> notices;
 };
 
-/// Throws data::InputError where mesh, grasps or clouds cannot be used.
+/// Steps of `step` that it takes to cover `duration` [s]. Throws data::InputError where they are more than
+/// data::max_steps.
+int steps_in(double duration, double step);
+
+/// Throws data::InputError where mesh, grasps, clouds or the number of steps cannot be used.
 Replay make_replay(const data::Recording& recording, const ReplaySettings& settings);
 
 /// Makes stiff the triangles inside patches that a clamp takes at the beginning and never lets go.

@@ -1,5 +1,6 @@
 #include "sysid/report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -9,6 +10,7 @@
 #include "data/html_page.h"
 #include "sysid/next_steps.h"
 #include "sysid/parameter_label.h"
+#include "sysid/registration_parameter.h"
 
 namespace flash::embedded {
 std::string_view report_template();
@@ -121,6 +123,34 @@ Json table_of(const Summary& summary, const GridResults& results) {
   return {{"values", values}, {"scores", scores}};
 }
 
+// Which bound of the registration which candidate ended at: a row a recording and bound, the candidates in
+// order of their score.
+Json bounds_of(const GridResults& results) {
+  std::vector<const CandidateResult*> candidates;
+  for (const CandidateResult& candidate : results.candidates)
+    if (std::isfinite(candidate.score)) candidates.push_back(&candidate);
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const auto* a, const auto* b) { return a->score < b->score; });
+  Json rows = Json::array();
+  for (std::size_t r = 0; r < results.recordings.size(); ++r)
+    for (const RegistrationParameter& parameter : registration_parameters) {
+      Json hits = Json::array();
+      int count = 0;
+      for (const CandidateResult* candidate : candidates) {
+        const bool hit =
+            r < candidate->recordings.size() && is_at_bound(candidate->recordings[r].bounds_hit, parameter);
+        hits.push_back(hit ? 1 : 0);
+        count += hit;
+      }
+      if (count > 0)
+        rows.push_back({{"recording", results.recordings[r]},
+                        {"what", parameter.label},
+                        {"best", hits.front() == 1},
+                        {"hits", hits}});
+    }
+  return rows;
+}
+
 Json overlays_of(const std::vector<Overlay>& overlays, int max_cloud_points) {
   Json list = Json::array();
   for (const Overlay& overlay : overlays) {
@@ -170,6 +200,7 @@ std::string render_report(const Summary& summary, const GridResults& results,
   json["warnings"] = summary.warnings;
   json["unknowns"] = standing_unknowns(summary);
   json["next_steps"] = next_steps(summary);
+  json["bounds"] = bounds_of(results);
   json["solver_check"] = Json::array();
   for (const SolverCheck& check : summary.solver_check)
     json["solver_check"].push_back({{"what", check.what},

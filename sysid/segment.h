@@ -47,9 +47,18 @@ struct Segmentation {
   std::array<int, point_label_count> counts{};  ///< points by label
 };
 
-/// The largest plane across `up` by RANSAC, then refined to all its points (Fischler and Bolles 1981). Throws
-/// data::InputError where no plane holds `plane_fraction` of the points.
-TablePlane find_table(const data::Points& points, const SegmentSettings& settings);
+struct FoundTable {
+  TablePlane plane;
+  double tilt = 0;   ///< angle of its normal against `up` [rad]
+  int frames = 0;    ///< that hold points
+  int agreeing = 0;  ///< that show at least half of what any of them shows of it
+};
+
+/// The table of a recording: the largest plane across `up` that stands still, by RANSAC over all frames, then
+/// refined to its points (Fischler and Bolles 1981). A crop may cut the table off: points above and below the
+/// crop box count too. Planes that fewer than two thirds of the frames show are cloth. Throws
+/// data::InputError where no plane that holds `plane_fraction` of the points stands still.
+FoundTable find_table(const std::vector<data::Points>& frames, const SegmentSettings& settings);
 
 /// Cuts the cloth out of one frame: crop box, table (all that is not `table_clearance` above it, where there
 /// is one), arm, then Euclidean clusters, statistical outliers and a voxel grid. Points that are not finite

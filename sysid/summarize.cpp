@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "data/asset.h"
 #include "data/atomic_file.h"
 #include "data/procedural_mesh.h"
 #include "data/sha256.h"
 #include "data/text.h"
+#include "sysid/registration_parameter.h"
 #include "sysid/separate_regions.h"
 
 namespace flash::sysid {
@@ -68,7 +70,8 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
 }
 
 std::vector<std::string> warnings_of(const Summary& summary, const CandidateResult& best,
-                                     const GridSettings& settings) {
+                                     const std::vector<CandidateResult>& candidates,
+                                     const std::vector<Replay>& replays, const GridSettings& settings) {
   std::vector<std::string> warnings;
   const std::size_t found = static_cast<std::size_t>(summary.candidates);
   for (const ParameterFinding& finding : summary.parameters) {
@@ -78,10 +81,28 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
     if (finding.edge != RangeEdge::none && finding.identifiable == Identifiable::yes)
       warnings.push_back(finding.name + ": the best value is at the edge of the searched range");
   }
+  const auto claims_bending = [](const ParameterFinding& finding) {
+    return finding.name == "bending" && finding.identifiable != Identifiable::no;
+  };
+  if (std::any_of(summary.parameters.begin(), summary.parameters.end(), claims_bending))
+    for (const Replay& replay : replays)
+      if (replay.recording.gravity.isZero())
+        warnings.push_back(replay.recording.name +
+                           ": gravity is zero in recording.json: what is said of bending rests on inertia "
+                           "alone, and is wrong where the sheet had weight");
   for (std::size_t r = 0; r < best.recordings.size(); ++r)
-    for (const std::string& bound : best.recordings[r].bounds_hit)
-      warnings.push_back(summary.recordings[r].name + ": " + bound +
-                         " is at its bound; widen `nuisance` in recording.json");
+    for (const RegistrationParameter& parameter : registration_parameters) {
+      if (!is_at_bound(best.recordings[r].bounds_hit, parameter)) continue;
+      const auto count =
+          std::count_if(candidates.begin(), candidates.end(), [&](const CandidateResult& candidate) {
+            return r < candidate.recordings.size() &&
+                   is_at_bound(candidate.recordings[r].bounds_hit, parameter);
+          });
+      warnings.push_back(summary.recordings[r].name + ": " +
+                         at_bound_text(parameter, replays[r].recording.nuisance) +
+                         " (the best candidate and " + std::to_string(count) + " of all " +
+                         std::to_string(candidates.size()) + " end at it)");
+    }
   if (summary.unconverged > 0)
     warnings.push_back(data::format_count(static_cast<std::size_t>(summary.unconverged)) + " of " +
                        data::format_count(found) + " candidates did not converge in every step");
@@ -113,6 +134,9 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
   texts["mesh"] = replay.recording.mesh_spec + " (" +
                   data::format_count(static_cast<std::size_t>(replay.sheet.rest.vertices.rows())) +
                   " vertices)";
+  texts["object_mesh"] = data::is_mesh_spec(replay.object_mesh)
+                             ? replay.object_mesh
+                             : std::filesystem::absolute(replay.object_mesh).lexically_normal().string();
   texts["constitutive"] = data::to_string(settings.base.material.constitutive);
   texts["bending_model"] = data::to_string(settings.base.material.bending_model);
   texts["time_step_s"] = data::format_number(replay.settings.solver.time_step);
@@ -171,7 +195,7 @@ Summary summarize(const GridResults& results, const GridVerdict& verdict, const 
   summary.fixed = fixed_of(summary, settings);
   for (std::size_t r = 0; r < replays.size(); ++r)
     summary.recordings.push_back(summarize_recording(replays[r], best.recordings[r], verdict, nuisance));
-  summary.warnings = warnings_of(summary, best, settings);
+  summary.warnings = warnings_of(summary, best, results.candidates, replays, settings);
   if (const std::string warning = warning_of_regions(results, verdict.level95); !warning.empty())
     summary.warnings.push_back(warning);
   if (const std::string reason = reason_unusable(summary, best); !reason.empty()) {

@@ -6,6 +6,8 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/text.h"
+#include "sysid/parameter_grid.h"
 
 namespace flash::sysid {
 namespace {
@@ -150,6 +152,74 @@ Eigen::MatrixXd read_matrix(const data::JsonObject& json, const char* key) {
   return matrix;
 }
 
+/// Refuses files of a later program or of another major version, which may mean other things by a field.
+void check_version(const data::JsonObject& json) {
+  const auto part = [](const std::string& version, std::size_t k) {
+    const std::vector<std::string_view> parts = data::split(version, ".");
+    return k < parts.size() ? data::parse_integer(parts[k]) : std::nullopt;
+  };
+  const std::string found = json.string("tool_version");
+  const auto major = part(found, 0), minor = part(found, 1);
+  if (!major || !minor || *major != *part(FLASH_VERSION, 0) || *minor > *part(FLASH_VERSION, 1))
+    throw json.error("tool_version", "a search by this program, version " FLASH_VERSION ", or one before it");
+}
+
+const ParameterInfo* info_of(const std::string& name) {
+  for (const ParameterInfo& info : known_parameters())
+    if (info.name == name) return &info;
+  return nullptr;
+}
+
+void check_value(const std::string& path, const std::string& field, const std::string& name, double value) {
+  const ParameterInfo* const info = info_of(name);
+  if (info == nullptr) throw data::input_error(path, field, "found \"" + name + "\", which is no parameter");
+  if (!(value >= info->low && value <= info->high))
+    throw data::input_error(path, field + "." + name,
+                            "found " + data::format_short(value) + ", expected " +
+                                data::format_short(info->low) + " to " + data::format_short(info->high));
+}
+
+void check_score(const std::string& path, const std::string& field, double score) {
+  if (!(score >= 0))
+    throw data::input_error(path, field,
+                            "found " + data::format_short(score) + ", expected a number of 0 or above");
+}
+
+void check_values(const Summary& summary, const std::string& path) {
+  for (const auto& [name, value] : summary.best) check_value(path, "best.parameters", name, value);
+  for (const auto& [name, fixed] : summary.fixed) check_value(path, "fixed", name, fixed.value);
+  check_score(path, "best.score", summary.best_score);
+  check_score(path, "best.membrane_stiffness", summary.membrane_stiffness);
+  check_score(path, "level95", summary.level95);
+  for (const ParameterFinding& finding : summary.parameters) {
+    const std::string field = "parameters." + finding.name;
+    if (!summary.best.empty() && !summary.best.contains(finding.name))
+      throw data::input_error(path, "best.parameters." + finding.name, "missing, expected a number");
+    if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
+    if (finding.interval95 && !((*finding.interval95)[0] <= (*finding.interval95)[1]))
+      throw data::input_error(path, field + ".interval95", "expected its lower end first");
+    if (finding.values.empty() || finding.values.size() != finding.scores.size())
+      throw data::input_error(path, field + ".profile", "expected as many scores as values, one at least");
+    for (const double value : finding.values) check_value(path, "parameters", finding.name, value);
+    for (const double score : finding.scores) check_score(path, field + ".profile.scores", score);
+  }
+  const auto count = static_cast<Eigen::Index>(summary.parameters.size());
+  if (summary.covariance_log.size() > 0 && summary.covariance_log.rows() != count)
+    throw data::input_error(path, "covariance_log", "expected a row for each of axes, or none");
+  for (const SummaryRecording& recording : summary.recordings) {
+    check_score(path, "recordings." + recording.name + ".score", recording.score);
+    check_score(path, "recordings." + recording.name + ".sigma_m", recording.sigma_m);
+    for (const SummaryFrame& frame : recording.frames) {
+      check_score(path, "recordings." + recording.name + ".frames.score", frame.score);
+      check_score(path, "recordings." + recording.name + ".frames.weight", frame.weight);
+    }
+  }
+  if (summary.candidates < 0 || summary.unconverged < 0 || summary.unconverged > summary.candidates)
+    throw data::input_error(path, "unconverged", "expected 0 to the number of candidates");
+  if (summary.exit_code != 0 && (summary.exit_code != 3 || summary.warnings.empty()))
+    throw data::input_error(path, "exit_code", "expected 0, or 3 with the reason among warnings");
+}
+
 }  // namespace
 
 std::string to_string(Identifiable identifiable) {
@@ -219,6 +289,7 @@ Summary load_summary(const std::string& path) {
   json.expect_fields({"schema", "tool_version", "best", "level95", "axes", "parameters", "fixed",
                       "covariance_log", "recordings", "solver_check", "settings", "asset", "candidates",
                       "unconverged", "device", "wall_seconds", "warnings", "exit_code"});
+  check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
   const data::JsonObject best = json.object("best");
@@ -247,6 +318,7 @@ Summary load_summary(const std::string& path) {
   summary.wall_seconds = json.number("wall_seconds");
   summary.warnings = typed<std::vector<std::string>>(json, "warnings", "a list of texts");
   summary.exit_code = json.integer("exit_code");
+  check_values(summary, path);
   return summary;
 }
 

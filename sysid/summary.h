@@ -95,7 +95,9 @@ std::string summary_text(const Summary& summary);
 /// when the folder cannot be written.
 void save_summary(const Summary& summary, const std::string& path);
 
-/// Throws data::InputError naming file and field unless the file is of schema "flash-sysid-summary/1".
+/// Throws data::InputError naming file and field unless the file is of schema "flash-sysid-summary/1", was
+/// written by this program or an earlier one of the same major version, and holds values that a search can
+/// find.
 Summary load_summary(const std::string& path);
 
 }  // namespace flash::sysid

@@ -14,7 +14,9 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/mesh_io.h"
+#include "data/text.h"
 #include "sysid/depth_camera.h"
+#include "sysid/memory_estimate.h"
 #include "sysid/replay.h"
 
 namespace flash::sysid {
@@ -97,18 +99,29 @@ data::Trajectory smooth_motion(const Eigen::Vector3d& from, const Eigen::Vector3
 }
 
 void check(const SynthSettings& settings) {
-  const auto positive = [](const char* flag, double value) {
-    if (!(value > 0))
-      throw data::InputError(std::string(flag) + ": found " + std::to_string(value) +
-                             ", expected more than 0");
+  const auto within = [](const char* flag, double value, double least, double most, const char* unit) {
+    if (!(value >= least && value <= most))
+      throw data::InputError(std::string(flag) + ": found " + data::format_short(value) + ", expected " +
+                             data::format_short(least) + " to " + data::format_short(most) + unit);
   };
-  positive("--duration", settings.duration);
-  positive("--rate", settings.keyframe_rate);
+  constexpr double kLongest = 3600, kFarthest = 10, kMostKeyframes = 10'000;
+  within("--duration", settings.duration, 1e-6, kLongest, " s");
+  within("--rest", settings.rest, 0, kLongest, " s");
+  within("--rate", settings.keyframe_rate, 1e-6, kMostKeyframes / (settings.duration + settings.rest),
+         " keyframes a second");
+  within("--time-offset", settings.time_offset, -kFarthest, kFarthest, " s");
+  within("--noise", settings.depth_noise, 0, kFarthest, " m");
+  for (int k = 0; k < 3; ++k) {
+    within("--offset", settings.cloud_offset[k], -kFarthest, kFarthest, " m");
+    if (settings.displacement)
+      within("--displacement", (*settings.displacement)[k], -kFarthest, kFarthest, " m");
+    for (const SynthCamera& camera : settings.cameras)
+      within("--camera", camera.base_from_camera.translation()[k], -kFarthest, kFarthest, " m");
+  }
   if (settings.cameras.empty()) throw data::InputError("--camera: found none, expected at least one");
   if (!(settings.dropped >= 0 && settings.dropped < 1))
     throw data::InputError("--dropped: found " + std::to_string(settings.dropped) +
                            ", expected at least 0 and less than 1");
-  if (!(settings.depth_noise >= 0)) throw data::InputError("--noise: expected at least 0");
 }
 
 data::Recording recording_of(const data::TriangleMesh& mesh, const std::string& mesh_spec,
@@ -178,9 +191,9 @@ bool is_visible(const Eigen::Vector3d& point, const DepthView& view, const Synth
   const Eigen::Vector3d seen = camera.base_from_camera.inverse() * point;
   const auto pixel = data::project(camera.intrinsics, seen);
   if (!pixel) return false;
-  const auto u = static_cast<Eigen::Index>(std::lround(pixel->x())),
-             v = static_cast<Eigen::Index>(std::lround(pixel->y()));
-  if (u < 0 || v < 0 || u >= view.depth.cols() || v >= view.depth.rows()) return false;
+  const double column = std::round(pixel->x()), row = std::round(pixel->y());
+  if (!(column >= 0 && row >= 0 && column < view.depth.cols() && row < view.depth.rows())) return false;
+  const auto u = static_cast<Eigen::Index>(column), v = static_cast<Eigen::Index>(row);
   return seen.z() < view.depth(v, u) + 0.005;
 }
 
@@ -227,7 +240,8 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   replay.settings.solver = solver;
   replay.settings.clamp_slopes = settings.clamp_slopes;
   if (settings.clamp_slopes) stiffen_clamped(replay);
-  replay.steps = static_cast<int>(std::ceil((settings.duration + settings.rest) / solver.time_step - 1e-9));
+  replay.steps = steps_in(settings.duration + settings.rest, solver.time_step);
+  check_job({replay}, 1, estimate_batch({replay}, 1));
   const sim::Rollout rollout = std::move(
       sim::simulate(replay.sheet, {make_environment(replay, {material, {}})}, replay.steps, solver, 1)
           .front());

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "data/error.h"
 #include "data/parallel.h"
 
 namespace flash::sysid {
@@ -90,7 +91,9 @@ GridResults score_models(const std::vector<ModelledReplay>& models, const std::v
   }
   const std::vector<std::vector<double>> points = cartesian_product(axes);
   results.candidates.resize(points.size());
+  const std::atomic<bool>* const stop = models.front().replay.settings.solver.stop;
   const auto score = [&](const std::vector<MotionModel>& slices, std::size_t i) {
+    if (stop != nullptr && *stop) throw data::Stopped();
     std::vector<ReplayResult> motions(slices.size());
     for (std::size_t r = 0; r < slices.size(); ++r) {
       motions[r].motion = slices[r].at({}, share);

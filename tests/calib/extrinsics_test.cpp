@@ -57,6 +57,17 @@ TEST(Extrinsics, DamagedFilesAreNamedByFieldAndFile) {
   }
 }
 
+TEST(Extrinsics, AnswersThatCannotBeUsedAreRefusedUnlessAccepted) {
+  SavedCalibration saved;
+  saved.json["exit_code"] = 3;
+  saved.json["warnings"] = {"rotations turn about one axis only"};
+  saved.save();
+  EXPECT_THROW(load_extrinsics(saved.path), data::InputError);
+  const Extrinsics accepted = load_extrinsics(saved.path, true);
+  EXPECT_FALSE(accepted.usable);
+  EXPECT_EQ(accepted.warnings, std::vector<std::string>{"rotations turn about one axis only"});
+}
+
 TEST(Extrinsics, RosUrdfAndEasyHandeyeSayTheSameTransform) {
   for (const Eigen::Vector3d& rotation : {Eigen::Vector3d(0.3, -0.8, 2), Eigen::Vector3d(0, M_PI / 2, 0)}) {
     const NamedTransform transform{"tool0", "camera", make_pose({0.1, -0.2, 0.3}, rotation)};

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "data/atomic_file.h"
 #include "data/depth_image.h"
 #include "tests/data/temporary_folder.h"
 
@@ -154,6 +155,36 @@ TEST(DepthImage, BrokenFilesAreErrors) {
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   for (std::size_t size = 8; size + 20 < bytes.size(); size += 5)
     EXPECT_NE(input_error_of([&] { load_mask(folder.write("cut.png", bytes.substr(0, size))); }), "") << size;
+}
+
+TEST(DepthImage, APictureThatUnpacksToTooMuchIsRefusedByItsHeader) {
+  const TemporaryFolder folder;
+  save_mask({4, 3, std::vector<std::uint8_t>(12, 9)}, folder / "m.png");
+  std::string bytes = read_file(folder / "m.png");
+  const auto sized = [&](std::uint8_t width_byte, std::uint8_t height_byte) {
+    bytes[18] = static_cast<char>(width_byte);  // the width is 256 times this, and 4
+    bytes[22] = static_cast<char>(height_byte);
+    const std::string path = folder.write("x.png", bytes);
+    return input_error_of([&] { load_mask(path); }).substr(path.size());
+  };
+  EXPECT_EQ(sized(64, 64), ": found 16,388 x 16,387 pixels, expected at most 268,435,456 in all");
+  EXPECT_NE(sized(1, 1).find("PNG cannot be decoded"), std::string::npos);  // the header's sum is wrong
+}
+
+TEST(DepthImage, ACameraThatSeesNothingNearIsRefused) {
+  CameraIntrinsics camera;
+  camera.width = 4;
+  camera.height = 3;
+  camera.cx = 1.5;
+  camera.cy = 1;
+  const DepthImage depth{4, 3, std::vector<std::uint16_t>(12, 1000)};
+  camera.fx = camera.fy = 1e-300;
+  EXPECT_EQ(
+      input_error_of([&] { points_from_depth(depth, {}, camera, 0.001, "d.png"); }),
+      "d.png: 12 of 12 pixels become points more than 100 km away, or none: check the camera's matrix and "
+      "distortion, and the depth scale");
+  camera.fx = camera.fy = 5;
+  EXPECT_EQ(points_from_depth(depth, {}, camera, 0.001, "d.png").rows(), 12);
 }
 
 TEST(DepthImage, PointsLieWhereTheirPixelsLook) {

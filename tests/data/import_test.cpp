@@ -1,6 +1,7 @@
 #include "data/import.h"
 
 #include <gtest/gtest.h>
+#include "data/extrinsics.h"
 
 #include <cmath>
 #include <numbers>
@@ -8,6 +9,7 @@
 #include "data/atomic_file.h"
 #include "data/depth_image.h"
 #include "data/mesh_io.h"
+#include "data/text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -37,6 +39,23 @@ class ImportFiles : public testing::Test {
   TemporaryFolder folder_;
   ImportOptions options_;
 };
+
+// The gripper stands still for 3 s, then lifts; the clouds begin at 2 s.
+TEST_F(ImportFiles, TheGraspBeginsByTheClockOfTheFilesWhenTheGripperSetsOff) {
+  const auto grasp_of = [&](double first_pose, double first_cloud) {
+    const auto pose = [&](double t, const char* y) {
+      return format_number(first_pose + t) + ",0.5," + y + ",0.052,0,0,0,1\n";
+    };
+    folder_.write("tcp.csv", "t,tx,ty,tz,qx,qy,qz,qw\n" + pose(0, "0.1") + pose(3, "0.1") + pose(4, "0.15"));
+    options_.times = "rate:10:" + format_number(first_cloud);
+    options_.overwrite = true;
+    const Recording recording = import_recording(options_);
+    return recording.origin + recording.grasps[0].from;
+  };
+  EXPECT_EQ(grasp_of(1.764e9, 1.764e9 + 2), 1.764e9 + 2);
+  EXPECT_EQ(grasp_of(1000, 1003.5), 1003);
+  EXPECT_EQ(grasp_of(0, 0), 0);
+}
 
 TEST_F(ImportFiles, CloudsAndATrajectoryBecomeARecording) {
   options_.nuisance.offset.setConstant(0.06);
@@ -118,21 +137,101 @@ TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
   folder_.write("camera.json",
                 R"({"schema": "flash-extrinsics/1", "setup": "eye-to-hand", "transform": {"parent": "base",
     "child": "camera", "translation": [0.5, 0.24, 1.06], "rotation_xyzw": [1, 0, 0, 0]}})");
-  EXPECT_TRUE(load_extrinsics(folder_ / "camera.json").isApprox(load_extrinsics(folder_ / "camera.tum")));
+  EXPECT_TRUE(load_camera_pose(folder_ / "camera.json", false)
+                  .transform.T.isApprox(load_camera_pose(folder_ / "camera.tum", false).transform.T));
   options_.overwrite = true;
+  folder_.write(
+      "camera.json",
+      R"({"schema": "flash-extrinsics/1", "exit_code": 3, "warnings": ["one axis only"], "transform": {
+    "translation": [0.5, 0.24, 1.06], "rotation_xyzw": [1, 0, 0, 0]}})");
+  options_.extrinsics = folder_ / "camera.json";
+  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("cannot be used (one axis only)"),
+            std::string::npos);
+  options_.accept_unusable = true;
+  const std::vector<std::string> said = import_recording(options_).notices;
+  EXPECT_NE(std::find(said.begin(), said.end(), (folder_ / "camera.json") + ": one axis only"), said.end());
   options_.extrinsics.clear();
   EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
             "import: --depth needs --intrinsics and --extrinsics");
 }
 
-TEST_F(ImportFiles, WhatFailsItsCheckLeavesNoRecording) {
+TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
+  // Seen from above, from the grasped corner: 0.3 m to the left (+x), 0.2 m to the right (+y).
+  Points cloud(31 * 21, 3);
+  for (int i = 0; i < 31; ++i)
+    for (int j = 0; j < 21; ++j) cloud.row(21 * i + j) << 0.5 - 0.01 * i, 0.1 + 0.01 * j, 0.06;
+  for (const char* name : {"clouds/2.ply", "clouds/10.pcd", "clouds/11.ply"})
+    save_point_cloud(cloud, folder_ / name);
+  options_.overwrite = true;
+  const auto told = [&](const std::string& sheet, const std::string& grasp) {
+    options_.sheet = sheet;
+    options_.grasp = grasp;
+    for (const std::string& notice : import_recording(options_).notices)
+      if (notice.find("--sheet") != std::string::npos) return notice;
+    return std::string();
+  };
+  EXPECT_EQ(told("0.2x0.3", "corner"), "");
+  EXPECT_EQ(told("0.2x0.3", "corner:1,1"), "");
+  EXPECT_EQ(told("0.3x0.2", "corner:1,0"), "");
+  EXPECT_NE(told("0.3x0.2", "corner").find("--sheet: with the sides changed over, 0.2x0.3, the sheet is"),
+            std::string::npos);
+  EXPECT_NE(told("0.2x0.3", "corner:0,1"), "");
+}
+
+TEST_F(ImportFiles, TheMiddleOfThePatchCanBeAtTheTool) {
+  options_.tool_at_patch = true;
+  options_.within = 0.04;
+  const Recording recording = import_recording(options_);
+  Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+  const std::vector<int> held = select_vertices(recording, recording.grasps[0]);
+  for (const int vertex : held) middle += recording.start.row(vertex) / static_cast<double>(held.size());
+  EXPECT_TRUE(middle.isApprox(Eigen::RowVector3d(0.5, 0.1, 0.05), 1e-9)) << middle;
+}
+
+TEST_F(ImportFiles, SenselessOptionsAreRefusedByTheirNames) {
+  const auto message = [&](auto change) {
+    ImportOptions options = options_;
+    change(options);
+    return input_error_of([&] { import_recording(options); });
+  };
+  EXPECT_EQ(message([](ImportOptions& o) { o.cell = 100; }),
+            "--cell: found \"100\", expected at most the shorter side of the sheet, 0.2 m");
+  EXPECT_EQ(message([](ImportOptions& o) { o.sheet = "200x200", o.cell = 10; }),
+            "--sheet: found \"200x200\", expected metres (millimetres read as metres?)");
+  EXPECT_EQ(message([](ImportOptions& o) { o.times = "rate:1e300"; }),
+            "--times: found \"rate:1e300\", expected rate:HZ, rate:HZ:START or a CSV file with a column t");
+  EXPECT_EQ(message([](ImportOptions& o) { o.asset = "nowhere.json"; }),
+            "--asset: found \"nowhere.json\", expected a file");
+  const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
+  EXPECT_EQ(message([&](ImportOptions& o) { o.trajectory = one; }),
+            "--trajectory: " + one + ": found one pose, expected two or more");
+  EXPECT_NE(
+      message([](ImportOptions& o) { o.times = "rate:10:1764000000"; }).find("expected one clock for both"),
+      std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "lift"));
+}
+
+TEST_F(ImportFiles, TheAssetIsNamedFromTheRecording) {
+  options_.asset = folder_.write("towel.json", "{}");
+  for (const bool again : {false, true}) {
+    options_.overwrite = again;
+    EXPECT_EQ(std::filesystem::weakly_canonical(import_recording(options_).asset),
+              std::filesystem::weakly_canonical(options_.asset));
+    EXPECT_NE(read_file(folder_ / "lift/recording.json").find("\"../towel.json\""), std::string::npos);
+  }
+}
+
+TEST_F(ImportFiles, WhatFailsItsCheckLeavesNothing) {
   options_.grasp = "corner:0,2";
   EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("--grasp: found \"corner:0,2\""),
             std::string::npos);
   options_.grasp = "position";  // the sheet would lie at the origin, half a metre from the gripper
   EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("no vertex lies within"),
             std::string::npos);
-  EXPECT_FALSE(std::filesystem::exists(folder_ / "lift/recording.json"));
+  std::size_t entries = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "."))
+    entries += !entry.path().empty();
+  EXPECT_EQ(entries, 2u);  // tcp.csv, clouds
   options_.grasp = "corner";
   options_.crop_z = "0.5:0.1";
   EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
@@ -144,6 +243,14 @@ TEST_F(ImportFiles, WhatFailsItsCheckLeavesNoRecording) {
   options_.crop_z.clear();
   import_recording(options_);
   EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("exists already"), std::string::npos);
+  // A shorter recording over a longer one leaves none of its frames, but what it did not write.
+  folder_.write("lift/frames/notes.txt", "mine");
+  std::filesystem::remove(folder_ / "clouds/11.ply");
+  options_.overwrite = true;
+  import_recording(options_);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "lift/frames/000002.ply"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/000001.ply"));
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/notes.txt"));
 }
 
 class ImportedClip : public testing::TestWithParam<const char*> {};

@@ -49,6 +49,26 @@ TEST(JsonReader, SyntaxErrorsNameLineAndColumn) {
   EXPECT_NE(input_error_of([] { parse_json("", "f.json"); }), "");
 }
 
+TEST(JsonReader, DeepNestingIsRefusedBeforeTheStackEnds) {
+  const auto nested = [](std::size_t levels) {
+    return R"({"text": "[[[[\"[", "list":)" + std::string(levels, '[') + std::string(levels, ']') + '}';
+  };
+  EXPECT_EQ(input_error_of([&] { parse_json(nested(255), "f.json"); }), "");
+  EXPECT_EQ(input_error_of([&] { parse_json(nested(256), "f.json"); }),
+            "f.json: line 1: found more than 256 levels of nesting");
+  EXPECT_NE(input_error_of([&] { parse_json(nested(80000), "f.json"); }), "");
+  EXPECT_NE(input_error_of([&] { parse_json(std::string(80000, '['), "f.json"); }), "");
+}
+
+TEST(JsonReader, NamesGivenTwiceInOneObjectAreRefused) {
+  const auto message = [](const char* text) { return input_error_of([&] { parse_json(text, "f.json"); }); };
+  EXPECT_EQ(message(R"({"props": {"young": 1, "poisson": 0.3, "young": 2}})"),
+            "f.json: props.young: given twice, expected once");
+  EXPECT_EQ(message(R"({"a": 1, "b": [{"a": 1}, {"a": 2}], "c": {"a": {}}, "a": null})"),
+            "f.json: a: given twice, expected once");
+  EXPECT_EQ(message(R"({"a": {"a": 1}, "b": [{"a": 1}, {"a": 2}]})"), "");
+}
+
 TEST(JsonReader, FormattedTextReadsBackAsTheSame) {
   nlohmann::ordered_json value = {
       {"text", "a, b: \"c\" \\"}, {"numbers", {1.5, 1e-7, 3}}, {"nothing", nullptr}};

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
 #include <random>
 
 #include "data/atomic_file.h"
@@ -125,6 +127,87 @@ TEST(MeshIo, AsciiPcdDropsTheHolesOfAnOrganisedCloud) {
   EXPECT_EQ(points.row(1), Eigen::RowVector3d(4, 5, 6));
 }
 
+/// What PCL 1.13 writes for eight points x = 1/4, 1/4, 1/4, 1/4, 1/2, ..., y = 1, z = 2 but for the seventh's
+/// NaN.
+const std::string compressed_header =
+    "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 "
+    "1 1\n"
+    "WIDTH 8\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 8\nDATA binary_compressed\n";
+const std::string compressed_body(
+    "\x26\x00\x00\x00\x60\x00\x00\x00\x04\x00\x00\x80\x3e\x00\xe0\x04\x03\x02\x00\x3f\x00\xe0"
+    "\x04\x03\x00\x80\x20\x0f\xe0\x13\x03\x01\x00\x40\x20\x2f\xe0\x0a\x03\x01\xc0\x7f\x20\x17"
+    "\x00\x40",
+    46);
+
+TEST(MeshIo, CompressedPcdOfPclIsRead) {
+  const TemporaryFolder folder;
+  std::size_t left_out = 0;
+  const Points points =
+      load_point_cloud(folder.write("a.pcd", compressed_header + compressed_body), left_out);
+  EXPECT_EQ(left_out, 1u);
+  ASSERT_EQ(points.rows(), 7);
+  EXPECT_EQ(points.row(3), Eigen::RowVector3d(0.25, 1, 2));
+  EXPECT_EQ(points.row(6), Eigen::RowVector3d(0.5, 1, 2));
+}
+
+TEST(MeshIo, DamagedCompressedPcdIsAnErrorNotACrash) {
+  const TemporaryFolder folder;
+  std::mt19937 generator(1);
+  for (int trial = 0; trial < 500; ++trial) {
+    std::string damaged = compressed_body;
+    damaged[generator() % damaged.size()] = static_cast<char>(generator());
+    if (trial % 2 == 1) damaged.resize(generator() % damaged.size());
+    const std::string path = folder.write("a.pcd", compressed_header + damaged);
+    const std::string message = input_error_of([&] { load_point_cloud(path); });
+    ASSERT_TRUE(message.empty() || message.starts_with(path)) << message;
+  }
+  for (const char* line : {"SIZE 4 4 4611686018427387904", "COUNT 1 1 4611686018427387904", "COUNT 1 0 1",
+                           "POINTS 4611686018427387904"}) {
+    std::string header = compressed_header;
+    const std::size_t begin = header.find(std::string("\n") + std::string(line).substr(0, 5)) + 1;
+    header.replace(begin, header.find('\n', begin) - begin, line);
+    EXPECT_NE(input_error_of([&] { load_point_cloud(folder.write("a.pcd", header + compressed_body)); }), "")
+        << line;
+  }
+}
+
+TEST(MeshIo, BigEndianPlyIsRead) {
+  const TemporaryFolder folder;
+  const auto big = [](auto value) {
+    std::string bytes(reinterpret_cast<const char*>(&value), sizeof value);
+    return std::string(bytes.rbegin(), bytes.rend());
+  };
+  std::string file =
+      "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty double x\nproperty float y\n"
+      "property short z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  for (int v = 0; v < 3; ++v)
+    file += big(v == 1 ? 0.1 : 0.0) + big(v == 2 ? 0.5f : 0.0f) + big(static_cast<std::int16_t>(258 * v));
+  file += big(std::uint8_t{3}) + big(0) + big(1) + big(2);
+  const TriangleMesh mesh = load_triangle_mesh(folder.write("a.ply", file));
+  Points vertices(3, 3);
+  vertices << 0, 0, 0, 0.1, 0, 258, 0, 0.5, 516;
+  EXPECT_EQ(mesh.vertices, vertices);
+  EXPECT_EQ(mesh.triangles.row(0), Eigen::RowVector3i(0, 1, 2));
+}
+
+// How an organised cloud marks the pixels that saw nothing depends on the driver, not on the format.
+TEST(MeshIo, CloudsOfEveryFormatLeaveOutWhatIsNotFinite) {
+  const TemporaryFolder folder;
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
+                   infinity = std::numeric_limits<double>::infinity();
+  Points points(5, 3);
+  points << 1, 2, 3, nan, nan, nan, 4, 5, 6, 7, nan, 9, 1, 2, infinity;
+  for (const char* name : {"a.ply", "a.pcd"}) {
+    SCOPED_TRACE(name);
+    save_point_cloud(points, folder / name);
+    std::size_t left_out = 0;
+    const Points read = load_point_cloud(folder / name, left_out);
+    EXPECT_EQ(left_out, 3u);
+    ASSERT_EQ(read.rows(), 2);
+    EXPECT_EQ(read.row(1), Eigen::RowVector3d(4, 5, 6));
+  }
+}
+
 std::string ply(const std::string& body, int vertices, int faces) {
   return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(vertices) +
          "\nproperty float x\nproperty float y\nproperty float z\nelement face " + std::to_string(faces) +
@@ -152,12 +235,14 @@ TEST(MeshIo, BrokenMeshesAreNamed) {
   EXPECT_EQ(message("a.ply", ply(square, 5, 1)), ": ends before all elements of its header are read");
   EXPECT_EQ(message("a.ply", ply(square + "2 0 1\n", 4, 1)), ": face 0 has 2 corners, expected 3 or more");
   EXPECT_EQ(message("a.ply", "solid"), ": not a PLY file, expected \"ply\" on its first line");
-  EXPECT_EQ(message("a.ply", "ply\nformat binary_big_endian 1.0\n"),
-            ": header line 2: found \"format binary_big_endian 1.0\", expected format ascii or "
-            "binary_little_endian");
+  EXPECT_EQ(message("a.ply", "ply\nformat binary_middle_endian 1.0\n"),
+            ": header line 2: found \"format binary_middle_endian 1.0\", expected format ascii, "
+            "binary_little_endian or binary_big_endian");
   EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 x\n"), ": line 2: found \"x\", expected a coordinate");
   EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 4\n"),
             ": triangle 0: found vertex index 3, expected 0 to 2");
+  EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 99999999999\n"),
+            ": line 4: found \"99999999999\", expected a vertex index from 1");
   EXPECT_EQ(message("a.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n"),
             ": DATASET STRUCTURED_POINTS, expected POLYDATA or UNSTRUCTURED_GRID");
   EXPECT_EQ(message("a.fbx", ""),

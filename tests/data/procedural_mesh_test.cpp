@@ -4,8 +4,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <map>
 #include <numbers>
+#include <random>
+#include <vector>
 
 #include "data/error.h"
 #include "data/mesh_io.h"
@@ -117,6 +121,41 @@ TEST(ProceduralMesh, CircumcirclesOfTheDelaunayMeshAreEmpty) {
     }
     expect_disc_topology(mesh);
     EXPECT_NEAR(area(mesh), 0.04, 1e-15);
+  }
+}
+
+double smallest_angle(const TriangleMesh& mesh) {
+  double smallest = std::numbers::pi;
+  for (Eigen::Index t = 0; t < mesh.triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::Vector3d corner = mesh.vertices.row(mesh.triangles(t, k));
+      const Eigen::Vector3d a = mesh.vertices.row(mesh.triangles(t, (k + 1) % 3)).transpose() - corner;
+      const Eigen::Vector3d b = mesh.vertices.row(mesh.triangles(t, (k + 2) % 3)).transpose() - corner;
+      smallest = std::min(smallest, std::atan2(a.cross(b).norm(), a.dot(b)));
+    }
+  return smallest * 180 / std::numbers::pi;
+}
+
+// Even points on the border lie on many common circles: rounding once made triangles without an area of them.
+TEST(ProceduralMesh, DelaunayMeshesOfAnySizeCoverItWithoutThinTriangles) {
+  std::mt19937 generator(1);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(generator()) / 4294967296.0;
+  };
+  std::vector<std::array<double, 3>> sizes = {
+      {0.3177, 0.2485, 0.02118}, {0.2223, 0.4269, 0.07}, {1, 1, 0.02}};
+  for (int k = 0; k < 500; ++k) {
+    const double width = uniform(0.05, 0.6), height = uniform(0.05, 0.6), side = std::min(width, height);
+    sizes.push_back({width, height, std::max(side / uniform(1, 15), std::sqrt(width * height / 400))});
+  }
+  for (const auto& [width, height, cell] : sizes) {
+    SCOPED_TRACE(std::to_string(width) + " x " + std::to_string(height) + ", cell " + std::to_string(cell));
+    const TriangleMesh mesh = delaunay_rectangle(width, height, cell, 1);
+    ASSERT_NO_THROW(check_triangle_mesh(mesh, "mesh"));
+    ASSERT_NEAR(area(mesh) / (width * height), 1, 1e-13);  // rounding of some hundred sums
+    if (cell <= std::min(width, height)) {
+      ASSERT_GE(smallest_angle(mesh), 15);
+    }
   }
 }
 

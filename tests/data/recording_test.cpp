@@ -4,8 +4,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "data/atomic_file.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -70,6 +72,55 @@ TEST_F(RecordingFiles, LoadsWhatTheFileSays) {
   ASSERT_EQ(notices.size(), 1u);
   EXPECT_NE(notices[0].find("1 of 2 keyframes have no point inside the crop box (t = 0.5 s)"),
             std::string::npos);
+}
+
+// Stamps of ROS and of cameras count from 1970, or from when the machine was switched on.
+TEST_F(RecordingFiles, TimesCountFromItsStartWhateverTheClock) {
+  const Recording zero = load();
+  for (const double epoch : {1000.0, 1.764e9, -3.5}) {
+    const std::string t0 = format_number(epoch), t1 = format_number(epoch + 1);
+    folder_.write("gripper.tum", t0 + " 0.2 0.2 0 0 0 0 1\n" + t1 + " 0.2 0.2 0.1 0 0 0 1\n");
+    json_["grasps"][0]["from"] = epoch;
+    json_["grasps"][0]["to"] = epoch + 0.7;
+    json_["keyframes"][0]["t"] = epoch;
+    json_["keyframes"][1]["t"] = epoch + 0.5;
+    const Recording recording = load();
+    EXPECT_EQ(recording.origin, epoch);
+    EXPECT_EQ(recording.keyframes[1].time, 0.5);
+    EXPECT_EQ(recording.grasps[0].from, 0);
+    EXPECT_EQ(recording.grasps[0].to, 0.7);
+    EXPECT_EQ(recording.trajectories.at("gripper").times, zero.trajectories.at("gripper").times);
+    save_recording(recording, folder_ / "again.json");
+    const json again = json::parse(read_file(folder_ / "again.json"));
+    EXPECT_EQ(again["grasps"][0]["from"], epoch);
+    EXPECT_EQ(again["keyframes"][1]["t"], epoch + 0.5);
+    json_["grasps"][0].erase("from");  // with the recording
+    EXPECT_EQ(load().grasps[0].from, 0);
+  }
+}
+
+TEST_F(RecordingFiles, ItsNameIsOneLine) {
+  json_["name"] = "two\nlines";
+  EXPECT_NE(message().find("name: found"), std::string::npos);
+  json_["name"] = "../../anything else";
+  EXPECT_EQ(message(), "");
+}
+
+TEST_F(RecordingFiles, TimesOfAnotherClockAndSenselessBoundsAreNamed) {
+  json_["grasps"][0]["from"] = -1e12;
+  EXPECT_NE(message().find("grasps[0].from: found -1e+12 s, expected a time by the clock of the keyframes"),
+            std::string::npos);
+  json_["grasps"][0]["from"] = 0;
+  json_["keyframes"][0]["t"] = -1.764e9;
+  EXPECT_NE(message().find("keyframes: found times from -1764000000 to 0.5 s"), std::string::npos);
+  json_["keyframes"][0]["t"] = 0;
+  for (const auto& [field, value] : std::vector<std::pair<std::string, double>>{
+           {"time_s", 1e9}, {"time_s", 1e4}, {"offset_m", 1e9}, {"yaw_rad", 1e9}, {"start_yaw_rad", 10}}) {
+    const json nuisance = json_["nuisance"];
+    json_["nuisance"][field] = value;
+    EXPECT_NE(message().find("nuisance." + field), std::string::npos) << field;
+    json_["nuisance"] = nuisance;
+  }
 }
 
 TEST_F(RecordingFiles, SurvivesSaveAndLoad) {
@@ -218,7 +269,38 @@ TEST_F(RecordingFiles, BrokenAndEmptyCloudsAreNamed) {
   Points cloud = load_point_cloud(folder_ / "frames/000.ply");
   cloud(1, 2) = NAN;
   save_point_cloud(cloud, folder_ / "frames/001.ply");
-  EXPECT_EQ(message(), folder_ / "frames/001.ply" + ": 1 of 3 points are not finite; first at index 1");
+  EXPECT_EQ(message(), "");
+  const Recording recording = load_recording(folder_ / "recording.json");
+  std::vector<std::string> notices;
+  EXPECT_EQ(load_keyframes(recording, notices)[0].cloud.rows(), 1);
+  EXPECT_NE(notices.back().find("2 points of 2 keyframes are not finite and were left out"),
+            std::string::npos);
+}
+
+TEST_F(RecordingFiles, EmptyKeyframesAreUsualWhileTheSheetStillLies) {
+  const auto notice = [&](double raised) {
+    folder_.write("gripper.tum", "0 0.2 0.2 0 0 0 0 1\n0.5 0.2 0.2 " + std::to_string(raised) + " 0 0 0 1\n");
+    json_["keyframes"] = json::array();
+    for (int k = 0; k < 4; ++k)
+      json_["keyframes"].push_back({{"t", 0.2 * k}, {"cloud", k < 3 ? "frames/001.ply" : "frames/000.ply"}});
+    EXPECT_EQ(message(), "");
+    std::vector<std::string> notices;
+    load_keyframes(load_recording(folder_ / "recording.json"), notices);
+    return notices.at(0);
+  };
+  const std::string found = "3 of 4 keyframes have no point inside the crop box (t = 0 to 0.4 s)";
+  EXPECT_TRUE(notice(0.03).ends_with(found +
+                                     ": as usual at the beginning of a lift, while the sheet lies on the "
+                                     "table"))
+      << notice(0.03);
+  EXPECT_TRUE(notice(0.3).ends_with(found)) << notice(0.3);
+}
+
+TEST_F(RecordingFiles, JumpsOfTheGripperAreTold) {
+  folder_.write("gripper.tum", "0 0.2 0.2 0 0 0 0 1\n0.5 0.2 0.2 0.1 0 0 0 1\n0.6 10.2 0.2 0.1 0 0 0 1\n");
+  EXPECT_EQ(message(), "");
+  EXPECT_NE(load_recording(folder_ / "recording.json").notices.at(0).find("a jump of up to 10 m"),
+            std::string::npos);
 }
 
 class SharedRecording : public testing::TestWithParam<std::string> {};

@@ -43,6 +43,21 @@ void write_meshes(const std::string& folder) {
   data::write_atomically(folder + "/pcd/ascii.pcd",
                          "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\nHEIGHT 1\n"
                          "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n0 0 0\n");
+  data::write_atomically(
+      folder + "/pcd/compressed.pcd",
+      "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 8\nHEIGHT 1\n"
+      "VIEWPOINT 0 0 0 1 0 0 0\nPOINTS 8\nDATA binary_compressed\n" +
+          std::string(
+              "\x26\x00\x00\x00\x60\x00\x00\x00\x04\x00\x00\x80\x3e\x00\xe0\x04\x03\x02\x00\x3f\x00\xe0"
+              "\x04\x03\x00\x80\x20\x0f\xe0\x13\x03\x01\x00\x40\x20\x2f\xe0\x0a\x03\x01\xc0\x7f\x20\x17"
+              "\x00\x40",
+              46));
+  data::write_atomically(
+      folder + "/ply/big_endian.ply",
+      "ply\nformat binary_big_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" +
+          std::string(12, '\0') + std::string("\x3f\x80\0\0\0\0\0\0\0\0\0\0", 12) +
+          std::string("\0\0\0\0\x3f\x80\0\0\0\0\0\0", 12) + std::string("\3\0\0\0\0\0\0\0\1\0\0\0\2", 13));
 }
 
 void write_camera(const std::string& folder) {

@@ -68,12 +68,14 @@ def rms(a, b):
 def of_motion(scene, rest, output):
     last, before = output.last, output.frame(output.steps - 1)
     velocity = [[(a - b) / scene["dt"] for a, b in zip(p, q)] for p, q in zip(last, before)]
-    along = [p[0] - q[0] for p, q in zip(last, rest)]
+    moved = {axis: [p[k] - q[k] for p, q in zip(last, rest)] for k, axis in enumerate("xyz")}
+    along = moved["x"]
     height = [p[2] for p in last]
     quantities = {"z (implicit Euler)": height, "z (continuum) ": height, "x displacement after 1 s": along,
                   "distance (implicit Euler)": along, "distance (continuum)": along,
                   "y,z displacement": max(abs(p[k] - q[k]) for p, q in zip(last, rest) for k in (1, 2)),
                   "final speed": max(math.hypot(*v) for v in velocity), "velocity after one step": velocity}
+    quantities |= {f"{axis} displacement after 1 s": values for axis, values in moved.items()}
     if "plane" in output.forces:
         quantities["normal force sum N"] = output.forces["plane"][2]
     return quantities

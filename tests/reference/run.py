@@ -37,7 +37,7 @@ def solve(name, scenes, results, sim):
     done = subprocess.run([sim, "run", str(path), "-o", str(folder / "out"), "--force", "--quiet", "--threads", "1"],
                           capture_output=True, text=True)
     if done.returncode != 0:
-        sys.exit(f"{name}: exit code {done.returncode}: {done.stderr}")
+        raise RuntimeError(f"exit code {done.returncode}: {done.stderr.strip()}")
     output = quantities.Output(folder / "out")
     result = {}
     expected = None
@@ -49,12 +49,24 @@ def solve(name, scenes, results, sim):
         expected = scene_files.read_points(scenes / scene["reference_positions"])
         result["positions"] = output.last
     found = quantities.of(scene, rest, output, expected)
-    result["quantities"] = {entry["quantity"]: found[entry["quantity"]] for entry in scene["expected"]}
+    wanted = [entry["quantity"] for entry in scene["expected"]]
+    unknown = [quantity for quantity in wanted if quantity not in found]
+    if unknown:
+        raise RuntimeError(f"no such quantity here: {', '.join(unknown)}")
+    result["quantities"] = {quantity: found[quantity] for quantity in wanted}
     (results / f"{name}.json").write_text(json.dumps(result))
     return name, time.monotonic() - begin, done.stderr.strip()
 
 
-def main():
+def solved(name, *arguments):
+    """What solve returns, or the reason why a scene has no result: the others have theirs all the same."""
+    try:
+        return *solve(name, *arguments), ""
+    except (RuntimeError, OSError, KeyError, ValueError) as error:
+        return name, 0.0, "", f"{type(error).__name__}: {error}"
+
+
+def main(words=None):
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sim", required=True, help="the program flash-sim")
     parser.add_argument("--scenes", required=True, type=pathlib.Path, help="folder of the reference scenes")
@@ -62,13 +74,17 @@ def main():
     parser.add_argument("--jobs", type=int, default=1, help="scenes at once")
     parser.add_argument("--judge", action="store_true", help="fail where a quantity is farther off than allowed")
     parser.add_argument("scene", nargs="*", help="these alone")
-    options = parser.parse_args()
+    options = parser.parse_args(words)
     options.out.mkdir(parents=True, exist_ok=True)
     failed = False
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        runs = pool.map(lambda name: solve(name, options.scenes, options.out, options.sim),
+        runs = pool.map(lambda name: solved(name, options.scenes, options.out, options.sim),
                         options.scene or names(options.scenes))
-        for name, seconds, warnings in runs:
+        for name, seconds, warnings, reason in runs:
+            if reason:
+                failed = True
+                print(f"          {name}  no result: {reason}", flush=True)
+                continue
             print(f"{seconds:6.1f} s  {name}  {warnings}".rstrip(), flush=True)
             for quantity, value, wanted, error, allowed in reference.rows_of(name, options.scenes, options.out):
                 if options.judge and not error <= allowed:

@@ -4,6 +4,7 @@ exit code 2 and one line that names the file and the field, and must leave nothi
 import argparse
 import copy
 import json
+import os
 import pathlib
 import shutil
 import struct
@@ -164,6 +165,13 @@ def write_sound_files(sysid, sim, folder):
     content["keyframes"] = [{"t": 0.3, "depth": "depth.png", "mask": "mask.png"}]
     content.pop("crop", None)
     path.write_text(json.dumps(content))
+    (folder / "view" / "depth").mkdir(parents=True)
+    (folder / "view" / "camera_info.yaml").write_text(CAMERA)
+    for frame in range(3):
+        shutil.copy(folder / "depth" / "depth.png", folder / "view" / "depth" / f"{frame}.png")
+    (folder / "view" / "extrinsics.json").write_text(json.dumps(
+        {"schema": "flash-extrinsics/1", "transform": {"parent": "base", "child": "camera", "translation": [0.1, 0.1, 0.6],
+                                                       "rotation_xyzw": [1, 0, 0, 0]}}))
     program.must(sysid, "grid", recording, "--asset", asset, "--bending", "5e-5,1e-4,2e-4", "--no-solver-check",
                  "--no-horizon", "--quiet", "-o", folder / "run")
 
@@ -187,7 +195,27 @@ def verbs(sysid, sim):
                                  "5e-5,1e-4,2e-4", "--no-solver-check", "--no-horizon", "--resume", "-o", f / "run"],
             "import": lambda f: [sysid, "import", f / "recording" / "frames", "--trajectory",
                                  f / "recording" / "gripper.tum", "--times", f / "times.csv", "--sheet", "0.2x0.2",
-                                 "--cell", "0.05", "-o", f / "out"]}
+                                 "--cell", "0.05", "-o", f / "out"],
+            **{" ".join(options): lambda f, options=options: [
+                sysid, "import", f / "recording" / "frames", "--trajectory", f / "recording" / "gripper.tum", "--sheet",
+                "0.2x0.2", "--cell", "0.05", "-o", f / "out", *options] for options in IMPORT_OPTIONS},
+            **{" ".join(("segment", *options)): lambda f, options=options: [
+                sysid, "segment", f / "view", "-o", f / "out", *(str(word).replace("{}", str(f)) for word in options)]
+               for options in SEGMENT_OPTIONS}}
+
+
+# What no user can mean, and what the message has to name.
+IMPORT_OPTIONS = {("--cell", "100"): "--cell", ("--offset", "nan"): "--offset", ("--heading", "inf"): "--heading",
+                  ("--times", "rate:0"): "--times", ("--times", "rate:10:1764000000"): "--times",
+                  ("--times", "/dev/zero"): "/dev/zero", ("--asset", "nowhere.json"): "--asset",
+                  ("--crop-z", "1:0"): "--crop-z"}
+SEGMENT_OPTIONS = {("--voxel", "1e-12"): "--voxel", ("--voxel", "nan"): "--voxel", ("--cluster-gap", "50"): "--cluster-gap",
+                   ("--arm-radius", "1e9"): "--arm-radius", ("--clearance", "-1"): "--clearance",
+                   ("--depth-scale", "1e9"): "--depth-scale", ("--crop-min", "1,0,0", "--crop-max", "0,1,1"): "--crop-min",
+                   ("--crop-min", "9,9,9"): "table", ("--trajectory", "{}/recording/gripper.tum"): "--times",
+                   ("--trajectory", "{}/recording/gripper.tum", "--times", "rate:10:1764000000"): "gripper.tum",
+                   ("--times", "{}"): "is a folder", ("--masks", "{}/nowhere"): "nowhere",
+                   ("--intrinsics", "{}/pipe"): "pipe", ("--extrinsics", "/dev/zero"): "/dev/zero"}
 
 
 def asset_cases():
@@ -321,9 +349,9 @@ def cloud_cases(first):
     file = f"recording/{first}"
     for name, damage, words in (
             ("cut off", cut(0.9), ()), ("header cut off", lambda c: c[:20], ("header",)),
-            ("not finite", ply_number(4, NAN), ("not finite",)), ("in millimetres", ply_scaled(1000), ("millimetres",)),
+            ("in millimetres", ply_scaled(1000), ("millimetres",)),
             ("of another kind", lambda _: b"# .PCD v0.7\n", ("PLY",)),
-            ("big endian", lambda c: c.replace(b"little", b"big", 1), ("format",)),
+            ("of mixed endian", lambda c: c.replace(b"little", b"middle", 1), ("format",)),
             ("property of unknown type", lambda c: c.replace(b"property float", b"property quad", 1), ("type",))):
         yield Case(f"cloud {name}", "recording", rewritten(file, damage), first.split("/")[-1], *words)
 
@@ -341,6 +369,10 @@ def camera_cases():
             ("depth cut off", depth, cut(0.6), ()), ("depth no PNG", depth, lambda _: b"JFIF", ()),
             ("depth of another size", depth, lambda _: png(4, 3, 16, [b"\1\1" * 4] * 3), ()),
             ("depth huge", depth, lambda c: c[:16] + struct.pack(">II", 2**31 - 1, 2**31 - 1) + c[24:], ()),
+            ("depth of 400 megapixels", depth, lambda _: png(20000, 20000, 16, []),
+             ("20,000 x 20,000 pixels", "expected at most")),
+            ("camera of no focal length", camera, lambda c: c.replace(b"[50", b"[1e-300", 1).replace(b", 50,", b", 1e-300,", 1),
+             ("pixels become points",)),
             ("mask of another size", "depth/mask.png", lambda _: png(4, 3, 8, [b"\xff" * 4] * 3), ()),
             ("mask cut off", "depth/mask.png", cut(0.6), ()),
             ("camera no YAML", camera, lambda _: b"{[", ()), ("camera empty", camera, lambda _: b"", ()),
@@ -351,7 +383,8 @@ def camera_cases():
             ("camera of an unknown model", camera, lambda c: c.replace(b"plumb_bob", b"fisheye", 1),
              ("distortion_model",))):
         # Sizes that differ are found in the image, and named with its mask.
-        named = "its mask" if name == "mask of another size" else pathlib.Path(file).name
+        named = {"mask of another size": "its mask", "camera of no focal length": "depth.png"}.get(
+            name, pathlib.Path(file).name)
         yield Case(name, "depth", rewritten(file, damage), named, *words)
 
 
@@ -381,6 +414,30 @@ def import_cases():
         yield Case(name, "import", times(text), "times.csv")
 
 
+    def pipe(folder):
+        (folder / "recording" / "gripper.tum").unlink()
+        os.mkfifo(folder / "recording" / "gripper.tum")
+    yield Case("trajectory a pipe", "import", pipe, "gripper.tum", "pipe")
+    yield Case("trajectory of one line", "import",
+               lambda folder: (folder / "recording/gripper.tum").write_text("0 0 0 0 0 0 0 1\n"), "--trajectory", "one pose")
+    for options, word in IMPORT_OPTIONS.items():
+        name = " ".join(options)
+        yield Case(f"import {name}", name, lambda folder: None, word)
+
+
+def segment_cases():
+    for options, word in SEGMENT_OPTIONS.items():
+        name = " ".join(("segment", *options))
+        yield Case(name, name, lambda folder: os.mkfifo(folder / "pipe"), word)
+
+
+def deep_cases():
+    deep = b"[" * 80000 + b"]" * 80000
+    for verb, file in (("asset", "asset.json"), ("scene", "scene.json"), ("recording", "recording/recording.json"),
+                       ("report", "run/summary.json"), ("report", "run/grid.json")):
+        yield Case(f"{file} nested too deeply", verb, rewritten(file, lambda _: deep), pathlib.Path(file).name, "nesting")
+
+
 def option_cases():
     for name in ("unknown term", "no number", "not positive", "not finite"):
         yield Case(f"--sigma: {name}", name, lambda folder: None, "--sigma")
@@ -389,7 +446,7 @@ def option_cases():
 def all_cases(first_frame):
     for cases in (asset_cases(), scene_cases(), mesh_cases(), recording_cases(), trajectory_cases(),
                   cloud_cases(first_frame), camera_cases(), result_cases(), import_cases(),
-                  option_cases()):
+                  segment_cases(), deep_cases(), option_cases()):
         yield from cases
 
 
@@ -399,7 +456,8 @@ def complaint(case, commands, sound, work):
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(sound, folder)
     case.damage(folder)
-    files = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    entries = set(folder.rglob("*"))
+    files = {path: path.read_bytes() for path in entries if path.is_file()}
     done = program.call(*commands[case.verb](folder), "--quiet")
     text = done.stderr.rstrip("\n")
     if done.returncode != 2:
@@ -409,8 +467,9 @@ def complaint(case, commands, sound, work):
     missing = [word for word in case.words if word not in text]
     if missing:
         return f"does not name {missing}: {text}"
-    if (folder / "out").is_file() or any(path.is_file() for path in (folder / "out").rglob("*")):
-        return "left something behind"
+    left = set(folder.rglob("*")) - entries
+    if left:
+        return f"left {sorted(str(path) for path in left)[:3]} behind"
     changed = [path.name for path, content in files.items() if not path.exists() or path.read_bytes() != content]
     return f"changed {changed}" if changed else ""
 

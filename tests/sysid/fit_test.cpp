@@ -47,6 +47,21 @@ TEST(Fit, GlobalSearchLeavesAStartTurnedTheWrongWay) {
   EXPECT_EQ(fit(replays, settings).values, result.values);
 }
 
+TEST(Fit, SaysWhyItEndedAndThatAStartAtTheEdgeWasNotRefined) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_lift(folder)};
+  const FitResult at_edge = fit(replays, fit_of({{"bending", {1e-3, 1e-2}, true}}, {1e-3}));  // truth: 2e-4
+  EXPECT_FALSE(at_edge.refined);
+  EXPECT_TRUE(at_edge.stuck);
+  EXPECT_EQ(at_edge.termination,
+            "nothing was refined: at the start bending is at the lower end of its range, and the cost falls "
+            "only beyond; search a wider range first");
+  const FitResult inside = fit(replays, fit_of({{"bending", {1e-5, 1e-2}, true}}, {1e-3}));
+  EXPECT_TRUE(inside.refined);
+  EXPECT_FALSE(inside.stuck);
+  EXPECT_EQ(inside.termination.substr(0, 28), "the cost stands still after ");
+}
+
 TEST(Fit, BothStagesHaveTheSameCost) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_lift(folder)};

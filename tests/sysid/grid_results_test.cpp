@@ -50,7 +50,7 @@ class Results : public ::testing::Test {
 
 TEST_F(Results, ComeBackAsTheyWereWritten) {
   {
-    ResultsStore store(folder, kAxes, {"lift, one", "lift two"}, kPrint, false);
+    ResultsStore store(folder, kAxes, {"lift, one", "lift two"}, kPrint, Existing::refuse);
     store.append(result_of(3, 0.005));
     CandidateResult lost = result_of(0, std::numeric_limits<double>::infinity());
     lost.status = CandidateStatus::diverged;
@@ -78,13 +78,13 @@ TEST_F(Results, ComeBackAsTheyWereWritten) {
 
 TEST_F(Results, GoOnWhereTheyStoppedAfterACutLine) {
   {
-    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, false);
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse);
     store.append(result_of(0, 0.005));
     store.append(result_of(1, 0.006));
   }
   std::ofstream(folder + "/results.csv", std::ios::app) << "2,100,0.1,0.00";
   {
-    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, true);
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::resume);
     EXPECT_TRUE(store.contains(1));
     EXPECT_FALSE(store.contains(2));
     store.append(result_of(2, 0.007));
@@ -95,21 +95,21 @@ TEST_F(Results, GoOnWhereTheyStoppedAfterACutLine) {
 }
 
 TEST_F(Results, AreNeverMixedWithOthers) {
-  { ResultsStore(folder, kAxes, {"a"}, kPrint, false); }
-  EXPECT_THROW(ResultsStore(folder, kAxes, {"a"}, kPrint, false), data::InputError);
+  { ResultsStore(folder, kAxes, {"a"}, kPrint, Existing::refuse); }
+  EXPECT_THROW(ResultsStore(folder, kAxes, {"a"}, kPrint, Existing::refuse), data::InputError);
   const Fingerprint other = {{"time_step_s", "0.005"}, {"asset friction", "0.4"}};
   EXPECT_EQ(
-      data::input_error_of([&] { ResultsStore(folder, kAxes, {"a"}, other, true); }),
+      data::input_error_of([&] { ResultsStore(folder, kAxes, {"a"}, other, Existing::resume); }),
       folder +
           ": --resume: these are not the inputs and settings of its results: asset friction was 0.3 and is "
           "0.4, and 1 more; name another folder, or repeat the first command");
-  EXPECT_NO_THROW(ResultsStore(folder, kAxes, {"a"}, kPrint, true));
+  EXPECT_NO_THROW(ResultsStore(folder, kAxes, {"a"}, kPrint, Existing::resume));
 }
 
 // What is left when the program ends between the lines of a batch, or within one.
 TEST_F(Results, LinesThatBelongToNoResultAreCutOffAndTheRestStaysAsItWas) {
   {
-    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, false);
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse);
     store.append({result_of(0, 0.005), result_of(1, 0.006)});
   }
   const auto text = [&](const char* file) { return data::read_file(folder + "/" + file); };
@@ -121,21 +121,56 @@ TEST_F(Results, LinesThatBelongToNoResultAreCutOffAndTheRestStaysAsItWas) {
   std::ofstream(folder + "/registrations.csv", std::ios::app) << "2,a,0.5,0,0,0,0,0,\n2,";
   std::ofstream(folder + "/results.csv", std::ios::app) << "2,100,0.1,0.00";
   std::ofstream(folder + "/summary.json.123-0.tmp") << "{";
-  ResultsStore(folder, kAxes, {"a", "b"}, kPrint, true);
+  ResultsStore(folder, kAxes, {"a", "b"}, kPrint, Existing::resume);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(text(files[i]), whole[i]) << files[i];
   EXPECT_FALSE(fs::exists(folder + "/summary.json.123-0.tmp"));
 }
 
 TEST_F(Results, HaveOneWriterAtATime) {
-  const ResultsStore store(folder, kAxes, {"a"}, kPrint, false);
+  const ResultsStore store(folder, kAxes, {"a"}, kPrint, Existing::refuse);
   EXPECT_NE(data::input_error_of([&] {
-              ResultsStore(folder, kAxes, {"a"}, kPrint, true);
+              ResultsStore(folder, kAxes, {"a"}, kPrint, Existing::resume);
             }).find("another run is writing to it"),
             std::string::npos);
 }
 
+TEST_F(Results, OfARunningSearchAreNotReplaced) {
+  {
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse);
+    store.append(result_of(0, 0.005));
+    EXPECT_THROW(ResultsStore(folder, kAxes, {"a", "b"}, kPrint, Existing::replace), data::InputError);
+    EXPECT_EQ(load_grid_results(folder).candidates.size(), 1u);
+  }
+  fs::create_directories(folder + "/best/a");
+  std::ofstream(folder + "/summary.json") << "{}";
+  std::ofstream(folder + "/notes.txt") << "mine";
+  const ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::replace);
+  EXPECT_TRUE(load_grid_results(folder).candidates.empty());
+  EXPECT_FALSE(fs::exists(folder + "/best"));
+  EXPECT_FALSE(fs::exists(folder + "/summary.json"));
+  EXPECT_TRUE(fs::exists(folder + "/notes.txt"));
+}
+
+TEST_F(Results, ThatNoSearchCanHaveFoundAreNamed) {
+  {
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse);
+    store.append(result_of(0, 0.005));
+  }
+  const std::string path = folder + "/results.csv", text = data::read_file(path);
+  const auto message_of = [&](const std::string& from, const std::string& to) {
+    std::string changed = text;
+    changed.replace(changed.rfind(from), from.size(), to);
+    data::write_atomically(path, changed);
+    return data::input_error_of([&] { load_grid_results(folder); });
+  };
+  EXPECT_NE(message_of(",0.005,", ",-5,").find("results.csv:2: score_m: found \"-5\""), std::string::npos);
+  EXPECT_NE(message_of(",0.005,", ",nan,").find("results.csv:2: score_m: found \"nan\""), std::string::npos);
+  EXPECT_NE(message_of("\n0,10,", "\n0,-10,").find("results.csv:2: young: found \"-10\""), std::string::npos);
+  EXPECT_NE(message_of("\n0,10,", "\n1e300,10,").find("results.csv:2: id"), std::string::npos);
+}
+
 TEST_F(Results, HeaderNamesTheColumnsOfTheContract) {
-  { ResultsStore(folder, kAxes, {"a"}, kPrint, false); }
+  { ResultsStore(folder, kAxes, {"a"}, kPrint, Existing::refuse); }
   std::ifstream file(folder + "/results.csv");
   std::string header;
   std::getline(file, header);

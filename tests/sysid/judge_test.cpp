@@ -53,7 +53,7 @@ TEST(Judge, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   replays[0] = make_replay(replays[0].recording, settings);
   GridSettings grid = bending_grid();
   grid.rollouts = folder / "rollouts";
-  ResultsStore store(folder / "run", grid.axes, {"lift"}, {}, false);
+  ResultsStore store(folder / "run", grid.axes, {"lift"}, {}, Existing::refuse);
   ASSERT_TRUE(grid_search(replays, grid, store));
   GridResults results = store.results();
   const Summary summary = judge(results, replays, grid, without_horizon());

@@ -38,8 +38,44 @@ TEST(ParameterGrid, NamesWhatIsWrong) {
             std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("bending", "0:1:3:log"); }).find("logarithmic"), std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("young", "5:2:3"); }).find("not below"), std::string::npos);
-  EXPECT_NE(message_of([] { parse_axis("poisson", "0.7"); }).find("outside"), std::string::npos);
+  const std::vector<Axis> many = {parse_axis("bending", "1e-6:1e-3:100000"),
+                                  parse_axis("friction", "0.1:1:100000")};
+  EXPECT_NE(message_of([&] {
+              check_axes(many, data::Constitutive::tri_corotated);
+            }).find("--bending, --friction: found 1e+10 candidates, expected at most 1,000,000"),
+            std::string::npos);
+  EXPECT_NE(message_of([] { parse_axis("poisson", "0.7"); }).find("expected -0.99 to 0.5"),
+            std::string::npos);
   EXPECT_NE(message_of([] { parse_fixed("friction"); }).find("name=value"), std::string::npos);
+}
+
+TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
+  EXPECT_EQ(message_of([] { parse_axis("table_height", "9"); }),
+            "--table-height: found 9, expected -0.5 to 0.5 m");
+  EXPECT_EQ(message_of([] { parse_axis("start_yaw", "0:x:3"); }).substr(0, 13), "--start-yaw: ");
+  EXPECT_EQ(message_of([] { parse_axis("bending", "1e-6:1e-3:3000000"); }),
+            "--bending: found the count 3000000, expected a whole number from 1 to 1,000,000");
+  EXPECT_EQ(message_of([] { parse_axis("bending", "1e-4,2e-4,1e-4"); }), "--bending: 0.0001 is given twice");
+  EXPECT_EQ(message_of([] { parse_fixed("yuong=1"); }),
+            "--fix yuong: unknown parameter (did you mean \"young\"?)");
+  EXPECT_NE(message_of([] { parse_fixed("colour=1"); }).find("expected one of young, poisson"),
+            std::string::npos);
+  EXPECT_EQ(message_of([] { parse_fixed("friction=1e300", "--set"); }),
+            "--set friction: found 1e+300, expected 0 to 10");
+  EXPECT_EQ(message_of([] { parse_fixed("friction=low", "--set"); }),
+            "--set friction: found \"low\", expected a number");
+}
+
+TEST(ParameterGrid, ParametersOfAPinchNeedAPinch) {
+  Replay clamped;
+  clamped.recording.grasps.resize(1);
+  const std::vector<Axis> depth = {parse_axis("grasp_depth", "0.01:0.03:2")};
+  EXPECT_NE(message_of([&] { check_grasp_axes(depth, {clamped}); }).find("--grasp-depth: acts on a grasp"),
+            std::string::npos);
+  Replay pinched = clamped;
+  pinched.settings.grasp_shape = data::GraspShape::pinch;
+  EXPECT_EQ(message_of([&] { check_grasp_axes(depth, {clamped, pinched}); }), "");
+  EXPECT_EQ(message_of([&] { check_grasp_axes({parse_axis("start_yaw", "0:1:2")}, {clamped}); }), "");
 }
 
 TEST(ParameterGrid, RefusesYoungAndPoissonTogetherUnderArap) {

@@ -242,6 +242,19 @@ TEST(Profile, RecordingsThatContradictEachOtherWidenTheInterval) {
   EXPECT_GT(width(), 0.4);  // both answers are inside
 }
 
+// --friction 0.3 says what --fix friction=0.3 says.
+TEST(Profile, AnAxisOfOneValueIsNoParameterOfTheRegion) {
+  const Axis bending{"bending", {1e-5, 3e-5, 1e-4, 3e-4, 1e-3}, true};
+  const std::vector<double> wanted = scattered(12, std::log(1e-4), 0.5, 3);
+  const auto score = [&](std::size_t k, const std::vector<double>& x) {
+    return std::sqrt(kFloor * kFloor + 1e-6 * std::pow(x[0] - wanted[k], 2));
+  };
+  const GridVerdict alone = profile_grid(grid_of({bending}, 12, score));
+  const GridVerdict with_one = profile_grid(grid_of({bending, {"friction", {0.3}, false}}, 12, score));
+  EXPECT_DOUBLE_EQ(with_one.level95, alone.level95);
+  EXPECT_DOUBLE_EQ((*with_one.parameters[0].interval95)[0], (*alone.parameters[0].interval95)[0]);
+}
+
 TEST(Profile, WithoutAUsableCandidateThereIsNoVerdict) {
   const auto none = [](std::size_t, const std::vector<double>&) {
     return std::numeric_limits<double>::infinity();

@@ -4,11 +4,14 @@
 
 #include <cmath>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 
+#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/procedural_mesh.h"
 #include "sysid/fingerprint.h"
 #include "sysid/grid_search.h"
+#include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {
 namespace {
@@ -129,19 +132,19 @@ TEST_F(Lift, GridSearchEqualsItselfWithMoreThreadsAndAfterAStop) {
   };
   const Fingerprint key = fingerprint({replay}, grid);
   const std::string at_once = folder("flash_grid_at_once"), stopped = folder("flash_grid_stopped");
-  ResultsStore one(at_once, grid.axes, {recording.name}, key, false);
+  ResultsStore one(at_once, grid.axes, {recording.name}, key, Existing::refuse);
   EXPECT_TRUE(grid_search({replay}, grid, one));
 
   std::atomic<bool> stop = false;
   {
-    ResultsStore first(stopped, grid.axes, {recording.name}, key, false);
+    ResultsStore first(stopped, grid.axes, {recording.name}, key, Existing::refuse);
     EXPECT_FALSE(grid_search(
         {replay}, grid, first, [&](const Progress& p) { stop = p.done >= 2; }, &stop));
     EXPECT_EQ(first.results().candidates.size(), 2u);
   }
   grid.threads = 2;
   EXPECT_EQ(fingerprint({replay}, grid), key);  // threads decide nothing
-  ResultsStore rest(stopped, grid.axes, {recording.name}, key, true);
+  ResultsStore rest(stopped, grid.axes, {recording.name}, key, Existing::resume);
   EXPECT_TRUE(grid_search({replay}, grid, rest));
   ASSERT_EQ(rest.results().candidates.size(), 6u);
   for (std::size_t i = 0; i < 6; ++i) {
@@ -163,6 +166,55 @@ TEST_F(Lift, FingerprintFollowsSettingsAndInputs) {
   Replay moved = replay;
   moved.observations[3].points(0, 0) += 1e-6;
   EXPECT_NE(fingerprint({moved}, grid), key);
+}
+
+TEST(Replay, StampsOfAnyClockGiveTheSameStepsAndScore) {
+  const data::TemporaryFolder folder;
+  const Replay zero = short_lift(folder);
+  const nlohmann::json recording = nlohmann::json::parse(data::read_file(folder / "lift/recording.json"));
+  const data::Trajectory gripper = data::load_tum(folder / "lift/gripper.tum");
+  const auto score_of = [](const Replay& replay) {
+    return score_motions({replay}, run(replay, {{short_lift_material(), {}}}), {}).score;
+  };
+  const double expected = score_of(zero);
+  for (const double epoch : {1000.0, 1.764e9}) {
+    nlohmann::json moved = recording;
+    moved["grasps"][0]["from"] = epoch;
+    for (nlohmann::json& keyframe : moved["keyframes"]) keyframe["t"] = keyframe["t"].get<double>() + epoch;
+    data::Trajectory path = gripper;
+    for (double& time : path.times) time += epoch;
+    data::save_tum(path, folder / "lift/gripper.tum");
+    folder.write("lift/recording.json", moved.dump());
+    const Replay replay = make_replay(data::load_recording(folder / "lift"), zero.settings);
+    EXPECT_EQ(replay.steps, zero.steps);
+    EXPECT_DOUBLE_EQ(score_of(replay), expected);
+  }
+}
+
+TEST(Replay, ASimulationWithoutEndIsRefusedWithItsCause) {
+  const data::TemporaryFolder folder;
+  const Replay replay = short_lift(folder);
+  const auto message_of = [&](const auto& spoil) {
+    data::Recording recording = replay.recording;
+    ReplaySettings settings = replay.settings;
+    spoil(recording, settings);
+    return data::input_error_of([&] { make_replay(recording, settings); });
+  };
+  EXPECT_NE(
+      message_of([](data::Recording&, ReplaySettings& s) {
+        s.solver.time_step = 1e-9;
+      }).find("--time-step: found 1e-09 s, which makes 4e+08 steps of 0.4 s, expected at most 1,000,000"),
+      std::string::npos);
+  EXPECT_NE(message_of([](data::Recording& r, ReplaySettings&) {
+              r.grasps[0].from = -20'000;
+            }).find("grasps.from: found 2e+04 s before the first keyframe"),
+            std::string::npos);
+  EXPECT_NE(message_of([](data::Recording& r, ReplaySettings&) {
+              r.keyframes.back().time = 20'000;
+            }).find("recording.json: keyframes: "),
+            std::string::npos);
+  EXPECT_NE(message_of([](data::Recording&, ReplaySettings& s) { s.score_from = 3; }).find("--from, --to: "),
+            std::string::npos);
 }
 
 TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {

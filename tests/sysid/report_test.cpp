@@ -57,6 +57,24 @@ TEST(Report, OpensOffline) {
   EXPECT_EQ(html.find("@DATA@"), std::string::npos);
 }
 
+TEST(Report, SaysWhichBoundWhichCandidateEndedAt) {
+  GridResults results = example_results();
+  for (std::size_t i = 0; i < results.candidates.size(); ++i) {
+    results.candidates[i].recordings.resize(1);
+    if (i < 3) results.candidates[i].recordings[0].bounds_hit = {"time"};  // scores 8, 7 and 6 mm
+  }
+  results.candidates[4].recordings[0].bounds_hit = {"offset_x"};  // the best
+  const nlohmann::json bounds = data_of(render_report(example_summary(), results, {}, {}))["bounds"];
+  ASSERT_EQ(bounds.size(), 2u);
+  EXPECT_EQ(bounds[0]["what"], "offset x");
+  EXPECT_EQ(bounds[0]["best"], true);
+  EXPECT_EQ(bounds[0]["hits"],
+            (std::vector<int>{1, 0, 0, 0, 0, 0, 0, 0}));  // in order of score; one diverged
+  EXPECT_EQ(bounds[1]["what"], "clock");
+  EXPECT_EQ(bounds[1]["best"], false);
+  EXPECT_EQ(bounds[1]["hits"], (std::vector<int>{0, 0, 0, 1, 0, 1, 0, 1}));
+}
+
 TEST(Report, ShowsTheReplayInTenthsOfAMillimetre) {
   ReportSettings settings;
   settings.max_cloud_points = 4;

@@ -68,11 +68,49 @@ Scene lifted_sheet(unsigned seed) {
 TEST(Segment, TableIsFoundBelowSheetArmAndClutter) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     const Scene scene = lifted_sheet(seed);
-    const TablePlane table = find_table(scene.points, SegmentSettings());
+    const TablePlane table = find_table({scene.points}, SegmentSettings()).plane;
     // Sheet points below the tolerance count as table and bend the fit: under 3 % of them, at most 6 mm high.
     EXPECT_LT(std::acos(std::min(1.0, table.normal.dot(scene.table.normal))), 0.003) << seed;
     EXPECT_LT(std::abs((scene.table.point - table.point).dot(table.normal)), 0.0006) << seed;
   }
+}
+
+// A level piece of 0.2 x 0.2 m that moves by 0.1 m a frame, and nothing below it.
+TEST(Segment, APlaneThatMovesIsClothAndNoTable) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform(0.0, 0.2);
+  std::vector<data::Points> frames;
+  for (int k = 0; k < 6; ++k) {
+    data::Points piece(2000, 3);
+    for (int i = 0; i < piece.rows(); ++i) piece.row(i) << 0.1 * k + uniform(random), uniform(random), 0.3;
+    frames.push_back(piece);
+  }
+  const auto message = [&] {
+    try {
+      find_table(frames, SegmentSettings());
+    } catch (const data::InputError& error) {
+      return std::string(error.what());
+    }
+    return std::string();
+  };
+  EXPECT_NE(message().find("is seen in 0 of 6 frames only: it is cloth"), std::string::npos) << message();
+  // The table is there too, but smaller: it is the one that stands still.
+  for (data::Points& frame : frames) {
+    frame.conservativeResize(2500, 3);
+    for (int i = 2000; i < 2500; ++i) frame.row(i) << 4 * uniform(random), 4 * uniform(random), 0.1;
+  }
+  const FoundTable table = find_table(frames, SegmentSettings());
+  EXPECT_NEAR(table.plane.point.z(), 0.1, 1e-6);
+  EXPECT_EQ(table.agreeing, 6);
+  EXPECT_LT(table.tilt, 1e-6);
+}
+
+TEST(Segment, VoxelsOfAnySizeHoldAllPoints) {
+  const Scene scene = lifted_sheet(2);
+  SegmentSettings settings;
+  settings.voxel = 1e-6;  // more cells than a 32-bit number counts
+  const Segmentation result = segment_cloth(scene.points, scene.table, scene.arm, settings);
+  EXPECT_EQ(result.cloth.rows(), result.counts[static_cast<int>(PointLabel::cloth)]);
 }
 
 TEST(Segment, KeepsTheSheetAndNothingElse) {
@@ -162,7 +200,7 @@ TEST(Segment, NoPlaneIsAnErrorThatSaysSo) {
   data::Points cloud(2000, 3);
   for (int i = 0; i < cloud.rows(); ++i) cloud.row(i) << uniform(random), uniform(random), uniform(random);
   try {
-    find_table(cloud, SegmentSettings());
+    find_table({cloud}, SegmentSettings());
     FAIL() << "a uniform cube holds no table";
   } catch (const data::InputError& error) {
     EXPECT_NE(std::string(error.what()).find("no plane across the vertical"), std::string::npos)

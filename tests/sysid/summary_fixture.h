@@ -9,7 +9,7 @@ namespace flash::sysid {
 /// A search over bending and poisson that knows the first and not the second.
 inline Summary example_summary() {
   Summary summary;
-  summary.tool_version = "1.2.3";
+  summary.tool_version = FLASH_VERSION;
   summary.best = {{"young", 3e4},         {"poisson", 0.2},  {"bending", 1e-4},         {"friction", 0.3},
                   {"areal_density", 0.2}, {"air_drag", 0.0}, {"stiffness_damping", 0.0}};
   summary.membrane_stiffness = 30;

@@ -60,6 +60,17 @@ TEST(Summary, SaysWhichFieldIsWrong) {
   EXPECT_NE(message_of("\"identifiable\": \"yes\"", "\"identifiable\": \"maybe\"")
                 .find("parameters.bending.identifiable"),
             std::string::npos);
+  for (const char* version : {"99.0.0", "0.2.0", "", "one"})
+    EXPECT_NE(message_of("\"tool_version\": \"" FLASH_VERSION, "\"tool_version\": \"" + std::string(version))
+                  .find("summary.json: tool_version:"),
+              std::string::npos)
+        << version;
+  EXPECT_NE(message_of("\"bending\": 0.0001", "\"bending\": -5").find("best.parameters.bending: found -5"),
+            std::string::npos);
+  EXPECT_NE(message_of("\"score\": 0.004", "\"score\": -5").find("best.score: found -5"), std::string::npos);
+  EXPECT_NE(message_of("\"estimate\": 0.00011", "\"estimate\": -1").find("parameters.bending: found -1"),
+            std::string::npos);
+  EXPECT_NE(message_of("\"exit_code\": 0", "\"exit_code\": 7").find("exit_code"), std::string::npos);
   EXPECT_NE(message_of("\"candidates\"", "\"candidate\"").find("did you mean \"candidates\"?"),
             std::string::npos);
 }

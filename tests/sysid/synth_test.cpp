@@ -112,6 +112,23 @@ TEST(Synth, SaysWhatItCannotDo) {
   SynthSettings settings = short_lift();
   settings.kind = "juggle";
   EXPECT_NE(data::input_error_of([&] { make(settings); }).find("--kind"), std::string::npos);
+  const auto message = [&](const auto& spoil) {
+    settings = short_lift();
+    spoil(settings);
+    return data::input_error_of([&] { make(settings); });
+  };
+  using Settings = SynthSettings;
+  EXPECT_NE(message([](Settings& s) { s.keyframe_rate = 1e9; }).find("--rate: found 1e+09"),
+            std::string::npos);
+  EXPECT_NE(message([](Settings& s) { s.duration = 1e9; }).find("--duration: found 1e+09"),
+            std::string::npos);
+  EXPECT_NE(message([](Settings& s) {
+              s.displacement = {1e300, 0, 0};
+            }).find("--displacement: found 1e+300"),
+            std::string::npos);
+  EXPECT_NE(
+      message([](Settings& s) { s.cameras[0].base_from_camera.translation().x() = NAN; }).find("--camera"),
+      std::string::npos);
   settings = short_lift();
   settings.cameras.clear();
   EXPECT_NE(data::input_error_of([&] { make(settings); }).find("--camera"), std::string::npos);
@@ -127,7 +144,7 @@ TEST(Judge, FindsTheTruthOfASyntheticLift) {
   grid.base.material = stiff_towel();
   grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log")};
   grid.fixed = {parse_fixed("friction=0.3")};
-  ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), false);
+  ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), Existing::refuse);
   ASSERT_TRUE(grid_search(replays, grid, store));
   GridResults results = store.results();
   const Summary summary = judge(results, replays, grid, {});

@@ -1,0 +1,67 @@
+#include "data/extrinsics.h"
+
+#include <cmath>
+
+#include "data/json_reader.h"
+#include "data/text.h"
+#include "data/trajectory.h"
+
+namespace flash::data {
+namespace {
+
+std::vector<std::string> read_warnings(const JsonObject& file) {
+  std::vector<std::string> warnings;
+  if (!file.has("warnings")) return warnings;
+  if (!file.raw("warnings").is_array()) throw file.error("warnings", "a list of texts");
+  for (const nlohmann::json& warning : file.raw("warnings")) {
+    if (!warning.is_string()) throw file.error("warnings", "a list of texts");
+    warnings.push_back(warning.get<std::string>());
+  }
+  return warnings;
+}
+
+}  // namespace
+
+NamedTransform read_transform(const JsonObject& object) {
+  object.expect_fields({"parent", "child", "translation", "rotation_xyzw"});
+  NamedTransform transform{
+      .parent = object.string("parent", ""), .child = object.string("child", ""), .T = {}};
+  Eigen::Matrix<double, 7, 1> pose;
+  pose << object.vector("translation", 3), object.vector("rotation_xyzw", 4);
+  if (std::abs(pose.tail<4>().norm() - 1) > 1e-3) throw object.error("rotation_xyzw", "a unit quaternion");
+  transform.T = from_vector(pose);
+  return transform;
+}
+
+CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
+  file.expect_fields({"schema",      "setup",        "method",        "transform",     "target_pose",
+                      "covariance",  "predicted_sd", "sigmas",        "residuals",     "depth",
+                      "time_offset", "comparison",   "views",         "observability", "convention_findings",
+                      "scale",       "splits",       "smooth_errors", "warnings",      "exit_code",
+                      "provenance"});
+  if (file.string("schema", "") != "flash-extrinsics/1") throw file.error("schema", "\"flash-extrinsics/1\"");
+  CameraPose pose;
+  pose.transform = read_transform(file.object("transform"));
+  pose.warnings = read_warnings(file);
+  pose.usable = file.integer("exit_code", 0) == 0;
+  if (!pose.usable && !accept_unusable)
+    throw file.error("exit_code", "0: flash-calib handeye ended with an answer that cannot be used" +
+                                      (pose.warnings.empty() ? "" : " (" + pose.warnings.front() + ")") +
+                                      "; calibrate again, or take it as it is with --force");
+  return pose;
+}
+
+CameraPose load_camera_pose(const std::string& path, bool accept_unusable) {
+  if (lower_extension(path) == ".json") {
+    const nlohmann::json json = load_json(path);
+    const JsonObject file(json, path);
+    if (file.string("setup", "") == "eye-in-hand")
+      throw file.error("setup", "\"eye-to-hand\": this camera moves with the gripper");
+    return read_camera_pose(file, accept_unusable);
+  }
+  CameraPose pose;
+  pose.transform = {.parent = "base", .child = "camera", .T = load_trajectory(path).poses.front()};
+  return pose;
+}
+
+}  // namespace flash::data

@@ -1,0 +1,35 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+namespace flash::data {
+
+class JsonObject;
+
+/// A transform between two named frames.
+struct NamedTransform {
+  std::string parent, child;
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();  ///< maps points of the child into the parent
+};
+
+/// What every reader of "flash-extrinsics/1" needs: where the camera is, and what `flash-calib handeye` said
+/// of its own answer.
+struct CameraPose {
+  NamedTransform transform;           ///< base or gripper <- camera
+  std::vector<std::string> warnings;  ///< of the calibration, worst first
+  bool usable = true;                 ///< false: it ended with exit code 3
+};
+
+/// `accept_unusable` is what --force says. Without it an answer that cannot be used is refused. Throws
+/// InputError naming file, field, what was found and what was expected.
+CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable);
+
+/// T_base_camera of a camera that stands still, from such a file, or from a trajectory (any but .json) whose
+/// first pose counts. A camera on the gripper is refused too.
+CameraPose load_camera_pose(const std::string& path, bool accept_unusable);
+
+/// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
+NamedTransform read_transform(const JsonObject& object);
+
+}  // namespace flash::data

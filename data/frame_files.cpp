@@ -1,0 +1,151 @@
+#include "data/frame_files.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::data {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// "frame2" before "frame10": runs of digits count as numbers.
+bool natural_less(const std::string& a, const std::string& b) {
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+      continue;
+    }
+    const auto digits = [&](const std::string& text, std::size_t& at) {
+      std::size_t begin = at;
+      while (at < text.size() && is_digit(text[at])) ++at;
+      while (begin + 1 < at && text[begin] == '0') ++begin;
+      return text.substr(begin, at - begin);
+    };
+    const std::string m = digits(a, i), n = digits(b, j);
+    if (m.size() != n.size()) return m.size() < n.size();
+    if (m != n) return m < n;
+  }
+  if (a.size() - i != b.size() - j) return a.size() - i < b.size() - j;
+  return a < b;  // they differ in leading zeros
+}
+
+constexpr double kFastest = 1e5;  // frames a second: no camera has more
+
+InputError times_error(const std::string& times, const char* expected) {
+  return InputError("--times: found \"" + times + "\", expected " + expected);
+}
+
+std::vector<double> even_times(const std::string& times, std::size_t frames) {
+  const std::vector<std::string_view> parts = split(times, ":");
+  const std::optional<double> rate = parts.size() >= 2 ? parse_number(parts[1]) : std::nullopt;
+  const std::optional<double> start = parts.size() == 3 ? parse_number(parts[2]) : 0.0;
+  if (!rate || !start || parts.size() > 3 || !(*rate > 0 && *rate <= kFastest) || !std::isfinite(*start))
+    throw times_error(times, "rate:HZ, rate:HZ:START or a CSV file with a column t");
+  std::vector<double> result;
+  for (std::size_t i = 0; i < frames; ++i) {
+    result.push_back(*start + static_cast<double>(i) / *rate);
+    if (!std::isfinite(result[i]) || (i > 0 && !(result[i] > result[i - 1])))
+      throw times_error(times, "a rate by which every frame is later than the one before");
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<std::string> files_in_order(const std::string& folder,
+                                        const std::vector<std::string>& extensions) {
+  if (!fs::is_directory(folder)) throw InputError(folder + ": is no folder, expected one with files");
+  std::vector<std::string> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && std::find(extensions.begin(), extensions.end(),
+                                             lower_extension(entry.path().string())) != extensions.end())
+      files.push_back(entry.path().string());
+  std::sort(files.begin(), files.end(), natural_less);
+  return files;
+}
+
+std::vector<double> frame_times(const std::string& times, std::size_t frames) {
+  if (times.starts_with("rate:")) return even_times(times, frames);
+  const std::string text = read_file(times);
+  LineReader lines(text);
+  std::string_view line;
+  lines.next(line);
+  const std::vector<std::string_view> names = split(line, ",");
+  const auto column = std::find_if(names.begin(), names.end(),
+                                   [](std::string_view name) { return name == "t" || name == "t_s"; });
+  if (column == names.end())
+    throw input_error(times, "header", "found \"" + std::string(line) + "\", expected a column t or t_s");
+  const std::size_t index = static_cast<std::size_t>(column - names.begin());
+  std::vector<double> result;
+  while (lines.next(line)) {
+    if (line.empty()) continue;
+    const std::vector<std::string_view> cells = split(line, ",");
+    const std::optional<double> time =
+        cells.size() == names.size() ? parse_number(cells[index]) : std::nullopt;
+    if (!time || !std::isfinite(*time) || (!result.empty() && *time <= result.back()))
+      throw input_error(times, "line " + std::to_string(lines.number()),
+                        "found \"" + std::string(line) + "\", expected strictly increasing times");
+    result.push_back(*time);
+  }
+  if (result.size() != frames)
+    throw InputError(times + ": found " + std::to_string(result.size()) + " times, expected " +
+                     std::to_string(frames) + ", one a frame");
+  return result;
+}
+
+std::vector<std::string> compare_clocks(const std::vector<double>& times, const Trajectory& trajectory,
+                                        const std::string& path) {
+  if (times.empty() || trajectory.times.empty()) return {};
+  constexpr double rounding = 1e-6;  // of the files [s]
+  const double begin = trajectory.times.front(), end = trajectory.times.back();
+  const auto outside = static_cast<std::size_t>(std::count_if(
+      times.begin(), times.end(), [&](double t) { return t < begin - rounding || t > end + rounding; }));
+  const auto span = [](double from, double to) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.3f to %.3f s", from, to);
+    return std::string(text);
+  };
+  const std::string spans =
+      "the frames are of " + span(times.front(), times.back()) + ", the trajectory of " + span(begin, end);
+  const std::string of_all = std::to_string(outside) + " of " + std::to_string(times.size()) + " frames";
+  if (2 * outside > times.size())
+    throw InputError(path + ": " + spans + ": " + of_all +
+                     " are outside of it, expected one clock for both (--times)");
+  std::vector<std::string> notices;
+  if (outside > 0)
+    notices.push_back(path + ": " + spans + ": " + of_all +
+                      " are outside of it, and the gripper is taken to stand still there");
+  else if (times.size() > 1 && times.back() - times.front() < 0.1 * (end - begin))
+    notices.push_back(path + ": " + spans +
+                      ", ten times as long: are the times of the frames right (--times)?");
+  return notices;
+}
+
+std::vector<std::string> find_jumps(const Trajectory& trajectory, const std::string& path) {
+  constexpr double fastest = 5;      // no arm moves cloth faster [m/s]
+  constexpr double shortest = 0.02;  // shorter ones are rounding of close stamps [m]
+  std::size_t count = 0, first = 0;
+  double farthest = 0;
+  for (std::size_t i = 1; i < trajectory.poses.size(); ++i) {
+    const double distance =
+        (trajectory.poses[i].translation() - trajectory.poses[i - 1].translation()).norm();
+    if (distance < shortest || distance < fastest * (trajectory.times[i] - trajectory.times[i - 1])) continue;
+    if (count++ == 0) first = i;
+    farthest = std::max(farthest, distance);
+  }
+  if (count == 0) return {};
+  return {path + ": " + (count == 1 ? "a jump" : std::to_string(count) + " jumps") + " of up to " +
+          format_short(farthest) + " m from one pose to the next, faster than " + format_short(fastest) +
+          " m/s; first after pose " + std::to_string(first) + ": is the trajectory of one piece?"};
+}
+
+}  // namespace flash::data

@@ -1,0 +1,29 @@
+#pragma once
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "data/trajectory.h"
+
+namespace flash::data {
+
+/// The files of a folder whose names end in one of `extensions`, in order of name: 2 before 10. May be empty.
+/// Throws InputError where there is no such folder.
+std::vector<std::string> files_in_order(const std::string& folder,
+                                        const std::vector<std::string>& extensions);
+
+/// One time a frame [s], strictly increasing, from "rate:HZ", "rate:HZ:START" or a CSV file with a column t
+/// or t_s. Throws InputError that names --times or the file.
+std::vector<double> frame_times(const std::string& times, std::size_t frames);
+
+/// Whether frames and trajectory were stamped by one clock. Throws InputError, naming the trajectory's
+/// `path`, where more frames lie outside the trajectory than inside; what else is odd is returned for people
+/// to read.
+std::vector<std::string> compare_clocks(const std::vector<double>& times, const Trajectory& trajectory,
+                                        const std::string& path);
+
+/// Jumps that no robot makes, faster than 5 m/s, for people to read; at most one line. Empty where there are
+/// none.
+std::vector<std::string> find_jumps(const Trajectory& trajectory, const std::string& path);
+
+}  // namespace flash::data

@@ -1,0 +1,48 @@
+#include "data/lying_sheet.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace flash::data {
+
+double distance_to(const LyingSheet& sheet, const std::vector<Eigen::Vector2d>& points) {
+  if (points.empty()) return std::numeric_limits<double>::infinity();
+  const Eigen::Rotation2Dd turn(std::atan2(sheet.left, sheet.right) - sheet.heading);
+  const Eigen::Vector2d size(sheet.right, sheet.left);
+  std::vector<Eigen::Vector2d> local;  // right edge along x, left edge along y
+  double outside = 0;
+  for (const Eigen::Vector2d& point : points) {
+    local.push_back(turn * (point - sheet.corner));
+    outside += (local.back() - local.back().cwiseMax(0.0).cwiseMin(size)).norm();
+  }
+  constexpr int samples = 16;  // a side
+  double unseen = 0;
+  for (int i = 0; i < samples; ++i)
+    for (int j = 0; j < samples; ++j) {
+      const Eigen::Vector2d place = size.cwiseProduct(Eigen::Vector2d(i, j)) / (samples - 1);
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Eigen::Vector2d& point : local) nearest = std::min(nearest, (point - place).squaredNorm());
+      unseen += std::sqrt(nearest);
+    }
+  return outside / static_cast<double>(points.size()) + unseen / (samples * samples);
+}
+
+LyingSheet turned_to(LyingSheet sheet, const std::vector<Eigen::Vector2d>& points) {
+  const double middle = sheet.heading;
+  double least = std::numeric_limits<double>::infinity();
+  for (int degrees = -25; degrees <= 25; ++degrees) {
+    LyingSheet turned = sheet;
+    turned.heading = middle + degrees * std::numbers::pi / 180;
+    const double distance = distance_to(turned, points);
+    if (distance < least) {
+      least = distance;
+      sheet.heading = turned.heading;
+    }
+  }
+  return sheet;
+}
+
+}  // namespace flash::data

@@ -1,0 +1,30 @@
+#pragma once
+#include <string>
+
+namespace flash::data {
+
+/// A folder that readers see whole or not at all. Its files are written to another one, `PATH.PID-0.tmp` or,
+/// where PATH stands already, `PATH/.PID-0.tmp`, and publish() puts them in their place. What is not
+/// published leaves nothing behind, but after a kill the other folder.
+class StagedFolder {
+ public:
+  /// Makes nothing: writers make the folders that they need.
+  explicit StagedFolder(const std::string& path);
+  ~StagedFolder();
+  StagedFolder(const StagedFolder&) = delete;
+  StagedFolder& operator=(const StagedFolder&) = delete;
+
+  /// Where to write.
+  const std::string& path() const { return staged_; }
+
+  /// Files that stand in the place already stay, but for those of the same names and for the numbered frames
+  /// of an earlier run (000012.ply, .png) in folders that get new ones. `last`, a file without which the
+  /// folder is not complete, is taken away first and comes last. Throws std::filesystem::filesystem_error.
+  void publish(const std::string& last);
+
+ private:
+  std::string final_, staged_;
+  std::string made_;  // the outermost folder on the way that has to be made, or empty
+};
+
+}  // namespace flash::data

@@ -1,0 +1,66 @@
+#include "data/frame_files.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/data/temporary_folder.h"
+
+namespace flash::data {
+namespace {
+
+TEST(FrameFiles, NumbersCountInNames) {
+  const TemporaryFolder folder;
+  for (const char* name : {"10.png", "9.png", "a.txt", "1.PNG", "09b.png", "a2.png", "a10.png"})
+    folder.write(name, "");
+  std::filesystem::create_directory(folder / "5.png");
+  std::vector<std::string> names;
+  for (const std::string& path : files_in_order(folder / "", {".png"}))
+    names.push_back(std::filesystem::path(path).filename());
+  EXPECT_EQ(names, (std::vector<std::string>{"1.PNG", "9.png", "09b.png", "10.png", "a2.png", "a10.png"}));
+  EXPECT_NE(input_error_of([&] { files_in_order(folder / "none", {".png"}); }).find("is no folder"),
+            std::string::npos);
+}
+
+TEST(FrameFiles, TimesOfARateHaveAStart) {
+  EXPECT_EQ(frame_times("rate:4:1764000000", 3),
+            (std::vector<double>{1764000000, 1764000000.25, 1764000000.5}));
+  for (const char* wrong :
+       {"rate:", "rate:0", "rate:-1", "rate:nan", "rate:inf", "rate:10:inf", "rate:1:2:3", "rate:10:1e300"})
+    EXPECT_TRUE(input_error_of([&] { frame_times(wrong, 3); }).starts_with("--times: found")) << wrong;
+}
+
+Trajectory between(double begin, double end) {
+  Trajectory trajectory;
+  for (int k = 0; k <= 10; ++k) {
+    trajectory.times.push_back(begin + (end - begin) * k / 10);
+    trajectory.poses.emplace_back(Eigen::Translation3d(0.01 * k, 0, 0));
+  }
+  return trajectory;
+}
+
+TEST(FrameFiles, FramesOfAnotherClockAreRefused) {
+  const std::vector<double> times = frame_times("rate:10", 51);
+  EXPECT_TRUE(compare_clocks(times, between(0, 5), "g.tum").empty());
+  EXPECT_EQ(
+      input_error_of([&] { compare_clocks(times, between(1.764e9, 1.764e9 + 5), "g.tum"); }),
+      "g.tum: the frames are of 0.000 to 5.000 s, the trajectory of 1764000000.000 to 1764000005.000 s: "
+      "51 of 51 frames are outside of it, expected one clock for both (--times)");
+  EXPECT_NE(input_error_of([&] { compare_clocks(times, between(0, 2), "g.tum"); }), "");
+  EXPECT_NE(compare_clocks(times, between(0, 4), "g.tum").at(0).find("10 of 51 frames are outside"),
+            std::string::npos);
+  EXPECT_NE(
+      compare_clocks(frame_times("rate:1000", 51), between(0, 5), "g.tum").at(0).find("ten times as long"),
+      std::string::npos);
+}
+
+TEST(FrameFiles, JumpsOfATrajectoryAreFound) {
+  Trajectory trajectory = between(0, 1);
+  EXPECT_TRUE(find_jumps(trajectory, "g.tum").empty());
+  trajectory.poses[4].translation().x() += 10;
+  EXPECT_EQ(find_jumps(trajectory, "g.tum").at(0),
+            "g.tum: 2 jumps of up to 10.01 m from one pose to the next, faster than 5 m/s; first after pose "
+            "4: is the "
+            "trajectory of one piece?");
+}
+
+}  // namespace
+}  // namespace flash::data

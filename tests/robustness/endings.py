@@ -1,0 +1,239 @@
+#!/usr/bin/env python3
+"""How the programs end: a result that standard output does not take, signals, jobs that cannot end or fit, paths that the
+file system refuses, and values out of range. Each in one line, with the exit code that README.md states, and nothing
+left behind by what was refused."""
+import argparse
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import program
+
+FAILED, REFUSED = 1, 2
+
+
+def scene(cell, **fields):
+    return {"schema": "flash-scene/1", "timestep": 0.01, "gravity": [0, 0, -9.81],
+            "objects": {"cloth": f"cloth_{cell}.json"}} | fields
+
+
+def write_inputs(folder):
+    for cell in (0.05, 0.004):
+        (folder / f"cloth_{cell}.json").write_text(json.dumps(program.ASSET | {"mesh": f"sheet:0.2x0.2:{cell}"}))
+    far = {"hand": {"keyframes": [{"t": 0, "translation": [0, 0, 1]}], "grasps": [{"from": 0}]}}
+    curved = folder / "curved.obj"
+    curved.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nf 1 2 3\nf 2 4 3\n")
+    (folder / "cloth_curved.json").write_text(json.dumps(program.ASSET | {"mesh": "curved.obj"}))
+    for name, content in (("short", scene(0.05, steps=2)), ("default", scene(0.05)), ("long", scene(0.004, steps=100000)),
+                          ("nothing_grasped", scene(0.05, end_effectors=far)), ("curved", scene("curved", steps=2)),
+                          ("before_start", scene(0.05, keyframes=[-1])), ("too_many", scene(0.05, steps=2 ** 32)),
+                          ("too_long", scene(0.05, duration=1e9))):
+        (folder / f"{name}.json").write_text(json.dumps(content))
+    (folder / "twice.json").write_text('{"schema": "flash-scene/1", "timestep": 0.01, "timestep": 0.02}')
+    (folder / "loop").symlink_to("loop")
+    write_calibrations(folder)
+
+
+def write_calibrations(folder):
+    """Two arms on one camera, the second with an answer that cannot be used; a camera folder with such an answer."""
+    still = {"translation": [0, 0, 1], "rotation_xyzw": [1, 0, 0, 0]}
+    usable = {"schema": "flash-extrinsics/1", "setup": "eye-to-hand", "method": "errors_in_variables",
+              "transform": still | {"parent": "base", "child": "camera"},
+              "target_pose": still | {"parent": "gripper", "child": "target"},
+              "covariance": [[1e-6 if i == j else 0 for j in range(6)] for i in range(6)],
+              "warnings": ["two views were left out"], "exit_code": 0}
+    unusable = usable | {"warnings": ["rotations turn about one axis only"], "exit_code": 3}
+    (folder / "left.json").write_text(json.dumps(usable))
+    (folder / "right.json").write_text(json.dumps(unusable))
+    (folder / "raw").mkdir()
+    (folder / "raw" / "0.ply").write_text("ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\n"
+                                          "property float y\nproperty float z\nend_header\n")
+    (folder / "raw" / "extrinsics.json").write_text(json.dumps(unusable))
+
+
+def refusals(sim, sysid, calib):
+    """Command line, words of the one line on stderr."""
+    run, bench, synth = [sim, "run"], [sim, "bench"], [sysid, "synth", "--asset", "cloth_0.05.json", "-o", "out"]
+    grid = [sysid, "grid", "recording", "--asset", "asset.json", "-o", "out"]
+    long = "x" * 300
+    return [
+        ([*run, "nothing_grasped.json", "-o", "out"], ["end effector hand", "the nearest is 0.99 m away"]),
+        ([*run, "curved.json", "-o", "out"], ["flat"]),
+        ([*run, "before_start.json", "-o", "out"], ["before_start.json", "keyframes", "times from 0"]),
+        ([*run, "too_many.json", "-o", "out"], ["steps", "found 4294967296", "0 to 1,000,000"]),
+        ([*run, "too_long.json", "-o", "out"], ["duration", "at most 1,000,000 steps"]),
+        ([*run, "twice.json", "-o", "out"], ["timestep", "given twice"]),
+        ([*run, "short.json", "--steps", "4294967296", "-o", "out"], ["--steps", "from 0 to 1,000,000"]),
+        ([*run, "short.json", "--steps", "-1", "-o", "out"], ["--steps", "found \"-1\"", "from 0 to 1,000,000"]),
+        ([*run, "short.json", "--duration", "1e9", "-o", "out"], ["--duration", "1,000,000 steps"]),
+        ([*run, "short.json", "-o", ""], ["--out", "found \"\""]),
+        ([*run, "loop", "-o", "out"], ["loop: cannot be read: Too many levels of symbolic links"]),
+        ([*run, "short.json", "-o", "loop/out"], ["loop/out", "Too many levels of symbolic links"]),
+        ([*run, "short.json", "-o", long], [long, "File name too long"]),
+        ([*run, "short.json", "-o", "short.json/out"], ["short.json/out", "Not a directory"]),
+        ([sim, "rum"], ["unknown verb", "run"]),
+        ([*grid, "--bendin", "1e-4"], ["--bendin: unknown option", 'did you mean "--bending"']),
+        ([*grid, "--bending", "1e-4,1e-4"], ["--bending", "twice"]),
+        ([*bench, "--vertices", "1e9"], ["--vertices", "from 4 to 1,000,000"]),
+        ([*bench, "--vertices", "1000000", "--threads", "1000", "--envs", "1000"], ["--vertices", "MB of memory"]),
+        ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "above 0"]),
+        ([*bench, "--young-min", "5", "--young-max", "3"], ["--young-max", "found 3", "at least the 5"]),
+        ([*synth, "--set", "foo=1"], ["--set foo", "unknown parameter"]),
+        ([*synth, "--set", "friction=1e300"], ["--set friction", "0 to 10"]),
+        ([*grid, "--envs", "-1"], ["--envs", "found \"-1\"", "from 1 to 100,000"]),
+        ([*grid, "--bending", "1e-5:1e-3:3000000"], ["--bending", "3000000", "from 1 to 1,000,000"]),
+        ([*grid, "--table-height", "9:10:2"], ["--table-height", "-0.5 to 0.5"]),
+        ([*grid, "--start-yaw", "a"], ["--start-yaw", "\"a\" is not a number"]),
+        ([*grid, "--bending", "1e-4", "--fix", "foo=1"], ["--fix foo", "unknown parameter"]),
+        ([*grid, "--bending", "1e-5:1e-3:3", "--grasp-depth", "0.01:0.03:2"], ["--grasp-depth", "pinch"]),
+        *([] if calib is None else [
+            ([calib, "detect", ".", "--depth-scale", "nan", "--target", "chessboard:9x6:0.025"], ["--depth-scale"]),
+            ([calib, "register", "left.json", "right.json", "--without-images"], ["right.json", "exit_code", "one axis"]),
+            ([calib, "validate", ".", "--extrinsics", "right.json"], ["right.json", "exit_code", "one axis", "--force"]),
+            ([calib, "detect", ".", "--target", ""], ["--target", "found \"\""])]),
+        ([sysid, "segment", "raw", "-o", "out"], ["extrinsics.json", "exit_code", "one axis", "--force"])]
+
+
+def check_accepted(options, folder):
+    """--force takes a calibration that cannot be used; its warnings go on."""
+    if options.calib is None:
+        return
+    done = program.must(options.calib, "register", folder / "left.json", folder / "right.json", "--without-images",
+                        "--force", "-o", folder / "cell.json")
+    cell = json.loads((folder / "cell.json").read_text())
+    for warning in ("left.json: two views were left out", "right.json: rotations turn about one axis only"):
+        yield warning in done.stderr and any(warning in text for text in cell["notices"]), f"{warning}: {done.stderr}"
+    yield cell["exit_code"] == 0, "taken with --force, and yet not"
+
+
+def left_in(folder):
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+
+def check_refusals(options, folder):
+    before = left_in(folder)
+    for words, expected in refusals(options.sim, options.sysid, options.calib):
+        done = program.call(*words, "--quiet" if "bench" not in words and "rum" not in words else "--json", cwd=folder)
+        text = done.stderr.rstrip("\n")
+        where = " ".join(map(str, words[1:]))[:120]
+        yield done.returncode == REFUSED, f"{where}: exit code {done.returncode}: {text[-500:]}"
+        yield text and "\n" not in text and len(text) < 900, f"{where}: not one readable line: {text[:900]}"
+        yield all(word in text for word in expected), f"{where}: does not say {expected}: {text[:500]}"
+        yield not any(word.startswith("--") and "_" in word for word in text.split()), f"{where}: no such option: {text}"
+        yield left_in(folder) == before, f"{where}: left {set(left_in(folder)) - set(before)}"
+
+
+def check_lost_results(options, folder):
+    run = [options.sim, "run", "short.json"]
+    commands = [[*run, "--force", "-o", "lost"], [options.sim, "--help"], [options.sysid, "--version"],
+                [options.sysid, "synth", "--asset", "cloth_0.05.json", "--kind", "hang", "--duration", "0.1", "--json",
+                 "--force", "-o", "lost_recording"]]
+    if options.calib:
+        commands.append([options.calib, "--help"])
+    for words in commands:
+        for stdout, name in ((open("/dev/full", "w"), "full"), (None, "closed")):
+            closed = {"preexec_fn": lambda: os.close(1)} if stdout is None else {"stdout": stdout}
+            done = subprocess.run(list(map(str, words)), cwd=folder, stderr=subprocess.PIPE, text=True, **closed)
+            lines = [line for line in done.stderr.splitlines() if "standard output" in line]
+            yield done.returncode == FAILED, f"{words[1:]}, stdout {name}: exit code {done.returncode}"
+            yield len(lines) == 1, f"{words[1:]}, stdout {name}: {done.stderr}"
+    quiet = subprocess.run([str(options.sim), "run", "short.json", "--quiet", "-o", "quiet"], cwd=folder,
+                           preexec_fn=lambda: os.close(1))
+    yield quiet.returncode == 0, f"--quiet has no result to lose: exit code {quiet.returncode}"
+
+
+def started(words, folder, number):
+    """The program, once it answers to the signal."""
+    process = subprocess.Popen(list(map(str, words)), cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    status = pathlib.Path(f"/proc/{process.pid}/status")
+    while process.poll() is None:
+        caught = [line for line in status.read_text().splitlines() if line.startswith("SigCgt")]
+        if caught and int(caught[0].split()[1], 16) >> (number - 1) & 1:
+            break
+        time.sleep(0.01)
+    return process
+
+
+def check_signals(options, folder):
+    for number in (signal.SIGINT, signal.SIGTERM):
+        out = folder / f"stopped_{number}"
+        process = started([options.sim, "run", "long.json", "--quiet", "-o", out], folder, number)
+        while process.poll() is None and not (out / "frames" / "000001.ply").exists():
+            time.sleep(0.01)
+        process.send_signal(number)
+        text = process.communicate()[1]
+        rows = len((out / "log.csv").read_text().splitlines()) - 1
+        frames = len(list((out / "frames").iterdir()))
+        yield process.returncode == FAILED, f"{number}: exit code {process.returncode}"
+        yield "stopping after this step" in text, f"{number}: does not answer: {text}"
+        yield f"stopped after {rows:,} of 100,000 steps" in text, f"{number}: does not say what was done: {text}"
+        yield f"{frames:,} frames" in text and str(out) in text and "--force" in text, f"{number}: nor what is left: {text}"
+        yield frames == rows + 1, f"{number}: {frames} frames of {rows} steps"
+    process = started([options.sim, "bench", "--vertices", "2000", "--steps", "100000", "--envs", "1"], folder, signal.SIGINT)
+    process.send_signal(signal.SIGINT)
+    text = process.communicate()[1]
+    yield process.returncode == FAILED and "stopped" in text, f"bench: exit code {process.returncode}: {text}"
+    process = started([options.sim, "bench", "--vertices", "20000", "--steps", "100000", "--envs", "1"], folder,
+                      signal.SIGTERM)
+    process.send_signal(signal.SIGTERM)
+    process.stderr.readline(), process.stderr.readline()  # the answer to the first
+    process.send_signal(signal.SIGTERM)
+    process.communicate()
+    yield process.returncode == 128 + signal.SIGTERM, f"a second signal: exit code {process.returncode}"
+
+
+def check_defaults(options, folder):
+    done = program.must(options.sim, "run", folder / "default.json", "-o", folder / "by_default")
+    yield "100 steps are run, the default" in done.stderr, f"the default is not said: {done.stderr}"
+    times = [line.split(",")[1] for line in (folder / "by_default" / "log.csv").read_text().splitlines()[1:]]
+    yield times == [f"{(k + 1) / 100:g}" for k in range(100)], f"times of log.csv: {times}"
+    done = program.must(options.sim, "run", folder / "default.json", "--duration", "0.05", "-o", folder / "by_duration")
+    yield "default" not in done.stderr and "5 steps in" in done.stdout, f"--duration: {done.stderr}{done.stdout}"
+    done = program.must(options.sim, "run", "--help")
+    yield "Up to 1 % of the steps" in done.stdout, "--help does not say what is tolerated"
+
+
+def check_fit(options, folder):
+    """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
+    recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
+    program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "5e-5,1e-4,2e-4", "--no-solver-check",
+                 "--no-horizon", "--quiet", "-o", run)
+    line = [options.sysid, "fit", recording, "--start", run, "--prior", "bending=1e-4:2", "--quiet"]
+    done = program.call(*line, "--freeze", "poisson", "-o", folder / "fitted")
+    yield done.returncode == 0 and "95 %: " in done.stdout, f"fit: exit code {done.returncode}: {done.stderr}{done.stdout}"
+    fit = json.loads((folder / "fitted" / "fit.json").read_text())
+    yield fit["fixed"]["poisson"] == 0.3, f"fit: held at {fit['fixed']}"
+    yield "radient" not in fit["termination"], f"fit: ended with {fit['termination']}"
+    done = program.call(*line, "--freeze", "poison", "-o", folder / "other")
+    yield done.returncode == REFUSED and 'did you mean "poisson"' in done.stderr, f"fit --freeze poison: {done.stderr}"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sim", required=True, type=pathlib.Path, help="the program flash-sim")
+    parser.add_argument("--sysid", required=True, type=pathlib.Path, help="the program flash-sysid")
+    parser.add_argument("--calib", type=pathlib.Path, help="the program flash-calib")
+    options = parser.parse_args()
+    done, failed = 0, 0
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = pathlib.Path(temporary)
+        write_inputs(folder)
+        program.synthesize(options.sysid, folder)
+        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults,
+                      *([check_fit] if options.calib else [])):
+            for holds, complaint in check(options, folder):
+                done += 1
+                failed += not holds
+                if not holds:
+                    print(complaint, flush=True)
+    print(f"{done - failed} of {done} statements about how the programs end hold")
+    sys.exit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+#!/usr/bin/env python3
+"""Stops flash-sysid in the middle of a candidate of hundreds of thousands of steps, asks it for jobs without end, and
+gives it recordings whose names are paths, are the same, or are twice the same recording."""
+import argparse
+import json
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+import program
+
+HANG = 120  # seconds after which a job that was asked to stop counts as hanging
+LONG = ["--time-step", "3e-6"]  # 200,000 steps a candidate
+AXES = ["--bending", "1e-4,2e-4", "--no-solver-check", "--no-horizon"]
+failures = []
+
+
+def expect(condition, what, found=""):
+    if not condition:
+        failures.append(f"{what}: {found}")
+
+
+def start(*words):
+    """A job that has begun to catch signals."""
+    job = subprocess.Popen([*map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    caught, status = 0, pathlib.Path(f"/proc/{job.pid}/status")
+    while not caught & 1 << (signal.SIGTERM - 1) and job.poll() is None:
+        time.sleep(0.01)
+        lines = dict(line.split(":", 1) for line in status.read_text().splitlines() if ":" in line)
+        caught = int(lines.get("SigCgt", "0"), 16)
+    return job
+
+
+def end(job):
+    try:
+        return job.communicate(timeout=HANG)[1]
+    except subprocess.TimeoutExpired:
+        job.kill()
+        job.communicate()
+        return "does not end"
+
+
+def stops(sysid, root, asset, recording, run):
+    common = ["--asset", asset]
+    jobs = {
+        "grid": [recording, *common, *AXES, *LONG],
+        "replay": [recording, *common, *LONG],
+        "fit": [recording, *common, "--start", run, *LONG],
+        "plan": [recording, *common, "--time-step", "4e-6"],
+        "synth": [*common, "--duration", "0.6", "--mesh", "sheet:0.2x0.2:0.02", "--time-step", "3e-6"],
+    }
+    for verb, words in jobs.items():
+        out = root / f"stopped_{verb}"
+        for number in (signal.SIGINT, signal.SIGTERM):
+            job = start(sysid, verb, *words, "-o", out)
+            time.sleep(0.3)  # into its steps
+            job.send_signal(number)
+            error = end(job)
+            expect(job.returncode == 1, f"{verb}: exit code after {number.name}", f"{job.returncode} {error}")
+            expect("stopping after this step" in error, f"{verb}: answers {number.name}", error)
+            if verb != "grid":
+                expect("stopped before the end; nothing was written" in error, f"{verb}: says so", error)
+                expect(not out.exists(), f"{verb}: leaves nothing")
+                continue
+            expect("stopped with 0 of 2 candidates" in error, "grid: says what it keeps", error)
+            results = (out / "results.csv").read_text() if out.exists() else ""
+            expect(results.count("\n") == 1, "grid: keeps no part of a candidate", results)
+            shutil.rmtree(out, ignore_errors=True)
+    # Both signals wait until the job goes on: the second finds that the first has asked already.
+    job = start(sysid, "replay", *jobs["replay"], "-o", root / "twice")
+    for number in (signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGCONT):
+        job.send_signal(number)
+    error = end(job)
+    expect(job.returncode in (128 + signal.SIGINT, 128 + signal.SIGTERM), "second signal", f"{job.returncode} {error}")
+
+
+def lock_comes_first(sysid, root, asset, recording):
+    out = root / "locked"
+    job = start(sysid, "grid", recording, "--asset", asset, *AXES, *LONG, "-o", out)
+    while not (out / "grid.json").exists() and job.poll() is None:
+        time.sleep(0.01)
+    second = program.call(sysid, "grid", recording, "--asset", asset, *AXES, "--force", "-o", out)
+    expect(second.returncode == 2 and "another run is writing to it" in second.stderr, "--force beside a search",
+           second.stderr)
+    for name in ("grid.json", "results.csv", "registrations.csv", "keyframes.csv"):
+        expect((out / name).exists(), f"--force beside a search removes {name}")
+    job.terminate()
+    end(job)
+
+
+def names(sysid, root, asset, recording):
+    def copy(folder, name):
+        shutil.copytree(recording, folder)
+        data = json.loads((folder / "recording.json").read_text())
+        data["name"] = name
+        if folder.parent.name == "day2":
+            data["note"] = "another day"
+        (folder / "recording.json").write_text(json.dumps(data))
+        return folder
+
+    search = ["--asset", asset, *AXES]
+    victim = root / "victim"
+    victim.mkdir()
+    (victim / "000_mesh.ply").write_text("mine")
+    run = root / "named" / "run"
+    done = program.call(sysid, "grid", copy(root / "path", "../../../victim"), *search, "-o", run)
+    expect(done.returncode in (0, 3), "a name that is a path", done.stderr)
+    expect((victim / "000_mesh.ply").read_text() == "mine", "a name that is a path overwrites a file")
+    expect([path.name for path in (run / "best").iterdir()] == ["_._.._.._victim"], "folder of such a name")
+    expect(program.call(sysid, "report", run).returncode == 0, "its report")
+    done = program.call(sysid, "grid", copy(root / "long", "x" * 5000), *search, "-o", root / "long_run")
+    expect(done.returncode in (0, 3), "a name of 5,000 letters", done.stderr[:300])
+
+    days = [copy(root / "day1" / "lift", "lift"), copy(root / "day2" / "lift", "lift")]
+    run = root / "days"
+    done = program.call(sysid, "grid", *days, *search, "-o", run)
+    expect(done.returncode in (0, 3), "two recordings of one name", done.stderr)
+    summary = json.loads((run / "summary.json").read_text())
+    expect([each["name"] for each in summary["recordings"]] == ["lift", "lift_2"], "names in the summary")
+    expect(sorted(path.name for path in (run / "best").iterdir()) == ["lift", "lift_2"], "folders of two days")
+    registered = {line.split(",")[1] for line in (run / "registrations.csv").read_text().splitlines()[1:]}
+    expect(registered == {"lift", "lift_2"}, "names in registrations.csv", registered)
+    expect(done.stderr.count("2 of 2 candidates") == 1, "progress without a terminal", done.stderr)
+    (root / "link").symlink_to(days[0])
+    for same in (days[0], root / "link"):
+        done = program.call(sysid, "grid", days[0], same, *search, "-o", root / "same")
+        expect(done.returncode == 2 and "is the same recording as" in done.stderr, "one recording twice", done.stderr)
+        expect(not (root / "same").exists(), "a refused search leaves nothing")
+    done = program.call(sysid, "grid", *days, *search, "--quiet", "-o", root / "quiet")
+    expect("candidates," not in done.stderr, "--quiet", done.stderr)
+
+
+def refusals(sysid, root, asset, recording):
+    out = root / "refused"
+    replay, grid = ["replay", recording, "--asset", asset], ["grid", recording, "--asset", asset]
+    synth = ["synth", "--asset", asset, "--quiet"]
+    axis = ["--bending", "1e-4,2e-4"]
+    cases = [
+        ([*replay, "--time-step", "1e-9"], "--time-step: found 1e-09 s"),
+        ([*grid, *axis, "--time-step", "1e-9"], "--time-step: found 1e-09 s"),
+        ([*grid, "--bending", "1e-6:1e-3:100000", "--friction", "0.1:1:100000"], "expected at most 1,000,000"),
+        ([*grid, *axis, "--iterations", "2147483647", "--tolerance", "1e-300"], "--iterations"),
+        ([*grid, *axis, "--tolerance", "1e-300"], "--tolerance"),
+        ([*grid, "--bending", "1e-4,1e-4"], "--bending: 0.0001 is given twice"),
+        ([*grid, *axis, "--from", "3"], "--from, --to: "),
+        (["plan", recording, "--asset", asset, "--time-step", "2e-6"], "--time-step: found 2e-06 s"),
+        ([*synth, "--rate", "1e9"], "--rate: found 1e+09"),
+        ([*synth, "--duration", "1e9"], "--duration: found 1e+09"),
+        ([*synth, "--camera", "nan,0,0"], "--camera"),
+        ([*synth, "--displacement", "1e300", "0", "0"], "--displacement"),
+    ]
+    for words, needle in cases:
+        done = program.call(sysid, *words, "-o", out, timeout=HANG)
+        name = " ".join(map(str, words[1:]))
+        expect(done.returncode == 2, f"{name}: exit code", f"{done.returncode} {done.stderr}")
+        expect(needle in done.stderr and done.stderr.count("\n") == 1, f"{name}: message", done.stderr)
+        expect(not out.exists(), f"{name}: leaves nothing")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sysid", required=True, help="the program flash-sysid")
+    sysid = parser.parse_args().sysid
+    with tempfile.TemporaryDirectory() as temporary:
+        root = pathlib.Path(temporary)
+        asset, recording = program.synthesize(sysid, root)
+        run = root / "run"
+        done = program.call(sysid, "grid", recording, "--asset", asset, *AXES, "--quiet", "-o", run)
+        expect(done.returncode in (0, 3), "grid", done.stderr)
+        refusals(sysid, root, asset, recording)
+        names(sysid, root, asset, recording)
+        lock_comes_first(sysid, root, asset, recording)
+        stops(sysid, root, asset, recording, run)
+    if failures:
+        sys.exit("\n".join(failures))
+    print("all stopped, refused and kept apart as they should be")
+
+
+if __name__ == "__main__":
+    main()
