@@ -6,6 +6,8 @@ DATA ?= ../shared/data
 JOBS ?= $(shell nproc)
 FUZZ_SECONDS ?= 600
 CMAKE_ARGS ?=
+SEED ?= 10001
+SCENES ?= 1000
 
 PYTHON ?= /usr/bin/python3
 REFERENCE ?= ../shared/reference
@@ -15,7 +17,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate reference fuzz configure-test format check-format tidy install clean
-.PHONY: bench packages-build packages-test packages-bench packages-check
+.PHONY: bench random-scenes packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -53,6 +55,10 @@ validate: reference configure-test  ## Calibrate and fit what is in $(DATA), ren
 	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --calib $(BUILD)/bin/flash-calib --sim $(BUILD)/bin/flash-sim \
 	  --hand-eye-study $(BUILD)/tests/hand_eye_study --data $(DATA) --scenes $(REFERENCE)/scenes \
 	  --results $(BUILD)/reference --out $(BUILD)/validation --document docs/validation.md $(if $(ONLY),--only $(ONLY)) $(if $(TWINS),--twins $(TWINS))
+
+random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on; say what was not solved, and what energy, gaps and ways say
+	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --list
 
 reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py
 	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \

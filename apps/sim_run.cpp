@@ -52,18 +52,23 @@ class ProgressLine {
 };
 
 void print_json(const sim::SceneSummary& summary, const std::string& out, int exit_code) {
+  std::vector<std::string> warnings = summary.notices;
+  warnings.insert(warnings.end(), summary.warnings.begin(), summary.warnings.end());
   const nlohmann::ordered_json json = {{"schema", "flash-sim-summary/1"},
                                        {"out", out},
                                        {"steps", summary.steps},
                                        {"unconverged_steps", summary.unconverged_steps},
                                        {"residual_max", summary.residual_max},
+                                       {"halved_steps", summary.halved_steps},
                                        {"penetration_max_m", summary.penetration_max},
+                                       {"held_penetration_max_m", summary.held_penetration_max},
+                                       {"start_penetration_max_m", summary.start_penetration_max},
                                        {"iterations", summary.iterations},
                                        {"frames", summary.frames},
                                        {"wall_seconds", summary.wall_seconds},
                                        {"interrupted", summary.interrupted},
                                        {"at_rest", summary.at_rest},
-                                       {"warnings", summary.notices},
+                                       {"warnings", warnings},
                                        {"exit_code", exit_code}};
   std::cout << json.dump(2) << '\n';
 }
@@ -119,6 +124,7 @@ int run(const RunOptions& options) {
   if (!summary.at_rest && !summary.interrupted)
     std::cerr << "flash-sim: warning: not at rest after " << summary.steps << " steps: a vertex still moves "
               << data::format_short(summary.last_motion) << " m a step; allow more steps or longer ones\n";
+  for (const std::string& warning : summary.warnings) std::cerr << "flash-sim: warning: " << warning << '\n';
   if (summary.unconverged_steps > 0)
     std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps
               << " steps did not converge (1 in 100 is accepted); worst residual "
@@ -127,9 +133,13 @@ int run(const RunOptions& options) {
   if (options.json) {
     print_json(summary, options.out, exit_code);
   } else if (!options.quiet) {
+    const std::string in_parts =
+        summary.halved_steps > 0 ? " (" + std::to_string(summary.halved_steps) + " of them in parts)" : "";
     std::printf(
-        "%d steps in %.1f s, %.1f Newton iterations a step, residual at most %s, penetration at most %s m\n",
-        summary.steps, summary.wall_seconds, double(summary.iterations) / std::max(1, summary.steps),
+        "%d steps%s in %.1f s, %.1f Newton iterations a step, residual at most %s, penetration at most %s "
+        "m\n",
+        summary.steps, in_parts.c_str(), summary.wall_seconds,
+        double(summary.iterations) / std::max(1, summary.steps),
         data::format_short(summary.residual_max).c_str(),
         data::format_short(summary.penetration_max).c_str());
     std::printf("%s: %d frames, log.csv, forces.csv\n", options.out.c_str(), summary.frames);

@@ -150,6 +150,9 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
                              std::to_string(overlay.frames.size() - 1));
   draw_frames(overlay, frames, options.out);
 
+  if (motion.penetration_max > 5e-3)
+    warn("the gripper takes the sheet up to " + data::format_short(1e3 * motion.penetration_max) +
+         " mm below the table: is the table's height right?");
   if (!result.converged)
     warn("not converged in " + data::format_short(100 * motion.unconverged_share) +
          " % of the steps (residual " + data::format_short(result.residual_max) + ")");

@@ -60,11 +60,12 @@ void read_solver(const JsonObject& file, SceneSolver& solver) {
   }
   if (file.has("solver")) {
     const JsonObject object = file.object("solver");
-    object.expect_fields({"type", "iterations", "tolerance"});
+    object.expect_fields({"type", "iterations", "tolerance", "exit_speed"});
     solver.integrator = read_choice(object, "type", solver.integrator, {"newton", "projective"});
     solver.max_iterations = object.integer("iterations", solver.max_iterations);
     if (solver.max_iterations < 1) throw object.error("iterations", "a whole number from 1");
     solver.tolerance = object.positive("tolerance", solver.tolerance);
+    solver.exit_speed = object.positive("exit_speed", solver.exit_speed);
   }
 }
 

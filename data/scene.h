@@ -28,6 +28,7 @@ struct SceneSolver {
   std::string integrator = "newton";                              ///< solver.type: newton or projective
   int max_iterations = 60;                                        ///< solver.iterations a step
   double tolerance = 1e-3;                                        ///< solver.tolerance on |r| / |M g|
+  double exit_speed = 1.0;  ///< solver.exit_speed of what starts inside an obstacle, at most [m/s]
 };
 
 struct ScenePlane {

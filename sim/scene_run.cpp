@@ -34,6 +34,7 @@ Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sc
     settings.time_step = time_step;
     settings.max_iterations = solver.max_iterations;
     settings.tolerance = solver.tolerance;
+    settings.exit_speed = solver.exit_speed;
     return
         [newton = std::make_shared<Solver>(body.sheet, settings)](Environment& e) { return newton->step(e); };
   }
@@ -95,6 +96,7 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
   for (const StepReport& r : reports) {
     largest.residual = worst(largest.residual, r.residual);
     largest.penetration_max = worst(largest.penetration_max, r.penetration_max);
+    largest.substeps = std::max(largest.substeps, r.substeps);
     largest.complementarity = worst(largest.complementarity, r.complementarity);
     sum.iterations += r.iterations;
     sum.kinetic += r.kinetic;
@@ -109,7 +111,8 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
                        sum.membrane + sum.bending, sum.potential})
     row += "," + data::format_number(value);
   row += converged ? ",1" : ",0";
-  return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "\n";
+  return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "," +
+         std::to_string(largest.substeps) + "\n";
 }
 
 std::string force_rows(double time, const std::vector<SceneBody>& bodies,
@@ -136,6 +139,37 @@ std::string force_rows(double time, const std::vector<SceneBody>& bodies,
     rows += "\n";
   }
   return rows;
+}
+
+/// The deepest vertex of a kind that a run has seen.
+struct Deepest {
+  Penetration penetration;
+  std::size_t body = 0;
+  double time = 0;  ///< at the end of its step [s]
+
+  void see(const Penetration& seen, std::size_t in_body, double at) {
+    if (seen.depth > penetration.depth) *this = {seen, in_body, at};
+  }
+  std::string place(const std::vector<SceneBody>& bodies) const {
+    const SceneBody& in = bodies[body];
+    return in.name + ": vertex " + std::to_string(penetration.vertex) + " is " +
+           data::format_short(1e3 * penetration.depth) + " mm inside " +
+           in.obstacle_names[static_cast<std::size_t>(penetration.obstacle)] + " at " +
+           data::format_short(time) + " s";
+  }
+};
+
+constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
+
+/// Who holds a vertex: an end effector, or a support.
+std::string holder_of(const SceneBody& body, int vertex) {
+  const auto& grasps = body.environment.grasps;
+  for (std::size_t k = 0; k < grasps.size(); ++k)
+    if (body.environment.state.grasp_offsets.size() > k &&
+        body.environment.state.grasp_offsets[k].rows() > 0 &&
+        std::count(grasps[k].vertices.begin(), grasps[k].vertices.end(), vertex) > 0)
+      return body.grasp_names[k];
+  return "a support";
 }
 
 std::set<int> frames_to_write(const data::Scene& scene, int steps) {
@@ -188,7 +222,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   };
   std::string log =
       "step,t,residual,iterations,penetration_max_m,complementarity,kinetic_J,elastic_J,potential_J,"
-      "converged,membrane_J,bending_J\n";
+      "converged,membrane_J,bending_J,substeps\n";
   std::string forces = "t,body,fx,fy,fz\n";
   const auto write_tables = [&] {
     data::write_atomically((fs::path(output_dir) / "log.csv").string(), log);
@@ -196,6 +230,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   };
 
   std::vector<StepReport> reports(bodies.size());
+  Deepest held, started;
+  std::string holder;
   const data::TriangleMesh at_start = merged(bodies);
   const auto begin_writing = [&] {
     fs::remove_all(fs::path(output_dir) / "frames");
@@ -223,14 +259,21 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       const double time = bodies.empty() ? step * scene.time_step : bodies.front().environment.state.time;
       log += log_row(step, time, reports);
       forces += force_rows(time, bodies, reports);
-      bool converged = true;
-      for (const StepReport& report : reports) {
+      bool converged = true, halved = false;
+      for (std::size_t b = 0; b < reports.size(); ++b) {
+        const StepReport& report = reports[b];
         converged = converged && report.converged;
+        halved = halved || report.substeps > 1;
+        started.see(report.start_penetration, b, time - scene.time_step);
+        if (report.held_penetration.depth > held.penetration.depth)
+          holder = holder_of(bodies[b], report.held_penetration.vertex);
+        held.see(report.held_penetration, b, time);
         summary.residual_max = worst(summary.residual_max, report.residual);
         summary.penetration_max = worst(summary.penetration_max, report.penetration_max);
         summary.iterations += report.iterations;
       }
       summary.unconverged_steps += !converged;
+      summary.halved_steps += halved;
       summary.steps = step;
       if (scene.rest_motion) {
         summary.last_motion = scene.time_step * stop_motion(bodies);
@@ -245,6 +288,14 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     throw;
   }
   write_tables();
+  summary.held_penetration_max = held.penetration.depth;
+  summary.start_penetration_max = started.penetration.depth;
+  if (held.penetration.depth > told_depth)
+    summary.warnings.push_back(held.place(bodies) + ", where " + holder +
+                               " holds it: is the height of the obstacle right, or the path?");
+  if (started.penetration.depth > told_depth)
+    summary.warnings.push_back(started.place(bodies) + " at the start of a step: such vertices come out at " +
+                               data::format_short(scene.solver.exit_speed) + " m/s at most; start outside");
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }

@@ -9,17 +9,22 @@ namespace flash::sim {
 
 /// How a run of a scene went.
 struct SceneSummary {
-  int steps = 0;               ///< done
-  int unconverged_steps = 0;   ///< with an object whose residual stayed above the tolerance
-  double residual_max = 0;     ///< worst |r| / |M g|
-  double penetration_max = 0;  ///< [m]
-  long iterations = 0;         ///< of all objects and steps
-  int frames = 0;              ///< written
+  int steps = 0;                     ///< done
+  int unconverged_steps = 0;         ///< with an object whose residual stayed above the tolerance
+  double residual_max = 0;           ///< worst |r| / |M g|
+  int halved_steps = 0;              ///< that could not be solved as one, and were in parts
+  double penetration_max = 0;        ///< [m]
+  double held_penetration_max = 0;   ///< of vertices that supports or end effectors hold [m]
+  double start_penetration_max = 0;  ///< of vertices that start a step inside an obstacle [m]
+  long iterations = 0;               ///< of all objects and steps
+  int frames = 0;                    ///< written
   double wall_seconds = 0;
   bool interrupted = false;
   double last_motion = 0;  ///< quasistatic: of the vertex that moved farthest in the last step [m]
   bool at_rest = true;     ///< quasistatic: whether that is below the scene's bound
   std::vector<std::string> notices;
+  std::vector<std::string>
+      warnings;  ///< vertices held inside an obstacle, or that start there, one line each
 };
 
 struct SceneRun {
@@ -31,9 +36,9 @@ struct SceneRun {
 
 /// Runs a scene and writes, into output_dir: frames/%06d.ply (number: the step; all objects in one mesh),
 /// log.csv (step, t, residual, iterations, penetration_max_m, complementarity, kinetic_J, elastic_J,
-/// potential_J, converged, membrane_J, bending_J) and forces.csv (t, body, fx, fy, fz: of the body on the
-/// objects [N]). The last step of a quasistatic run is always a frame. frames/ of an earlier run goes. What
-/// was done is kept when the run stops early; nothing is written before the first step is done. Throws
+/// potential_J, converged, membrane_J, bending_J, substeps) and forces.csv (t, body, fx, fy, fz: of the body
+/// on the objects [N]). The last step of a quasistatic run is always a frame. frames/ of an earlier run goes.
+/// What was done is kept when the run stops early; nothing is written before the first step is done. Throws
 /// data::InputError, too, where the scene needs more memory than there is.
 SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std::string& output_dir);
 

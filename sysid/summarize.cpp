@@ -103,6 +103,10 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
                          " (the best candidate and " + std::to_string(count) + " of all " +
                          std::to_string(candidates.size()) + " end at it)");
     }
+  // A few millimetres are what a table's height is known to.
+  if (best.penetration_max > 5e-3)
+    warnings.push_back("the gripper takes the sheet up to " + data::format_short(1e3 * best.penetration_max) +
+                       " mm below the table: is the table's height right?");
   if (summary.unconverged > 0)
     warnings.push_back(data::format_count(static_cast<std::size_t>(summary.unconverged)) + " of " +
                        data::format_count(found) + " candidates did not converge in every step");

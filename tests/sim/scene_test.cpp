@@ -232,5 +232,30 @@ TEST_F(SceneRunTest, BadInputIsNamed) {
             std::string::npos);
 }
 
+TEST_F(SceneRunTest, AHandBelowTheTableAndAStartInsideItAreWarnedOf) {
+  const std::string common =
+      R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5, "gravity": [0, 0, -9.81],
+  "obstacles": {"table": {"shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}},)";
+  const data::Scene below = data::load_scene(write("below.json", common + R"(
+  "objects": {"cloth": {"asset": "cloth.json"}},
+  "end_effectors": {"hand": {"size": [0.02, 0.02, 0.02],
+    "keyframes": [{"t": 0, "translation": [0, 0, 0]}, {"t": 0.05, "translation": [0, 0, -0.08]}],
+    "grasps": [{"object": "cloth"}]}}})"));
+  const SceneSummary held = run_scene(below, {}, out());
+  ASSERT_EQ(held.warnings.size(), 1u);
+  EXPECT_NE(held.warnings[0].find("80 mm inside table at 0.05 s, where hand holds it"), std::string::npos)
+      << held.warnings[0];
+  EXPECT_NEAR(held.penetration_max, 0.08, 1e-9);
+  EXPECT_EQ(column("log.csv", "substeps").back(), "1");
+
+  const data::Scene inside = data::load_scene(write("inside.json", common + R"(
+  "solver": {"exit_speed": 0.5},
+  "objects": {"cloth": {"asset": "cloth.json", "start": {"T_base_object": [0, 0, -0.5, 0, 0, 0, 1]}}}})"));
+  const SceneSummary started = run_scene(inside, {}, out());
+  ASSERT_EQ(started.warnings.size(), 1u);
+  EXPECT_NE(started.warnings[0].find("500 mm inside table at 0 s"), std::string::npos) << started.warnings[0];
+  EXPECT_NEAR(started.penetration_max, 0.495, 1e-9);
+}
+
 }  // namespace
 }  // namespace flash::sim
