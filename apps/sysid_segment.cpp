@@ -20,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kSmallestVoxel = 1e-4;  // below it, the cells of a cloud cannot be numbered [m]
+constexpr double kSmallestVoxel = 1e-4;  // finer than any depth camera sees [m]
 
 struct SegmentOptions {
   CommonOptions common;
