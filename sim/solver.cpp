@@ -318,7 +318,8 @@ StepReport advance(Environment& environment, double h, int halvings, Solver::Wor
   StepReport report;
   if (try_step(environment, h, w, report)) return report;
   w.refactor = true;
-  if (halvings <= 0) return report;
+  const bool stopped = w.settings.stop != nullptr && *w.settings.stop;
+  if (halvings <= 0 || stopped) return report;
   const int spent_iterations = report.iterations, spent_solves = report.solves,
             spent_factorizations = report.factorizations;
   const State whole = std::exchange(environment.state, start);
