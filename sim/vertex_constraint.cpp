@@ -243,7 +243,7 @@ void update_contacts(const ContactStep& step, const data::Points& positions, con
     // Of a free one all but the touches is as it was made: most of them are, and it is much to write.
     if (constraint.hold != Hold::free) {
       VertexConstraint released;
-      released.touches = std::move(touches);
+      std::swap(released.touches, touches);
       constraint = std::move(released);
     }
     const auto on_surface = [](const Touch& touch) { return touch.gap <= touching_gap; };
