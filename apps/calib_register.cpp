@@ -44,7 +44,7 @@ std::string target_text(const std::string& target, const std::string& calibratio
 /// What the calibrations of the members say against themselves.
 struct Doubts {
   std::vector<std::string> warnings = {};  ///< each with the file or dataset it is of, once
-  bool unusable = false;                   ///< one cannot be used, and --force did not say to take it
+  bool unusable = false;                   ///< one that the cell stands on cannot be used
 
   void add(const std::string& source, const std::vector<std::string>& more) {
     for (const std::string& warning : more)
@@ -99,7 +99,11 @@ calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
     arms.push_back(name_of(path));
   }
   const calib::Cell composed = calib::compose_cell(arms, calibrations);
-  if (options.without_images) return composed;
+  if (options.without_images) {
+    for (const calib::Extrinsics& calibration : calibrations)
+      doubts.unusable = doubts.unusable || !calibration.usable;
+    return composed;
+  }
   std::vector<calib::CellMember> members;
   for (std::size_t i = 0; i < arms.size(); ++i) {
     const calib::ExtrinsicsInputs& inputs = calibrations[i].inputs;
@@ -124,7 +128,7 @@ calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
     members.push_back(member_of(arms[i], "camera", choice, calib::to_string(calibrations[i].setup), options,
                                 inputs.time_offset.has_value(), again));
     doubts.add(file, again.warnings);
-    doubts.unusable = doubts.unusable || (!again.usable && calibrations[i].usable);
+    doubts.unusable = doubts.unusable || !again.usable;
   }
   return solved_cell(members, options);
 }

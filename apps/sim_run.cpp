@@ -101,7 +101,6 @@ int run(const RunOptions& options) {
       !(fs::is_directory(options.out) && fs::is_empty(options.out)))
     throw data::InputError(options.out + ": exists already; choose another -o, or --force to overwrite");
   const data::Scene scene = data::load_scene(options.scene);
-  const std::atomic<bool>& stop = stop_on_signals();
   ProgressLine progress(!options.quiet);
   sim::SceneRun settings;
   settings.steps = steps_to_run(options, scene);
@@ -111,6 +110,7 @@ int run(const RunOptions& options) {
     if (!options.quiet) std::cerr << notice << '\n';
   };
   settings.progress = [&](int done, int steps) {
+    const std::atomic<bool>& stop = stop_on_signals();  // until the first step there is nothing to keep
     progress.show(done, steps);
     return !stop;
   };

@@ -39,6 +39,10 @@ struct TemporaryFile {
 }  // namespace
 
 void write_atomically(const std::string& path, std::string_view contents) {
+  const std::filesystem::file_status there = std::filesystem::status(path);
+  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there) &&
+      !std::filesystem::is_directory(there))
+    throw InputError(path + ": is a device, a pipe or a socket, and is not written over");
   const std::filesystem::path parent = std::filesystem::path(path).parent_path();
   if (!parent.empty()) std::filesystem::create_directories(parent);
 

@@ -5,7 +5,8 @@
 namespace flash::data {
 
 /// Writes `contents` to a temporary file beside `path`, syncs it and renames it: readers see the old file or
-/// the new one, never half. Missing folders are made. Throws std::system_error naming the path.
+/// the new one, never half. Missing folders are made. Throws std::system_error naming the path, and
+/// InputError where a device, a pipe or a socket is there.
 void write_atomically(const std::string& path, std::string_view contents);
 
 /// Removes from `folder` the temporary files of writers that were killed. Only while nobody writes there.

@@ -239,6 +239,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   };
   try {
     if (steps == 0) begin_writing();
+    if (run.progress && !run.progress(0, steps)) summary.interrupted = steps > 0;
     bool done = false;
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
       bool arrived = true;
@@ -294,8 +295,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     summary.warnings.push_back(held.place(bodies) + ", where " + holder +
                                " holds it: is the height of the obstacle right, or the path?");
   if (started.penetration.depth > told_depth)
-    summary.warnings.push_back(started.place(bodies) + " at the start of a step: such vertices come out at " +
-                               data::format_short(scene.solver.exit_speed) + " m/s at most; start outside");
+    summary.warnings.push_back(started.place(bodies) + ", where a step starts: the obstacle lets it out at " +
+                               data::format_short(scene.solver.exit_speed) +
+                               " m/s; start outside, and leave room where obstacles close");
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }

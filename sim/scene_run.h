@@ -28,10 +28,11 @@ struct SceneSummary {
 };
 
 struct SceneRun {
-  int steps = -1;                                     ///< to run; below zero: the scene's
-  int threads = 1;                                    ///< objects step in parallel
-  std::function<void(const std::string&)> notice;     ///< told each notice before the first step
-  std::function<bool(int done, int steps)> progress;  ///< after each step; false stops the run
+  int steps = -1;                                  ///< to run; below zero: the scene's
+  int threads = 1;                                 ///< objects step in parallel
+  std::function<void(const std::string&)> notice;  ///< told each notice before the first step
+  /// Before the first step and after each; false stops the run.
+  std::function<bool(int done, int steps)> progress;
 };
 
 /// Runs a scene and writes, into output_dir: frames/%06d.ply (number: the step; all objects in one mesh),

@@ -389,7 +389,8 @@ Penetration deepest_held(const ContactStep& step, const std::vector<VertexConstr
   for (size_t i = 0; i < constraints.size(); ++i) {
     if (constraints[i].hold != Hold::fixed) continue;
     for (size_t k = 0; k < step.motions.size(); ++k) {
-      const double depth = -gap_to(step.environment.obstacles[k], step.motions[k], positions.row(i)).distance;
+      const Gap gap = step.gap(static_cast<int>(k), positions, static_cast<int>(i));
+      const double depth = gap.sunk - gap.distance;
       if (depth > deepest.depth) deepest = {depth, static_cast<int>(i), static_cast<int>(k)};
     }
   }

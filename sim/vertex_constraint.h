@@ -107,7 +107,7 @@ double friction_potential(const ContactStep& step, const std::vector<VertexConst
                           const data::Points& positions);
 
 /// The deepest of the vertices that supports or grippers hold below an obstacle's surface at the end of the
-/// step.
+/// step, or took through it in the step: below the face through which the way came in.
 Penetration deepest_held(const ContactStep& step, const std::vector<VertexConstraint>& constraints,
                          const data::Points& positions);
 

@@ -33,5 +33,13 @@ TEST(ReadFile, WhatMayNeverEndIsNoInput) {
             large + ": found 1,000,000,001 bytes, expected at most 1,000,000,000");
 }
 
+TEST(WriteAtomically, ReplacesNoPipeAndNoDevice) {
+  const TemporaryFolder folder;
+  const std::string pipe = folder / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THROW(write_atomically(pipe, "1"), InputError);
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+}
+
 }  // namespace
 }  // namespace flash::data

@@ -48,7 +48,7 @@ TEST(FrameFiles, FramesOfAnotherClockAreRefused) {
   EXPECT_NE(compare_clocks(times, between(0, 4), "g.tum").at(0).find("10 of 51 frames are outside"),
             std::string::npos);
   EXPECT_NE(
-      compare_clocks(frame_times("rate:1000", 51), between(0, 5), "g.tum").at(0).find("ten times as long"),
+      compare_clocks(frame_times("rate:1000", 51), between(0, 5), "g.tum").at(0).find("far longer"),
       std::string::npos);
 }
 
