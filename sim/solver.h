@@ -17,7 +17,7 @@ struct SolverSettings {
   double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
   int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
   double exit_speed = 1.0;      ///< at which vertices that start inside an obstacle come out, at most [m/s]
-  int halvings = 6;  ///< a step that cannot be solved is repeated in two halves, each so again, so often
+  int halvings = 8;  ///< a step that cannot be solved is repeated in two halves, each so again, so often
   const std::atomic<bool>* stop = nullptr;  ///< once set, simulate ends before its next step
 };
 
