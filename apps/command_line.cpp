@@ -76,12 +76,24 @@ void occupy_closed_streams() {
       static_cast<void>(::open("/dev/null", stream == STDOUT_FILENO ? O_RDONLY : O_WRONLY));
 }
 
-/// `code` where standard output has taken all of the result.
+/// Whether a signal asked to stop. From here on one ends the program at once, as if none were caught.
+bool asked_to_stop_till_now() {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    struct sigaction now = {};
+    sigaction(signal, nullptr, &now);
+    if (now.sa_handler == ask_to_stop) std::signal(signal, SIG_DFL);
+  }
+  return stop_asked;
+}
+
+/// `code` where standard output has taken all of the result and no signal asked to stop.
 int delivered(const std::string& name, int code) {
   if (code != exit_done && code != exit_unusable) return code;
   errno = 0;
   std::cout.flush();
   const bool taken = std::fflush(stdout) == 0 && std::ferror(stdout) == 0 && std::cout.good();
+  if (taken && asked_to_stop_till_now())
+    return report(name, "the signal came when the result was complete; it is written", exit_failed);
   if (taken) return code;
   return report(name,
                 "the result cannot be written to standard output" +
@@ -169,6 +181,10 @@ const std::atomic<bool>& stop_on_signals() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   return stop_asked;
+}
+
+void end_after_signal() {
+  if (stop_asked) throw data::Stopped();
 }
 
 }  // namespace flash

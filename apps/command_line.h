@@ -14,7 +14,8 @@ enum ExitCode { exit_done = 0, exit_failed = 1, exit_bad_input = 2, exit_unusabl
 
 /// Runs the body of a tool and returns its exit code. data::InputError and paths that the file system refuses
 /// become 2 and any other exception, data::Stopped too, becomes 1, each as the one line "name: message" on
-/// stderr. A result that standard output did not take, because it is full or closed, becomes 1 as well.
+/// stderr. A result that standard output did not take, because it is full or closed, becomes 1 as well, and
+/// so does a body that ended by itself after a signal of stop_on_signals.
 int run_tool(const char* name, const std::function<int()>& body);
 
 /// Parses the command line of `app`, then runs `body`. Help and version print and return 0; an unknown verb,
@@ -24,5 +25,8 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
 /// From now on Ctrl-C and SIGTERM set the flag that this returns, and say at once on stderr that the program
 /// stops after the step in work. A second signal ends the program there, with the exit code 128 + signal.
 const std::atomic<bool>& stop_on_signals();
+
+/// Between a computation and the writing of its result: throws data::Stopped after a signal.
+void end_after_signal();
 
 }  // namespace flash

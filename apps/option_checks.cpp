@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "data/scene.h"
 #include "data/text.h"
 
 namespace flash {
@@ -56,6 +57,12 @@ CLI::Validator number_between(double low, double high) {
   const std::string range = data::format_short(low) + " to " + data::format_short(high);
   return number_check(range, "a number from " + range,
                       [low, high](double value) { return value >= low && value <= high; });
+}
+
+CLI::Validator time_step() {
+  const std::string most = data::format_short(data::max_time_step);
+  return number_check("above 0, to " + most, "a number above 0, at most " + most,
+                      [](double value) { return value > 0 && value <= data::max_time_step; });
 }
 
 CLI::Validator thread_number() { return whole_number(0, 1024); }

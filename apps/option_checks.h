@@ -11,6 +11,9 @@ CLI::Validator positive_number();  ///< finite and above 0
 CLI::Validator number_from(double low);
 CLI::Validator number_between(double low, double high);
 
+/// Of --time-step: above 0, at most data::max_time_step [s].
+CLI::Validator time_step();
+
 /// Of --threads: 0 means one a processor.
 CLI::Validator thread_number();
 

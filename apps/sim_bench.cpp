@@ -76,7 +76,7 @@ void add_bench_verb(CLI::App& app, Action& action) {
   verb.add_option("--threads", benchmark.threads, "Materials that run at the same time; 0: one a processor")
       ->check(thread_number())
       ->capture_default_str();
-  positive("--time-step", benchmark.time_step, "[s]");
+  verb.add_option("--time-step", benchmark.time_step, "[s]")->check(time_step())->capture_default_str();
   positive("--tolerance", benchmark.tolerance, "On the residual |r| / |M g|");
   positive("--young-min", benchmark.membrane_stiffness_min, "E t from [N/m]");
   positive("--young-max", benchmark.membrane_stiffness_max, "E t to [N/m]");

@@ -180,6 +180,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     say(options.common, line + (step.accepted ? "" : "  (left)"));
   });
   const std::string text = data::format_json(fit_json(result, settings));
+  end_after_signal();
   data::write_atomically((fs::path(options.out) / "fit.json").string(), text);
   if (options.common.json) {
     std::cout << text;

@@ -80,7 +80,7 @@ void add_device_option(CLI::App& verb, CommonOptions& options) {
 void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   CLI::App& group = *verb.add_option_group("Replay and score");
   group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
-  group.add_option("--time-step", options.time_step, "[s]")->check(positive_number())->capture_default_str();
+  group.add_option("--time-step", options.time_step, "[s]")->check(time_step())->capture_default_str();
   group.add_option("--iterations", options.iterations, "Of the solver, a step at most")
       ->check(whole_number(1, 10000))
       ->capture_default_str();

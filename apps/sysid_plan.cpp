@@ -1,12 +1,13 @@
-#include <unistd.h>
-
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
@@ -39,16 +40,18 @@ struct PlanOptions {
   std::string out;
 };
 
-// Removed whatever ends the program's work.
+// A folder of its own, which nobody else can read; removed with all that is in it.
 struct ScratchFolder {
-  ScratchFolder() = default;
+  ScratchFolder() {
+    if (mkdtemp(path.data()) == nullptr) throw std::system_error(errno, std::generic_category(), path);
+  }
   ScratchFolder(const ScratchFolder&) = delete;
   ScratchFolder& operator=(const ScratchFolder&) = delete;
   ~ScratchFolder() {
     std::error_code ignored;
     fs::remove_all(path, ignored);
   }
-  const fs::path path = fs::temp_directory_path() / ("flash-plan-" + std::to_string(getpid()));
+  std::string path = (fs::temp_directory_path() / "flash-plan-XXXXXX").string();
 };
 
 // What may be unknown of a cloth (618 fabrics measured: bending 1 to 110 uN m at 5 and 95 %), unless told.
@@ -88,9 +91,9 @@ std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::Materi
 constexpr double kMotion = 2.0, kLongestExperiment = 3.0;  // of the experiments that synth knows [s]
 
 // A sheet of the recording's size in each of the experiments that synth knows, seen by two cameras.
-data::Recording virtual_recording(const std::string& kind, const data::Recording& like,
-                                  const data::SheetMaterial& material, const sim::SolverSettings& solver,
-                                  const std::string& folder, unsigned seed) {
+sysid::Replay virtual_replay(const std::string& kind, const data::Recording& like,
+                             const data::SheetMaterial& material, const sysid::ReplaySettings& replay,
+                             unsigned seed) {
   sysid::SynthSettings settings;
   settings.name = kind;
   settings.kind = kind;
@@ -116,9 +119,10 @@ data::Recording virtual_recording(const std::string& kind, const data::Recording
   }
   data::TriangleMesh mesh = like.mesh;
   mesh.vertices.rowwise() -= low.transpose();
-  sysid::SynthRecording made = sysid::synthesize(mesh, like.mesh_spec, material, settings, solver);
-  sysid::save_synthetic(made, folder);
-  return data::load_recording(folder);
+  sysid::SynthRecording made = sysid::synthesize(mesh, like.mesh_spec, material, settings, replay.solver);
+  const ScratchFolder scratch;  // after the simulation, so that it stands for a moment only
+  sysid::save_synthetic(made, scratch.path);
+  return sysid::make_replay(data::load_recording(scratch.path), replay);
 }
 
 std::string spread_text(const sysid::Axis& axis, double spread) {
@@ -173,7 +177,6 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   check_output(options.out, options.common);
   sysid::steps_in(kLongestExperiment, options.replay.time_step);  // refused before anything is simulated
 
-  const ScratchFolder scratch;
   const data::SheetMaterial material = sysid::candidate_at(settings.at, settings.grid).material;
   std::vector<sysid::PlannedExperiment> experiments;
   for (const data::Recording& recording : recordings) {
@@ -185,15 +188,15 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   }
   for (const char* kind : {"corner_lift", "hang", "bar_pull", "bias_pull", "drag"}) {
     say(options.common, std::string("simulating ") + kind);
-    const data::Recording made = virtual_recording(kind, recordings.front(), material, replay.solver,
-                                                   (scratch.path / kind).string(), options.common.seed);
     sysid::ReplaySettings own;
     own.solver = replay.solver;
     own.threads = threads;
-    experiments.push_back(sysid::plan_experiment(kind, {sysid::make_replay(made, own)}, settings));
+    const sysid::Replay made = virtual_replay(kind, recordings.front(), material, own, options.common.seed);
+    experiments.push_back(sysid::plan_experiment(kind, {made}, settings));
   }
   const std::vector<sysid::Axis>& axes = settings.grid.axes;
   const std::string text = data::format_json(plan_json(experiments, axes, options));
+  end_after_signal();
   data::write_atomically(options.out, text);
   if (options.common.json) {
     std::cout << text;

@@ -81,9 +81,17 @@ data::Picture draw_sequence(const sysid::Overlay& overlay, const std::vector<int
   return sequence;
 }
 
+// While the folder is filled a signal leaves what is there.
+void end_half_written(const std::string& folder) {
+  if (stop_on_signals())
+    throw std::runtime_error("stopped before the end; " + folder +
+                             " is not complete: replay again, with --force in the same folder");
+}
+
 void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, const std::string& folder) {
   const Eigen::AlignedBox3d bounds = bounds_of(overlay, frames);
   for (const int k : frames) {
+    end_half_written(folder);
     const sysid::OverlayFrame& frame = overlay.frames[static_cast<std::size_t>(k)];
     data::save_png(sysid::draw_overlay({frame.vertices, overlay.triangles}, frame.cloud, bounds),
                    numbered(folder, "%03d.png", k));
@@ -137,17 +145,20 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
     throw std::runtime_error(recording.name + ": the simulation diverged; lower --time-step");
 
   const sysid::Overlay overlay = sysid::make_overlay(replay, motion.motion, result.recordings.front());
-  sysid::save_overlay(overlay, options.out);
-  if (options.every_step)
-    for (std::size_t k = 0; k < motion.motion.positions.size(); ++k)
-      data::save_triangle_mesh(
-          {motion.motion.positions[k], overlay.triangles},
-          numbered((fs::path(options.out) / "steps").string(), "%06d.ply", static_cast<int>(k)));
   const std::vector<int> frames = options.frames.empty() ? some_frames(overlay) : options.frames;
   for (const int k : frames)
     if (k < 0 || k >= static_cast<int>(overlay.frames.size()))
       throw data::InputError("--frames: " + std::to_string(k) + " is not a keyframe; expected 0 to " +
                              std::to_string(overlay.frames.size() - 1));
+  end_after_signal();
+  sysid::save_overlay(overlay, options.out);
+  if (options.every_step)
+    for (std::size_t k = 0; k < motion.motion.positions.size(); ++k) {
+      end_half_written(options.out);
+      data::save_triangle_mesh(
+          {motion.motion.positions[k], overlay.triangles},
+          numbered((fs::path(options.out) / "steps").string(), "%06d.ply", static_cast<int>(k)));
+    }
   draw_frames(overlay, frames, options.out);
 
   if (motion.penetration_max > 5e-3)
@@ -155,7 +166,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
          " mm below the table: is the table's height right?");
   if (!result.converged)
     warn("not converged in " + data::format_short(100 * motion.unconverged_share) +
-         " % of the steps (residual " + data::format_short(result.residual_max) + ")");
+         " % of the steps (1 % is accepted; residual " + data::format_short(result.residual_max) + ")");
   for (const sysid::RegistrationParameter& parameter : sysid::registration_parameters)
     if (sysid::is_at_bound(result.recordings.front().bounds_hit, parameter))
       warn(sysid::at_bound_text(parameter, recording.nuisance));
@@ -171,7 +182,8 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
                 1000 * result.score, 1000 * fit.offset.x(), 1000 * fit.offset.y(), 1000 * fit.offset.z(),
                 fit.yaw, 1000 * fit.time_offset, options.out.c_str());
   }
-  return exit_done;
+  // One step in a hundred may stay above the tolerance without spoiling a motion.
+  return motion.unconverged_share > 0.01 ? exit_unusable : exit_done;
 }
 
 }  // namespace
@@ -193,6 +205,7 @@ void add_replay_verb(CLI::App& app, Action& action) {
   add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
+      "Exit code 3: more than 1 % of the steps did not converge; all files are written.\n"
       "Example:\n  flash-sysid replay lift_a --asset towel.json --fix bending=1e-4 --frames 12,16,20,24 -o "
       "overlay");
   verb->callback(

@@ -112,6 +112,7 @@ int run_synth(SynthOptions options) {
   const data::SheetMaterial material = sysid::make_candidate(base, axes, values).material;
   options.solver.stop = &stop_on_signals();
   sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
+  end_after_signal();
   if (options.common.force) fs::remove_all(fs::path(options.out) / "frames");
   sysid::save_synthetic(synthetic, options.out);
   const std::string truth =
@@ -193,7 +194,7 @@ void add_synth_verb(CLI::App& app, Action& action) {
   verb->add_flag("--forces", synth.forces, "Record the gripper's force too");
   verb->add_flag("--no-gripper", options->no_gripper, "The gripper hides nothing");
   verb->add_option("--time-step", options->solver.time_step, "[s]")
-      ->check(positive_number())
+      ->check(time_step())
       ->capture_default_str();
   verb->add_option("--truth-out", options->truth,
                    "Where the truth goes; without it truth.json in the recording");

@@ -309,15 +309,15 @@ void check_grasps(const Recording& recording) {
     if (grasp.from > earliest) continue;
     const Eigen::Isometry3d pose = pose_at(recording.trajectories.at(grasp.gripper), grasp.from);
     const Eigen::Vector3d at = pose * grasp.select.position.value_or(Eigen::Vector3d::Zero());
-    double nearest = kInfinity;
+    Eigen::AlignedBox3d held;  // a gripper may be in the middle of an edge, far from each vertex
     for (const int vertex : select_vertices(recording, grasp))
-      nearest = std::min(nearest, (recording.start.row(vertex).transpose() - at).norm());
-    const double offset = recording.nuisance.offset.norm();
-    if (nearest > grasp.select.within + offset)
+      held.extend(recording.start.row(vertex).transpose());
+    const double distance = held.exteriorDistance(at), offset = recording.nuisance.offset.norm();
+    if (distance > (grasp.select.within + offset) * (1 + 1e-9))
       throw input_error(
           recording.source, "grasps[" + std::to_string(g) + "]",
           "at t = " + format_clock(recording.origin + grasp.from) + " s gripper " + grasp.gripper + " is " +
-              format_short(nearest) + " m from the nearest vertex it should hold, expected at most within " +
+              format_short(distance) + " m from the vertices it should hold, expected at most within " +
               format_short(grasp.select.within) + " m plus nuisance.offset_m " + format_short(offset) +
               " m: check object.start, select and the frame of the trajectory");
   }

@@ -325,6 +325,8 @@ Scene load_scene(const std::string& path) {
   }
   scene.name = file.string("name", std::filesystem::path(path).stem().string());
   scene.time_step = file.positive("timestep");
+  if (scene.time_step > max_time_step)
+    throw file.error("timestep", "at most " + format_short(max_time_step) + " s");
   scene.gravity = file.vector("gravity", 3);
   read_duration(file, scene);
   read_solver(file, scene.solver);

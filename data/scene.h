@@ -143,6 +143,9 @@ struct Scene {
 /// Steps of one simulation at most: what asks for more has another unit, or another clock.
 inline constexpr int max_steps = 1'000'000;
 
+/// The longest step of a simulation [s].
+inline constexpr double max_time_step = 1;
+
 /// How many steps of `time_step` a run of `duration` takes [s]; -1 where they are more than max_steps.
 int steps_of(double duration, double time_step);
 

@@ -1,10 +1,13 @@
 #include "sysid/fit.h"
 
 #include <ceres/ceres.h>
+#include <glog/logging.h>
 
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <limits>
 
 #include "data/error.h"
@@ -64,13 +67,36 @@ class Residuals : public ceres::CostFunction {
     mutable_parameter_block_sizes()->push_back(static_cast<int>(settings.grid.axes.size()));
   }
 
-  /// No exception passes through Ceres; what asked to stop ends the next simulation too.
+  /// No exception passes through Ceres: rethrow() throws it afterwards.
   bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    if (failure_) return false;
     try {
       return evaluate(parameters, residuals, jacobians);
-    } catch (const data::Stopped&) {
+    } catch (...) {
+      failure_ = std::current_exception();
       return false;
     }
+  }
+
+  bool failed() const { return failure_ != nullptr; }
+
+  /// Throws what ended an evaluation under Ceres, if something did.
+  void rethrow() const {
+    if (failure_) std::rethrow_exception(failure_);
+  }
+
+  /// (J^T J)^-1 at `x`; empty where a direction is not determined, or where a motion about x diverges.
+  Eigen::MatrixXd covariance(const std::vector<double>& x) const {
+    const auto count = static_cast<Eigen::Index>(x.size());
+    Eigen::VectorXd residuals(num_residuals());
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> jacobian(num_residuals(), count);
+    const double* const parameters = x.data();
+    double* rows = jacobian.data();
+    if (!evaluate(&parameters, residuals.data(), &rows)) return {};
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(jacobian, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::VectorXd& sizes = svd.singularValues();
+    if (sizes.size() < count || !(sizes[count - 1] > 1e-7 * sizes[0])) return {};
+    return svd.matrixV() * sizes.cwiseAbs2().cwiseInverse().asDiagonal() * svd.matrixV().transpose();
   }
 
   bool evaluate(double const* const* parameters, double* residuals, double** jacobians) const {
@@ -155,14 +181,16 @@ class Residuals : public ceres::CostFunction {
   const FitSettings& settings_;
   Eigen::Index rows_ = 0;
   double limit_ = 0, scale_ = 1;
+  mutable std::exception_ptr failure_;
 };
 
 class Path : public ceres::IterationCallback {
  public:
-  Path(const std::vector<Axis>& axes, const std::vector<double>& x,
+  Path(const Residuals& residuals, const std::vector<Axis>& axes, const std::vector<double>& x,
        const std::function<void(const FitStep&)>& report)
-      : axes_(axes), x_(x), report_(report) {}
+      : residuals_(residuals), axes_(axes), x_(x), report_(report) {}
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& summary) override {
+    if (residuals_.failed()) return ceres::SOLVER_ABORT;
     steps.push_back({values_at(axes_, x_.data()), summary.cost, summary.step_is_successful, FitStage::local});
     if (report_) report_(steps.back());
     return ceres::SOLVER_CONTINUE;
@@ -170,6 +198,7 @@ class Path : public ceres::IterationCallback {
   std::vector<FitStep> steps;
 
  private:
+  const Residuals& residuals_;
   const std::vector<Axis>& axes_;
   const std::vector<double>& x_;
   const std::function<void(const FitStep&)>& report_;
@@ -244,8 +273,11 @@ FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
     if (generation.accepted) from = generation.values;
   std::vector<double> x;
   for (std::size_t k = 0; k < axes.size(); ++k) x.push_back(coordinate(axes[k], from[k]));
-  ceres::Problem problem;
-  problem.AddResidualBlock(new Residuals(replays, settings, from), nullptr, x.data());  // the problem owns it
+  Residuals residuals(replays, settings, from);
+  ceres::Problem::Options borrow;
+  borrow.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  ceres::Problem problem(borrow);
+  problem.AddResidualBlock(&residuals, nullptr, x.data());
   for (std::size_t k = 0; k < axes.size(); ++k) {
     problem.SetParameterLowerBound(x.data(), static_cast<int>(k),
                                    coordinate(axes[k], axes[k].values.front()));
@@ -257,12 +289,14 @@ FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
   options.parameter_tolerance = 1e-5;
   options.linear_solver_type = ceres::DENSE_QR;
   options.logging_type = ceres::SILENT;
+  FLAGS_minloglevel = google::GLOG_FATAL;  // SILENT leaves the warning of a failed evaluation
   options.update_state_every_iteration = true;
-  Path path(axes, x, report);
+  Path path(residuals, axes, x, report);
   options.callbacks.push_back(&path);
   ceres::Solver::Summary summary;
   const std::vector<double> start = x;
   ceres::Solve(options, &problem, &summary);
+  residuals.rethrow();
 
   result.values = values_at(axes, x.data());
   result.path.insert(result.path.end(), path.steps.begin(), path.steps.end());
@@ -270,16 +304,7 @@ FitResult fit(const std::vector<Replay>& replays, const FitSettings& settings,
   const std::string ends = at_ends(axes, x);
   result.stuck = !result.refined && (!ends.empty() || summary.termination_type == ceres::FAILURE);
   result.termination = words_of(summary, result.refined, ends);
-  ceres::Covariance::Options with;
-  with.algorithm_type = ceres::DENSE_SVD;
-  with.null_space_rank = 0;
-  ceres::Covariance covariance(with);
-  const auto count = static_cast<Eigen::Index>(axes.size());
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> block(count, count);
-  if (covariance.Compute(std::vector<std::pair<const double*, const double*>>{{x.data(), x.data()}},
-                         &problem) &&
-      covariance.GetCovarianceBlock(x.data(), x.data(), block.data()))
-    result.covariance = block;
+  result.covariance = residuals.covariance(x);
   std::vector<ReplayResult> motions;
   for (const Replay& replay : replays)
     motions.push_back(std::move(run(replay, {candidate_at(result.values, settings.grid)}).front()));

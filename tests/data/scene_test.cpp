@@ -131,6 +131,7 @@ TEST_F(SceneFiles, FrictionBelongsToThePairThenToTheBody) {
 TEST_F(SceneFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed(kPublished, "/gravitiy", 1), "gravitiy: unknown field (did you mean \"gravity\"?)");
   EXPECT_EQ(changed(kPublished, "/timestep", 0), "timestep: found 0, expected a number above 0");
+  EXPECT_EQ(changed(kPublished, "/timestep", 1e9), "timestep: found 1000000000.0, expected at most 1 s");
   EXPECT_EQ(changed(kPublished, "/constraintsolver/type", "Newton"),
             "constraintsolver.type: found \"Newton\", expected one of automatic, NonSmoothNewton, "
             "LiteNonSmoothNewton, "

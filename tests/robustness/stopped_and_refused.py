@@ -3,6 +3,7 @@
 gives it recordings whose names are paths, are the same, or are twice the same recording."""
 import argparse
 import json
+import os
 import pathlib
 import shutil
 import signal
@@ -78,6 +79,66 @@ def stops(sysid, root, asset, recording, run):
     expect(job.returncode in (128 + signal.SIGINT, 128 + signal.SIGTERM), "second signal", f"{job.returncode} {error}")
 
 
+def wait_for(job, line):
+    while line not in (job.stderr.readline() or line):
+        pass
+
+
+def stops_late(sysid, root, asset, recording, run):
+    """Signals after a first result: in the optimizer and its last phase, and while pictures are written."""
+    out = root / "stopped_late"
+
+    def ended(job, what, *reasons):
+        error = end(job)
+        said = "stopping after this step" in error
+        expect(job.returncode == 1 if said else job.returncode in (0, 3), what, f"{job.returncode} {error}")
+        expect(not said or any(reason in error for reason in reasons), f"{what}: says what is there", error)
+        expect("Logging" not in error and "Terminating" not in error, f"{what}: log of a library", error)
+        expect("nothing was written" not in error or not out.exists(), f"{what}: leaves nothing", error)
+        shutil.rmtree(out, ignore_errors=True)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        for step in (0, 1, 2):
+            job = start(sysid, "fit", recording, "--asset", asset, "--start", run, "--steps", "2", "--threads", "1",
+                        "-o", out)
+            wait_for(job, f"step {step} of")
+            job.send_signal(number)
+            ended(job, f"fit: {number.name} after step {step}", "nothing was written", "it is written")
+        job = start(sysid, "replay", recording, "--asset", asset, "--every-step", "--time-step", "1e-3", "-o", out)
+        while not (out / "steps").exists() and job.poll() is None:
+            time.sleep(0.001)
+        job.send_signal(number)
+        ended(job, f"replay: {number.name} while it writes", "is not complete", "it is written")
+
+
+def plans(sysid, root, asset):
+    """A mesh whose edges have no vertex in the middle; what a killed plan leaves."""
+    scratch = root / "scratch"
+    scratch.mkdir()
+    environment = {**os.environ, "TMPDIR": str(scratch)}
+    made = root / "even"
+    program.must(sysid, "synth", "--asset", asset, "--mesh", "sheet:0.2x0.2:0.04", "--duration", "0.2", "--quiet",
+                 "-o", made)
+    words = [sysid, "plan", made, "--asset", asset, "--bending", "1e-5,1e-4", "--time-step", "0.02"]
+    done = program.call(*words, "-o", root / "plan.json", env=environment)
+    expect(done.returncode == 0 and (root / "plan.json").exists(), "plan of a mesh of even edges", done.stderr)
+    job = subprocess.Popen([*map(str, words), "-o", str(root / "killed.json")], stderr=subprocess.PIPE, text=True,
+                           env=environment)
+    wait_for(job, "simulating hang")
+    job.kill()
+    job.communicate()
+    expect(not list(scratch.iterdir()), "plan leaves nothing behind", list(scratch.iterdir()))
+
+
+def unconverged(sysid, root, asset, recording):
+    out = root / "unconverged"
+    done = program.call(sysid, "replay", recording, "--asset", asset, "--iterations", "1", "--tolerance", "1e-12",
+                        "-o", out)
+    expect(done.returncode == 3 and "not converged in" in done.stderr, "replay of unconverged steps",
+           f"{done.returncode} {done.stderr}")
+    expect((out / "overlay.csv").exists(), "replay of unconverged steps writes its files")
+
+
 def lock_comes_first(sysid, root, asset, recording):
     out = root / "locked"
     job = start(sysid, "grid", recording, "--asset", asset, *AXES, *LONG, "-o", out)
@@ -148,6 +209,8 @@ def refusals(sysid, root, asset, recording):
         ([*grid, "--bending", "1e-4,1e-4"], "--bending: 0.0001 is given twice"),
         ([*grid, *axis, "--from", "3"], "--from, --to: "),
         (["plan", recording, "--asset", asset, "--time-step", "2e-6"], "--time-step: found 2e-06 s"),
+        ([*replay, "--time-step", "1e9"], "--time-step: found \"1e9\", expected a number above 0, at most 1"),
+        ([*synth, "--time-step", "1e300"], "--time-step: found \"1e300\", expected a number above 0, at most 1"),
         ([*synth, "--rate", "1e9"], "--rate: found 1e+09"),
         ([*synth, "--duration", "1e9"], "--duration: found 1e+09"),
         ([*synth, "--camera", "nan,0,0"], "--camera"),
@@ -175,6 +238,9 @@ def main():
         names(sysid, root, asset, recording)
         lock_comes_first(sysid, root, asset, recording)
         stops(sysid, root, asset, recording, run)
+        stops_late(sysid, root, asset, recording, run)
+        plans(sysid, root, asset)
+        unconverged(sysid, root, asset, recording)
     if failures:
         sys.exit("\n".join(failures))
     print("all stopped, refused and kept apart as they should be")

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 
+#include "data/error.h"
 #include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {
@@ -60,6 +62,23 @@ TEST(Fit, SaysWhyItEndedAndThatAStartAtTheEdgeWasNotRefined) {
   EXPECT_TRUE(inside.refined);
   EXPECT_FALSE(inside.stuck);
   EXPECT_EQ(inside.termination.substr(0, 28), "the cost stands still after ");
+}
+
+TEST(Fit, EndsWithStoppedInTheMiddleAndAfterItsLastStep) {
+  const data::TemporaryFolder folder;
+  FitSettings settings = fit_of({{"bending", {1e-5, 1e-2}, true}}, {1e-3});
+  settings.iterations = 2;
+  for (std::size_t last = 0; last <= 2; ++last) {
+    std::atomic<bool> stop = false;
+    std::vector<Replay> replays = {short_lift(folder)};
+    replays[0].settings.solver.stop = &stop;
+    std::size_t reported = 0;
+    const auto stop_at_last = [&](const FitStep&) {
+      if (reported++ == last) stop = true;
+    };
+    EXPECT_THROW(fit(replays, settings, stop_at_last), data::Stopped);
+    EXPECT_EQ(reported, last + 1);
+  }
 }
 
 TEST(Fit, BothStagesHaveTheSameCost) {
