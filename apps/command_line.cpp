@@ -19,6 +19,7 @@
 #include <system_error>
 #include <vector>
 
+#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
 
@@ -117,6 +118,31 @@ void collect_options(const CLI::App& app, std::vector<std::string>& names) {
   for (const CLI::App* group : app.get_subcommands(nullptr)) collect_options(*group, names);
 }
 
+/// CLI11 would wait for a pipe, read a device without end, and take bytes that are no text for flags.
+std::string check_config(const std::string& path) {
+  const std::string text = data::read_file(path);
+  const auto odd = std::find_if(text.begin(), text.end(), [](unsigned char c) {
+    return (c < ' ' && c != '\n' && c != '\r' && c != '\t') || c == 0x7f;
+  });
+  if (odd != text.end())
+    throw data::InputError(path + ":" + std::to_string(1 + std::count(text.begin(), odd, '\n')) +
+                           ": found a control character, expected TOML, as [grid] and envs=8");
+  return {};
+}
+
+/// "options.toml: grid.bendin: unknown option or section".
+data::InputError wrong_config(const CLI::App& app, const CLI::ConfigError& error) {
+  constexpr std::string_view kUnknown = "INI was not able to parse ";  // of CLI11, before section and key
+  constexpr std::size_t kLongest = 80;
+  const std::string file = app.get_config_ptr()->results().front();
+  std::string text = error.what();
+  if (!text.starts_with(kUnknown)) return data::InputError(file + ": " + text);
+  text.erase(0, kUnknown.size());
+  if (text.ends_with(".++") || text.ends_with(".--")) text.resize(text.size() - 3);  // a section begins, ends
+  if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
+  return data::InputError(file + ": " + text + ": unknown option or section (see --help)");
+}
+
 /// What CLI11 found wrong with the command line; for a long option that the verb does not have, the nearest.
 std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
   std::vector<std::string> known;
@@ -163,8 +189,12 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
   occupy_closed_streams();
   return run_tool(app.get_name().c_str(), [&] {
     check_verb(app, argc, argv);
+    if (CLI::Option* const config = app.get_config_ptr()) config->check(check_config);
+    app.allow_config_extras(CLI::config_extras_mode::error);
     try {
       app.parse(argc, argv);
+    } catch (const CLI::ConfigError& error) {
+      throw wrong_config(app, error);
     } catch (const CLI::ParseError& error) {
       if (error.get_exit_code() == 0) return app.exit(error);
       return report(app.get_name(), wrong_words(app, error, argc, argv), exit_bad_input);

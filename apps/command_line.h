@@ -19,7 +19,8 @@ enum ExitCode { exit_done = 0, exit_failed = 1, exit_bad_input = 2, exit_unusabl
 int run_tool(const char* name, const std::function<int()>& body);
 
 /// Parses the command line of `app`, then runs `body`. Help and version print and return 0; an unknown verb,
-/// a parse error or an empty value returns 2 with one line on stderr.
+/// a parse error or an empty value returns 2 with one line on stderr, as does a file of --config that is no
+/// regular file, is no text, or names an option or a section that the tool does not have.
 int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& body);
 
 /// From now on Ctrl-C and SIGTERM set the flag that this returns, and say at once on stderr that the program

@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -13,11 +12,10 @@
 #include "data/text.h"
 #include "sim/sheet.h"
 #include "sysid/export_asset.h"
+#include "sysid/search_folder.h"
 
 namespace flash {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct ExportOptions {
   CommonOptions common;
@@ -28,7 +26,7 @@ struct ExportOptions {
 };
 
 int run_export(const ExportOptions& options) {
-  const sysid::Summary summary = sysid::load_summary((fs::path(options.run) / "summary.json").string());
+  const sysid::Summary summary = sysid::load_search_folder(options.run).summary;
   const data::Asset base = data::load_asset(options.asset.empty() ? summary.asset : options.asset);
   check_output(options.out, options.common);
   const data::Asset tuned = sysid::tuned_asset(base, summary);

@@ -225,7 +225,7 @@ std::vector<data::Recording> load_recordings(const std::vector<std::string>& pat
     const data::Recording& recording = recordings.back();
     names.push_back(recording.name);
     if (paths.size() == 1) break;
-    const auto [same, is_new] = known.emplace(sysid::recording_sha256(recording), recording.source);
+    const auto [same, is_new] = known.emplace(sysid::observed_sha256(recording), recording.source);
     if (!is_new)
       throw data::InputError(recording.source + ": is the same recording as " + same->second +
                              ", expected each once: twice would count as two trials");

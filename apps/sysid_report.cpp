@@ -11,6 +11,7 @@
 #include "sysid/predictability.h"
 #include "sysid/recording_names.h"
 #include "sysid/report.h"
+#include "sysid/search_folder.h"
 
 namespace flash {
 namespace {
@@ -26,8 +27,7 @@ struct ReportOptions {
 };
 
 int run_report(const ReportOptions& options) {
-  const sysid::Summary summary = sysid::load_summary((fs::path(options.run) / "summary.json").string());
-  sysid::GridResults results = sysid::load_grid_results(options.run);
+  auto [summary, results] = sysid::load_search_folder(options.run);
   std::vector<std::optional<double>> horizons;
   for (const sysid::SummaryRecording& recording : summary.recordings) horizons.push_back(recording.horizon_s);
   if (!horizons.empty()) sysid::drop_beyond_horizons(horizons, results);

@@ -65,10 +65,14 @@ std::vector<std::string> files_in_order(const std::string& folder,
                                         const std::vector<std::string>& extensions) {
   if (!fs::is_directory(folder)) throw InputError(folder + ": is no folder, expected one with files");
   std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.is_regular_file() && std::find(extensions.begin(), extensions.end(),
-                                             lower_extension(entry.path().string())) != extensions.end())
-      files.push_back(entry.path().string());
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    const std::string path = entry.path().string();
+    if (std::find(extensions.begin(), extensions.end(), lower_extension(path)) == extensions.end()) continue;
+    std::error_code unknown;
+    if (!entry.is_regular_file(unknown))
+      throw InputError(path + ": is no regular file, expected one: frames are numbered in order of name");
+    files.push_back(path);
+  }
   std::sort(files.begin(), files.end(), natural_less);
   return files;
 }

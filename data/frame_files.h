@@ -8,7 +8,8 @@
 namespace flash::data {
 
 /// The files of a folder whose names end in one of `extensions`, in order of name: 2 before 10. May be empty.
-/// Throws InputError where there is no such folder.
+/// Throws InputError where there is no such folder, and where such a name is of a folder, a pipe, a device or
+/// a broken link: without it the files after it would be counted wrongly.
 std::vector<std::string> files_in_order(const std::string& folder,
                                         const std::vector<std::string>& extensions);
 

@@ -86,13 +86,16 @@ constexpr const char* kKeyframesHeader = "id,recording,t,score_m,points,weight\n
 class Row {
  public:
   Row(const std::vector<std::string>& names, std::vector<std::string> fields, std::string place)
-      : names_(names), fields_(std::move(fields)), place_(std::move(place)) {}
+      : names_(names), fields_(std::move(fields)), place_(std::move(place)) {
+    if (fields_.size() != names_.size())
+      throw data::InputError(place_ + ": found " + std::to_string(fields_.size()) + " fields, expected " +
+                             std::to_string(names_.size()));
+  }
 
   const std::string& text(const std::string& name) const {
     const auto found = std::find(names_.begin(), names_.end(), name);
-    const auto index = static_cast<std::size_t>(found - names_.begin());
-    if (index >= fields_.size()) throw data::InputError(place_ + ": " + name + ": the column is missing");
-    return fields_[index];
+    if (found == names_.end()) throw data::InputError(place_ + ": " + name + ": the column is missing");
+    return fields_[static_cast<std::size_t>(found - names_.begin())];
   }
   double number(const std::string& name) const {
     const std::optional<double> value = data::parse_number(text(name));
@@ -110,6 +113,17 @@ class Row {
     if (!(value >= 0)) throw error(name, "a number of 0 or above");
     return value;
   }
+  /// A distance of points [m]; infinite where there is none.
+  double score(const std::string& name) const {
+    constexpr double kFarthest = 1e3;
+    const double value = not_negative(name);
+    if (value > kFarthest && std::isfinite(value)) throw error(name, "0 to 1000 m");
+    return value;
+  }
+  bool boolean(const std::string& name) const {
+    if (text(name) != "true" && text(name) != "false") throw error(name, "true or false");
+    return text(name) == "true";
+  }
   int index(const std::string& name) const {
     const int value = data::to_index(number(name));
     if (value < 0) throw error(name, "a whole number from 0");
@@ -125,14 +139,20 @@ class Row {
   std::string place_;
 };
 
+/// What becomes of a last line without its end, which a search that was killed leaves.
+enum class CutLine { refuse, leave_out };
+
 /// Calls `use` for each whole line after the header.
 template <class Use>
-void for_each_row(const std::string& path, const Use& use) {
+void for_each_row(const std::string& path, CutLine cut, const Use& use) {
   const std::string text = data::read_file(path);
   const std::string whole = text.substr(0, text.rfind('\n') + 1);
+  if (cut == CutLine::refuse && whole.size() < text.size())
+    throw data::InputError(path + ": the last line is cut off; grid --resume finds its candidate again");
   data::LineReader lines(whole);
   std::string_view line;
-  if (!lines.next(line)) return;
+  if (!lines.next(line))
+    throw data::input_error(path, "header", "missing, expected the names of the columns");
   const std::vector<std::string> names = fields_of(line);
   while (lines.next(line)) {
     if (!line.empty()) use(Row(names, fields_of(line), path + ":" + std::to_string(lines.number())));
@@ -193,6 +213,37 @@ CandidateStatus status_of(const Row& row) {
   throw row.error("status", "ok, unconverged or diverged");
 }
 
+/// One line of results.csv. Throws data::InputError unless it is of a candidate of the grid.
+CandidateResult read_result(const Row& row, const GridResults& grid) {
+  CandidateResult result;
+  result.id = row.index("id");
+  const double count = count_candidates(grid.axes);
+  if (!(result.id < count))
+    throw row.error("id", "0 to " + data::format_number(count - 1) + ", a candidate of grid.json");
+  result.values = values_of(grid.axes, result.id);
+  for (std::size_t k = 0; k < grid.axes.size(); ++k)
+    if (row.number(grid.axes[k].name) != result.values[k])
+      throw row.error(grid.axes[k].name, data::format_number(result.values[k]) + ", as in grid.json");
+  result.score = row.score("score_m");
+  result.converged = row.boolean("converged");
+  result.residual_max = row.not_negative("residual_max");
+  result.penetration_max = row.not_negative("penetration_max_m");
+  for (const char* name : {"offset_x", "offset_y", "offset_z", "time_offset_s", "yaw_rad"}) row.finite(name);
+  result.status = status_of(row);
+  result.recordings.resize(grid.recordings.size());
+  return result;
+}
+
+/// Only axes and numbers stand in results.csv.
+void check_plain_text(const std::string& path) {
+  const std::string text = data::read_file(path);
+  const auto odd = std::find_if(text.begin(), text.end(),
+                                [](char c) { return (c < ' ' || c > '~') && c != '\n' && c != '\r'; });
+  if (odd != text.end())
+    throw data::InputError(path + ":" + std::to_string(1 + std::count(text.begin(), odd, '\n')) +
+                           ": found a byte that is no letter, digit or sign");
+}
+
 void remove_results(const std::string& folder) {
   for (const char* file :
        {"grid.json", "results.csv", "registrations.csv", "keyframes.csv", "summary.json", "report.html"})
@@ -210,21 +261,7 @@ nlohmann::json load_grid(const std::string& folder) {
   return grid;
 }
 
-}  // namespace
-
-const char* to_string(CandidateStatus status) {
-  switch (status) {
-    case CandidateStatus::ok:
-      return "ok";
-    case CandidateStatus::unconverged:
-      return "unconverged";
-    case CandidateStatus::diverged:
-      return "diverged";
-  }
-  return "";
-}
-
-GridResults load_grid_results(const std::string& folder) {
+GridResults read_results(const std::string& folder, CutLine cut) {
   GridResults results;
   const nlohmann::json grid = load_grid(folder);
   try {
@@ -240,42 +277,33 @@ GridResults load_grid_results(const std::string& folder) {
   }
 
   std::map<int, CandidateResult> found;
-  for_each_row(path_of(folder, "results.csv"), [&](const Row& row) {
-    CandidateResult result;
-    result.id = row.index("id");
-    for (const Axis& axis : results.axes) {
-      result.values.push_back(row.number(axis.name));
-      if (std::find(axis.values.begin(), axis.values.end(), result.values.back()) == axis.values.end())
-        throw row.error(axis.name, "one of the values of grid.json");
-    }
-    result.score = row.not_negative("score_m");
-    result.converged = row.text("converged") == "true";
-    result.residual_max = row.not_negative("residual_max");
-    result.penetration_max = row.not_negative("penetration_max_m");
-    result.status = status_of(row);
-    result.recordings.resize(results.recordings.size());
-    found[result.id] = std::move(result);
+  check_plain_text(path_of(folder, "results.csv"));
+  for_each_row(path_of(folder, "results.csv"), cut, [&](const Row& row) {
+    CandidateResult result = read_result(row, results);
+    const int id = result.id;
+    if (!found.emplace(id, std::move(result)).second) throw row.error("id", "each id once");
   });
   const auto recording_of = [&](const Row& row) -> RecordingScore* {
     const auto candidate = found.find(row.index("id"));
     const auto name = std::find(results.recordings.begin(), results.recordings.end(), row.text("recording"));
-    if (candidate == found.end() || name == results.recordings.end()) return nullptr;
+    if (name == results.recordings.end()) throw row.error("recording", "a recording of grid.json");
+    if (candidate == found.end()) return nullptr;
     return &candidate->second.recordings[name - results.recordings.begin()];
   };
-  for_each_row(path_of(folder, "registrations.csv"), [&](const Row& row) {
+  for_each_row(path_of(folder, "registrations.csv"), cut, [&](const Row& row) {
     RecordingScore* recording = recording_of(row);
     if (recording == nullptr) return;
-    recording->score = row.not_negative("score_m");
+    recording->score = row.score("score_m");
     recording->offset = {row.finite("offset_x"), row.finite("offset_y"), row.finite("offset_z")};
     recording->yaw = row.finite("yaw_rad");
     recording->time_offset = row.finite("time_offset_s");
     recording->bounds_hit = words_of(row.text("bounds_hit"));
     recording->keyframes.clear();
   });
-  for_each_row(path_of(folder, "keyframes.csv"), [&](const Row& row) {
+  for_each_row(path_of(folder, "keyframes.csv"), cut, [&](const Row& row) {
     RecordingScore* recording = recording_of(row);
     if (recording == nullptr) return;
-    const KeyframeScore score{row.finite("t"), row.not_negative("score_m"), row.index("points"),
+    const KeyframeScore score{row.finite("t"), row.score("score_m"), row.index("points"),
                               row.not_negative("weight")};
     // A candidate interrupted between its keyframes and its result is computed again: the later line counts.
     const auto same = std::find_if(recording->keyframes.begin(), recording->keyframes.end(),
@@ -289,6 +317,21 @@ GridResults load_grid_results(const std::string& folder) {
   for (auto& [id, result] : found) results.candidates.push_back(std::move(result));
   return results;
 }
+}  // namespace
+
+const char* to_string(CandidateStatus status) {
+  switch (status) {
+    case CandidateStatus::ok:
+      return "ok";
+    case CandidateStatus::unconverged:
+      return "unconverged";
+    case CandidateStatus::diverged:
+      return "diverged";
+  }
+  return "";
+}
+
+GridResults load_grid_results(const std::string& folder) { return read_results(folder, CutLine::refuse); }
 
 ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
                            const std::vector<std::string>& recordings, const Fingerprint& fingerprint,
@@ -341,7 +384,7 @@ void ResultsStore::go_on(const Fingerprint& fingerprint) {
     throw data::InputError(folder_ + ": --resume: these are not the inputs and settings of its results: " +
                            changed + "; name another folder, or repeat the first command");
   }
-  results_ = load_grid_results(folder_);
+  results_ = read_results(folder_, CutLine::leave_out);
   std::set<int> ids;
   for (const CandidateResult& result : results_.candidates) ids.insert(result.id);
   for (const char* file : {"results.csv", "registrations.csv", "keyframes.csv"}) {

@@ -96,8 +96,9 @@ class ResultsStore {
   int lock_ = -1;  ///< descriptor of the file that is locked
 };
 
-/// Reads a folder written by ResultsStore; a last line cut off by a crash is left out. Throws
-/// data::InputError naming file and line, also for values that no search can have written.
+/// Reads a folder written by ResultsStore. Throws data::InputError naming file and line: a line that is cut
+/// off, which only a search that goes on repairs; a candidate that is not of the grid, or there twice; values
+/// that no search can have written.
 GridResults load_grid_results(const std::string& folder);
 
 }  // namespace flash::sysid

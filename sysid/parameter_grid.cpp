@@ -148,6 +148,14 @@ std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes
   return candidates;
 }
 
+std::vector<double> values_of(const std::vector<Axis>& axes, int id) {
+  auto rest = static_cast<std::size_t>(id);
+  std::vector<double> values(axes.size());
+  for (std::size_t k = axes.size(); k-- > 0; rest /= axes[k].values.size())
+    values[k] = axes[k].values[rest % axes[k].values.size()];
+  return values;
+}
+
 double count_candidates(const std::vector<Axis>& axes) {
   double count = 1;
   for (const Axis& axis : axes) count *= static_cast<double>(axis.values.size());

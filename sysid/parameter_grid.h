@@ -45,6 +45,9 @@ Axis parse_fixed(const std::string& assignment, const std::string& option = "--f
 /// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes);
 
+/// The values of one candidate, as cartesian_product lists them; `id` from 0, below count_candidates.
+std::vector<double> values_of(const std::vector<Axis>& axes, int id);
+
 /// How many cartesian_product makes.
 double count_candidates(const std::vector<Axis>& axes);
 

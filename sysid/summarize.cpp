@@ -155,6 +155,18 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
                                          : "mean";
 }
 
+void add_files(const data::RecordedKeyframe& keyframe, std::vector<std::string>& paths) {
+  for (const std::string& path :
+       {keyframe.cloud, keyframe.depth, keyframe.mask, keyframe.markers, keyframe.contour})
+    if (!path.empty()) paths.push_back(path);
+}
+
+std::string digest_of(const std::vector<std::string>& paths) {
+  std::string digests;
+  for (const std::string& path : paths) digests += data::sha256(data::read_file(path));
+  return data::sha256(digests);
+}
+
 }  // namespace
 
 ReplayCandidate candidate_of(const CandidateResult& result, const GridSettings& settings) {
@@ -217,13 +229,20 @@ std::string recording_sha256(const data::Recording& recording) {
   if (!recording.start_mesh.empty()) paths.push_back(recording.start_mesh);
   if (recording.camera && !recording.camera->intrinsics_path.empty())
     paths.push_back(recording.camera->intrinsics_path);
-  for (const data::RecordedKeyframe& keyframe : recording.keyframes)
-    for (const std::string& path :
-         {keyframe.cloud, keyframe.depth, keyframe.mask, keyframe.markers, keyframe.contour})
-      if (!path.empty()) paths.push_back(path);
-  std::string digests;
-  for (const std::string& path : paths) digests += data::sha256(data::read_file(path));
-  return data::sha256(digests);
+  for (const data::RecordedKeyframe& keyframe : recording.keyframes) add_files(keyframe, paths);
+  return digest_of(paths);
+}
+
+std::string observed_sha256(const data::Recording& recording) {
+  std::vector<std::string> paths;
+  for (const auto& [name, path] : recording.trajectory_paths) paths.push_back(path);
+  std::string forces;
+  for (const data::RecordedKeyframe& keyframe : recording.keyframes) {
+    add_files(keyframe, paths);
+    if (keyframe.force)
+      for (const double component : *keyframe.force) forces += data::format_number(component) + " ";
+  }
+  return data::sha256(digest_of(paths) + forces);
 }
 
 }  // namespace flash::sysid

@@ -170,13 +170,38 @@ const ParameterInfo* info_of(const std::string& name) {
   return nullptr;
 }
 
+void check_within(const std::string& path, const std::string& field, double value, double low, double high) {
+  if (!(value >= low && value <= high))
+    throw data::input_error(path, field,
+                            "found " + data::format_short(value) + ", expected " + data::format_short(low) +
+                                " to " + data::format_short(high));
+}
+
 void check_value(const std::string& path, const std::string& field, const std::string& name, double value) {
   const ParameterInfo* const info = info_of(name);
   if (info == nullptr) throw data::input_error(path, field, "found \"" + name + "\", which is no parameter");
-  if (!(value >= info->low && value <= info->high))
-    throw data::input_error(path, field + "." + name,
-                            "found " + data::format_short(value) + ", expected " +
-                                data::format_short(info->low) + " to " + data::format_short(info->high));
+  check_within(path, field + "." + name, value, info->low, info->high);
+}
+
+/// Estimate and interval: there as the verdict says, both in what was searched.
+void check_answer(const std::string& path, const std::string& field, const ParameterFinding& finding) {
+  const auto rounding = [](double value) { return 1e-9 * std::abs(value); };  // of a logarithm and back
+  if (finding.identifiable == Identifiable::yes && !finding.estimate)
+    throw data::input_error(path, field + ".estimate",
+                            "found null, expected a number, as identifiable is \"yes\"");
+  if (finding.identifiable != Identifiable::no && !finding.interval95)
+    throw data::input_error(
+        path, field + ".interval95",
+        "found null, expected two numbers, as identifiable is \"" + to_string(finding.identifiable) + "\"");
+  if (!finding.interval95) return;
+  const auto [low, high] = *finding.interval95;
+  if (!(low <= high)) throw data::input_error(path, field + ".interval95", "expected its lower end first");
+  const double first = finding.values.front(), last = finding.values.back();
+  for (const double end : {low, high})
+    check_within(path, field + ".interval95", end, first - rounding(first), last + rounding(last));
+  if (finding.estimate)
+    check_within(path, field + ".estimate", *finding.estimate, first - rounding(first),
+                 last + rounding(last));
 }
 
 void check_score(const std::string& path, const std::string& field, double score) {
@@ -196,11 +221,10 @@ void check_values(const Summary& summary, const std::string& path) {
     if (!summary.best.empty() && !summary.best.contains(finding.name))
       throw data::input_error(path, "best.parameters." + finding.name, "missing, expected a number");
     if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
-    if (finding.interval95 && !((*finding.interval95)[0] <= (*finding.interval95)[1]))
-      throw data::input_error(path, field + ".interval95", "expected its lower end first");
     if (finding.values.empty() || finding.values.size() != finding.scores.size())
       throw data::input_error(path, field + ".profile", "expected as many scores as values, one at least");
     for (const double value : finding.values) check_value(path, "parameters", finding.name, value);
+    check_answer(path, field, finding);
     for (const double score : finding.scores) check_score(path, field + ".profile.scores", score);
   }
   const auto count = static_cast<Eigen::Index>(summary.parameters.size());

@@ -11,12 +11,14 @@ TEST(FrameFiles, NumbersCountInNames) {
   const TemporaryFolder folder;
   for (const char* name : {"10.png", "9.png", "a.txt", "1.PNG", "09b.png", "a2.png", "a10.png"})
     folder.write(name, "");
-  std::filesystem::create_directory(folder / "5.png");
   std::vector<std::string> names;
   for (const std::string& path : files_in_order(folder / "", {".png"}))
     names.push_back(std::filesystem::path(path).filename());
   EXPECT_EQ(names, (std::vector<std::string>{"1.PNG", "9.png", "09b.png", "10.png", "a2.png", "a10.png"}));
   EXPECT_NE(input_error_of([&] { files_in_order(folder / "none", {".png"}); }).find("is no folder"),
+            std::string::npos);
+  std::filesystem::create_symlink("/dev/zero", folder / "5.png");
+  EXPECT_NE(input_error_of([&] { files_in_order(folder / "", {".png"}); }).find("5.png: is no regular file"),
             std::string::npos);
 }
 

@@ -166,6 +166,11 @@ TEST_F(Results, ThatNoSearchCanHaveFoundAreNamed) {
   EXPECT_NE(message_of(",0.005,", ",-5,").find("results.csv:2: score_m: found \"-5\""), std::string::npos);
   EXPECT_NE(message_of(",0.005,", ",nan,").find("results.csv:2: score_m: found \"nan\""), std::string::npos);
   EXPECT_NE(message_of("\n0,10,", "\n0,-10,").find("results.csv:2: young: found \"-10\""), std::string::npos);
+  EXPECT_NE(message_of(",0.005,", ",1e300,").find("results.csv:2: score_m"), std::string::npos);
+  EXPECT_NE(message_of(",true,", ",maybe,").find("results.csv:2: converged"), std::string::npos);
+  EXPECT_NE(message_of("\n0,10,", "\n99,10,").find("results.csv:2: id"), std::string::npos);
+  EXPECT_NE(message_of("\n0,10,", "\n3,10,").find("results.csv:2: young"), std::string::npos);
+  EXPECT_NE(message_of("\n0,10,", "\n0,10\xff,").find("results.csv:2: found a byte"), std::string::npos);
   EXPECT_NE(message_of("\n0,10,", "\n1e300,10,").find("results.csv:2: id"), std::string::npos);
 }
 

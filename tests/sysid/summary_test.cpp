@@ -70,6 +70,9 @@ TEST(Summary, SaysWhichFieldIsWrong) {
   EXPECT_NE(message_of("\"score\": 0.004", "\"score\": -5").find("best.score: found -5"), std::string::npos);
   EXPECT_NE(message_of("\"estimate\": 0.00011", "\"estimate\": -1").find("parameters.bending: found -1"),
             std::string::npos);
+  EXPECT_NE(message_of("\"estimate\": 0.00011", "\"estimate\": null").find("parameters.bending.estimate"),
+            std::string::npos);
+  EXPECT_NE(message_of("0.00015", "1e9").find("parameters.bending.interval95"), std::string::npos);
   EXPECT_NE(message_of("\"exit_code\": 0", "\"exit_code\": 7").find("exit_code"), std::string::npos);
   EXPECT_NE(message_of("\"candidates\"", "\"candidate\"").find("did you mean \"candidates\"?"),
             std::string::npos);
