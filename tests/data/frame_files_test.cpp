@@ -49,9 +49,8 @@ TEST(FrameFiles, FramesOfAnotherClockAreRefused) {
   EXPECT_NE(input_error_of([&] { compare_clocks(times, between(0, 2), "g.tum"); }), "");
   EXPECT_NE(compare_clocks(times, between(0, 4), "g.tum").at(0).find("10 of 51 frames are outside"),
             std::string::npos);
-  EXPECT_NE(
-      compare_clocks(frame_times("rate:1000", 51), between(0, 5), "g.tum").at(0).find("far longer"),
-      std::string::npos);
+  EXPECT_NE(compare_clocks(frame_times("rate:1000", 51), between(0, 5), "g.tum").at(0).find("far longer"),
+            std::string::npos);
 }
 
 TEST(FrameFiles, JumpsOfATrajectoryAreFound) {
