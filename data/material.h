@@ -26,6 +26,8 @@ struct SheetMaterial {
   double friction = 0.3;              ///< Coulomb coefficient against the table
   double air_drag = 0.0;              ///< mass-proportional damping [1/s]
   double stiffness_damping = 0.0;     ///< Rayleigh, stiffness-proportional [s]
+
+  bool operator==(const SheetMaterial&) const = default;
 };
 
 }  // namespace flash::data

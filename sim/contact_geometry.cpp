@@ -185,4 +185,17 @@ Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Vect
       obstacle.shape);
 }
 
+void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
+                   const data::Points& points, double time_step, double exit_speed,
+                   std::vector<double>& distances) {
+  std::visit(
+      [&](const auto& shape) {
+        for (Eigen::Index i = 0; i < points.rows(); ++i)
+          distances[i] = std::min(
+              distances[i],
+              gap_after_way(shape, motion, starts.row(i), points.row(i), time_step, exit_speed).distance);
+      },
+      obstacle.shape);
+}
+
 }  // namespace flash::sim

@@ -46,4 +46,10 @@ Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, 
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
               const Eigen::Vector3d& point, double time_step, double exit_speed);
 
+/// Lowers distances[i] to that of gap_after for every vertex, where it is smaller: rows of `starts` and
+/// `points`.
+void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
+                   const data::Points& points, double time_step, double exit_speed,
+                   std::vector<double>& distances);
+
 }  // namespace flash::sim

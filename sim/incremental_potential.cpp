@@ -53,6 +53,12 @@ double IncrementalPotential::evaluate(const Points& positions, Points& force, El
   return potential + elastic.membrane + elastic.bending;
 }
 
+double IncrementalPotential::at_start(const ElasticEnergy& elastic) const {
+  const Points inertial = environment_.state.positions - target_;
+  return 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() + elastic.membrane +
+         elastic.bending;
+}
+
 double IncrementalPotential::add_damping(const Points& positions, Points& force) const {
   const double rigidity = damping_share_ * environment_.material.bending_rigidity;
   const double potential =

@@ -29,6 +29,9 @@ class IncrementalPotential {
   /// `elastic`: the energy of the sheet alone.
   double evaluate(const data::Points& positions, data::Points& force, ElasticEnergy& elastic) const;
 
+  /// Potential at the start of the step, where the energy of the sheet is `elastic` [J].
+  double at_start(const ElasticEnergy& elastic) const;
+
   /// Hessian of the potential, without the stiffness of a quadratic bending model.
   /// `sparse`: over edges alone, which is all where no hinges bend.
   void assemble(const data::Points& positions, Curvature curvature, bool sparse,

@@ -64,23 +64,23 @@ void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse, const 
     double_product_.assign(pattern, blocks, bending.elimination_stiffness, rigidity);
 }
 
-int NewtonMatrix::solve(const std::vector<VertexConstraint>& constraints, const Points& gradient,
-                        double tolerance, Points& direction, Points& force) {
-  return single_ ? conjugate_gradients(single_product_, constraints, gradient, tolerance, direction, force)
-                 : conjugate_gradients(double_product_, constraints, gradient, tolerance, direction, force);
+int NewtonMatrix::solve(const ContactSet& contacts, const Points& gradient, double tolerance,
+                        Points& direction, Points& force) {
+  return single_ ? conjugate_gradients(single_product_, contacts, gradient, tolerance, direction, force)
+                 : conjugate_gradients(double_product_, contacts, gradient, tolerance, direction, force);
 }
 
-int NewtonMatrix::solve_coupled(const std::vector<VertexConstraint>& constraints, const Points& gradient,
-                                double tolerance, Points& direction, Points& force) {
-  return single_ ? generalized_minimal_residual(single_product_, constraints, gradient, tolerance, direction,
-                                                force)
-                 : generalized_minimal_residual(double_product_, constraints, gradient, tolerance, direction,
-                                                force);
+int NewtonMatrix::solve_coupled(const ContactSet& contacts, const std::vector<Eigen::Matrix3d>& couplings,
+                                const Points& gradient, double tolerance, Points& direction, Points& force) {
+  return single_ ? generalized_minimal_residual(single_product_, contacts, couplings, gradient, tolerance,
+                                                direction, force)
+                 : generalized_minimal_residual(double_product_, contacts, couplings, gradient, tolerance,
+                                                direction, force);
 }
 
 template <typename Scalar>
-int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product,
-                                               const std::vector<VertexConstraint>& constraints,
+int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product, const ContactSet& contacts,
+                                               const std::vector<Eigen::Matrix3d>& couplings,
                                                const Points& gradient, double tolerance, Points& direction,
                                                Points& force) {
   constexpr int most = 40;
@@ -89,13 +89,16 @@ int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product,
   Vector<Scalar> residual(size), x = Vector<Scalar>::Zero(size), image(size), preconditioned(size);
   Vector<float> single(size);
   std::vector<Restriction<Scalar>> free, coupled;
-  for (size_t i = 0; i < constraints.size(); ++i) {
+  for (int i = 0; i < gradient.rows(); ++i)
     residual.template segment<3>(3L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
-    const VertexConstraint& constraint = constraints[i];
+  for (size_t k = 0; k < contacts.constraints.size(); ++k) {
+    const VertexConstraint& constraint = contacts.constraints[k];
     if (constraint.hold == Hold::free) continue;
-    free.push_back({position[i], constraint.free.cast<Scalar>()});
-    coupled.push_back({position[i], (constraint.free + constraint.friction_coupling).cast<Scalar>()});
-    x.template segment<3>(3L * position[i]) = constraint.correction.cast<Scalar>();
+    const int i = position[constraint.vertex];
+    const Eigen::Matrix3d coupling = k < couplings.size() ? couplings[k] : Eigen::Matrix3d::Zero();
+    free.push_back({i, constraint.free.cast<Scalar>()});
+    coupled.push_back({i, (constraint.free + coupling).cast<Scalar>()});
+    x.template segment<3>(3L * i) = constraint.correction.cast<Scalar>();
   }
   restrict_to_free(free, residual);
   if (!x.isZero(0)) {
@@ -144,8 +147,7 @@ int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product,
 }
 
 template <typename Scalar>
-int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product,
-                                      const std::vector<VertexConstraint>& constraints,
+int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product, const ContactSet& contacts,
                                       const Points& gradient, double tolerance, Points& direction,
                                       Points& force) {
   const std::vector<int>& position = elimination_position(*plan_->symbolic);
@@ -155,12 +157,13 @@ int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product,
   Vector<float> single(size);
   std::vector<Restriction<Scalar>> restrictions;
   bool corrected = false;
-  for (size_t i = 0; i < constraints.size(); ++i) {
+  for (int i = 0; i < gradient.rows(); ++i)
     residual.template segment<3>(3L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
-    const VertexConstraint& constraint = constraints[i];
+  for (const VertexConstraint& constraint : contacts.constraints) {
     if (constraint.hold == Hold::free) continue;
-    restrictions.push_back({position[i], constraint.free.cast<Scalar>()});
-    x.template segment<3>(3L * position[i]) = constraint.correction.cast<Scalar>();
+    const int i = position[constraint.vertex];
+    restrictions.push_back({i, constraint.free.cast<Scalar>()});
+    x.template segment<3>(3L * i) = constraint.correction.cast<Scalar>();
     corrected = corrected || !constraint.correction.isZero(0);
   }
   if (corrected) {

@@ -2,9 +2,9 @@
 #include <memory>
 #include <vector>
 
+#include "sim/contact_set.h"
 #include "sim/sheet_plan.h"
 #include "sim/sheet_product.h"
-#include "sim/vertex_constraint.h"
 
 namespace flash::sim {
 
@@ -29,24 +29,25 @@ class NewtonMatrix {
   /// constraints, whose corrections it makes, until the residual has fallen to `tolerance` [N] or a tenth, or
   /// the matrix curves down (Steihaug 1983). Adds to `force` what the direction changes. Returns the number
   /// of solves with the factor.
-  int solve(const std::vector<VertexConstraint>& constraints, const data::Points& gradient, double tolerance,
+  int solve(const ContactSet& contacts, const data::Points& gradient, double tolerance,
             data::Points& direction, data::Points& force);
 
   /// The same with friction forces that grow with the normal forces: of the matrix L A P, P the free
-  /// directions and L = P + sum_k mu_k d l_k^T, where d is the direction of slip and l_k . f the normal force
-  /// of a surface under the force f. Not symmetric: by GMRES (Saad and Schultz 1986).
-  int solve_coupled(const std::vector<VertexConstraint>& constraints, const data::Points& gradient,
-                    double tolerance, data::Points& direction, data::Points& force);
+  /// directions and L = P + C, with the `couplings` C of the first of the constraints (friction_couplings).
+  /// Not symmetric: by GMRES (Saad and Schultz 1986).
+  int solve_coupled(const ContactSet& contacts, const std::vector<Eigen::Matrix3d>& couplings,
+                    const data::Points& gradient, double tolerance, data::Points& direction,
+                    data::Points& force);
 
  private:
   template <typename Scalar>
-  int generalized_minimal_residual(SheetProduct<Scalar>& product,
-                                   const std::vector<VertexConstraint>& constraints,
+  int generalized_minimal_residual(SheetProduct<Scalar>& product, const ContactSet& contacts,
+                                   const std::vector<Eigen::Matrix3d>& couplings,
                                    const data::Points& gradient, double tolerance, data::Points& direction,
                                    data::Points& force);
 
   template <typename Scalar>
-  int conjugate_gradients(SheetProduct<Scalar>& product, const std::vector<VertexConstraint>& constraints,
+  int conjugate_gradients(SheetProduct<Scalar>& product, const ContactSet& contacts,
                           const data::Points& gradient, double tolerance, data::Points& direction,
                           data::Points& force);
 

@@ -8,10 +8,10 @@
 #include <map>
 
 #include "sim/anderson.h"
+#include "sim/feasible_positions.h"
 #include "sim/grasp.h"
 #include "sim/incremental_potential.h"
 #include "sim/projective_contact.h"
-#include "sim/vertex_constraint.h"
 
 namespace flash::sim {
 namespace {
@@ -109,14 +109,16 @@ std::string inertia_warning(double carried, double gravity, const ProjectiveSett
 /// Forces of grasps, supports and obstacles, and how well the contacts are met. `needed`: from grasps and
 /// supports [N].
 void report_forces(const Environment& environment, const ProjectiveSettings& settings,
-                   const std::vector<VertexConstraint>& holds, const std::vector<VertexContact>& contacts,
+                   const ContactSet& holds, const std::vector<VertexContact>& contacts,
                    const VectorXd& multiplier, const Points& needed, ProjectiveReport& report) {
   report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
-  for (std::size_t i = 0; i < holds.size(); ++i) {
-    const Vector3d force = needed.row(i), held = force - holds[i].free * force;
-    if (holds[i].grasp >= 0) report.grasp_forces[holds[i].grasp] += held;
-    if (holds[i].grasp < 0 && holds[i].hold == Hold::fixed) report.fixed_forces.push_back({int(i), held});
+  for (const VertexConstraint& hold : holds.constraints) {
+    const Vector3d force = needed.row(hold.vertex), held = force - hold.free * force;
+    if (hold.grasp >= 0)
+      report.grasp_forces[hold.grasp] += held;
+    else
+      report.fixed_forces.push_back({hold.vertex, held});
   }
   std::size_t loaded = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {
@@ -130,8 +132,9 @@ void report_forces(const Environment& environment, const ProjectiveSettings& set
     report.complementarity = std::max(report.complementarity, std::abs(contact.gap[0]));
   }
   report.contacts = static_cast<int>(contacts.size());
-  if (report.metric == ContactMetric::inertia && loaded > 0 && holds.size() > 2 * loaded)
-    report.warning = inertia_warning(static_cast<double>(holds.size()) / static_cast<double>(loaded),
+  const auto vertices = static_cast<std::size_t>(needed.rows());
+  if (report.metric == ContactMetric::inertia && loaded > 0 && vertices > 2 * loaded)
+    report.warning = inertia_warning(static_cast<double>(vertices) / static_cast<double>(loaded),
                                      environment.gravity.norm(), settings);
 }
 
@@ -157,14 +160,15 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
 
   Points x = environment.state.positions + h * environment.state.velocities;
   const ContactStep contact_step(environment, h, std::numeric_limits<double>::infinity());
-  const std::vector<VertexConstraint> holds = begin_step(contact_step, x);
+  const ContactSet holds = begin_step(contact_step, x);
+  project_to_feasible(contact_step, holds, x);
   const Index n = x.rows();
-  std::vector<Vector3d> free_axes(n);
+  std::vector<Vector3d> free_axes(n, Vector3d::Ones());
   std::array<std::vector<int>, 3> held;
-  for (Index i = 0; i < n; ++i) {
-    free_axes[i] = holds[i].free.diagonal();
+  for (const VertexConstraint& hold : holds.constraints) {
+    free_axes[hold.vertex] = hold.free.diagonal();
     for (int axis = 0; axis < 3; ++axis)
-      if (free_axes[i][axis] == 0) held[axis].push_back(static_cast<int>(i));
+      if (hold.free(axis, axis) == 0) held[axis].push_back(hold.vertex);
   }
   system.hold(held);
   const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;

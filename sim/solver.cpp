@@ -5,10 +5,12 @@
 #include <limits>
 
 #include "sim/active_set.h"
+#include "sim/contact_set.h"
+#include "sim/feasible_positions.h"
 #include "sim/grasp.h"
 #include "sim/incremental_potential.h"
 #include "sim/newton_matrix.h"
-#include "sim/vertex_constraint.h"
+#include "sim/penetration.h"
 
 namespace flash::sim {
 
@@ -20,7 +22,8 @@ namespace {
 /// A point on the way to the end of a step, always feasible.
 struct Iterate {
   Points positions, force, residual;
-  std::vector<VertexConstraint> constraints;
+  ContactSet contacts;
+  data::SheetMaterial material;
   ElasticEnergy elastic;
   double potential = 0;
 };
@@ -41,7 +44,7 @@ struct Solver::Workspace {
   bool refactor = true;  ///< before the next solve: the factor is missing, or of a sheet that has moved on
   // Kept between steps for their memory.
   Iterate now, trial, longer;
-  std::vector<VertexConstraint> linear;
+  ContactSet linear;
   Points gradient, force, direction;
 
   Workspace(std::shared_ptr<const SheetPlan> plan_in, const SolverSettings& settings_in)
@@ -67,11 +70,12 @@ struct StepProblem {
         force_scale(potential.mass().norm() * gravity) {}
 
   void evaluate(Iterate& iterate) const {
+    iterate.material = contacts.environment.material;
     iterate.potential = potential.evaluate(iterate.positions, iterate.force, iterate.elastic);
-    update_contacts(contacts, iterate.positions, iterate.force, iterate.constraints);
+    update_contacts(contacts, iterate.positions, iterate.force, iterate.contacts);
     iterate.residual = iterate.force;
-    for (int i = 0; i < iterate.residual.rows(); ++i)
-      iterate.residual.row(i) -= iterate.constraints[i].reaction.transpose();
+    for (const VertexConstraint& constraint : iterate.contacts.constraints)
+      iterate.residual.row(constraint.vertex) -= constraint.reaction.transpose();
   }
 
   bool balanced(const Iterate& iterate, double tolerance) const {
@@ -90,7 +94,7 @@ void iterate_to_balance(const StepProblem& problem, Solver::Workspace& w, StepRe
   const double rigidity = problem.potential.effective_rigidity();
   const bool sparse = bending.model != data::BendingModel::hinge;
   Iterate &now = w.now, &trial = w.trial, &longer = w.longer;
-  longer.constraints = trial.constraints = now.constraints;
+  longer.contacts = trial.contacts = now.contacts;
   bool stuck = false;
   int forced_moves = 0;
   while (report.iterations < w.settings.max_iterations && !problem.balanced(now, tolerance)) {
@@ -98,39 +102,42 @@ void iterate_to_balance(const StepProblem& problem, Solver::Workspace& w, StepRe
     if (w.refactor) {
       problem.potential.assemble(now.positions, Curvature::positive, false, w.values);
       add_bending_stand_in(bending, rigidity, w.values);
-      add_slip_stiffness(now.constraints, w.values);
-      restrict_matrix(w.plan->pattern, now.constraints, w.values);
+      add_slip_stiffness(now.contacts, w.values);
+      restrict_matrix(w.plan->pattern, now.contacts, w.values);
       if (!w.matrix.factorize(w.values)) return;
       ++report.factorizations;
     }
     problem.potential.assemble(now.positions, stuck ? Curvature::positive : Curvature::exact, sparse,
                                w.values);
-    add_slip_stiffness(now.constraints, w.values);
-    if (!stuck) add_surface_curvature(now.constraints, w.values);
+    add_slip_stiffness(now.contacts, w.values);
+    if (!stuck) add_surface_curvature(now.contacts, w.values);
     w.matrix.assign(w.values, sparse, bending, rigidity, problem.potential.mass().minCoeff() / (h * h));
     // Friction at the normal forces of the iterate converges where these change little. In the parts of a
     // step that could not be solved as one it goes round in circles at times: then both at once, by the
     // residual.
     const bool coupled = !stuck && h < w.settings.time_step && report.iterations > coupled_after;
-    w.linear = now.constraints;
+    const LinearizedAt iterate{problem.contacts, now.positions, now.force, now.residual};
+    const std::vector<Eigen::Matrix3d> couplings =
+        coupled ? friction_couplings(problem.contacts, now.contacts) : std::vector<Eigen::Matrix3d>();
+    w.linear = now.contacts;
     w.gradient = now.residual;
     for (int exchange = 0; exchange < 6; ++exchange) {
       w.force = now.force;
       const double enough = 0.3 * tolerance * problem.force_scale;
-      const int solves = coupled ? w.matrix.solve_coupled(w.linear, w.gradient, enough, w.direction, w.force)
-                                 : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
+      const int solves =
+          coupled ? w.matrix.solve_coupled(w.linear, couplings, w.gradient, enough, w.direction, w.force)
+                  : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
       report.solves += solves;
       w.refactor = solves > w.settings.stale_factor_solves;
-      const bool changed =
-          stuck ? hold_touching(w.direction, w.linear)
-                : exchange_contacts(w.direction, now.force, now.residual, w.force, w.gradient, w.linear);
+      const bool changed = stuck ? hold_touching(iterate, w.direction, w.linear)
+                                 : exchange_contacts(iterate, w.direction, w.force, w.gradient, w.linear);
       if (!changed) break;
     }
 
     // The potential guides the step; where the surface is curved or the normal forces change it is not exact,
     // and a smaller residual does as well. Near the solution the potential falls by less than its rounding.
-    const auto potential_at = [&](const Iterate& iterate) {
-      return iterate.potential + friction_potential(problem.contacts, now.constraints, iterate.positions);
+    const auto potential_at = [&](const Iterate& at) {
+      return at.potential + friction_potential(problem.contacts, now.contacts, at.positions);
     };
     const double before = potential_at(now);
     const double slope = now.residual.cwiseProduct(w.direction).sum();
@@ -173,40 +180,37 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
   const Environment& environment = problem.contacts.environment;
   report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
-  for (size_t i = 0; i < end.constraints.size(); ++i) {
-    const VertexConstraint& c = end.constraints[i];
+  for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
+    const VertexConstraint& c = end.contacts.constraints[k];
     if (c.hold == Hold::fixed) {
-      if (c.grasp < 0) report.fixed_forces.push_back({int(i), c.reaction});
+      if (c.grasp < 0) report.fixed_forces.push_back({c.vertex, c.reaction});
       if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
-      continue;
     }
-    for (const Touch& touch : c.touches) {
-      report.penetration_max = std::max(report.penetration_max, touch.sunk - touch.gap);
-      // Where it is let out slowly it may stay below the surface.
-      report.complementarity = std::max(report.complementarity, -touch.gap);
+    for (const Touch& touch : end.contacts.touches_of(k)) {
       if (!touch.holds) continue;
       report.complementarity = std::max(report.complementarity, touch.gap);
       report.obstacle_forces[touch.obstacle] += touch.normal_force * touch.normal + touch.friction;
     }
   }
-  report.held_penetration = deepest_held(problem.contacts, end.constraints, end.positions);
-  report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
-  for (size_t k = 0; k < environment.obstacles.size(); ++k) {
-    ObstacleMotion at_start = problem.contacts.motions[k];
-    at_start.end = at_start.start;
-    for (size_t i = 0; i < end.constraints.size(); ++i) {
-      if (end.constraints[i].hold == Hold::fixed) continue;
-      const double depth =
-          -gap_to(environment.obstacles[k], at_start, environment.state.positions.row(int(i))).distance;
-      if (depth > gap_tolerance && depth > report.start_penetration.depth)
-        report.start_penetration = {depth, int(i), int(k)};
+  for (int i = 0; i < end.positions.rows(); ++i) {
+    const VertexConstraint* c = end.contacts.find(i);
+    if (c != nullptr && c->hold == Hold::fixed) continue;
+    for (size_t k = 0; k < environment.obstacles.size(); ++k) {
+      const Gap gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
+      report.penetration_max = std::max(report.penetration_max, gap.sunk - gap.distance);
+      // Where it is let out slowly it may stay below the surface.
+      report.complementarity = std::max(report.complementarity, -gap.distance);
     }
   }
+  report.held_penetration = deepest_held(problem.contacts, end.contacts, end.positions);
+  report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
+  report.start_penetration = deepest_at_start(problem.contacts, end.contacts, gap_tolerance);
 }
 
 /// Energies at the end of a step, and whether they came from somewhere: the potential of the step must not
 /// end above its start value, nor the energy above that of the start and the work done.
-bool account_for_energy(const StepProblem& problem, const Iterate& end, StepReport& report) {
+bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic_start, const Iterate& end,
+                        StepReport& report) {
   const Environment& environment = problem.contacts.environment;
   const State& start = environment.state;
   const double h = problem.contacts.time_step;
@@ -225,8 +229,9 @@ bool account_for_energy(const StepProblem& problem, const Iterate& end, StepRepo
     report.potential -= mass[i] * environment.gravity.dot(end.positions.row(i));
     falls += mass[i] * environment.gravity.dot(way);
     unbalanced += std::abs(end.residual.row(i).dot(way));
-    const VertexConstraint& c = end.constraints[i];
-    if (c.hold == Hold::free) continue;
+  }
+  for (const VertexConstraint& c : end.contacts.constraints) {
+    const Vector3d way = moved.row(c.vertex);
     const double work = c.reaction.dot(way);
     if (c.hold == Hold::fixed) {
       report.work += work;
@@ -239,10 +244,7 @@ bool account_for_energy(const StepProblem& problem, const Iterate& end, StepRepo
   for (const ObstacleMotion& motion : problem.contacts.motions)
     start_is_feasible = start_is_feasible && !motion.moves;
 
-  Points force;
-  ElasticEnergy elastic;
-  const double potential_at_start = problem.potential.evaluate(start.positions, force, elastic);
-  const double elastic_at_start = elastic.membrane + elastic.bending,
+  const double elastic_at_start = elastic_start.membrane + elastic_start.bending,
                elastic_at_end = report.membrane + report.bending;
   const double kinetic_at_start = kinetic_of(start.velocities);
   const double gain =
@@ -255,21 +257,35 @@ bool account_for_energy(const StepProblem& problem, const Iterate& end, StepRepo
       1e-14 * environment.material.membrane_stiffness * mass.sum() / environment.material.areal_density;
   if (!(gain <= energy_tolerance * there + unbalanced + rounding)) return false;
   if (!start_is_feasible) return true;
-  return end.potential <= potential_at_start + energy_tolerance * there + unbalanced + rounding;
+  return end.potential <=
+         problem.potential.at_start(elastic_start) + energy_tolerance * there + unbalanced + rounding;
+}
+
+/// Of the sheet at the start of the step: as a rule it is where the last step ended.
+ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const Solver::Workspace& w) {
+  const Environment& environment = problem.contacts.environment;
+  const Points& start = environment.state.positions;
+  if (w.now.material == environment.material && w.now.positions.rows() == start.rows() &&
+      w.now.positions == start)
+    return w.now.elastic;
+  Points force = Points::Zero(start.rows(), 3);
+  return add_elastic_gradient(*w.plan, problem.bending, environment.material, start, force);
 }
 
 /// One step of `h` as a whole; environment.state advances in any case. Returns whether it is as good as
 /// halves would be: solved, or to all that rounding allows.
 bool try_step(Environment& environment, double h, Solver::Workspace& w, StepReport& report) {
   const StepProblem problem(*w.plan, environment, h, w.settings.exit_speed);
+  const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
   w.now.positions = environment.state.positions + h * environment.state.velocities;
-  w.now.constraints = begin_step(problem.contacts, w.now.positions);
+  w.now.contacts = begin_step(problem.contacts, w.now.positions);
+  project_to_feasible(problem.contacts, w.now.contacts, w.now.positions);
   problem.evaluate(w.now);
   iterate_to_balance(problem, w, report);
 
   report.residual = w.now.residual.norm() / problem.force_scale;
   report_contacts(problem, w.now, report);
-  const bool energy_is_sound = account_for_energy(problem, w.now, report);
+  const bool energy_is_sound = account_for_energy(problem, elastic_at_start, w.now, report);
   const bool sound = report.complementarity <= gap_tolerance && energy_is_sound;
   report.converged = sound && problem.balanced(w.now, w.settings.tolerance);
   environment.state.time += h;

@@ -5,7 +5,7 @@
 
 #include "sheet_scene.h"
 #include "sim/contact_geometry.h"
-#include "sim/vertex_constraint.h"
+#include "sim/contact_law.h"
 
 namespace flash::sim {
 namespace {
@@ -173,16 +173,17 @@ TEST(Contact, SurfacesShareAForceByNonNegativeLeastSquares) {
     std::vector<Touch> touches(static_cast<size_t>(1 + sample % 6));
     for (Touch& touch : touches) touch.normal = Vector3d::Random().normalized();
     const Vector3d needed = Vector3d::Random();
-    const auto forces = normal_forces(touches, std::vector<bool>(touches.size(), true), needed);
+    share_force(touches, needed, [](const Touch&) { return true; });
     // The conditions of the minimum of |needed - sum forces * normals|^2 over forces not below zero.
     Vector3d rest = needed;
-    for (size_t k = 0; k < touches.size(); ++k) rest -= forces[k] * touches[k].normal;
+    for (size_t k = 0; k < touches.size(); ++k) rest -= touches[k].normal_force * touches[k].normal;
     for (size_t k = 0; k < touches.size(); ++k) {
-      EXPECT_GE(forces[k], 0);
+      EXPECT_GE(touches[k].normal_force, 0);
+      EXPECT_EQ(touches[k].holds, touches[k].normal_force > 0);
       EXPECT_LE(touches[k].normal.dot(rest),
                 1e-5);  // faces that differ by less than a thousandth count as one
       // Rounding, by three normals that span a volume of 1e-3 at least.
-      EXPECT_NEAR(forces[k] * touches[k].normal.dot(rest), 0, 1e-7);
+      EXPECT_NEAR(touches[k].normal_force * touches[k].normal.dot(rest), 0, 1e-7);
     }
   }
 }
