@@ -11,8 +11,8 @@
 #include "data/procedural_mesh.h"
 #include "data/text.h"
 #include "sim/sheet.h"
-#include "sysid/export_asset.h"
-#include "sysid/search_folder.h"
+#include "sysid/report/export_asset.h"
+#include "sysid/report/search_folder.h"
 
 namespace flash {
 namespace {

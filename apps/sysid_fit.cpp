@@ -18,10 +18,10 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
-#include "sysid/fit.h"
-#include "sysid/memory_estimate.h"
-#include "sysid/parameter_label.h"
-#include "sysid/summary.h"
+#include "sysid/infer/fit/fit.h"
+#include "sysid/replay/memory_estimate.h"
+#include "sysid/report/parameter_label.h"
+#include "sysid/report/summary.h"
 
 namespace flash {
 namespace {

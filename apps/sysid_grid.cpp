@@ -12,14 +12,14 @@
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
 #include "data/text.h"
-#include "sysid/fingerprint.h"
-#include "sysid/judge.h"
-#include "sysid/memory_estimate.h"
-#include "sysid/overlay.h"
-#include "sysid/parameter_label.h"
-#include "sysid/recording_names.h"
-#include "sysid/report.h"
-#include "sysid/summarize.h"
+#include "sysid/emulate/fingerprint.h"
+#include "sysid/emulate/search_memory.h"
+#include "sysid/infer/answer.h"
+#include "sysid/report/overlay.h"
+#include "sysid/report/parameter_label.h"
+#include "sysid/report/recording_names.h"
+#include "sysid/report/report.h"
+#include "sysid/report/summarize.h"
 
 namespace flash {
 namespace {
@@ -124,7 +124,7 @@ std::vector<sysid::Overlay> keep_best(const sysid::GridResults& results, const s
   const std::vector<std::string> folders = sysid::file_names(results.recordings);
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const sysid::ReplayResult motion =
-        std::move(sysid::run(replays[r], {sysid::candidate_of(best, settings)}).front());
+        std::move(sysid::run(replays[r], {sysid::candidate_at(best.values, settings)}).front());
     overlays.push_back(sysid::make_overlay(replays[r], motion.motion, best.recordings[r]));
     sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / folders[r]).string());
   }
@@ -145,11 +145,12 @@ int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
              const GridOptions& options, const std::string& device,
              std::chrono::steady_clock::time_point begin) {
   sysid::GridResults results = store.results();
-  sysid::JudgeSettings judge;
-  if (options.repeatability > 0) judge.repeatability = options.repeatability;
-  judge.horizon = !options.no_horizon;
-  judge.solver_check = !options.no_solver_check;
-  sysid::Summary summary = sysid::judge(results, replays, settings, judge);
+  sysid::AnswerSettings asked;
+  if (options.repeatability > 0) asked.repeatability = options.repeatability;
+  asked.horizon = !options.no_horizon;
+  asked.solver_check = !options.no_solver_check;
+  const sysid::Answer answer = sysid::find_answer(results, replays, settings, asked);
+  sysid::Summary summary = sysid::summarize(results, answer, replays, settings, asked);
   summary.asset = fs::absolute(asset.source).lexically_normal().string();
   summary.device = device;
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

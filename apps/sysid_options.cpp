@@ -17,8 +17,8 @@
 #include "data/error.h"
 #include "data/text.h"
 #include "sim/sheet.h"
-#include "sysid/recording_names.h"
-#include "sysid/summarize.h"
+#include "sysid/report/recording_names.h"
+#include "sysid/report/summarize.h"
 
 namespace flash {
 namespace {

@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "data/asset.h"
-#include "sysid/grid_search.h"
-#include "sysid/replay.h"
+#include "sysid/emulate/grid_search.h"
+#include "sysid/replay/replay.h"
 
 namespace flash {
 

@@ -17,12 +17,11 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
-#include "sysid/depth_camera.h"
-#include "sysid/memory_estimate.h"
-#include "sysid/parameter_label.h"
-#include "sysid/plan.h"
-#include "sysid/sensitivity.h"
-#include "sysid/synth.h"
+#include "sysid/capture/render_depth.h"
+#include "sysid/capture/synth.h"
+#include "sysid/design/plan.h"
+#include "sysid/replay/memory_estimate.h"
+#include "sysid/report/parameter_label.h"
 
 namespace flash {
 namespace {

@@ -11,10 +11,10 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
-#include "sysid/memory_estimate.h"
-#include "sysid/overlay.h"
-#include "sysid/overlay_image.h"
-#include "sysid/registration_parameter.h"
+#include "sysid/observe/registration_parameter.h"
+#include "sysid/replay/memory_estimate.h"
+#include "sysid/report/overlay.h"
+#include "sysid/report/overlay_image.h"
 
 namespace flash {
 namespace {

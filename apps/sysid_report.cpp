@@ -8,10 +8,9 @@
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
-#include "sysid/predictability.h"
-#include "sysid/recording_names.h"
-#include "sysid/report.h"
-#include "sysid/search_folder.h"
+#include "sysid/report/recording_names.h"
+#include "sysid/report/report.h"
+#include "sysid/report/search_folder.h"
 
 namespace flash {
 namespace {

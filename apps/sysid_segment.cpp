@@ -13,7 +13,7 @@
 #include "data/error.h"
 #include "data/frame_files.h"
 #include "data/text.h"
-#include "sysid/segment_folder.h"
+#include "sysid/capture/segment/segment_folder.h"
 
 namespace flash {
 namespace {

@@ -14,8 +14,8 @@
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
-#include "sysid/depth_camera.h"
-#include "sysid/synth.h"
+#include "sysid/capture/render_depth.h"
+#include "sysid/capture/synth.h"
 
 namespace flash {
 namespace {

@@ -18,11 +18,12 @@ function(flash_library module)
   install(TARGETS ${target} EXPORT flashTargets)
 endfunction()
 
-# Headers by their path from the root, so that `#include "sim/solver.h"` reads the same inside and outside.
+# Headers by their path from the root, so that `#include "sim/solver.h"` reads the same inside and outside; those of
+# sysid, which is not installed as a whole, in sysid/CMakeLists.txt.
 function(flash_install)
-  foreach(module data sim sysid)
+  foreach(module data sim)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${module} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/flash
-            FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE PATTERN "segment*" EXCLUDE)
+            FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE)
   endforeach()
   set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/flash)
   install(EXPORT flashTargets NAMESPACE flash:: DESTINATION ${destination})

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "data/procedural_mesh.h"
-#include "sysid/objective.h"
+#include "sysid/observe/score.h"
 
 namespace flash::sysid {
 

@@ -2,9 +2,9 @@
 #include <string>
 
 #include "data/procedural_mesh.h"
-#include "sysid/depth_camera.h"
-#include "sysid/replay.h"
-#include "sysid/synth.h"
+#include "sysid/capture/render_depth.h"
+#include "sysid/capture/synth.h"
+#include "sysid/replay/replay.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {

@@ -1,8 +1,8 @@
 #pragma once
 #include <cmath>
 
-#include "sysid/grid_results.h"
-#include "sysid/summary.h"
+#include "sysid/emulate/results_store.h"
+#include "sysid/report/summary.h"
 
 namespace flash::sysid {
 

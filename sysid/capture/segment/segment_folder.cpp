@@ -1,0 +1,215 @@
+#include "sysid/capture/segment/segment_folder.h"
+
+#include <pcl/console/print.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <utility>
+
+#include "data/depth_image.h"
+#include "data/error.h"
+#include "data/extrinsics.h"
+#include "data/frame_files.h"
+#include "data/mesh_io.h"
+#include "data/staged_folder.h"
+#include "data/text.h"
+#include "sysid/capture/segment/segment_picture.h"
+
+namespace flash::sysid {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The first of the folders that holds such files.
+std::vector<std::string> first_with(const fs::path& folder, const std::vector<std::string>& subfolders,
+                                    const std::vector<std::string>& extensions) {
+  for (const std::string& subfolder : subfolders) {
+    if (!fs::is_directory(folder / subfolder)) continue;
+    std::vector<std::string> files = data::files_in_order((folder / subfolder).string(), extensions);
+    if (!files.empty()) return files;
+  }
+  return {};
+}
+
+data::Points merged(const std::vector<RawView>& views, int frame, bool masked, std::size_t& not_finite) {
+  std::vector<data::Points> parts;
+  Eigen::Index count = 0;
+  for (const RawView& view : views) {
+    parts.push_back(load_raw_frame(view, frame, masked, not_finite));
+    count += parts.back().rows();
+  }
+  data::Points points(count, 3);
+  Eigen::Index row = 0;
+  for (const data::Points& part : parts) {
+    points.middleRows(row, part.rows()) = part;
+    row += part.rows();
+  }
+  return points;
+}
+
+// The table does not move: one plane from some frames, thinned, serves all.
+FoundTable table_of(const std::vector<RawView>& views, int frames, const SegmentSettings& settings) {
+  constexpr int wanted_frames = 12, wanted_points = 10000;
+  const int used = std::min(frames, wanted_frames);
+  std::vector<data::Points> sample;
+  std::size_t not_finite = 0;
+  for (int k = 0; k < used; ++k) {
+    const data::Points points = merged(views, k * frames / used, false, not_finite);
+    const Eigen::Index step = 1 + points.rows() / wanted_points;
+    sample.push_back(points(Eigen::seq(0, Eigen::last, step), Eigen::all));
+  }
+  return find_table(sample, settings);
+}
+
+std::string tilt_warning(const FoundTable& table) {
+  char text[400];
+  const Eigen::Vector3d& n = table.plane.normal;
+  std::snprintf(
+      text, sizeof text,
+      "table: the plane that was found is tilted by %.1f deg against z of the base frame (normal %.4f "
+      "%.4f %.4f; seen in %d of %d frames): is the camera's pose right, and is this the table? "
+      "--table-height gives one that is level",
+      table.tilt * 180 / M_PI, n.x(), n.y(), n.z(), table.agreeing, table.frames);
+  return text;
+}
+
+// Where all the points went instead.
+std::string no_cloth(const std::vector<Segmentation>& frames, const SegmentFolderSettings& settings) {
+  std::array<std::size_t, point_label_count> counts{};
+  for (const Segmentation& frame : frames)
+    for (int label = 0; label < point_label_count; ++label) counts[label] += frame.counts[label];
+  std::string places;
+  for (const PointLabel label :
+       {PointLabel::outside, PointLabel::table, PointLabel::arm, PointLabel::clutter})
+    places += (places.empty() ? "" : ", ") + data::format_count(counts[static_cast<int>(label)]) + ' ' +
+              to_string(label);
+  return "no frame holds a cluster of " + std::to_string(settings.segment.cluster_points) +
+         " points above the table (points: " + places + ")";
+}
+
+std::string frame_name(int frame) {
+  char name[32];
+  std::snprintf(name, sizeof name, "frames/%06d.ply", frame);
+  return name;
+}
+
+}  // namespace
+
+RawView open_raw_view(const std::string& folder, const RawViewFiles& given) {
+  if (!fs::is_directory(folder)) throw data::input_error(folder, "folder", "does not exist");
+  RawView view;
+  view.folder = folder;
+  view.files = first_with(folder, {"", "clouds", "frames"}, {".ply", ".pcd"});
+  const bool clouds = !view.files.empty();
+  if (clouds) {
+    for (const auto& [option, path] : {std::pair("--masks", given.masks), {"--intrinsics", given.intrinsics}})
+      if (!path.empty())
+        throw data::InputError(folder + ": holds clouds, " + option + " is for depth images");
+  } else {
+    view.files = first_with(folder, {"depth", ""}, {".png"});
+    if (view.files.empty())
+      throw data::input_error(folder, "folder",
+                              "found neither clouds (.ply, .pcd) nor 16-bit depth images (.png)");
+    view.camera = data::load_camera_intrinsics(
+        given.intrinsics.empty() ? (fs::path(folder) / "camera_info.yaml").string() : given.intrinsics);
+    view.depth_scale = given.depth_scale.value_or(view.depth_scale);
+  }
+  if (!given.masks.empty())
+    for (const std::string& file : view.files)
+      view.masks.push_back((fs::path(given.masks) / fs::path(file).filename()).string());
+  std::string extrinsics = given.extrinsics;
+  for (const char* name : {"extrinsics.json", "extrinsics.tum"})
+    if (const fs::path path = fs::path(folder) / name; extrinsics.empty() && fs::exists(path))
+      extrinsics = path.string();
+  if (!extrinsics.empty()) {
+    const data::CameraPose pose = data::load_camera_pose(extrinsics, given.accept_unusable);
+    view.base_from_camera = pose.transform.T;
+    for (const std::string& warning : pose.warnings) view.warnings.push_back(extrinsics + ": " + warning);
+  } else if (!clouds) {
+    throw data::input_error((fs::path(folder) / "extrinsics.json").string(), "file",
+                            "missing: depth images need the pose of their camera, here or as --extrinsics");
+  }
+  return view;
+}
+
+data::Points load_raw_frame(const RawView& view, int frame, bool masked, std::size_t& not_finite) {
+  constexpr double farthest = 1e5;  // no camera sees farther [m]
+  const std::string& file = view.files[frame];
+  data::Points points;
+  if (view.camera) {
+    const data::MaskImage mask =
+        masked && !view.masks.empty() ? data::load_mask(view.masks[frame]) : data::MaskImage{};
+    points =
+        data::points_from_depth(data::load_depth_image(file), mask, *view.camera, view.depth_scale, file);
+  } else {
+    points = data::load_point_cloud(file, not_finite);
+  }
+  points *= view.base_from_camera.linear().transpose();
+  points.rowwise() += view.base_from_camera.translation().transpose();
+  if (points.rows() > 0 && !(points.cwiseAbs().maxCoeff() < farthest))
+    throw data::InputError(file + ": found points more than 100 km from the robot's base, expected metres");
+  return points;
+}
+
+SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vector<double>& times,
+                               const SegmentFolderSettings& settings, const std::string& folder) {
+  const int frames = static_cast<int>(times.size());
+  for (const RawView& view : views)
+    if (static_cast<int>(view.files.size()) != frames)
+      throw data::input_error(view.folder, "frames",
+                              "found " + std::to_string(view.files.size()) + ", expected " +
+                                  std::to_string(frames) + ": one a time stamp, the same in every view");
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what it has to say is said here
+  SegmentedFolder result;
+  if (settings.gripper)
+    result.warnings = data::compare_clocks(times, *settings.gripper, settings.gripper_path);
+  for (const RawView& view : views)
+    result.warnings.insert(result.warnings.end(), view.warnings.begin(), view.warnings.end());
+  if (settings.table_height)
+    result.table = FoundTable{{{0, 0, *settings.table_height}, settings.segment.up}, 0, 0, 0};
+  else if (settings.find_table)
+    result.table = table_of(views, frames, settings.segment);
+  constexpr double doubtful = 2 * M_PI / 180;
+  if (result.table && result.table->tilt > doubtful) result.warnings.push_back(tilt_warning(*result.table));
+
+  std::vector<LabelledFrame> shown;
+  std::size_t with_cloth = 0, not_finite = 0;
+  for (int k = 0; k < frames; ++k) {
+    LabelledFrame frame{merged(views, k, true, not_finite), {}};
+    ArmCylinder arm;
+    arm.radius = settings.gripper ? settings.arm_radius : 0;
+    if (settings.gripper) arm.tip = data::pose_at(*settings.gripper, times[k]).translation();
+    Segmentation segmentation =
+        segment_cloth(frame.points, result.table ? std::optional(result.table->plane) : std::nullopt, arm,
+                      settings.segment);
+    with_cloth += segmentation.cloth.rows() > 0 ? 1 : 0;
+    const int columns = std::min(frames, settings.picture_frames);
+    const int next = static_cast<int>(shown.size());
+    if (next < columns && k == (columns == 1 ? 0 : next * (frames - 1) / (columns - 1))) {
+      frame.labels = segmentation.labels;
+      shown.push_back(std::move(frame));
+    }
+    segmentation.labels.clear();
+    result.frames.push_back(std::move(segmentation));
+  }
+  if (with_cloth == 0)
+    throw data::input_error(views.front().folder, "frames", no_cloth(result.frames, settings));
+  if (not_finite > 0)
+    result.warnings.push_back(data::format_count(not_finite) +
+                              " points of the clouds are not finite and were left out");
+
+  data::StagedFolder staged(folder);
+  for (int k = 0; k < frames; ++k) {
+    result.clouds.push_back(frame_name(k));
+    data::save_point_cloud(result.frames[k].cloth, (fs::path(staged.path()) / result.clouds.back()).string());
+  }
+  result.picture = "segment.png";
+  data::save_png(draw_segmentation(shown), (fs::path(staged.path()) / result.picture).string());
+  staged.publish(result.picture);
+  return result;
+}
+
+}  // namespace flash::sysid

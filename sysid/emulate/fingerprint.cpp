@@ -1,0 +1,207 @@
+#include "sysid/emulate/fingerprint.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <set>
+
+#include "data/asset.h"
+#include "data/text.h"
+
+namespace flash::sysid {
+namespace {
+
+/// FNV-1a, 64 bits: tells inputs apart, promises nothing against intent.
+class Hash {
+ public:
+  void add(const void* bytes, std::size_t size) {
+    const auto* byte = static_cast<const unsigned char*>(bytes);
+    for (std::size_t i = 0; i < size; ++i) state_ = (state_ ^ byte[i]) * 0x100000001b3ULL;
+  }
+  void add(double value) { add(&value, sizeof value); }
+  void add(const std::string& text) {
+    add(static_cast<double>(text.size()));
+    add(text.data(), text.size());
+  }
+  template <class Derived>
+  void add_matrix(const Eigen::DenseBase<Derived>& matrix) {
+    add(static_cast<double>(matrix.rows()));
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+      for (Eigen::Index j = 0; j < matrix.cols(); ++j) add(static_cast<double>(matrix(i, j)));
+    }
+  }
+  std::string text() const {
+    char buffer[17];
+    std::snprintf(buffer, sizeof buffer, "%016llx", static_cast<unsigned long long>(state_));
+    return buffer;
+  }
+
+ private:
+  std::uint64_t state_ = 0xcbf29ce484222325ULL;
+};
+
+std::string sheet_hash(const data::Recording& recording) {
+  Hash hash;
+  hash.add_matrix(recording.mesh.vertices);
+  hash.add_matrix(recording.mesh.triangles);
+  hash.add_matrix(recording.start);
+  return hash.text();
+}
+
+std::string surroundings_hash(const data::Recording& recording) {
+  Hash hash;
+  hash.add_matrix(recording.gravity);
+  hash.add(recording.has_table);
+  hash.add_matrix(recording.table_point);
+  hash.add_matrix(recording.table_normal);
+  hash.add_matrix(recording.crop.min);
+  hash.add_matrix(recording.crop.max);
+  return hash.text();
+}
+
+std::string nuisance_hash(const data::NuisanceBounds& bounds) {
+  Hash hash;
+  hash.add_matrix(bounds.offset);
+  hash.add(bounds.yaw);
+  hash.add(bounds.time);
+  return hash.text();
+}
+
+std::string trajectories_hash(const data::Recording& recording) {
+  Hash hash;
+  for (const auto& [name, trajectory] : recording.trajectories) {
+    hash.add(name);
+    for (std::size_t i = 0; i < trajectory.times.size(); ++i) {
+      hash.add(trajectory.times[i]);
+      hash.add_matrix(trajectory.poses[i].matrix());
+    }
+  }
+  return hash.text();
+}
+
+std::string grasps_hash(const Replay& replay) {
+  Hash hash;
+  for (const data::RecordedGrasp& grasp : replay.recording.grasps) {
+    const data::GraspShape shape = replay.settings.grasp_shape.value_or(grasp.shape);
+    hash.add(grasp.gripper);
+    for (const int vertex : grasp.select.vertices) hash.add(vertex);
+    if (grasp.select.corner) hash.add(2 * (*grasp.select.corner)[0] + (*grasp.select.corner)[1]);
+    if (grasp.select.position) hash.add_matrix(*grasp.select.position);
+    for (const double value :
+         {grasp.from, grasp.to, replay.settings.grasp_within.value_or(grasp.select.within), grasp.depth,
+          grasp.pitch, static_cast<double>(shape)}) {
+      hash.add(value);
+    }
+    hash.add_matrix(grasp.direction);
+    if (replay.settings.clamp_slopes) hash.add("slopes");
+  }
+  return hash.text();
+}
+
+std::string keyframes_hash(const std::vector<Observation>& observations) {
+  Hash hash;
+  for (const Observation& observation : observations) {
+    hash.add(observation.t);
+    hash.add(observation.weight);
+    hash.add_matrix(observation.points);
+    hash.add_matrix(observation.contour);
+    hash.add_matrix(observation.markers);
+    if (observation.force) hash.add_matrix(*observation.force);
+  }
+  return hash.text();
+}
+
+std::string values_text(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : " ") + data::format_number(value);
+  return text;
+}
+
+void add_replay(const Replay& replay, Fingerprint& print) {
+  const std::string name = "recording " + replay.recording.name;
+  print[name + " mesh and start"] = sheet_hash(replay.recording);
+  print[name + " gravity, table and crop"] = surroundings_hash(replay.recording);
+  print[name + " nuisance bounds"] = nuisance_hash(replay.recording.nuisance);
+  print[name + " trajectories"] = trajectories_hash(replay.recording);
+  print[name + " grasps"] = grasps_hash(replay);
+  print[name + " keyframes"] = keyframes_hash(replay.observations);
+  print[name + " begins, steps, closing time"] =
+      values_text({replay.start, static_cast<double>(replay.steps), replay.settings.closing_time});
+  const sim::SolverSettings& solver = replay.settings.solver;
+  print["time_step_s"] = data::format_number(solver.time_step);
+  print["tolerance"] = data::format_number(solver.tolerance);
+  print["iterations"] = std::to_string(solver.max_iterations);
+}
+
+void add_material(const MaterialBase& base, Fingerprint& print) {
+  const data::SheetMaterial& m = base.material;
+  print["asset constitutive"] = data::to_string(m.constitutive);
+  print["asset bending_model"] = data::to_string(m.bending_model);
+  print["asset E t"] = data::format_number(m.membrane_stiffness);
+  print["asset poisson"] = data::format_number(m.poissons_ratio);
+  print["asset areal_density"] = data::format_number(m.areal_density);
+  print["asset bending_rigidity"] =
+      base.bending_from_thickness ? "from thickness" : data::format_number(m.bending_rigidity);
+  print["asset friction"] = data::format_number(m.friction);
+  print["asset air_drag"] = data::format_number(m.air_drag);
+  print["asset stiffness_damping"] = data::format_number(m.stiffness_damping);
+  print["asset thickness"] = base.thickness ? data::format_number(*base.thickness) : "none";
+}
+
+void add_score(const ScoreSettings& score, Fingerprint& print) {
+  const Objective& objective = score.objective;
+  print["distance"] = values_text({static_cast<double>(objective.robust.kind), objective.robust.trim_fraction,
+                                   objective.robust.huber_delta});
+  print["sigmas of cloud, contour, marks, force"] = values_text(
+      {objective.cloud_sigma, objective.contour_sigma, objective.marker_sigma, objective.force_sigma});
+  print["two_sided"] = objective.two_sided ? "yes" : "no";
+  const RegistrationSettings& fit = score.registration;
+  print["registration"] =
+      values_text({static_cast<double>(fit.iterations), static_cast<double>(fit.points_per_keyframe),
+                   fit.tolerance, fit.softening}) +
+      " from " + values_text(fit.time_starts);
+  print["shared offset, yaw, time"] =
+      values_text({static_cast<double>(score.shared.offset), static_cast<double>(score.shared.yaw),
+                   static_cast<double>(score.shared.time)});
+}
+
+}  // namespace
+
+Fingerprint fingerprint(const std::vector<Replay>& replays, const GridSettings& settings) {
+  Fingerprint print;
+  print["program"] = FLASH_VERSION;
+  for (const Replay& replay : replays) add_replay(replay, print);
+  add_material(settings.base, print);
+  std::string order;
+  for (const Axis& axis : settings.axes) {
+    print["axis " + axis.name] = values_text(axis.values);
+    order += (order.empty() ? "" : " ") + axis.name;
+  }
+  print["axes"] = order;
+  for (const Axis& axis : settings.fixed) print["fixed " + axis.name] = values_text(axis.values);
+  add_score(settings.score, print);
+  return print;
+}
+
+std::string difference(const Fingerprint& was, const Fingerprint& is) {
+  std::set<std::string> names;
+  for (const auto* print : {&was, &is})
+    for (const auto& [name, value] : *print) names.insert(name);
+  const auto value_of = [](const Fingerprint& print, const std::string& name) {
+    const auto found = print.find(name);
+    return found == print.end() ? std::string("absent") : found->second;
+  };
+  std::string first;
+  int more = 0;
+  for (const std::string& name : names) {
+    const std::string old_value = value_of(was, name), new_value = value_of(is, name);
+    if (old_value == new_value) continue;
+    if (first.empty())
+      first = name + " was " + old_value + " and is " + new_value;
+    else
+      ++more;
+  }
+  return more == 0 ? first : first + ", and " + std::to_string(more) + " more";
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,75 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/material.h"
+#include "sysid/replay/replay.h"
+
+namespace flash::sysid {
+
+/// One searched parameter and its values.
+struct Axis {
+  std::string name;            ///< short published name, see `known_parameters`
+  std::vector<double> values;  ///< increasing
+  bool logarithmic = false;
+};
+
+/// A parameter that can be searched or fixed.
+struct ParameterInfo {
+  std::string name;
+  std::string unit;
+  bool material;     ///< belongs to the asset; otherwise it describes the recording (nuisance)
+  double low, high;  ///< values outside are refused
+  std::string meaning;
+};
+
+/// young, poisson, bending, friction, areal_density, air_drag, stiffness_damping; start_yaw, table_height,
+/// grasp_depth, grasp_direction, grasp_pitch.
+const std::vector<ParameterInfo>& known_parameters();
+
+/// How the command line calls a parameter: "--start-yaw" for start_yaw.
+std::string option_of(const std::string& name);
+
+/// Throws data::InputError naming `option` and the nearest known one unless a parameter has that name.
+void check_parameter(const std::string& option, const std::string& name);
+
+/// "low:high:count:log", "low:high:count" (evenly), "a,b,c" or one value.
+/// Throws data::InputError naming the option: unknown parameter (with the nearest known), malformed, out of
+/// range, a value given twice.
+Axis parse_axis(const std::string& name, const std::string& specification);
+
+/// "friction=0.3", an axis of one value. Throws data::InputError naming `option`, that which was used.
+Axis parse_fixed(const std::string& assignment, const std::string& option = "--fix");
+
+/// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.
+std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes);
+
+/// The values of one candidate, as cartesian_product lists them; `id` from 0, below count_candidates.
+std::vector<double> values_of(const std::vector<Axis>& axes, int id);
+
+/// How many cartesian_product makes.
+double count_candidates(const std::vector<Axis>& axes);
+
+/// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
+/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; more than a million candidates. Throws
+/// data::InputError with the reason.
+void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive);
+
+/// Refuses grasp_depth, grasp_direction and grasp_pitch where no grasp of the recordings is a pinch: nothing
+/// would change with them.
+void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& replays);
+
+/// What candidates are built on: the asset's material and how `young` and `bending` are understood.
+struct MaterialBase {
+  data::SheetMaterial material;
+  std::optional<double> thickness;  ///< given: young is E [Pa]; absent: young is E t [N/m]
+  bool bending_from_thickness =
+      false;  ///< D = E t^3 / (12 (1 - nu^2)) follows young unless bending is an axis
+};
+
+/// The base with the named values in place of its own. Fixed parameters are axes of one value.
+ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,
+                               const std::vector<double>& values);
+
+}  // namespace flash::sysid

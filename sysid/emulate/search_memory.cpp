@@ -1,0 +1,48 @@
+#include "sysid/emulate/search_memory.h"
+
+#include <algorithm>
+
+#include "sysid/emulate/two_mesh_motions.h"
+
+namespace flash::sysid {
+
+namespace {
+
+constexpr double kFiner = 4;  // vertices of the mesh of half the cell, over those of the search's
+
+double kept_steps(const Replay& replay) {
+  const std::vector<bool> read = steps_read(replay, replay.start, replay.settings.solver.time_step,
+                                            static_cast<std::size_t>(replay.steps) + 1);
+  return static_cast<double>(std::count(read.begin(), read.end(), true));
+}
+
+}  // namespace
+
+MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSettings& settings,
+                               bool solver_check) {
+  MemoryEstimate estimate;
+  double motion = 0, solver = 0, kept = 0;
+  for (const Replay& replay : replays) {
+    const double vertices = vertices_of(replay);
+    solver = std::max(solver, sim::solver_bytes_per_vertex * vertices);
+    motion += (replay.steps + 1) * vertices * bytes_per_position;
+    kept += kept_steps(replay) * vertices * bytes_per_position;
+  }
+  const double candidates = count_candidates(settings.axes);
+  const double at_once = std::min<double>(
+      {static_cast<double>(settings.threads), static_cast<double>(settings.envs), candidates});
+  const bool keeps = !settings.rollouts.empty();
+  estimate.simulation = at_once * (solver + motion);
+  if (solver_check) estimate.simulation = std::max(estimate.simulation, kFiner * (solver + motion));
+  if (solver_check && keeps) estimate.simulation = kFiner * at_once * (solver + motion);
+  estimate.steps = estimate.simulation * motion / (solver + motion);
+  if (!keeps) return estimate;
+  const double finer = solver_check ? count_candidates(thinned(settings.axes)) : 0;
+  // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer
+  // one.
+  const double own = candidates * kept, half_cell = finer * kFiner * kept;
+  estimate.kept = own + std::max(own, 2 * half_cell);
+  return estimate;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,199 @@
+#include "sysid/infer/adaptive_design.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/error.h"
+#include "data/parallel.h"
+
+namespace flash::sysid {
+namespace {
+
+double coordinate(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
+
+std::array<double, 2> range_of(const Axis& axis) {
+  return {coordinate(axis, axis.values.front()), coordinate(axis, axis.values.back())};
+}
+
+/// Points an axis by how many are searched: some hundreds in all.
+int points_per_axis(const std::vector<Axis>& axes) {
+  const auto searched =
+      std::count_if(axes.begin(), axes.end(), [](const Axis& axis) { return axis.values.size() > 1; });
+  constexpr std::array<int, 5> kPoints = {1, 17, 9, 7, 5};
+  return kPoints[static_cast<std::size_t>(std::min<std::ptrdiff_t>(searched, 4))];
+}
+
+std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searched) {
+  const int points = points_per_axis(searched);
+  std::vector<Axis> axes = searched;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    Axis& axis = axes[k];
+    if (axis.values.size() < 2) continue;
+    const double first = axis.values.front(), last = axis.values.back();
+    axis.values.clear();
+    for (int i = 0; i < points; ++i) {
+      const double from = coordinate(axis, extent[k][0]), to = coordinate(axis, extent[k][1]);
+      const double x = from + (to - from) * i / (points - 1);
+      axis.values.push_back(std::clamp(axis.logarithmic ? std::exp(x) : x, first, last));
+    }
+  }
+  return axes;
+}
+
+constexpr double kSame = 1e-9;  // of a width
+
+double distance(const Axis& axis, double from, double to) {
+  return axis.logarithmic ? std::log(to / from) : to - from;
+}
+
+double moved(const Axis& axis, double value, double by) {
+  return axis.logarithmic ? value * std::exp(by) : value + by;
+}
+
+double cell_of(const Axis& axis) {
+  return distance(axis, axis.values.front(), axis.values.back()) /
+         static_cast<double>(axis.values.size() - 1);
+}
+
+}  // namespace
+
+Extent extent_of(const std::vector<Axis>& axes) {
+  Extent extent;
+  for (const Axis& axis : axes) extent.push_back({axis.values.front(), axis.values.back()});
+  return extent;
+}
+
+Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::vector<Axis>& axes) {
+  constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most
+  constexpr double kSmallest = 1e-4;      // half extent over the range
+  Extent next = extent;
+  bool fits = true;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    if (axes[k].values.size() < 2) continue;
+    const auto at = [&](double value) { return coordinate(axes[k], value); };
+    const std::array<double, 2> range = range_of(axes[k]), now = {at(extent[k][0]), at(extent[k][1])};
+    const double width = now[1] - now[0], spacing = width / (points_per_axis(axes) - 1);
+    const double best = at(*verdict.parameters[k].estimate);
+    double reach = 0;  // the larger half of the interval
+    for (const std::size_t side : {0, 1}) {
+      const double end = at((*verdict.parameters[k].interval95)[side]);
+      const bool open = std::abs(end - now[side]) < 1e-9 * width;
+      const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
+      // Past an open end by a quarter of the width or more; a longer way would lose what the last extents
+      // told.
+      const double past = std::max(0.75 * width, std::abs(end - best) + 0.25 * width);
+      reach = std::max(reach, open && more ? past / kRoom : std::abs(end - best));
+      fits = fits && !(open && more);
+    }
+    const double half = std::max({kRoom * reach, spacing, kSmallest * (range[1] - range[0])});
+    const double low = std::max(range[0], best - half), high = std::min(range[1], best + half);
+    next[k] = {axes[k].logarithmic ? std::exp(low) : low, axes[k].logarithmic ? std::exp(high) : high};
+    fits = fits && width < 1.001 * kMost / kRoom * (high - low);
+  }
+  return fits ? extent : next;
+}
+
+GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
+                         double share, const GridSettings& settings) {
+  GridResults results;
+  results.axes = axes;
+  std::vector<Replay> replays;
+  std::vector<TwoMeshMotions> all;
+  for (const ModelledReplay& model : models) {
+    results.recordings.push_back(model.replay.recording.name);
+    replays.push_back(model.replay);
+    all.push_back(model.model);
+  }
+  const std::vector<std::vector<double>> points = cartesian_product(axes);
+  results.candidates.resize(points.size());
+  const std::atomic<bool>* const stop = models.front().replay.settings.solver.stop;
+  const auto score = [&](const std::vector<TwoMeshMotions>& slices, std::size_t i) {
+    if (stop != nullptr && *stop) throw data::Stopped();
+    std::vector<ReplayResult> motions(slices.size());
+    for (std::size_t r = 0; r < slices.size(); ++r) {
+      motions[r].motion = slices[r].at({}, share);
+      motions[r].converged = motions[r].finite = true;
+    }
+    results.candidates[i] = score_motions(replays, motions, settings.score);
+    results.candidates[i].id = static_cast<int>(i);
+    results.candidates[i].values = points[i];
+  };
+  // Points that share their first values share the slices there.
+  const auto visit = [&](const auto& self, const std::vector<TwoMeshMotions>& slices, std::size_t k,
+                         std::size_t first, std::size_t count) -> void {
+    if (k == axes.size()) return score(slices, first);
+    const std::size_t values = axes[k].values.size(), part = count / values;
+    data::for_each_in_parallel(values, k == 0 ? settings.threads : 1, [&](std::size_t i) {
+      std::vector<TwoMeshMotions> held;
+      for (const TwoMeshMotions& slice : slices) held.push_back(slice.slice(axes[k].values[i]));
+      self(self, held, k + 1, first + i * part, part);
+    });
+  };
+  visit(visit, all, 0, 0, points.size());
+  return results;
+}
+
+Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
+            const GridSettings& settings, std::optional<double> repeatability) {
+  constexpr int kRounds = 16;
+  Extent extent = start;
+  std::vector<Replay> replays;
+  for (const ModelledReplay& model : models) replays.push_back(model.replay);
+  const MotionsAt motions = motions_of(models, share);
+  Zoomed found;
+  for (int round = 0; round < kRounds; ++round) {
+    found.results = score_models(models, axes_over(extent, settings.axes), share, settings);
+    found.verdict = profile_grid(found.results, repeatability);
+    if (found.verdict.best < 0) break;
+    const std::vector<double> estimate(found.verdict.estimate.begin(), found.verdict.estimate.end());
+    found.information = keyframe_information(measure_sensitivity(replays, settings, estimate, true, motions));
+    found.verdict = profile_grid(found.results, {repeatability, {}, found.information});
+    const Extent next = next_extent(extent, found.verdict, settings.axes);
+    if (next == extent) break;
+    extent = next;
+  }
+  return found;
+}
+
+std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count) {
+  std::vector<Axis> axes = searched;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    Axis& axis = axes[k];
+    if (axis.values.size() < 2) continue;
+    const double first = axis.values.front(), last = axis.values.back();
+    const auto [low, high] = extent[k];
+    if (distance(axis, low, high) > cell_of(axis)) continue;
+    axis.values.clear();
+    for (int i = 0; i < count; ++i) {
+      const double share = static_cast<double>(i) / (count - 1);
+      const double value = axis.logarithmic ? low * std::pow(high / low, share) : low + share * (high - low);
+      axis.values.push_back(std::clamp(value, first, last));
+    }
+  }
+  return axes;
+}
+
+Extent next_lattice(const Extent& extent, const Extent& zoomed, const GridVerdict& verdict,
+                    const std::vector<Axis>& searched) {
+  constexpr double kPart = 0.5 - kSame;
+  Extent next = next_extent(zoomed, verdict, searched);
+  bool holds = true;
+  for (std::size_t k = 0; k < searched.size(); ++k) {
+    const Axis& axis = searched[k];
+    if (axis.values.size() < 2) continue;
+    const auto [low, high] = extent[k];
+    const auto [from, to] = *verdict.parameters[k].interval95;
+    const double width = distance(axis, low, high), first = axis.values.front(), last = axis.values.back();
+    const auto leaves = [&](double end, double side, double range) {
+      return std::abs(distance(axis, end, side)) <= kSame * width &&
+             std::abs(distance(axis, side, range)) > kSame * width;
+    };
+    const bool below = leaves(from, low, first), above = leaves(to, high, last);
+    if (below) next[k][0] = std::max(first, moved(axis, low, -width));
+    if (above) next[k][1] = std::min(last, moved(axis, high, width));
+    holds = holds && !below && !above && distance(axis, zoomed[k][0], zoomed[k][1]) >= kPart * width;
+  }
+  return holds ? extent : next;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,30 @@
+#include "sysid/observe/horizon.h"
+
+#include "sysid/observe/motion_distance.h"
+
+namespace flash::sysid {
+
+std::optional<double> predictability_horizon(const Replay& replay, const ReplayCandidate& candidate,
+                                             double limit, double perturbation) {
+  ReplayCandidate twin = candidate;
+  twin.material.membrane_stiffness *= 1 + perturbation;
+  twin.material.bending_rigidity *= 1 + perturbation;
+  twin.material.friction *= 1 + perturbation;
+  const std::vector<ReplayResult> results = run(replay, {candidate, twin});
+  for (const auto& [t, distance] : motion_distance(replay, results[0].motion, results[1].motion))
+    if (!(distance <= limit)) return t;
+  return std::nullopt;
+}
+
+void drop_beyond_horizon(std::optional<double> horizon, Replay& replay) {
+  if (!horizon) return;
+  std::vector<Observation> kept = replay.observations;
+  double weight = 0;
+  for (Observation& observation : kept) {
+    if (observation.t >= *horizon) observation.weight = 0;
+    if (observation.seen()) weight += observation.weight;
+  }
+  if (weight > 0) replay.observations = std::move(kept);
+}
+
+}  // namespace flash::sysid

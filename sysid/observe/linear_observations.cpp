@@ -1,0 +1,177 @@
+#include "sysid/observe/linear_observations.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace flash::sysid {
+namespace {
+
+Eigen::Vector3d at(const data::Points& points, const Eigen::Vector3i& corners,
+                   const Eigen::Vector3d& barycentric) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) sum += barycentric[k] * points.row(corners[k]).transpose();
+  return sum;
+}
+
+Eigen::Vector3d normal_of(const data::Points& positions, const Eigen::Vector3i& corners) {
+  const Eigen::Vector3d a = positions.row(corners[0]), b = positions.row(corners[1]),
+                        c = positions.row(corners[2]);
+  return (b - a).cross(c - a).normalized();
+}
+
+/// Out of the sheet, in its surface, across the border edge that the place lies on.
+Eigen::Vector3d border_normal(const data::Points& positions, const Eigen::Vector3i& corners,
+                              const Eigen::Vector3d& barycentric) {
+  int opposite;
+  barycentric.minCoeff(&opposite);
+  const Eigen::Vector3d a = positions.row(corners[(opposite + 1) % 3]),
+                        b = positions.row(corners[(opposite + 2) % 3]);
+  return (b - a).cross(normal_of(positions, corners)).normalized();
+}
+
+}  // namespace
+
+void LinearObservations::add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
+                                  const Eigen::Isometry3d& simulated_from_observed,
+                                  const SheetDistance& sheet, const Replay& replay,
+                                  const data::Points& positions, const data::Points& velocities) {
+  const Eigen::Index count = std::min(points.rows(), at_most);
+  if (count == 0 || !(common.weight > 0)) return;
+  int hint = -1;
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index row = i * points.rows() / count;
+    const Eigen::Vector3d point = simulated_from_observed * points.row(row).transpose();
+    Place place = common;
+    place.mark = static_cast<std::size_t>(row);
+    SurfacePoint nearest;
+    if (place.term == Term::surface) nearest = sheet.nearest(point, hint);
+    if (place.term == Term::border) nearest = sheet.nearest_on_border(point);
+    if (place.term == Term::mark)
+      nearest = sheet.mark(replay.observations[place.observation].marks[place.mark], point);
+    hint = nearest.triangle;
+    const Eigen::Vector3i corners = replay.recording.mesh.triangles.row(nearest.triangle);
+    place.position = nearest.position;
+    place.velocity = at(velocities, corners, nearest.barycentric);
+    const bool mark = place.term == Term::mark;
+    place.weight = std::sqrt(common.weight / static_cast<double>(count));
+    for (int k = 0; k < (mark ? 3 : 1); ++k) {
+      place.direction = mark ? Eigen::Vector3d(Eigen::Vector3d::Unit(k))
+                        : place.term == Term::surface
+                            ? normal_of(positions, corners)
+                            : border_normal(positions, corners, nearest.barycentric);
+      place.residual = place.direction.dot(point - place.position);
+      places_.push_back(place);
+    }
+  }
+}
+
+LinearObservations::LinearObservations(const Replay& replay, const Motion& motion,
+                                       const Registration& registration, const Objective& objective,
+                                       Eigen::Index points_per_term)
+    : registration_(registration) {
+  SheetDistance sheet(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
+  double total = 0;
+  for (const Observation& observation : replay.observations)
+    if (observation.seen()) total += observation.weight;
+  data::Points positions, velocities;
+  for (std::size_t k = 0; k < replay.observations.size(); ++k) {
+    const Observation& observation = replay.observations[k];
+    if (!observation.seen() || observation.weight <= 0) continue;
+    const double t = observation.t + registration.time_offset;
+    surface_at(motion, t, positions, &velocities);
+    sheet.move(positions);
+    const std::array<double, 5> weights = term_weights(observation, objective);
+    const auto common = [&](Term term, double weight) {
+      Place place{};
+      place.term = term;
+      place.observation = k;
+      place.weight = observation.weight / total * weight;
+      return place;
+    };
+    const auto add = [&](const data::Points& points, Term term, double weight) {
+      add_term(points, points_per_term, common(term, weight), simulated_from_observed, sheet, replay,
+               positions, velocities);
+    };
+    add(observation.points, Term::surface, weights[0]);
+    add(observation.contour, Term::border, weights[1]);
+    add(observation.markers, Term::mark, weights[2]);
+    if (!observation.force || !(weights[3] > 0)) continue;
+    Place place = common(Term::force, weights[3]);
+    place.position = force_at(motion, t);
+    place.velocity.setZero();
+    // A force in newtons times its weight is a length; squared, the weight counts twice.
+    place.weight = weights[3] * std::sqrt(observation.weight / total);
+    for (int axis = 0; axis < 3; ++axis) {
+      place.direction = Eigen::Vector3d::Unit(axis);
+      place.residual = place.direction.dot(*observation.force - place.position);
+      places_.push_back(place);
+    }
+  }
+}
+
+std::vector<Eigen::Index> LinearObservations::rows_of_keyframes() const {
+  std::vector<Eigen::Index> counts;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    if (i == 0 || places_[i].observation != places_[i - 1].observation) counts.push_back(0);
+    ++counts.back();
+  }
+  return counts;
+}
+
+Eigen::VectorXd LinearObservations::residuals() const {
+  Eigen::VectorXd rows(this->rows());
+  for (Eigen::Index i = 0; i < rows.size(); ++i) {
+    const Place& place = places_[static_cast<std::size_t>(i)];
+    rows[i] = place.weight * place.residual;
+  }
+  return rows;
+}
+
+Eigen::VectorXd LinearObservations::displacements(const Replay& replay, const Motion& motion) const {
+  SheetDistance sheet(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  Eigen::VectorXd rows(this->rows());
+  data::Points positions;
+  std::size_t current = static_cast<std::size_t>(-1);
+  int hint = -1;
+  for (Eigen::Index i = 0; i < rows.size(); ++i) {
+    const Place& place = places_[static_cast<std::size_t>(i)];
+    const Observation& observation = replay.observations[place.observation];
+    const double t = observation.t + registration_.time_offset;
+    if (place.observation != current) {
+      surface_at(motion, t, positions);
+      sheet.move(positions);
+      current = place.observation;
+    }
+    Eigen::Vector3d there = Eigen::Vector3d::Zero();
+    if (place.term == Term::surface) {
+      const SurfacePoint nearest = sheet.nearest(place.position, hint);
+      hint = nearest.triangle;
+      there = nearest.position;
+    }
+    if (place.term == Term::border) there = sheet.nearest_on_border(place.position).position;
+    if (place.term == Term::mark) there = sheet.mark(observation.marks[place.mark], place.position).position;
+    if (place.term == Term::force) there = force_at(motion, t);
+    rows[i] = place.weight * place.direction.dot(there - place.position);
+  }
+  return rows;
+}
+
+Eigen::Matrix<double, Eigen::Dynamic, 5> LinearObservations::registration_derivatives() const {
+  Eigen::Matrix<double, Eigen::Dynamic, 5> rows(this->rows(), 5);
+  const Eigen::Matrix3d observed_from_simulated = registration_.observed_from_simulated().linear();
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    const Place& place = places_[static_cast<std::size_t>(i)];
+    if (place.term == Term::force) {
+      rows.row(i).setZero();
+      continue;
+    }
+    rows.row(i).head<3>() = place.weight * (observed_from_simulated * place.direction).transpose();
+    rows(i, 3) =
+        place.weight * place.direction.dot(registration_.up.cross(place.position - registration_.pivot));
+    rows(i, 4) = place.weight * place.direction.dot(place.velocity);
+  }
+  return rows;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,58 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "sysid/observe/score.h"
+#include "sysid/replay/replay.h"
+
+namespace flash::sysid {
+
+/// Where on a simulated motion each observation belongs, and the direction in which it can tell the sheet
+/// from another: the normal of the surface for a point of a cloud, the normal of the border in the surface
+/// for a point of the outline, every direction for a mark and for the force. Linear identification stands on
+/// it: residuals, their derivatives by parameters, displacements between solutions.
+///
+/// Rows are weighted as the score is: the sum of squares of a vector of rows is the mean over keyframes of
+/// the mean over terms of the mean square [m^2], a force counting cloud_sigma / force_sigma.
+class LinearObservations {
+ public:
+  /// `replay`: of `motion`; its observations count. `points_per_term`: of a keyframe, evenly thinned.
+  LinearObservations(const Replay& replay, const Motion& motion, const Registration& registration,
+                     const Objective& objective, Eigen::Index points_per_term = 200);
+
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(places_.size()); }
+
+  /// Rows of each weighing keyframe, in order.
+  std::vector<Eigen::Index> rows_of_keyframes() const;
+
+  /// How far each observation stands from its place, along the direction [m].
+  Eigen::VectorXd residuals() const;
+
+  /// How far another motion takes the sheet from each place, along the direction [m]; `replay` is of `motion`
+  /// and may have another mesh. Before any registration anew.
+  Eigen::VectorXd displacements(const Replay& replay, const Motion& motion) const;
+
+  /// Derivatives of `displacements` by offset x, y, z [m], yaw [rad] and time [s].
+  Eigen::Matrix<double, Eigen::Dynamic, 5> registration_derivatives() const;
+
+ private:
+  enum class Term { surface, border, mark, force };
+  struct Place {
+    Term term;
+    std::size_t observation;    // index of the keyframe
+    std::size_t mark = 0;       // index in the keyframe
+    double weight = 0;          // root of the row's share
+    double residual = 0;        // [m]
+    Eigen::Vector3d direction;  // unit, frame of the simulation
+    Eigen::Vector3d position;   // [m]; of a force [N]
+    Eigen::Vector3d velocity;   // of the sheet there [m/s]
+  };
+  void add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
+                const Eigen::Isometry3d& simulated_from_observed, const SheetDistance& sheet,
+                const Replay& replay, const data::Points& positions, const data::Points& velocities);
+
+  std::vector<Place> places_;
+  Registration registration_;
+};
+
+}  // namespace flash::sysid

@@ -1,0 +1,33 @@
+#include "sysid/replay/half_cell.h"
+
+#include "data/procedural_mesh.h"
+#include "data/text.h"
+
+namespace flash::sysid {
+namespace {
+
+// "sheet:0.4x0.4:0.02[:pattern]" with half the cell; empty for anything else.
+std::string half_cell(const std::string& specification) {
+  if (!data::is_mesh_spec(specification)) return "";
+  const std::vector<std::string_view> words = data::split(specification, ":");
+  const auto cell = words.size() >= 3 ? data::parse_number(words[2]) : std::nullopt;
+  if (!cell || words[0] != "sheet") return "";
+  std::string finer =
+      std::string(words[0]) + ":" + std::string(words[1]) + ":" + data::format_number(0.5 * *cell);
+  for (std::size_t k = 3; k < words.size(); ++k) finer += ":" + std::string(words[k]);
+  return finer;
+}
+
+}  // namespace
+
+std::optional<Replay> on_half_the_cell(const Replay& replay) {
+  ReplaySettings settings = replay.settings;
+  settings.mesh = half_cell(replay.recording.mesh_spec);
+  if (settings.mesh.empty() || !replay.recording.start_mesh.empty()) return std::nullopt;
+  Replay finer = make_replay(replay.recording, settings);
+  for (std::size_t k = 0; k < replay.observations.size(); ++k)
+    finer.observations[k].weight = replay.observations[k].weight;
+  return finer;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,55 @@
+#include "sysid/replay/memory_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::sysid {
+double vertices_of(const Replay& replay) { return static_cast<double>(replay.sheet.rest.vertices.rows()); }
+
+MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates) {
+  MemoryEstimate estimate;
+  const auto count = static_cast<double>(candidates);
+  for (const Replay& replay : replays) {
+    const double threads = std::min<double>(replay.settings.threads, count);
+    estimate.simulation =
+        std::max(estimate.simulation, threads * sim::solver_bytes_per_vertex * vertices_of(replay));
+    estimate.steps += count * (replay.steps + 1) * vertices_of(replay) * bytes_per_position;
+  }
+  estimate.simulation += estimate.steps;
+  return estimate;
+}
+
+void check_job(const std::vector<Replay>& replays, double candidates, const MemoryEstimate& memory,
+               double limit) {
+  double work = 0;  // steps of a vertex
+  for (const Replay& replay : replays) work += candidates * replay.steps * vertices_of(replay);
+  const Replay& first = replays.front();
+  const bool many_threads = first.settings.threads > 1;
+  if (limit > 0 && memory.total() > limit) {
+    const auto megabytes = [](double bytes) {
+      return data::format_count(static_cast<std::size_t>(std::min(std::ceil(bytes / 1e6), 1e15)));
+    };
+    std::string remedy = memory.kept > memory.simulation        ? "fewer values or a coarser --mesh"
+                         : 2 * memory.steps > memory.simulation ? "a longer --time-step or a coarser --mesh"
+                                                                : "a coarser --mesh";
+    if (many_threads) remedy += " or fewer --threads";
+    throw data::InputError("about " + megabytes(memory.total()) +
+                           " MB of memory are needed, expected at most the " + megabytes(limit) +
+                           " MB that there are: use " + remedy);
+  }
+  // Faster than any machine: the refusal must be certain.
+  constexpr double kWorkPerSecond = 1e7, kLongest = 365 * 86400.0;
+  const double seconds = work / (kWorkPerSecond * std::max(1, first.settings.threads));
+  if (seconds <= kLongest) return;
+  throw data::InputError(
+      data::format_short(candidates) + " candidates of " +
+      data::format_count(static_cast<std::size_t>(first.steps)) + " steps of " +
+      data::format_count(static_cast<std::size_t>(vertices_of(first))) + " vertices take more than " +
+      data::format_short(seconds / kLongest) + " years: use " +
+      (candidates > first.steps ? "fewer values" : "a longer --time-step") + " or a coarser --mesh");
+}
+
+}  // namespace flash::sysid

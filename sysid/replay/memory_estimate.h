@@ -1,0 +1,30 @@
+#pragma once
+#include "data/memory_limit.h"
+#include "sysid/replay/replay.h"
+
+namespace flash::sysid {
+
+/// Memory that a job will take at its peak [bytes].
+struct MemoryEstimate {
+  double program = 60e6;  ///< itself, with what scoring takes; measured
+  double simulation = 0;  ///< solvers and motions in work at once, one candidate a thread
+  double steps = 0;       ///< the part of `simulation` that grows with the number of steps
+  double kept = 0;        ///< motions over the grid and about its finer mesh, where rollouts are kept
+  double total() const { return program + simulation + kept; }
+};
+
+/// Of one position of one vertex [bytes].
+inline constexpr double bytes_per_position = 3 * sizeof(double);
+
+/// Of the sheet that is simulated.
+double vertices_of(const Replay& replay);
+
+/// Of `candidates` simulated in one batch (`run`), their motions kept together.
+MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates);
+
+/// Refuses what this machine cannot finish. Throws data::InputError, saying what would help, where the memory
+/// goes beyond `limit` [bytes] (0: unknown), and where `candidates` on every replay take years.
+void check_job(const std::vector<Replay>& replays, double candidates, const MemoryEstimate& memory,
+               double limit = data::memory_limit());
+
+}  // namespace flash::sysid

@@ -1,0 +1,26 @@
+#pragma once
+#include <string>
+
+#include "sysid/replay/replay.h"
+
+namespace flash::sysid {
+
+/// A folder of simulated motions, so that the same candidates can be scored again without simulating them:
+/// against another recording of the same motion, under another objective, in a search with more values. A
+/// motion is kept at the steps around its keyframes only, in double precision, in a file of its own named by
+/// the SHA-256 of everything that decides it (sheet, start, grippers, table, solver, material). Files are
+/// written whole or not at all; several programs may share a folder.
+class MotionStore {
+ public:
+  /// Creates the folder. Throws std::runtime_error where it cannot.
+  explicit MotionStore(const std::string& folder);
+
+  /// The candidate's motion, from the folder where it is there, else simulated and kept. Positions between
+  /// keyframes are empty. Throws data::InputError naming a file that is not a motion.
+  ReplayResult run(const Replay& replay, const ReplayCandidate& candidate) const;
+
+ private:
+  std::string folder_;
+};
+
+}  // namespace flash::sysid

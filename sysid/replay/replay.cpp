@@ -1,0 +1,201 @@
+#include "sysid/replay/replay.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/error.h"
+#include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
+#include "data/scene.h"
+#include "data/text.h"
+#include "sysid/replay/grasp_targets.h"
+
+namespace flash::sysid {
+namespace {
+
+/// Without gravity the table's normal, and z where there is no table either.
+Eigen::Vector3d upward(const data::Recording& recording) {
+  if (recording.gravity.norm() > 0) return -recording.gravity.normalized();
+  return recording.has_table ? recording.table_normal : Eigen::Vector3d::UnitZ();
+}
+
+/// Turns `start` about the axis `up` through `pivot`.
+void turn(data::Points& points, const Eigen::Vector3d& pivot, const Eigen::Vector3d& up, double angle) {
+  const Eigen::Matrix3d rotation = Eigen::AngleAxisd(angle, up).toRotationMatrix();
+  points = ((points.rowwise() - pivot.transpose()) * rotation.transpose()).rowwise() + pivot.transpose();
+}
+
+/// The vertices of `mesh` inside the bounding box, at rest, of those that were taken on the recording's own.
+std::vector<int> same_place(const std::vector<int>& taken, const data::TriangleMesh& own,
+                            const data::TriangleMesh& mesh, const std::string& source) {
+  Eigen::AlignedBox3d box;
+  for (const int vertex : taken) box.extend(own.vertices.row(vertex).transpose());
+  const double slack = 1e-6 * (own.vertices.colwise().maxCoeff() - own.vertices.colwise().minCoeff()).norm();
+  std::vector<int> vertices;
+  for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i)
+    if (box.exteriorDistance(Eigen::Vector3d(mesh.vertices.row(i))) <= slack)
+      vertices.push_back(static_cast<int>(i));
+  if (vertices.empty())
+    throw data::input_error(source, "grasps.select.vertices", "none of the other mesh lies where these do");
+  return vertices;
+}
+
+/// Replaces the recording's mesh; the start follows its pose, grasps the place of their vertices.
+void replace_mesh(data::Recording& recording, const std::string& mesh) {
+  if (!recording.start_mesh.empty()) {
+    throw data::input_error(recording.source, "object.start",
+                            "is a mesh of its own, so that the sheet cannot be meshed anew as " + mesh);
+  }
+  const data::TriangleMesh own = std::move(recording.mesh);
+  recording.mesh = data::is_mesh_spec(mesh) ? data::parse_mesh_spec(mesh) : data::load_triangle_mesh(mesh);
+  for (data::RecordedGrasp& grasp : recording.grasps)
+    if (!grasp.select.vertices.empty())
+      grasp.select.vertices = same_place(grasp.select.vertices, own, recording.mesh, recording.source);
+  recording.mesh_spec = mesh;
+  recording.start = (recording.mesh.vertices * recording.base_from_object.linear().transpose()).rowwise() +
+                    recording.base_from_object.translation().transpose();
+}
+
+/// Throws data::InputError where --from and --to leave nothing to score.
+void check_window(const Replay& replay) {
+  if (replay.observations.empty())
+    throw data::input_error(replay.recording.source, "keyframes", "there is none");
+  const auto inside = [&](const Observation& observation) {
+    return observation.t >= replay.settings.score_from && observation.t <= replay.settings.score_to;
+  };
+  if (std::none_of(replay.observations.begin(), replay.observations.end(), inside))
+    throw data::InputError(
+        "--from, --to: " + replay.recording.source + " has no keyframe between; they span " +
+        data::format_clock(replay.observations.front().t) + " to " +
+        data::format_clock(replay.observations.back().t) + " s after the recording's start");
+}
+
+/// Steps from `start` until the last keyframe can have been seen. Throws data::InputError, naming the cause,
+/// where they are more than data::max_steps.
+int count_steps(const data::Recording& recording, double start, double step) {
+  const double first = recording.keyframes.front().time, last = recording.keyframes.back().time;
+  const double duration = last + recording.nuisance.time - start;
+  constexpr double kUsual = 600;  // what takes longer is at fault itself [s]
+  if (duration > kUsual && duration / step > data::max_steps)
+    throw data::input_error(recording.source, first - start > last - first ? "grasps.from" : "keyframes",
+                            "found " + data::format_short(first - start) +
+                                " s before the first keyframe and " + data::format_short(last - first) +
+                                " s to the last, expected at most " + data::format_count(data::max_steps) +
+                                " steps of " + data::format_short(step) + " s: cut off what does not move");
+  return steps_in(duration, step) + 1;
+}
+
+}  // namespace
+
+int steps_in(double duration, double step) {
+  // Time stamps since 1970 know a time to 2e-7 s.
+  const double steps = std::ceil(duration / step - 1e-3);
+  if (steps <= data::max_steps) return static_cast<int>(steps);
+  throw data::InputError("--time-step: found " + data::format_short(step) + " s, which makes " +
+                         data::format_short(steps) + " steps of " + data::format_short(duration) +
+                         " s, expected at most " + data::format_count(data::max_steps) + ": take at least " +
+                         data::format_short(1.01 * duration / data::max_steps) + " s");
+}
+
+Replay make_replay(const data::Recording& recording, const ReplaySettings& settings) {
+  Replay replay;
+  replay.recording = recording;
+  replay.settings = settings;
+  replay.object_mesh = recording.mesh_spec;
+  if (!settings.mesh.empty()) replace_mesh(replay.recording, settings.mesh);
+  replay.sheet = sim::make_sheet(replay.recording.mesh);
+  replay.up = upward(recording);
+
+  // Marks are named by vertices of the recording's own mesh.
+  replay.queries =
+      std::make_shared<const SheetDistance>(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  for (const data::Keyframe& keyframe : data::load_keyframes(recording, replay.notices)) {
+    Observation observation{.t = keyframe.time,
+                            .points = keyframe.cloud,
+                            .contour = keyframe.contour,
+                            .markers = keyframe.markers,
+                            .force = keyframe.force};
+    for (const int vertex : keyframe.marker_vertices)
+      observation.marks.push_back(replay.queries->nearest(recording.mesh.vertices.row(vertex).transpose()));
+    const bool weighs =
+        keyframe.time >= settings.score_from && keyframe.time <= settings.score_to &&
+        (keyframe.cloud.rows() >= settings.min_points || keyframe.contour.rows() >= settings.min_points ||
+         keyframe.markers.rows() > 0 || keyframe.force);
+    observation.weight = weighs ? 1 : 0;
+    replay.observations.push_back(std::move(observation));
+  }
+  check_window(replay);
+
+  replay.beginning = replay.observations.front().t;
+  bool closes = false;
+  for (const data::RecordedGrasp& grasp : recording.grasps) {
+    replay.beginning = std::min(replay.beginning, grasp.from);
+    closes = closes || shape_of(grasp, settings) == data::GraspShape::pinch;
+  }
+  if (settings.clamp_slopes) stiffen_clamped(replay);
+  const double pre_roll = settings.pre_roll.value_or(closes ? 0.4 : 0.0);
+  const double step = settings.solver.time_step;
+  replay.start = replay.beginning - steps_in(pre_roll, step) * step;
+  replay.steps = count_steps(recording, replay.start, step);
+
+  if (recording.grasps.empty()) {
+    replay.pivot = replay.recording.start.colwise().mean().transpose();
+  } else {
+    const data::RecordedGrasp& grasp = recording.grasps.front();
+    replay.pivot = data::pose_at(trajectory_of(recording, grasp), grasp.from).translation();
+  }
+  return replay;
+}
+
+sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate) {
+  const data::Recording& recording = replay.recording;
+  const ReplayNuisance& nuisance = candidate.nuisance;
+  data::Points flat = recording.start;
+  turn(flat, replay.pivot, replay.up, nuisance.start_yaw);
+  const Eigen::RowVector3d raise = nuisance.table_height * replay.up.transpose();
+
+  sim::Environment environment;
+  environment.material = candidate.material;
+  environment.gravity = recording.gravity;
+  environment.state.time = replay.start;
+  environment.state.positions = flat.rowwise() + raise;
+  environment.state.velocities = data::Points::Zero(flat.rows(), 3);
+  if (recording.has_table) {
+    environment.obstacles.push_back(
+        {sim::Plane{.point = recording.table_point + raise.transpose(), .normal = recording.table_normal}});
+  }
+  for (const data::RecordedGrasp& grasp : recording.grasps)
+    environment.grasps.push_back(make_grasp(replay, grasp, nuisance, flat));
+  return environment;
+}
+
+std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates) {
+  std::vector<sim::Environment> environments;
+  for (const ReplayCandidate& candidate : candidates)
+    environments.push_back(make_environment(replay, candidate));
+  std::vector<sim::Rollout> rollouts = sim::simulate(replay.sheet, std::move(environments), replay.steps,
+                                                     replay.settings.solver, replay.settings.threads);
+  std::vector<ReplayResult> results;
+  for (sim::Rollout& rollout : rollouts) {
+    ReplayResult& result = results.emplace_back();
+    result.motion = {replay.start, replay.settings.solver.time_step, std::move(rollout.positions)};
+    for (const sim::StepReport& report : rollout.reports)
+      result.motion.forces.push_back(report.grasp_forces.empty() ? Eigen::Vector3d::Zero()
+                                                                 : report.grasp_forces.back());
+    int missed = 0;
+    for (const sim::StepReport& report : rollout.reports) {
+      missed += !(report.converged && std::isfinite(report.residual));
+      result.residual_max = sim::worst(result.residual_max, report.residual);
+      result.penetration_max = sim::worst(result.penetration_max, report.penetration_max);
+    }
+    result.converged = missed == 0;
+    result.unconverged_share =
+        rollout.reports.empty() ? 0 : missed / static_cast<double>(rollout.reports.size());
+    result.finite =
+        std::all_of(result.motion.positions.begin(), result.motion.positions.end(),
+                    [](const data::Points& p) { return p.allFinite() && p.cwiseAbs().maxCoeff() < 1e4; });
+  }
+  return results;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,87 @@
+#pragma once
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "data/recording.h"
+#include "sim/solver.h"
+#include "sysid/replay/motion.h"
+#include "sysid/replay/observation.h"
+#include "sysid/replay/sheet_distance.h"
+
+namespace flash::sysid {
+
+/// What every candidate of a replay has in common.
+struct ReplaySettings {
+  sim::SolverSettings solver;
+  std::string mesh;  ///< mesh specification or file in place of the recording's; empty: the recording's
+  std::optional<double> pre_roll;  ///< simulated before the recording starts, gripper at its first pose;
+                                   ///< absent: 0.4 where a grasp needs time to close, else 0 [s]
+  double closing_time = 0.25;      ///< the fingers', within the pre-roll [s]
+  std::optional<data::GraspShape> grasp_shape;  ///< in place of the recording's
+  std::optional<double> grasp_within;           ///< in place of the recording's [m]
+  bool clamp_slopes = false;  ///< clamp, from the beginning to the end: the patch does not bend either
+  double score_from = -std::numeric_limits<double>::infinity();  ///< keyframes before carry no weight [s]
+  double score_to = std::numeric_limits<double>::infinity();     ///< keyframes after carry no weight [s]
+  int min_points = 20;  ///< keyframes of fewer points carry no weight
+  int threads = 1;
+};
+
+/// How the sheet lay and how it was grasped: what the recording leaves open and what changes the motion.
+struct ReplayNuisance {
+  double start_yaw = 0;     ///< turn of the sheet on the table about the gripper's first position [rad]
+  double table_height = 0;  ///< of table and sheet, against the gripper's path [m]
+  std::optional<double> grasp_depth;      ///< pinch: size of the folded patch; absent: the recording's [m]
+  std::optional<double> grasp_direction;  ///< pinch: angle of the ridge from the sheet's diagonal; absent:
+                                          ///< the recording's [rad]
+  std::optional<double> grasp_pitch;      ///< pinch: tilt of the ridge; absent: the recording's [rad]
+};
+
+struct ReplayCandidate {
+  data::SheetMaterial material;
+  ReplayNuisance nuisance;
+};
+
+/// One candidate's simulated motion and how the solver fared.
+struct ReplayResult {
+  Motion motion;
+  bool converged = false;        ///< every step
+  bool finite = false;           ///< all positions are numbers
+  double residual_max = 0;       ///< |r| / |M g|
+  double penetration_max = 0;    ///< [m]
+  double unconverged_share = 0;  ///< of the steps
+};
+
+/// A recording made ready for simulation: its mesh, the start, the steps to take.
+struct Replay {
+  data::Recording recording;
+  std::string
+      object_mesh;  ///< mesh specification or file of the recording itself, whatever settings.mesh says
+  sim::Sheet sheet;
+  std::shared_ptr<const SheetDistance> queries;  ///< of the sheet at rest
+  ReplaySettings settings;
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity; the table normal without gravity
+  Eigen::Vector3d pivot =
+      Eigen::Vector3d::Zero();  ///< the first grasp's gripper at its start, or the sheet's centre
+  double start = 0;             ///< time of the first state: the recording's start less the pre-roll [s]
+  double beginning = 0;         ///< of the recording: its first grasp or keyframe [s]
+  int steps = 0;
+  std::vector<Observation> observations;
+  std::vector<std::string> notices;
+};
+
+/// Steps of `step` that it takes to cover `duration` [s]. Throws data::InputError where they are more than
+/// data::max_steps.
+int steps_in(double duration, double step);
+
+/// Throws data::InputError where mesh, grasps, clouds or the number of steps cannot be used.
+Replay make_replay(const data::Recording& recording, const ReplaySettings& settings);
+
+/// The simulated world of one candidate, before its first step.
+sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate);
+
+std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates);
+
+}  // namespace flash::sysid

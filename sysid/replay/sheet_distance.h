@@ -1,0 +1,41 @@
+#pragma once
+#include <vector>
+
+#include "sysid/replay/surface_distance.h"
+
+namespace flash::sysid {
+
+/// Where observations of a moving sheet belong on it: points on its surface, outlines on its border, marks at
+/// the place they were put.
+class SheetDistance {
+ public:
+  /// `layout`: see SurfaceDistance; also the first positions.
+  SheetDistance(const data::Triangles& triangles, const data::Points& layout);
+
+  void move(const data::Points& positions);
+
+  /// As SurfaceDistance::nearest.
+  SurfacePoint nearest(const Eigen::Vector3d& query, int hint = -1) const {
+    return surface_.nearest(query, hint);
+  }
+
+  /// Nearest point of the border, the edges of one triangle only; triangle -1 where there is no border.
+  SurfacePoint nearest_on_border(const Eigen::Vector3d& query) const;
+
+  /// The mark (its triangle and barycentric weights count) and how far it is from `query`.
+  SurfacePoint mark(const SurfacePoint& place, const Eigen::Vector3d& query) const;
+
+ private:
+  struct BorderEdge {
+    int triangle, first;         // corners first and first + 1
+    Eigen::Vector3d a, ab;       // [m]
+    double inverse_squared = 0;  // of the length; zero for an edge without length
+  };
+
+  data::Triangles triangles_;
+  data::Points positions_;
+  SurfaceDistance surface_;
+  std::vector<BorderEdge> border_;
+};
+
+}  // namespace flash::sysid

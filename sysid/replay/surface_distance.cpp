@@ -1,0 +1,245 @@
+#include "sysid/replay/surface_distance.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+/// Orders triangles so that every aligned run of 8, 64, 512, ... is compact: halves along the longest axis,
+/// cut at multiples of the largest power of eight below the count.
+void order_in_space(const data::Points& centroids, std::vector<int>::iterator first,
+                    std::vector<int>::iterator last, int width) {
+  const std::ptrdiff_t count = last - first;
+  if (count <= width) return;
+  std::ptrdiff_t unit = width;
+  while (unit * width < count) unit *= width;
+  Eigen::Array3d low = Eigen::Array3d::Constant(kInfinity), high = -low;
+  for (auto i = first; i != last; ++i) {
+    low = low.min(centroids.row(*i).transpose().array());
+    high = high.max(centroids.row(*i).transpose().array());
+  }
+  int axis;
+  (high - low).maxCoeff(&axis);
+  const std::ptrdiff_t units = (count + unit - 1) / unit;
+  const auto middle = first + unit * ((units + 1) / 2);
+  std::nth_element(first, middle, last,
+                   [&](int i, int j) { return centroids(i, axis) < centroids(j, axis); });
+  order_in_space(centroids, first, middle, width);
+  order_in_space(centroids, middle, last, width);
+}
+
+}  // namespace
+
+/// Corner a, edges e = b - a and f = c - a, unit normal and the constants of the projections on edges and
+/// plane.
+struct SurfaceDistance::Packet {
+  double a[3][width], e[3][width], f[3][width], n[3][width];
+  double inverse_ee[width], inverse_ff[width], inverse_gg[width];  // g = c - b
+  double ee[width], ef[width], ff[width];
+  double inverse_determinant[width];  // NaN for a triangle without area: then only its edges count
+};
+
+struct SurfaceDistance::Node {
+  double low[3][width], high[3][width];
+};
+
+SurfaceDistance::~SurfaceDistance() = default;
+SurfaceDistance::SurfaceDistance(SurfaceDistance&&) noexcept = default;
+SurfaceDistance::SurfaceDistance(const SurfaceDistance&) = default;
+
+SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::Points& layout)
+    : triangles_(triangles) {
+  const int count = static_cast<int>(triangles.rows());
+  data::Points centroids(count, 3);
+  for (int i = 0; i < count; ++i) {
+    centroids.row(i) =
+        (layout.row(triangles(i, 0)) + layout.row(triangles(i, 1)) + layout.row(triangles(i, 2))) / 3.0;
+  }
+  order_.resize(count);
+  std::iota(order_.begin(), order_.end(), 0);
+  order_in_space(centroids, order_.begin(), order_.end(), width);
+  slot_of_.resize(count);
+  for (int slot = 0; slot < count; ++slot) slot_of_[order_[slot]] = slot;
+
+  const int packets = (count + width - 1) / width;
+  order_.resize(static_cast<std::size_t>(packets) * width, -1);
+  packets_.resize(packets);
+  for (int size = packets; levels_.empty() || size > 1;) {
+    size = (size + width - 1) / width;
+    levels_.emplace_back(size);
+  }
+  move(layout);
+}
+
+void SurfaceDistance::move(const data::Points& positions) {
+  positions_ = positions;
+  for (auto& level : levels_) {
+    for (Node& node : level) {
+      std::fill(&node.low[0][0], &node.low[0][0] + 3 * width, kInfinity);
+      std::fill(&node.high[0][0], &node.high[0][0] + 3 * width, -kInfinity);
+    }
+  }
+  for (std::size_t slot = 0; slot < order_.size(); ++slot) {
+    // Empty slots repeat the last triangle, which changes no answer.
+    const int triangle = order_[slot] >= 0 ? order_[slot] : order_[slot_of_.size() - 1];
+    const Eigen::Vector3d a = positions.row(triangles_(triangle, 0)),
+                          b = positions.row(triangles_(triangle, 1)),
+                          c = positions.row(triangles_(triangle, 2));
+    const Eigen::Vector3d e = b - a, f = c - a, n = e.cross(f);
+    const auto inverse = [](double x) { return x > 0 ? 1 / x : 0.0; };
+    Packet& packet = packets_[slot / width];
+    const int lane = static_cast<int>(slot % width);
+    const double area2 = n.squaredNorm();
+    for (int k = 0; k < 3; ++k) {
+      packet.a[k][lane] = a[k];
+      packet.e[k][lane] = e[k];
+      packet.f[k][lane] = f[k];
+      packet.n[k][lane] = area2 > 0 ? n[k] / std::sqrt(area2) : 0.0;
+    }
+    packet.ee[lane] = e.squaredNorm();
+    packet.ff[lane] = f.squaredNorm();
+    packet.ef[lane] = e.dot(f);
+    packet.inverse_ee[lane] = inverse(e.squaredNorm());
+    packet.inverse_ff[lane] = inverse(f.squaredNorm());
+    packet.inverse_gg[lane] = inverse((c - b).squaredNorm());
+    packet.inverse_determinant[lane] = area2 > 0 ? 1 / area2 : std::numeric_limits<double>::quiet_NaN();
+
+    Node& node = levels_[0][slot / (width * width)];
+    const int child = static_cast<int>(slot / width % width);
+    for (int k = 0; k < 3; ++k) {
+      node.low[k][child] = std::min({node.low[k][child], a[k], b[k], c[k]});
+      node.high[k][child] = std::max({node.high[k][child], a[k], b[k], c[k]});
+    }
+  }
+  for (std::size_t level = 1; level < levels_.size(); ++level) {
+    for (std::size_t i = 0; i < levels_[level - 1].size(); ++i) {
+      const Node& below = levels_[level - 1][i];
+      Node& node = levels_[level][i / width];
+      for (int k = 0; k < 3; ++k) {
+        node.low[k][i % width] = *std::min_element(below.low[k], below.low[k] + width);
+        node.high[k][i % width] = *std::max_element(below.high[k], below.high[k] + width);
+      }
+    }
+  }
+}
+
+void SurfaceDistance::search_packet(int index, const Eigen::Vector3d& query, double& best, int& slot) const {
+  const Packet& t = packets_[index];
+  double distance2[width];
+  const double px = query.x(), py = query.y(), pz = query.z();
+  for (int i = 0; i < width; ++i) {
+    const double vx = px - t.a[0][i], vy = py - t.a[1][i], vz = pz - t.a[2][i];
+    const double ve = vx * t.e[0][i] + vy * t.e[1][i] + vz * t.e[2][i];
+    const double vf = vx * t.f[0][i] + vy * t.f[1][i] + vz * t.f[2][i];
+    const double vn = vx * t.n[0][i] + vy * t.n[1][i] + vz * t.n[2][i];
+    const double ee = t.ee[i], ef = t.ef[i], ff = t.ff[i];
+    const auto clamped = [](double x) {
+      x = x < 0 ? 0 : x;
+      return x > 1 ? 1 : x;
+    };
+    const auto squared_length = [&](double s, double r) {  // of v - s e - r f
+      const double x = vx - s * t.e[0][i] - r * t.f[0][i], y = vy - s * t.e[1][i] - r * t.f[1][i],
+                   z = vz - s * t.e[2][i] - r * t.f[2][i];
+      return x * x + y * y + z * z;
+    };
+    const double on_e = squared_length(clamped(ve * t.inverse_ee[i]), 0);
+    const double on_f = squared_length(0, clamped(vf * t.inverse_ff[i]));
+    // Along g = f - e from b: (v - e) . g = vf - ve - ef + ee.
+    const double s = clamped((vf - ve - ef + ee) * t.inverse_gg[i]);
+    const double on_g = squared_length(1 - s, s);
+    double d = on_e < on_f ? on_e : on_f;
+    d = on_g < d ? on_g : d;
+    const double weight_b = (ff * ve - ef * vf) * t.inverse_determinant[i];
+    const double weight_c = (ee * vf - ef * ve) * t.inverse_determinant[i];
+    const bool inside = (weight_b >= 0) & (weight_c >= 0) & (weight_b + weight_c <= 1);
+    distance2[i] = inside ? vn * vn : d;
+  }
+  for (int i = 0; i < width; ++i) {
+    if (distance2[i] < best) {
+      best = distance2[i];
+      slot = index * width + i;
+    }
+  }
+}
+
+void SurfaceDistance::search(std::size_t level, int index, const Eigen::Vector3d& query, double& best,
+                             int& slot) const {
+  const Node& node = levels_[level][index];
+  double distance2[width];
+  for (int i = 0; i < width; ++i) {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double below = node.low[k][i] - query[k], above = query[k] - node.high[k][i];
+      double outside = below > above ? below : above;
+      outside = outside < 0 ? 0 : outside;
+      sum += outside * outside;
+    }
+    distance2[i] = sum;
+  }
+  for (;;) {
+    int nearest = 0;
+    for (int i = 1; i < width; ++i) {
+      if (distance2[i] < distance2[nearest]) nearest = i;
+    }
+    if (!(distance2[nearest] < best)) return;
+    distance2[nearest] = kInfinity;
+    if (level == 0) {
+      search_packet(index * width + nearest, query, best, slot);
+    } else {
+      search(level - 1, index * width + nearest, query, best, slot);
+    }
+  }
+}
+
+SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& query, int hint) const {
+  double best = kInfinity;
+  int slot = 0;
+  if (hint >= 0) search_packet(slot_of_[hint] / width, query, best, slot);
+  search(levels_.size() - 1, 0, query, best, slot);
+  const int triangle = order_[slot] >= 0 ? order_[slot] : order_[slot_of_.size() - 1];
+  SurfacePoint result =
+      nearest_on_triangle(query, positions_.row(triangles_(triangle, 0)),
+                          positions_.row(triangles_(triangle, 1)), positions_.row(triangles_(triangle, 2)));
+  result.triangle = triangle;
+  return result;
+}
+
+SurfacePoint nearest_on_triangle(const Eigen::Vector3d& query, const Eigen::Vector3d& a,
+                                 const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const Eigen::Vector3d ab = b - a, ac = c - a, ap = query - a, bp = query - b, cp = query - c;
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap), d3 = ab.dot(bp), d4 = ac.dot(bp), d5 = ab.dot(cp),
+               d6 = ac.dot(cp);
+  const double va = d3 * d6 - d5 * d4, vb = d5 * d2 - d1 * d6, vc = d1 * d4 - d3 * d2;
+  Eigen::Vector3d weights;
+  if (d1 <= 0 && d2 <= 0) {
+    weights = {1, 0, 0};
+  } else if (d3 >= 0 && d4 <= d3) {
+    weights = {0, 1, 0};
+  } else if (d6 >= 0 && d5 <= d6) {
+    weights = {0, 0, 1};
+  } else if (vc <= 0 && d1 >= 0 && d3 <= 0) {
+    const double s = d1 / (d1 - d3);
+    weights = {1 - s, s, 0};
+  } else if (vb <= 0 && d2 >= 0 && d6 <= 0) {
+    const double s = d2 / (d2 - d6);
+    weights = {1 - s, 0, s};
+  } else if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+    const double s = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+    weights = {0, 1 - s, s};
+  } else {
+    weights = Eigen::Vector3d(va, vb, vc) / (va + vb + vc);
+  }
+  SurfacePoint result;
+  result.barycentric = weights;
+  result.position = weights[0] * a + weights[1] * b + weights[2] * c;
+  result.distance = (query - result.position).norm();
+  return result;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,132 @@
+#include "sysid/report/export_asset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "sim/sheet.h"
+
+namespace flash::sysid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+// Names and matrix together: the order of the rows must not depend on another field.
+Json covariance(const Summary& summary) {
+  if (summary.covariance_log.size() == 0) return nullptr;
+  Json json = {{"parameters", Json::array()}, {"matrix", Json::array()}};
+  for (const ParameterFinding& finding : summary.parameters) json["parameters"].push_back(finding.name);
+  for (Eigen::Index i = 0; i < summary.covariance_log.rows(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < summary.covariance_log.cols(); ++j)
+      row.push_back(number(summary.covariance_log(i, j)));
+    json["matrix"].push_back(row);
+  }
+  return json;
+}
+
+/// Where the base has its values from: by its own identification, or assumed.
+std::string source_of(const data::Asset& base, const std::string& name) {
+  const Json known = Json::parse(base.identification, nullptr, false);
+  if (!known.is_object()) return "assumed";
+  const Json* const fixed = known.contains("fixed") ? &known["fixed"] : nullptr;
+  if (fixed && fixed->is_object() && fixed->contains(name) && (*fixed)[name].is_object())
+    return (*fixed)[name].value("source", "assumed");
+  const Json* const verdicts = known.contains("identifiable") ? &known["identifiable"] : nullptr;
+  if (verdicts && verdicts->is_object() && verdicts->value(name, "no") != "no") return "identified";
+  return "assumed";
+}
+
+std::string identification(const data::Asset& base, const std::map<std::string, double>& base_values,
+                           const Summary& summary) {
+  Json json;
+  json["recordings"] = Json::array();
+  std::optional<double> horizon;
+  for (const SummaryRecording& recording : summary.recordings) {
+    json["recordings"].push_back({{"name", recording.name}, {"sha256", recording.sha256}});
+    if (recording.horizon_s) horizon = std::min(horizon.value_or(*recording.horizon_s), *recording.horizon_s);
+  }
+  for (const char* part : {"estimate", "interval95", "identifiable", "fixed"}) json[part] = Json::object();
+  for (const ParameterFinding& finding : summary.parameters) {
+    const bool known = finding.identifiable != Identifiable::no;
+    json["estimate"][finding.name] = known && finding.estimate ? Json(*finding.estimate) : Json(nullptr);
+    json["interval95"][finding.name] =
+        known && finding.interval95 ? Json(*finding.interval95) : Json(nullptr);
+    json["identifiable"][finding.name] = to_string(finding.identifiable);
+  }
+  for (const auto& [name, fixed] : summary.fixed)
+    json["fixed"][name] = {{"value", fixed.value}, {"source", fixed.source}};
+  for (const ParameterFinding& finding : summary.parameters)
+    if (finding.identifiable == Identifiable::no && base_values.count(finding.name))
+      json["fixed"][finding.name] = {{"value", base_values.at(finding.name)},
+                                     {"source", source_of(base, finding.name)}};
+  json["covariance_log"] = covariance(summary);
+  json["score_m"] = number(summary.best_score);
+  json["horizon_s"] = horizon ? Json(*horizon) : Json(nullptr);
+  json["solver"] = summary.settings;
+  json["tool_version"] = summary.tool_version;
+  json["randomization"] = randomization_ranges(summary);
+  return data::format_json(json);
+}
+
+}  // namespace
+
+std::map<std::string, std::array<double, 2>> randomization_ranges(const Summary& summary) {
+  std::map<std::string, std::array<double, 2>> ranges;
+  for (const ParameterFinding& finding : summary.parameters) {
+    if (finding.values.empty()) continue;
+    const std::array<double, 2> searched = {finding.values.front(), finding.values.back()};
+    ranges[finding.name] =
+        finding.identifiable == Identifiable::no ? searched : finding.interval95.value_or(searched);
+  }
+  return ranges;
+}
+
+data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
+  if (summary.best.empty())
+    throw data::InputError("summary.json: best: the search found no candidate to export");
+  data::Asset asset = base;
+  const auto mesh = summary.settings.find("object_mesh");
+  if (mesh != summary.settings.end()) asset.mesh = mesh->second;
+  const double area = sim::make_sheet(data::load_rest_mesh(asset)).vertex_area.sum();
+  const data::SheetMaterial material = data::resolve_sheet(base, area).material;
+  const std::map<std::string, double> base_values = {{"young", base.young},
+                                                     {"poisson", base.poisson},
+                                                     {"bending", material.bending_rigidity},
+                                                     {"friction", base.friction},
+                                                     {"areal_density", material.areal_density},
+                                                     {"air_drag", base.air_drag},
+                                                     {"stiffness_damping", base.stiffness_damping}};
+
+  std::map<std::string, double> values = summary.best;
+  bool bending_found = summary.fixed.count("bending") > 0;
+  for (const ParameterFinding& finding : summary.parameters) {
+    if (finding.identifiable == Identifiable::yes && finding.estimate)
+      values[finding.name] = *finding.estimate;
+    if (finding.identifiable == Identifiable::no && base_values.count(finding.name))
+      values[finding.name] = base_values.at(finding.name);
+    bending_found |= finding.name == "bending" && finding.identifiable != Identifiable::no;
+  }
+  asset.format = data::AssetFormat::flash_1;
+  asset.young = values.at("young");
+  asset.poisson = values.at("poisson");
+  asset.friction = values.at("friction");
+  asset.air_drag = values.at("air_drag");
+  asset.stiffness_damping = values.at("stiffness_damping");
+  asset.published_bending.reset();
+  const bool follows_young = base.thickness && !base.bending_rigidity && !base.published_bending;
+  if (!follows_young || bending_found) asset.bending_rigidity = values.at("bending");
+  asset.density.reset();
+  asset.mass.reset();
+  asset.object_mass.reset();
+  asset.areal_density = values.at("areal_density");
+  asset.identification = identification(base, base_values, summary);
+  return asset;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,31 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sysid/emulate/grid_search.h"
+#include "sysid/infer/answer.h"
+#include "sysid/replay/replay.h"
+#include "sysid/report/summary.h"
+
+namespace flash::sysid {
+
+/// What a grid search found, said for people and for later tools: estimates, intervals, nuisance values, what
+/// was fixed, warnings, and whether the answer can be used. exit_code is 3 when no candidate has a score,
+/// when the best did not converge, or when none of the searched material parameters is identifiable;
+/// `warnings` then begins with the reason. Device and times are left to the caller.
+Summary summarize(const GridResults& results, const Answer& answer, const std::vector<Replay>& replays,
+                  const GridSettings& grid, const AnswerSettings& settings);
+
+/// The same without a solver check and horizons.
+Summary summarize(const GridResults& results, const GridVerdict& verdict, const std::vector<Replay>& replays,
+                  const GridSettings& settings);
+
+/// SHA-256 over recording.json and every file it names, in the order they are named, each as its own digest.
+std::string recording_sha256(const data::Recording& recording);
+
+/// SHA-256 of what was recorded alone: trajectories, the files of the keyframes and their forces. It stays
+/// the same where the recording is named or described anew.
+std::string observed_sha256(const data::Recording& recording);
+
+}  // namespace flash::sysid

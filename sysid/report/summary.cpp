@@ -1,0 +1,331 @@
+#include "sysid/report/summary.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/text.h"
+#include "sysid/emulate/parameter_grid.h"
+
+namespace flash::sysid {
+namespace {
+
+using Json = nlohmann::ordered_json;
+constexpr const char* schema = "flash-sysid-summary/1";
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+template <class T>
+Json optional(const std::optional<T>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json numbers(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (double value : values) list.push_back(number(value));
+  return list;
+}
+
+Json to_json(const ParameterFinding& finding) {
+  Json json;
+  json["estimate"] = optional(finding.estimate);
+  json["interval95"] = optional(finding.interval95);
+  json["identifiable"] = to_string(finding.identifiable);
+  json["edge"] = finding.edge == RangeEdge::none ? Json(nullptr) : Json(to_string(finding.edge));
+  json["note"] = finding.note;
+  json["logarithmic"] = finding.logarithmic;
+  json["profile"] = {{"values", numbers(finding.values)}, {"scores", numbers(finding.scores)}};
+  return json;
+}
+
+Json to_json(const SummaryRecording& recording) {
+  Json json;
+  json["name"] = recording.name;
+  json["sha256"] = recording.sha256;
+  json["offset"] = {recording.offset.x(), recording.offset.y(), recording.offset.z()};
+  json["yaw"] = recording.yaw;
+  json["time_offset"] = recording.time_offset;
+  json["nuisance"] = recording.nuisance;
+  json["score"] = number(recording.score);
+  json["sigma_m"] = number(recording.sigma_m);
+  json["sigma_source"] = recording.sigma_source;
+  json["horizon_s"] = optional(recording.horizon_s);
+  json["frames"] = Json::array();
+  for (const SummaryFrame& frame : recording.frames)
+    json["frames"].push_back({{"t", frame.t}, {"score", number(frame.score)}, {"weight", frame.weight}});
+  return json;
+}
+
+Json to_json(const Eigen::MatrixXd& matrix) {
+  Json rows = Json::array();
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) row.push_back(number(matrix(i, j)));
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+// A number that was not finite is written as null.
+double finite_or_infinite(const nlohmann::json& value) {
+  return value.is_number() ? value.get<double>() : INFINITY;
+}
+double score_of(const data::JsonObject& json, const char* key) {
+  return json.optional_number(key).value_or(INFINITY);
+}
+
+std::vector<double> list_of(const data::JsonObject& json, const char* key) {
+  if (!json.raw(key).is_array()) throw json.error(key, "a list");
+  std::vector<double> values;
+  for (const nlohmann::json& value : json.raw(key)) values.push_back(finite_or_infinite(value));
+  return values;
+}
+
+template <class T>
+T typed(const data::JsonObject& json, const char* key, const char* expected) {
+  try {
+    return json.raw(key).get<T>();
+  } catch (const nlohmann::json::exception&) {
+    throw json.error(key, expected);
+  }
+}
+
+Identifiable identifiable_of(const data::JsonObject& json) {
+  const std::string name = json.string("identifiable");
+  for (Identifiable value :
+       {Identifiable::yes, Identifiable::no, Identifiable::lower_bound, Identifiable::upper_bound})
+    if (name == to_string(value)) return value;
+  throw json.error("identifiable", "yes, no, lower_bound or upper_bound");
+}
+
+ParameterFinding read_finding(const std::string& name, const data::JsonObject& json) {
+  json.expect_fields({"estimate", "interval95", "identifiable", "edge", "note", "logarithmic", "profile"});
+  ParameterFinding finding;
+  finding.name = name;
+  finding.estimate = json.optional_number("estimate");
+  if (json.has("interval95")) {
+    const Eigen::VectorXd interval = json.vector("interval95", 2);
+    finding.interval95 = {interval[0], interval[1]};
+  }
+  finding.identifiable = identifiable_of(json);
+  const std::string edge = json.string("edge", "");
+  finding.edge = edge == "low" ? RangeEdge::low : edge == "high" ? RangeEdge::high : RangeEdge::none;
+  finding.note = json.string("note");
+  finding.logarithmic = json.boolean("logarithmic", false);
+  const data::JsonObject profile = json.object("profile");
+  finding.values = list_of(profile, "values");
+  finding.scores = list_of(profile, "scores");
+  return finding;
+}
+
+SummaryRecording read_recording(const data::JsonObject& json) {
+  json.expect_fields({"name", "sha256", "offset", "yaw", "time_offset", "nuisance", "score", "sigma_m",
+                      "sigma_source", "horizon_s", "frames"});
+  SummaryRecording recording;
+  recording.name = json.string("name");
+  recording.sha256 = json.string("sha256");
+  recording.offset = json.vector("offset", 3);
+  recording.yaw = json.number("yaw");
+  recording.time_offset = json.number("time_offset");
+  recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
+  recording.score = score_of(json, "score");
+  recording.sigma_m = score_of(json, "sigma_m");
+  recording.sigma_source = json.string("sigma_source");
+  recording.horizon_s = json.optional_number("horizon_s");
+  for (const data::JsonObject& frame : json.objects("frames"))
+    recording.frames.push_back({frame.number("t"), score_of(frame, "score"), frame.number("weight")});
+  return recording;
+}
+
+Eigen::MatrixXd read_matrix(const data::JsonObject& json, const char* key) {
+  const nlohmann::json& rows = json.raw(key);
+  const auto size = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd matrix(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const nlohmann::json& row = rows[static_cast<std::size_t>(i)];
+    if (row.size() != rows.size()) throw json.error(key, "a square matrix");
+    for (Eigen::Index j = 0; j < size; ++j)
+      matrix(i, j) = finite_or_infinite(row[static_cast<std::size_t>(j)]);
+  }
+  return matrix;
+}
+
+/// Refuses files of a later program or of another major version, which may mean other things by a field.
+void check_version(const data::JsonObject& json) {
+  const auto part = [](const std::string& version, std::size_t k) {
+    const std::vector<std::string_view> parts = data::split(version, ".");
+    return k < parts.size() ? data::parse_integer(parts[k]) : std::nullopt;
+  };
+  const std::string found = json.string("tool_version");
+  const auto major = part(found, 0), minor = part(found, 1);
+  if (!major || !minor || *major != *part(FLASH_VERSION, 0) || *minor > *part(FLASH_VERSION, 1))
+    throw json.error("tool_version", "a search by this program, version " FLASH_VERSION ", or one before it");
+}
+
+const ParameterInfo* info_of(const std::string& name) {
+  for (const ParameterInfo& info : known_parameters())
+    if (info.name == name) return &info;
+  return nullptr;
+}
+
+void check_within(const std::string& path, const std::string& field, double value, double low, double high) {
+  if (!(value >= low && value <= high))
+    throw data::input_error(path, field,
+                            "found " + data::format_short(value) + ", expected " + data::format_short(low) +
+                                " to " + data::format_short(high));
+}
+
+void check_value(const std::string& path, const std::string& field, const std::string& name, double value) {
+  const ParameterInfo* const info = info_of(name);
+  if (info == nullptr) throw data::input_error(path, field, "found \"" + name + "\", which is no parameter");
+  check_within(path, field + "." + name, value, info->low, info->high);
+}
+
+/// Estimate and interval: there as the verdict says, both in what was searched.
+void check_answer(const std::string& path, const std::string& field, const ParameterFinding& finding) {
+  const auto rounding = [](double value) { return 1e-9 * std::abs(value); };  // of a logarithm and back
+  if (finding.identifiable == Identifiable::yes && !finding.estimate)
+    throw data::input_error(path, field + ".estimate",
+                            "found null, expected a number, as identifiable is \"yes\"");
+  if (finding.identifiable != Identifiable::no && !finding.interval95)
+    throw data::input_error(
+        path, field + ".interval95",
+        "found null, expected two numbers, as identifiable is \"" + to_string(finding.identifiable) + "\"");
+  if (!finding.interval95) return;
+  const auto [low, high] = *finding.interval95;
+  if (!(low <= high)) throw data::input_error(path, field + ".interval95", "expected its lower end first");
+  const double first = finding.values.front(), last = finding.values.back();
+  for (const double end : {low, high})
+    check_within(path, field + ".interval95", end, first - rounding(first), last + rounding(last));
+  if (finding.estimate)
+    check_within(path, field + ".estimate", *finding.estimate, first - rounding(first),
+                 last + rounding(last));
+}
+
+void check_score(const std::string& path, const std::string& field, double score) {
+  if (!(score >= 0))
+    throw data::input_error(path, field,
+                            "found " + data::format_short(score) + ", expected a number of 0 or above");
+}
+
+void check_values(const Summary& summary, const std::string& path) {
+  for (const auto& [name, value] : summary.best) check_value(path, "best.parameters", name, value);
+  for (const auto& [name, fixed] : summary.fixed) check_value(path, "fixed", name, fixed.value);
+  check_score(path, "best.score", summary.best_score);
+  check_score(path, "best.membrane_stiffness", summary.membrane_stiffness);
+  check_score(path, "level95", summary.level95);
+  for (const ParameterFinding& finding : summary.parameters) {
+    const std::string field = "parameters." + finding.name;
+    if (!summary.best.empty() && !summary.best.contains(finding.name))
+      throw data::input_error(path, "best.parameters." + finding.name, "missing, expected a number");
+    if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
+    if (finding.values.empty() || finding.values.size() != finding.scores.size())
+      throw data::input_error(path, field + ".profile", "expected as many scores as values, one at least");
+    for (const double value : finding.values) check_value(path, "parameters", finding.name, value);
+    check_answer(path, field, finding);
+    for (const double score : finding.scores) check_score(path, field + ".profile.scores", score);
+  }
+  const auto count = static_cast<Eigen::Index>(summary.parameters.size());
+  if (summary.covariance_log.size() > 0 && summary.covariance_log.rows() != count)
+    throw data::input_error(path, "covariance_log", "expected a row for each of axes, or none");
+  for (const SummaryRecording& recording : summary.recordings) {
+    check_score(path, "recordings." + recording.name + ".score", recording.score);
+    check_score(path, "recordings." + recording.name + ".sigma_m", recording.sigma_m);
+    for (const SummaryFrame& frame : recording.frames) {
+      check_score(path, "recordings." + recording.name + ".frames.score", frame.score);
+      check_score(path, "recordings." + recording.name + ".frames.weight", frame.weight);
+    }
+  }
+  if (summary.candidates < 0 || summary.unconverged < 0 || summary.unconverged > summary.candidates)
+    throw data::input_error(path, "unconverged", "expected 0 to the number of candidates");
+  if (summary.exit_code != 0 && (summary.exit_code != 3 || summary.warnings.empty()))
+    throw data::input_error(path, "exit_code", "expected 0, or 3 with the reason among warnings");
+}
+
+}  // namespace
+
+std::string summary_text(const Summary& summary) {
+  Json json;
+  json["schema"] = schema;
+  json["tool_version"] = summary.tool_version;
+  json["best"] = {{"parameters", summary.best},
+                  {"membrane_stiffness", number(summary.membrane_stiffness)},
+                  {"score", number(summary.best_score)}};
+  json["level95"] = number(summary.level95);
+  json["axes"] = Json::array();
+  json["parameters"] = Json::object();
+  for (const ParameterFinding& finding : summary.parameters) {
+    json["axes"].push_back(finding.name);
+    json["parameters"][finding.name] = to_json(finding);
+  }
+  json["fixed"] = Json::object();
+  for (const auto& [name, fixed] : summary.fixed)
+    json["fixed"][name] = {{"value", fixed.value}, {"source", fixed.source}};
+  json["covariance_log"] = to_json(summary.covariance_log);
+  json["recordings"] = Json::array();
+  for (const SummaryRecording& recording : summary.recordings)
+    json["recordings"].push_back(to_json(recording));
+  json["solver_check"] = Json::array();
+  for (const SolverCheck& check : summary.solver_check)
+    json["solver_check"].push_back({{"what", check.what},
+                                    {"score", number(check.score)},
+                                    {"surface_change_m", number(check.surface_change_m)},
+                                    {"shift", check.shift}});
+  json["settings"] = summary.settings;
+  json["asset"] = summary.asset;
+  json["candidates"] = summary.candidates;
+  json["unconverged"] = summary.unconverged;
+  json["device"] = summary.device;
+  json["wall_seconds"] = summary.wall_seconds;
+  json["warnings"] = summary.warnings;
+  json["exit_code"] = summary.exit_code;
+  return data::format_json(json);
+}
+
+void save_summary(const Summary& summary, const std::string& path) {
+  data::write_atomically(path, summary_text(summary));
+}
+
+Summary load_summary(const std::string& path) {
+  const nlohmann::json file = data::load_json(path);
+  const data::JsonObject json(file, path);
+  if (json.string("schema") != schema) throw json.error("schema", schema);
+  json.expect_fields({"schema", "tool_version", "best", "level95", "axes", "parameters", "fixed",
+                      "covariance_log", "recordings", "solver_check", "settings", "asset", "candidates",
+                      "unconverged", "device", "wall_seconds", "warnings", "exit_code"});
+  check_version(json);
+  Summary summary;
+  summary.tool_version = json.string("tool_version");
+  const data::JsonObject best = json.object("best");
+  summary.best = typed<std::map<std::string, double>>(best, "parameters", "numbers by name");
+  summary.membrane_stiffness = score_of(best, "membrane_stiffness");
+  summary.best_score = score_of(best, "score");
+  summary.level95 = score_of(json, "level95");
+  const data::JsonObject parameters = json.object("parameters");
+  for (const std::string& name : typed<std::vector<std::string>>(json, "axes", "a list of names"))
+    summary.parameters.push_back(read_finding(name, parameters.object(name.c_str())));
+  for (const auto& [name, fixed] : json.members("fixed"))
+    summary.fixed[name] = {fixed.number("value"), fixed.string("source")};
+  summary.covariance_log = read_matrix(json, "covariance_log");
+  for (const data::JsonObject& recording : json.objects("recordings"))
+    summary.recordings.push_back(read_recording(recording));
+  for (const data::JsonObject& check : json.objects("solver_check"))
+    summary.solver_check.push_back(
+        {check.string("what"), score_of(check, "score"), score_of(check, "surface_change_m"),
+         check.has("shift") ? typed<std::map<std::string, double>>(check, "shift", "numbers by name")
+                            : std::map<std::string, double>{}});
+  summary.settings = typed<std::map<std::string, std::string>>(json, "settings", "texts by name");
+  summary.asset = json.string("asset");
+  summary.candidates = json.integer("candidates");
+  summary.unconverged = json.integer("unconverged");
+  summary.device = json.string("device");
+  summary.wall_seconds = json.number("wall_seconds");
+  summary.warnings = typed<std::vector<std::string>>(json, "warnings", "a list of texts");
+  summary.exit_code = json.integer("exit_code");
+  check_values(summary, path);
+  return summary;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,75 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sysid/infer/finding.h"
+#include "sysid/infer/solver_check.h"
+
+namespace flash::sysid {
+
+/// A parameter that was not searched.
+struct FixedParameter {
+  double value = 0;
+  std::string source = "assumed";  ///< "measured" or "assumed"
+};
+
+struct SummaryFrame {
+  double t = 0;       ///< [s]
+  double score = 0;   ///< mean distance of the observed points to the simulated surface [m]
+  double weight = 1;  ///< 0: dropped (beyond the predictability horizon)
+};
+
+/// How the best candidate fits one recording, and the nuisance values found for it.
+struct SummaryRecording {
+  std::string name;
+  std::string sha256;                                ///< of recording.json and the files it names
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< observed = simulated moved by this [m]
+  double yaw = 0;                                    ///< [rad]
+  double time_offset = 0;                            ///< [s]
+  std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
+  double score = 0;                                  ///< [m]
+  double sigma_m = 0;                                ///< spread of one keyframe's score [m]
+  std::string sigma_source;                          ///< "repeatability", "residual", "given"
+  std::optional<double> horizon_s;                   ///< predictable until here [s]
+  std::vector<SummaryFrame> frames;
+};
+
+/// All that a search found: the file summary.json (schema "flash-sysid-summary/1").
+struct Summary {
+  std::map<std::string, double> best;        ///< every material parameter of the best candidate
+  double membrane_stiffness = 0;             ///< E t of the best candidate [N/m]
+  double best_score = 0;                     ///< [m]
+  double level95 = 0;                        ///< score below which a candidate is inside the 95 % region [m]
+  std::vector<ParameterFinding> parameters;  ///< the searched ones, in the order of the axes
+  std::map<std::string, FixedParameter> fixed;
+  Eigen::MatrixXd covariance_log;  ///< of log(parameter) in the order of `parameters`; empty: not estimated
+  std::vector<SummaryRecording> recordings;
+  std::vector<SolverCheck> solver_check;
+  std::map<std::string, std::string> settings;  ///< constitutive, bending_model, mesh, time_step_s, ...
+  std::string asset;                            ///< path of the asset the search started from
+  int candidates = 0;
+  int unconverged = 0;
+  std::string device = "cpu";
+  double wall_seconds = 0;
+  std::string tool_version;
+  std::vector<std::string> warnings;
+  int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used
+};
+
+/// The text of summary.json.
+std::string summary_text(const Summary& summary);
+
+/// Written to a temporary file and renamed, so that a reader never sees half of it. Throws std::runtime_error
+/// when the folder cannot be written.
+void save_summary(const Summary& summary, const std::string& path);
+
+/// Throws data::InputError naming file and field unless the file is of schema "flash-sysid-summary/1", was
+/// written by this program or an earlier one of the same major version, and holds values that a search can
+/// find.
+Summary load_summary(const std::string& path);
+
+}  // namespace flash::sysid

@@ -1,0 +1,266 @@
+#include "sysid/capture/segment/segment_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <random>
+
+#include "data/depth_image.h"
+#include "data/error.h"
+#include "data/mesh_io.h"
+
+namespace flash::sysid {
+namespace {
+
+namespace fs = std::filesystem;
+
+class SegmentFolder : public testing::Test {
+ protected:
+  SegmentFolder()
+      : root_(fs::temp_directory_path() / ("segment_folder_" + std::to_string(std::random_device()()) +
+                                           testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::create_directories(root_);
+  }
+  ~SegmentFolder() override { fs::remove_all(root_); }
+
+  std::string folder(const std::string& name) const { return (root_ / name).string(); }
+
+  fs::path root_;
+};
+
+// A camera 1 m above the table z = 0.07 looks straight down: x right, y towards the robot, z down.
+const Eigen::Vector3d camera_position(0.5, 0.1, 1.07);
+
+data::CameraIntrinsics small_camera() {
+  data::CameraIntrinsics camera;
+  camera.width = 160;
+  camera.height = 120;
+  camera.fx = camera.fy = 160;
+  camera.cx = 79.5;
+  camera.cy = 59.5;
+  return camera;
+}
+
+// A depth image of a table with a flat square patch 0.2 m wide, `height` above it, under the camera's axis.
+data::DepthImage patch_above_table(double height) {
+  const data::CameraIntrinsics camera = small_camera();
+  data::DepthImage image{camera.width, camera.height,
+                         std::vector<std::uint16_t>(camera.width * camera.height)};
+  for (int v = 0; v < camera.height; ++v)
+    for (int u = 0; u < camera.width; ++u) {
+      const double z = 1.0 - height;
+      const bool patch =
+          std::abs((u - camera.cx) / camera.fx * z) < 0.1 && std::abs((v - camera.cy) / camera.fy * z) < 0.1;
+      image.at(u, v) = static_cast<std::uint16_t>(std::lround(1000 * (patch ? z : 1.0)));
+    }
+  image.at(0, 0) = 0;  // nothing measured
+  return image;
+}
+
+void write_depth_view(const std::string& folder, const std::vector<double>& heights) {
+  fs::create_directories(folder + "/depth");
+  data::save_camera_info(small_camera(), folder + "/camera_info.yaml");
+  for (std::size_t k = 0; k < heights.size(); ++k)
+    data::save_depth_image(patch_above_table(heights[k]), folder + "/depth/" + std::to_string(k) + ".png");
+  // Half a turn about x: the optical axis points down.
+  std::ofstream(folder + "/extrinsics.json")
+      << R"({"schema": "flash-extrinsics/1", "transform": {"parent": "base", "child": "camera",
+             "translation": [0.5, 0.1, 1.07], "rotation_xyzw": [1, 0, 0, 0]}})";
+}
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const data::InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST_F(SegmentFolder, DepthImagesBecomeTheLiftedPatchInTheBaseFrame) {
+  write_depth_view(folder("raw"), {0.1, 0.2});
+  SegmentFolderSettings settings;
+  const SegmentedFolder result =
+      segment_folder({open_raw_view(folder("raw"))}, {0.0, 0.1}, settings, folder("out"));
+  ASSERT_TRUE(result.table);
+  EXPECT_NEAR(result.table->plane.point.z(), 0.07, 1e-6);
+  for (int k : {0, 1}) {
+    const data::Points cloth = data::load_point_cloud(folder("out") + "/" + result.clouds[k]);
+    ASSERT_GT(cloth.rows(), 300);
+    const double height = 0.07 + 0.1 * (k + 1);
+    EXPECT_LT((cloth.col(2).array() - height).abs().maxCoeff(), 1e-6);
+    // The patch ends at 0.1 m from the axis, less up to one pixel and what the outlier filter takes from its
+    // rim.
+    EXPECT_NEAR(cloth.col(0).maxCoeff(), camera_position.x() + 0.1, 0.012);
+    EXPECT_NEAR(cloth.col(0).minCoeff(), camera_position.x() - 0.1, 0.012);
+    EXPECT_NEAR(cloth.col(1).mean(), camera_position.y(), 0.002);
+  }
+  EXPECT_TRUE(fs::exists(folder("out") + "/segment.png"));
+}
+
+TEST_F(SegmentFolder, CamerasThatCannotBeUsedAreRefusedUnlessAccepted) {
+  write_depth_view(folder("raw"), {0.1});
+  std::ofstream(folder("raw") + "/extrinsics.json")
+      << R"({"schema": "flash-extrinsics/1", "exit_code": 3, "warnings": ["one axis only"],
+             "transform": {"translation": [0.5, 0.1, 1.07], "rotation_xyzw": [1, 0, 0, 0]}})";
+  EXPECT_THROW(open_raw_view(folder("raw")), data::InputError);
+  RawViewFiles files;
+  files.accept_unusable = true;
+  const RawView accepted = open_raw_view(folder("raw"), files);
+  const std::vector<std::string> said{folder("raw") + "/extrinsics.json: one axis only"};
+  EXPECT_EQ(accepted.warnings, said);
+  SegmentFolderSettings settings;
+  settings.find_table = false;
+  EXPECT_EQ(segment_folder({accepted}, {0.0}, settings, folder("out")).warnings, said);
+}
+
+TEST_F(SegmentFolder, ViewsAreMergedFrameByFrame) {
+  write_depth_view(folder("a"), {0.1});
+  fs::create_directories(folder("b"));
+  data::Points side(400, 3);  // a second patch 0.1 m beside the first, close enough to be one cluster with it
+  for (int i = 0; i < side.rows(); ++i)
+    side.row(i) << camera_position.x() + 0.1 + 0.005 * (i % 20), 0.05 + 0.005 * (i / 20), 0.17;
+  data::save_point_cloud(side, folder("b") + "/000.ply");
+  const SegmentedFolder result =
+      segment_folder({open_raw_view(folder("a")), open_raw_view(folder("b"))}, {0.0}, {}, folder("out"));
+  EXPECT_GT(result.frames[0].cloth.col(0).maxCoeff(), camera_position.x() + 0.19);
+}
+
+TEST_F(SegmentFolder, TheArmAboveTheGripperIsCutAway) {
+  write_depth_view(folder("raw"), {0.1});
+  fs::create_directories(folder("arm"));
+  data::Points arm(500, 3);
+  for (int i = 0; i < arm.rows(); ++i)
+    arm.row(i) << 0.55 + 0.02 * std::cos(0.5 * i), 0.1 + 0.02 * std::sin(0.5 * i), 0.175 + 0.0005 * i;
+  data::save_point_cloud(arm, folder("arm") + "/000.ply");
+  SegmentFolderSettings settings;
+  data::Trajectory gripper;
+  gripper.times = {0.0};
+  gripper.poses = {Eigen::Isometry3d(Eigen::Translation3d(0.55, 0.1, 0.171))};
+  settings.gripper = gripper;
+  const std::vector<RawView> views = {open_raw_view(folder("raw")), open_raw_view(folder("arm"))};
+  EXPECT_LT(segment_folder(views, {0.0}, settings, folder("out")).frames[0].cloth.col(2).maxCoeff(), 0.172);
+  settings.gripper.reset();
+  EXPECT_GT(segment_folder(views, {0.0}, settings, folder("out2")).frames[0].cloth.col(2).maxCoeff(), 0.3);
+}
+
+TEST_F(SegmentFolder, NumbersInNamesCount) {
+  write_depth_view(folder("raw"), std::vector<double>(11, 0.1));
+  const RawView view = open_raw_view(folder("raw"));
+  EXPECT_TRUE(view.files[2].ends_with("/2.png")) << view.files[2];
+  EXPECT_TRUE(view.files[10].ends_with("/10.png")) << view.files[10];
+}
+
+TEST_F(SegmentFolder, TheTableIsFoundWhereTheCropCutsItOff) {
+  write_depth_view(folder("raw"), {0.1, 0.2});
+  SegmentFolderSettings settings;
+  settings.segment.crop.min.z() = 0.08;
+  const SegmentedFolder result =
+      segment_folder({open_raw_view(folder("raw"))}, {0.0, 0.1}, settings, folder("out"));
+  EXPECT_NEAR(result.table->plane.point.z(), 0.07, 1e-6);
+  EXPECT_EQ(result.table->agreeing, 2);
+  EXPECT_TRUE(result.warnings.empty());
+  EXPECT_GT(result.frames[0].cloth.rows(), 300);
+}
+
+TEST_F(SegmentFolder, ATableThatIsTiltedIsDoubted) {
+  write_depth_view(folder("raw"), {0.1});
+  // The camera's pose is off by 5 degrees about x.
+  const double half = (180 - 5) * M_PI / 360;
+  std::ofstream(folder("raw") + "/extrinsics.tum")
+      << "0 0.5 0.1 1.07 " << std::sin(half) << " 0 0 " << std::cos(half);
+  fs::remove(folder("raw") + "/extrinsics.json");
+  const SegmentedFolder result = segment_folder({open_raw_view(folder("raw"))}, {0.0}, {}, folder("out"));
+  ASSERT_EQ(result.warnings.size(), 1u);
+  EXPECT_NE(result.warnings[0].find("tilted by 5.0 deg"), std::string::npos) << result.warnings[0];
+}
+
+TEST_F(SegmentFolder, FilesBesideTheViewCountInPlaceOfItsOwn) {
+  write_depth_view(folder("raw"), {0.1});
+  fs::rename(folder("raw") + "/camera_info.yaml", folder("lens.yaml"));
+  fs::rename(folder("raw") + "/extrinsics.json", folder("pose.json"));
+  data::MaskImage left{160, 120, std::vector<std::uint8_t>(160 * 120, 0)};
+  for (int v = 0; v < 120; ++v)
+    for (int u = 0; u < 80; ++u) left.at(u, v) = 255;
+  data::save_mask(left, folder("masks") + "/0.png");
+  RawViewFiles files;
+  files.intrinsics = folder("lens.yaml");
+  files.extrinsics = folder("pose.json");
+  files.masks = folder("masks");
+  files.depth_scale = 0.0005;
+  SegmentFolderSettings settings;
+  const SegmentedFolder result =
+      segment_folder({open_raw_view(folder("raw"), files)}, {0.0}, settings, folder("out"));
+  // Half as far away, and only half of it in the mask; the table, seen everywhere, is found all the same.
+  EXPECT_NEAR(result.table->plane.point.z(), 1.07 - 0.5, 1e-6);
+  EXPECT_NEAR(result.frames[0].cloth.col(2).mean(), 1.07 - 0.45, 1e-6);
+  EXPECT_LT(result.frames[0].cloth.col(0).maxCoeff(), camera_position.x());
+  settings.table_height = 0.6;
+  EXPECT_EQ(segment_folder({open_raw_view(folder("raw"), files)}, {0.0}, settings, folder("out"))
+                .table->plane.point.z(),
+            0.6);
+}
+
+TEST_F(SegmentFolder, ATrajectoryOfAnotherClockIsRefusedAndNothingIsLeft) {
+  write_depth_view(folder("raw"), {0.1, 0.2});
+  SegmentFolderSettings settings;
+  data::Trajectory gripper;
+  gripper.times = {1764e6, 1764e6 + 1};
+  gripper.poses.assign(2, Eigen::Isometry3d(Eigen::Translation3d(0.55, 0.1, 0.171)));
+  settings.gripper = gripper;
+  const std::vector<RawView> views = {open_raw_view(folder("raw"))};
+  EXPECT_NE(message_of([&] {
+              segment_folder(views, {0.0, 0.1}, settings, folder("a/out"));
+            }).find("2 of 2 frames are outside of it"),
+            std::string::npos);
+  settings.gripper.reset();
+  settings.segment.cluster_points = 1000000;
+  EXPECT_NE(message_of([&] {
+              segment_folder(views, {0.0, 0.1}, settings, folder("a/out"));
+            }).find("no frame holds a cluster of 1000000 points"),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(folder("a")));
+}
+
+TEST_F(SegmentFolder, PointsThatAreNowhereAreCountedOrRefused) {
+  write_depth_view(folder("raw"), {0.1});
+  data::Points hole(2, 3);
+  hole << 0.5, 0.1, 0.17, 0.5, 0.1, std::nan("");
+  data::save_point_cloud(hole, folder("b") + "/000.ply");
+  const std::vector<RawView> views = {open_raw_view(folder("raw")), open_raw_view(folder("b"))};
+  const SegmentedFolder result = segment_folder(views, {0.0}, {}, folder("out"));
+  ASSERT_EQ(result.warnings.size(), 1u);
+  EXPECT_NE(result.warnings[0].find("1 points of the clouds are not finite"), std::string::npos);
+  hole(1, 2) = 1e30;
+  data::save_point_cloud(hole, folder("b") + "/000.ply");
+  EXPECT_NE(message_of([&] { segment_folder(views, {0.0}, {}, folder("out")); }).find("more than 100 km"),
+            std::string::npos);
+}
+
+TEST_F(SegmentFolder, WhatIsMissingIsNamed) {
+  EXPECT_NE(message_of([&] { open_raw_view(folder("nowhere")); }).find("does not exist"), std::string::npos);
+  fs::create_directories(folder("empty"));
+  EXPECT_NE(message_of([&] { open_raw_view(folder("empty")); }).find("found neither clouds"),
+            std::string::npos);
+  write_depth_view(folder("raw"), {0.1, 0.2});
+  const RawView view = open_raw_view(folder("raw"));
+  EXPECT_NE(message_of([&] { segment_folder({view}, {0.0}, {}, folder("out")); }).find("found 2, expected 1"),
+            std::string::npos);
+  fs::remove(folder("raw") + "/extrinsics.json");
+  EXPECT_NE(message_of([&] { open_raw_view(folder("raw")); }).find("need the pose of their camera"),
+            std::string::npos);
+}
+
+TEST_F(SegmentFolder, ATableWithoutClothSaysSo) {
+  write_depth_view(folder("raw"), {0.0});
+  const RawView view = open_raw_view(folder("raw"));
+  EXPECT_NE(
+      message_of([&] { segment_folder({view}, {0.0}, {}, folder("out")); }).find("no frame holds a cluster"),
+      std::string::npos);
+}
+
+}  // namespace
+}  // namespace flash::sysid

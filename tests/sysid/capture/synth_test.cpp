@@ -1,0 +1,167 @@
+#include "sysid/capture/synth.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/procedural_mesh.h"
+#include "sysid/capture/render_depth.h"
+#include "sysid/emulate/fingerprint.h"
+#include "sysid/emulate/grid_search.h"
+#include "sysid/infer/answer.h"
+#include "sysid/report/summarize.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr const char* mesh_spec = "sheet:0.3x0.3:0.05";
+
+data::SheetMaterial stiff_towel() {
+  data::SheetMaterial material;
+  material.membrane_stiffness = 30;
+  material.bending_rigidity = 2e-4;
+  return material;
+}
+
+SynthSettings short_lift() {
+  SynthSettings settings;
+  settings.name = "lift";
+  settings.duration = 1.0;
+  settings.grasp_within = 0.051;
+  SynthCamera camera;
+  camera.intrinsics.width = 80;
+  camera.intrinsics.height = 60;
+  camera.intrinsics.fx = camera.intrinsics.fy = 70;
+  camera.intrinsics.cx = 39.5;
+  camera.intrinsics.cy = 29.5;
+  camera.base_from_camera = look_at({0.15, -0.6, 0.6}, {0.15, 0.15, 0.1}, Eigen::Vector3d::UnitZ());
+  settings.cameras = {camera};
+  return settings;
+}
+
+SynthRecording make(const SynthSettings& settings) {
+  return synthesize(data::parse_mesh_spec(mesh_spec), mesh_spec, stiff_towel(), settings, {});
+}
+
+TEST(Synth, LoadsAsARecordingAndFitsItsOwnTruthToTheNoise) {
+  const data::TemporaryFolder folder;
+  SynthSettings settings = short_lift();
+  settings.cloud_offset = {0.01, -0.005, 0.002};
+  SynthRecording synthetic = make(settings);
+  EXPECT_EQ(synthetic.unconverged_share, 0);
+  save_synthetic(synthetic, folder / "lift");
+
+  const data::Recording recording = data::load_recording(folder / "lift");
+  EXPECT_EQ(recording.keyframes.size(), 11u);
+  const Replay replay = make_replay(recording, {});
+  const ReplayResult result = std::move(run(replay, {{stiff_towel(), {}}}).front());
+  ScoreSettings score;
+  score.objective.robust.kind = RobustKind::plain;
+  const CandidateResult fit = score_motions({replay}, {result}, score);
+  // Noise of 1 mm along rays that meet the sheet at angles up to grazing: a mean distance below sqrt(2/pi)
+  // mm.
+  EXPECT_LT(fit.score, 0.8e-3);
+  EXPECT_GT(fit.score, 0.2e-3);
+  // A sheet says little about its motion in its own plane; the height it says exactly.
+  EXPECT_NEAR(fit.recordings[0].offset.z(), 0.002, 5e-4);
+  EXPECT_LT((fit.recordings[0].offset - settings.cloud_offset).norm(), 3e-3);
+}
+
+TEST(Synth, TheSameSeedGivesTheSameRecordingAndAnotherAnother) {
+  SynthSettings settings = short_lift();
+  settings.duration = 0.2;
+  const SynthRecording once = make(settings), again = make(settings);
+  settings.seed = 2;
+  const SynthRecording other = make(settings);
+  EXPECT_EQ(once.clouds.back(), again.clouds.back());
+  EXPECT_NE(once.clouds.back(), other.clouds.back());
+}
+
+TEST(Synth, TheGripperHidesClothAndLostFramesAreLost) {
+  SynthSettings settings = short_lift();
+  settings.duration = 0.4;
+  const SynthRecording seen = make(settings);
+  settings.gripper_half_extents.setZero();
+  const SynthRecording bare = make(settings);
+  EXPECT_LT(seen.clouds.back().rows(), bare.clouds.back().rows());
+  settings.dropped = 0.5;
+  settings.keyframe_rate = 100;
+  const SynthRecording thinned = make(settings);
+  EXPECT_NEAR(static_cast<double>(thinned.clouds.size()), 20,
+              12);  // 41 coins: four standard deviations are 13
+}
+
+// The trajectory starts and ends at rest and the pull is seen at the border of the sheet.
+TEST(Synth, ABarPullCarriesItsContourAndForce) {
+  SynthSettings settings = short_lift();
+  settings.kind = "bar_pull";
+  settings.duration = 0.5;
+  settings.forces = true;
+  const SynthRecording pull = make(settings);
+  ASSERT_EQ(pull.recording.grasps.size(), 2u);
+  EXPECT_GT(pull.contours.back().rows(), 50);
+  // E t e w = 30 N/m x 0.1 x 0.3 m, more for the clamped ends that cannot contract, less what friction
+  // carries.
+  ASSERT_TRUE(pull.recording.keyframes.back().force.has_value());
+  EXPECT_NEAR(pull.recording.keyframes.back().force->x(), 0.9, 0.25);
+  const data::Trajectory& gripper = pull.recording.trajectories.at("gripper");
+  EXPECT_NEAR((gripper.poses.back().translation() - gripper.poses.front().translation()).x(), 0.03, 1e-12);
+}
+
+TEST(Synth, SaysWhatItCannotDo) {
+  SynthSettings settings = short_lift();
+  settings.kind = "juggle";
+  EXPECT_NE(data::input_error_of([&] { make(settings); }).find("--kind"), std::string::npos);
+  const auto message = [&](const auto& spoil) {
+    settings = short_lift();
+    spoil(settings);
+    return data::input_error_of([&] { make(settings); });
+  };
+  using Settings = SynthSettings;
+  EXPECT_NE(message([](Settings& s) { s.keyframe_rate = 1e9; }).find("--rate: found 1e+09"),
+            std::string::npos);
+  EXPECT_NE(message([](Settings& s) { s.duration = 1e9; }).find("--duration: found 1e+09"),
+            std::string::npos);
+  EXPECT_NE(message([](Settings& s) {
+              s.displacement = {1e300, 0, 0};
+            }).find("--displacement: found 1e+300"),
+            std::string::npos);
+  EXPECT_NE(
+      message([](Settings& s) { s.cameras[0].base_from_camera.translation().x() = NAN; }).find("--camera"),
+      std::string::npos);
+  settings = short_lift();
+  settings.cameras.clear();
+  EXPECT_NE(data::input_error_of([&] { make(settings); }).find("--camera"), std::string::npos);
+}
+
+// The whole way: a recording with known truth, a search, an answer whose interval holds the truth.
+TEST(Answer, FindsTheTruthOfASyntheticLift) {
+  const data::TemporaryFolder folder;
+  SynthRecording synthetic = make(short_lift());
+  save_synthetic(synthetic, folder / "lift");
+  std::vector<Replay> replays = {make_replay(data::load_recording(folder / "lift"), {})};
+  GridSettings grid;
+  grid.base.material = stiff_towel();
+  grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log")};
+  grid.fixed = {parse_fixed("friction=0.3")};
+  ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), Existing::refuse);
+  ASSERT_TRUE(grid_search(replays, grid, store));
+  GridResults results = store.results();
+  const Answer answer = find_answer(results, replays, grid, {});
+  const Summary summary = summarize(results, answer, replays, grid, {});
+  EXPECT_EQ(summary.exit_code, 0);
+  ASSERT_EQ(summary.parameters.size(), 1u);
+  const ParameterFinding& bending = summary.parameters[0];
+  // On cells of 50 mm the solver's own error may leave a side open.
+  EXPECT_NE(bending.identifiable, Identifiable::no);
+  EXPECT_LE((*bending.interval95)[0], 2e-4);
+  EXPECT_GE((*bending.interval95)[1], 2e-4);
+  EXPECT_NEAR(std::log(*bending.estimate / 2e-4), 0, std::log(2));  // one step of the grid
+  EXPECT_EQ(summary.fixed.at("friction").source, "measured");
+  EXPECT_EQ(summary.solver_check.size(), 4u);  // the estimate itself, step, mesh, iterations
+  EXPECT_EQ(summary.recordings[0].sha256.size(), 64u);
+}
+
+}  // namespace
+}  // namespace flash::sysid

@@ -1,0 +1,119 @@
+#include "sysid/emulate/parameter_grid.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/error.h"
+
+namespace flash::sysid {
+namespace {
+
+std::string message_of(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const data::InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(ParameterGrid, ReadsRangesListsAndSingleValues) {
+  const Axis young = parse_axis("young", "1e3:1e6:4:log");
+  ASSERT_EQ(young.values.size(), 4u);
+  EXPECT_TRUE(young.logarithmic);
+  EXPECT_NEAR(young.values[1], 1e4, 1e-8);
+  EXPECT_EQ(young.values[3], 1e6);
+  const Axis poisson = parse_axis("poisson", "0:0.45:4");
+  EXPECT_FALSE(poisson.logarithmic);
+  EXPECT_NEAR(poisson.values[1], 0.15, 1e-15);
+  EXPECT_EQ(parse_axis("friction", "0.5,0.2,0.3").values, (std::vector<double>{0.2, 0.3, 0.5}));
+  EXPECT_EQ(parse_fixed("friction=0.3").values, std::vector<double>{0.3});
+}
+
+TEST(ParameterGrid, NamesWhatIsWrong) {
+  EXPECT_EQ(message_of([] { parse_axis("yuong", "1"); }),
+            "--yuong: unknown parameter (did you mean \"young\"?)");
+  EXPECT_NE(message_of([] { parse_axis("young", "1:2:x"); }).find("\"x\" is not a number"),
+            std::string::npos);
+  EXPECT_NE(message_of([] { parse_axis("bending", "0:1:3:log"); }).find("logarithmic"), std::string::npos);
+  EXPECT_NE(message_of([] { parse_axis("young", "5:2:3"); }).find("not below"), std::string::npos);
+  const std::vector<Axis> many = {parse_axis("bending", "1e-6:1e-3:100000"),
+                                  parse_axis("friction", "0.1:1:100000")};
+  EXPECT_NE(message_of([&] {
+              check_axes(many, data::Constitutive::tri_corotated);
+            }).find("--bending, --friction: found 1e+10 candidates, expected at most 1,000,000"),
+            std::string::npos);
+  EXPECT_NE(message_of([] { parse_axis("poisson", "0.7"); }).find("expected -0.99 to 0.5"),
+            std::string::npos);
+  EXPECT_NE(message_of([] { parse_fixed("friction"); }).find("name=value"), std::string::npos);
+}
+
+TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
+  EXPECT_EQ(message_of([] { parse_axis("table_height", "9"); }),
+            "--table-height: found 9, expected -0.5 to 0.5 m");
+  EXPECT_EQ(message_of([] { parse_axis("start_yaw", "0:x:3"); }).substr(0, 13), "--start-yaw: ");
+  EXPECT_EQ(message_of([] { parse_axis("bending", "1e-6:1e-3:3000000"); }),
+            "--bending: found the count 3000000, expected a whole number from 1 to 1,000,000");
+  EXPECT_EQ(message_of([] { parse_axis("bending", "1e-4,2e-4,1e-4"); }), "--bending: 0.0001 is given twice");
+  EXPECT_EQ(message_of([] { parse_fixed("yuong=1"); }),
+            "--fix yuong: unknown parameter (did you mean \"young\"?)");
+  EXPECT_NE(message_of([] { parse_fixed("colour=1"); }).find("expected one of young, poisson"),
+            std::string::npos);
+  EXPECT_EQ(message_of([] { parse_fixed("friction=1e300", "--set"); }),
+            "--set friction: found 1e+300, expected 0 to 10");
+  EXPECT_EQ(message_of([] { parse_fixed("friction=low", "--set"); }),
+            "--set friction: found \"low\", expected a number");
+}
+
+TEST(ParameterGrid, ParametersOfAPinchNeedAPinch) {
+  Replay clamped;
+  clamped.recording.grasps.resize(1);
+  const std::vector<Axis> depth = {parse_axis("grasp_depth", "0.01:0.03:2")};
+  EXPECT_NE(message_of([&] { check_grasp_axes(depth, {clamped}); }).find("--grasp-depth: acts on a grasp"),
+            std::string::npos);
+  Replay pinched = clamped;
+  pinched.settings.grasp_shape = data::GraspShape::pinch;
+  EXPECT_EQ(message_of([&] { check_grasp_axes(depth, {clamped, pinched}); }), "");
+  EXPECT_EQ(message_of([&] { check_grasp_axes({parse_axis("start_yaw", "0:1:2")}, {clamped}); }), "");
+}
+
+TEST(ParameterGrid, RefusesYoungAndPoissonTogetherUnderArap) {
+  const std::vector<Axis> axes = {parse_axis("young", "1e3:1e6:4:log"), parse_axis("poisson", "0:0.4:3")};
+  EXPECT_NE(message_of([&] { check_axes(axes, data::Constitutive::tri_arap); }).find("E / (1 + nu)"),
+            std::string::npos);
+  EXPECT_EQ(message_of([&] { check_axes(axes, data::Constitutive::tri_corotated); }), "");
+  EXPECT_EQ(message_of([&] {
+              check_axes({axes[0], parse_fixed("poisson=0.3")}, data::Constitutive::tri_arap);
+            }),
+            "");
+  EXPECT_NE(message_of([&] {
+              check_axes({axes[0], axes[0]}, data::Constitutive::tri_arap);
+            }).find("twice"),
+            std::string::npos);
+}
+
+TEST(ParameterGrid, ProductHoldsEveryCombinationOnceLastAxisFastest) {
+  const auto grid = cartesian_product({{"young", {1, 2}}, {"friction", {0.1, 0.2, 0.3}}});
+  ASSERT_EQ(grid.size(), 6u);
+  EXPECT_EQ(grid[1], (std::vector<double>{1, 0.2}));
+  EXPECT_EQ(grid[5], (std::vector<double>{2, 0.3}));
+  EXPECT_EQ(cartesian_product({}).size(), 1u);
+}
+
+TEST(ParameterGrid, YoungIsTimesThicknessAndBendingFollowsThePlateFormulaUnlessGiven) {
+  MaterialBase base;
+  base.thickness = 1e-3;
+  base.bending_from_thickness = true;
+  const std::vector<Axis> axes = {parse_axis("young", "2e5"), parse_axis("poisson", "0.5")};
+  const data::SheetMaterial plate = make_candidate(base, axes, {2e5, 0.5}).material;
+  EXPECT_DOUBLE_EQ(plate.membrane_stiffness, 200);
+  EXPECT_DOUBLE_EQ(plate.bending_rigidity, 2e5 * 1e-9 / (12 * 0.75));
+  EXPECT_DOUBLE_EQ(
+      make_candidate(base, {axes[0], parse_axis("bending", "3e-5")}, {2e5, 3e-5}).material.bending_rigidity,
+      3e-5);
+  EXPECT_DOUBLE_EQ(make_candidate({}, axes, {2e5, 0.5}).material.membrane_stiffness, 2e5);
+}
+
+}  // namespace
+}  // namespace flash::sysid

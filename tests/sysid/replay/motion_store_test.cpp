@@ -1,0 +1,119 @@
+#include "sysid/replay/motion_store.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "data/procedural_mesh.h"
+#include "sysid/capture/render_depth.h"
+#include "sysid/capture/synth.h"
+#include "sysid/emulate/grid_search.h"
+#include "sysid/emulate/sensitivity.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr const char* kMesh = "sheet:0.3x0.3:0.05";
+
+data::SheetMaterial towel() {
+  data::SheetMaterial material;
+  material.membrane_stiffness = 30;
+  material.bending_rigidity = 2e-4;
+  return material;
+}
+
+/// A short recording of some kind, loaded back from its files.
+Replay recorded(const data::TemporaryFolder& folder, const std::string& kind, unsigned seed,
+                bool forces = false) {
+  SynthSettings settings;
+  settings.name = kind;
+  settings.kind = kind;
+  settings.duration = 0.6;
+  settings.grasp_within = 0.051;
+  settings.seed = seed;
+  settings.forces = forces;
+  SynthCamera camera;
+  camera.intrinsics.width = 48;
+  camera.intrinsics.height = 36;
+  camera.intrinsics.fx = camera.intrinsics.fy = 40;
+  camera.intrinsics.cx = 23.5;
+  camera.intrinsics.cy = 17.5;
+  camera.base_from_camera = look_at({0.15, -0.5, 0.6}, {0.15, 0.15, 0.05}, Eigen::Vector3d::UnitZ());
+  settings.cameras = {camera};
+  SynthRecording made = synthesize(data::parse_mesh_spec(kMesh), kMesh, towel(), settings, {});
+  save_synthetic(made, folder / kind);
+  return make_replay(data::load_recording(folder / kind), {});
+}
+
+int files_in(const std::string& folder) {
+  return static_cast<int>(std::distance(std::filesystem::directory_iterator(folder), {}));
+}
+
+TEST(MotionStore, AKeptMotionScoresAsTheSimulatedOneBitForBit) {
+  const data::TemporaryFolder folder;
+  const Replay replay = recorded(folder, "corner_lift", 1, true);
+  const MotionStore store(folder / "rollouts");
+  const ReplayCandidate candidate{towel(), {}};
+  const auto score = [&](const ReplayResult& result) { return score_motions({replay}, {result}, {}).score; };
+  const double simulated = score(std::move(run(replay, {candidate}).front()));
+  EXPECT_EQ(score(store.run(replay, candidate)), simulated);
+  EXPECT_EQ(score(store.run(replay, candidate)), simulated);
+  EXPECT_EQ(files_in(folder / "rollouts"), 1);
+}
+
+TEST(MotionStore, AnotherMotionIsAnotherFileAndAnotherNoiseIsNot) {
+  const data::TemporaryFolder folder;
+  const MotionStore store(folder / "rollouts");
+  ReplayCandidate candidate{towel(), {}};
+  store.run(recorded(folder, "corner_lift", 1), candidate);
+  store.run(recorded(folder, "corner_lift", 2), candidate);  // the same motion seen anew
+  EXPECT_EQ(files_in(folder / "rollouts"), 1);
+  candidate.material.friction += 0.1;
+  store.run(recorded(folder, "corner_lift", 1), candidate);
+  EXPECT_EQ(files_in(folder / "rollouts"), 2);
+}
+
+TEST(MotionStore, ACutFileIsNamed) {
+  const data::TemporaryFolder folder;
+  const Replay replay = recorded(folder, "corner_lift", 1);
+  const MotionStore store(folder / "rollouts");
+  const ReplayCandidate candidate{towel(), {}};
+  store.run(replay, candidate);
+  const auto file = std::filesystem::directory_iterator(folder / "rollouts")->path();
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  EXPECT_NE(data::input_error_of([&] { store.run(replay, candidate); }).find(file.filename().string()),
+            std::string::npos);
+}
+
+TEST(Sensitivity, ExplainsTheMotionOfAnotherParameterByThatParameter) {
+  const data::TemporaryFolder folder;
+  GridSettings grid;
+  grid.base.material = towel();
+  grid.axes = {parse_axis("bending", "1e-4:4e-4:2:log"), parse_axis("friction", "0.2:0.5:2")};
+  const std::vector<double> values = {2e-4, 0.35};
+  const std::vector<Replay> replays = {recorded(folder, "corner_lift", 1)};
+  const Sensitivity sensitivity = measure_sensitivity(replays, grid, values);
+  const std::vector<ReplayResult> other = run(replays[0], {candidate_at({2e-4 * 1.05, 0.35}, grid)});
+  const Eigen::VectorXd found =
+      explain(sensitivity, displacements(sensitivity, replays, other), Eigen::Vector2d(std::log(4.0), 0.3));
+  // Half the step of the differences: what is not linear over 10 % is a few per cent of 5 %.
+  EXPECT_NEAR(found[0], std::log(1.05), 0.005);
+  EXPECT_NEAR(found[1], 0, 0.01);
+}
+
+TEST(Sensitivity, APullTellsYoungsModulusByItsForceAlone) {
+  const data::TemporaryFolder folder;
+  GridSettings grid;
+  grid.base.material = towel();
+  grid.axes = {parse_axis("young", "15:60:2:log")};
+  const auto strength = [&](bool forces) {
+    const std::vector<Replay> replays = {recorded(folder, "bar_pull", 1, forces)};
+    return measure_sensitivity(replays, grid, {30}).parameters.norm();
+  };
+  // 3 N at 10 % of strain, 20 mN a millimetre: decimetres. The shape moves by a fraction of a millimetre.
+  EXPECT_GT(strength(true), 20 * strength(false));
+}
+
+}  // namespace
+}  // namespace flash::sysid

@@ -1,0 +1,244 @@
+#include "sysid/replay/replay.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/procedural_mesh.h"
+#include "sysid/emulate/fingerprint.h"
+#include "sysid/emulate/grid_search.h"
+#include "sysid/replay/grasp_targets.h"
+#include "tests/sysid/short_lift.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+class Lift : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    path = std::string(FLASH_SHARED_DIR) + "/data/twin/lift_a";
+    if (!std::filesystem::exists(path)) GTEST_SKIP() << "no recording at " << path;
+    recording = data::load_recording(path);
+    settings.mesh = "sheet:0.4x0.4:0.04";
+    settings.grasp_within = 0.041;
+  }
+  std::string path;
+  data::Recording recording;
+  ReplaySettings settings;
+};
+
+TEST_F(Lift, ClampHoldsThePatchAsItLies) {
+  const Replay replay = make_replay(recording, settings);
+  EXPECT_EQ(replay.start, 0);
+  EXPECT_NEAR(replay.pivot.x(), 0.39, 1e-12);
+  EXPECT_NEAR(replay.start + (replay.steps - 1) * 0.01, 2.5, 1e-9);
+  const sim::Environment environment = make_environment(replay, {});
+  EXPECT_EQ(environment.grasps.at(0).vertices.size(), 4u);
+  EXPECT_EQ(environment.grasps.at(0).targets.rows(), 0);
+  EXPECT_EQ(environment.obstacles.size(), 1u);
+}
+
+TEST_F(Lift, PointHoldsTheCornerAlone) {
+  settings.grasp_shape = data::GraspShape::point;
+  const Replay replay = make_replay(recording, settings);
+  const sim::Environment environment = make_environment(replay, {});
+  ASSERT_EQ(environment.grasps.at(0).vertices.size(), 1u);
+  const auto corner = replay.recording.mesh.vertices.row(environment.grasps[0].vertices[0]);
+  EXPECT_NEAR((corner - Eigen::RowVector3d(0.4, 0.4, 0)).norm(), 0, 1e-12);
+}
+
+TEST_F(Lift, PinchClosesBeforeTheRecordingStarts) {
+  settings.grasp_shape = data::GraspShape::pinch;
+  const Replay replay = make_replay(recording, settings);
+  EXPECT_NEAR(replay.start, -0.4, 1e-12);
+  ReplayCandidate candidate;
+  candidate.nuisance.grasp_depth = 0.041;
+  const sim::Environment environment = make_environment(replay, candidate);
+  const sim::Grasp& grasp = environment.grasps.at(0);
+  EXPECT_EQ(grasp.vertices.size(), 4u);
+  EXPECT_EQ(grasp.from, replay.start);
+  EXPECT_LE(grasp.from + grasp.closing_time, 0);
+  const Eigen::VectorXd heights = grasp.targets.col(2);  // the gripper starts at z = 0, unturned
+  EXPECT_NEAR(heights.minCoeff(), 0, 1e-12);
+  EXPECT_NEAR(heights.maxCoeff(), 0.04 / std::sqrt(2.0), 1e-12);
+}
+
+TEST_F(Lift, StartYawTurnsTheSheetAboutTheGripperAndTableHeightLeavesTheGripperWhereItIs) {
+  settings.pre_roll = 0.3;
+  const Replay replay = make_replay(recording, settings);
+  ReplayCandidate candidate;
+  candidate.nuisance.start_yaw = 0.2;
+  candidate.nuisance.table_height = -0.01;
+  const sim::Environment environment = make_environment(replay, candidate);
+  const data::Points& start = environment.state.positions;
+  const Eigen::RowVector3d was = replay.recording.start.row(0) - replay.pivot.transpose(),
+                           is = start.row(0) - replay.pivot.transpose();
+  EXPECT_NEAR(std::atan2(is.y(), is.x()) - std::atan2(was.y(), was.x()), 0.2, 1e-12);
+  EXPECT_NEAR(is.head<2>().norm(), was.head<2>().norm(), 1e-12);
+  EXPECT_NEAR(start.col(2).maxCoeff(), -0.01, 1e-12);
+  EXPECT_NEAR(std::get<sim::Plane>(environment.obstacles.at(0).shape).point.z(), -0.01, 1e-12);
+  EXPECT_NEAR(environment.grasps.at(0).targets.col(2).norm(), 0, 1e-12);
+
+  candidate.nuisance.table_height = 0.01;  // a table above the recorded grasp carries the patch
+  const sim::Environment raised = make_environment(replay, candidate);
+  EXPECT_NEAR(raised.grasps.at(0).targets.col(2).minCoeff(), 0.01, 1e-12);
+}
+
+TEST_F(Lift, RegistrationTakesBoundsAndPivotOfTheRecording) {
+  recording.nuisance.offset = {0.01, 0.02, 0.03};
+  recording.nuisance.yaw = kPi / 12;
+  const Replay replay = make_replay(recording, settings);
+  const Motion motion;
+  const RegistrationProblem problem = registration_problem(replay, motion);
+  EXPECT_EQ(problem.bounds.offset, recording.nuisance.offset);
+  EXPECT_EQ(problem.bounds.yaw, kPi / 12);
+  EXPECT_EQ(problem.start.pivot, replay.pivot);
+}
+
+TEST_F(Lift, GridSearchEqualsItselfWithMoreThreadsAndAfterAStop) {
+  settings.score_to = 0.3;
+  Replay replay = make_replay(recording, settings);
+  replay.steps = 30;
+  GridSettings grid;
+  grid.axes = {parse_axis("bending", "5e-5:2e-4:3:log"), parse_axis("friction", "0.2,0.4")};
+  const auto folder = [](const char* name) {
+    const auto place = std::filesystem::temp_directory_path() / name;
+    std::filesystem::remove_all(place);
+    return place.string();
+  };
+  const Fingerprint key = fingerprint({replay}, grid);
+  const std::string at_once = folder("flash_grid_at_once"), stopped = folder("flash_grid_stopped");
+  ResultsStore one(at_once, grid.axes, {recording.name}, key, Existing::refuse);
+  EXPECT_TRUE(grid_search({replay}, grid, one));
+
+  std::atomic<bool> stop = false;
+  {
+    ResultsStore first(stopped, grid.axes, {recording.name}, key, Existing::refuse);
+    EXPECT_FALSE(grid_search(
+        {replay}, grid, first, [&](const Progress& p) { stop = p.done >= 2; }, &stop));
+    EXPECT_EQ(first.results().candidates.size(), 2u);
+  }
+  grid.threads = 2;
+  EXPECT_EQ(fingerprint({replay}, grid), key);  // threads decide nothing
+  ResultsStore rest(stopped, grid.axes, {recording.name}, key, Existing::resume);
+  EXPECT_TRUE(grid_search({replay}, grid, rest));
+  ASSERT_EQ(rest.results().candidates.size(), 6u);
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(rest.results().candidates[i].score, one.results().candidates[i].score);
+    EXPECT_EQ(rest.results().candidates[i].values, one.results().candidates[i].values);
+  }
+  std::filesystem::remove_all(at_once);
+  std::filesystem::remove_all(stopped);
+}
+
+TEST_F(Lift, FingerprintFollowsSettingsAndInputs) {
+  const Replay replay = make_replay(recording, settings);
+  GridSettings grid;
+  grid.axes = {parse_axis("bending", "1e-4")};
+  const Fingerprint key = fingerprint({replay}, grid);
+  GridSettings other = grid;
+  other.base.material.friction += 0.1;
+  EXPECT_NE(fingerprint({replay}, other), key);
+  Replay moved = replay;
+  moved.observations[3].points(0, 0) += 1e-6;
+  EXPECT_NE(fingerprint({moved}, grid), key);
+}
+
+TEST(Replay, StampsOfAnyClockGiveTheSameStepsAndScore) {
+  const data::TemporaryFolder folder;
+  const Replay zero = short_lift(folder);
+  const nlohmann::json recording = nlohmann::json::parse(data::read_file(folder / "lift/recording.json"));
+  const data::Trajectory gripper = data::load_tum(folder / "lift/gripper.tum");
+  const auto score_of = [](const Replay& replay) {
+    return score_motions({replay}, run(replay, {{short_lift_material(), {}}}), {}).score;
+  };
+  const double expected = score_of(zero);
+  for (const double epoch : {1000.0, 1.764e9}) {
+    nlohmann::json moved = recording;
+    moved["grasps"][0]["from"] = epoch;
+    for (nlohmann::json& keyframe : moved["keyframes"]) keyframe["t"] = keyframe["t"].get<double>() + epoch;
+    data::Trajectory path = gripper;
+    for (double& time : path.times) time += epoch;
+    data::save_tum(path, folder / "lift/gripper.tum");
+    folder.write("lift/recording.json", moved.dump());
+    const Replay replay = make_replay(data::load_recording(folder / "lift"), zero.settings);
+    EXPECT_EQ(replay.steps, zero.steps);
+    EXPECT_DOUBLE_EQ(score_of(replay), expected);
+  }
+}
+
+TEST(Replay, ASimulationWithoutEndIsRefusedWithItsCause) {
+  const data::TemporaryFolder folder;
+  const Replay replay = short_lift(folder);
+  const auto message_of = [&](const auto& spoil) {
+    data::Recording recording = replay.recording;
+    ReplaySettings settings = replay.settings;
+    spoil(recording, settings);
+    return data::input_error_of([&] { make_replay(recording, settings); });
+  };
+  EXPECT_NE(
+      message_of([](data::Recording&, ReplaySettings& s) {
+        s.solver.time_step = 1e-9;
+      }).find("--time-step: found 1e-09 s, which makes 4e+08 steps of 0.4 s, expected at most 1,000,000"),
+      std::string::npos);
+  EXPECT_NE(message_of([](data::Recording& r, ReplaySettings&) {
+              r.grasps[0].from = -20'000;
+            }).find("grasps.from: found 2e+04 s before the first keyframe"),
+            std::string::npos);
+  EXPECT_NE(message_of([](data::Recording& r, ReplaySettings&) {
+              r.keyframes.back().time = 20'000;
+            }).find("recording.json: keyframes: "),
+            std::string::npos);
+  EXPECT_NE(message_of([](data::Recording&, ReplaySettings& s) { s.score_from = 3; }).find("--from, --to: "),
+            std::string::npos);
+}
+
+TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {
+  // A strip carried by its end; places held alone leave the slope to one cell: first order.
+  data::Recording recording;
+  recording.name = recording.source = "strip";
+  recording.has_table = true;
+  recording.keyframes = {};
+  data::RecordedGrasp grasp;
+  grasp.gripper = "gripper";
+  grasp.select.corner = {1, 1};
+  grasp.select.within = 0.0501;
+  recording.grasps = {grasp};
+  data::Trajectory& path = recording.trajectories["gripper"];
+  for (int i = 0; i <= 30; ++i) {
+    path.times.push_back(0.01 * i);
+    path.poses.emplace_back(Eigen::Translation3d(0.175, 0.025, 0.04 * i / 30));
+  }
+  data::SheetMaterial material;
+  material.membrane_stiffness = 30;
+  material.bending_rigidity = 2e-4;
+  const auto height = [&](double cell, bool slopes) {  // of the middle of the strip, in the end
+    Replay replay;
+    replay.recording = recording;
+    replay.recording.mesh = data::parse_mesh_spec("sheet:0.2x0.05:" + std::to_string(cell));
+    replay.recording.start = replay.recording.mesh.vertices;
+    replay.sheet = sim::make_sheet(replay.recording.mesh);
+    if (slopes) stiffen_clamped(replay);
+    replay.steps = 30;
+    const data::Points& last = run(replay, {{material, {}}}).front().motion.positions.back();
+    for (Eigen::Index i = 0; i < last.rows(); ++i)
+      if ((replay.recording.mesh.vertices.row(i) - Eigen::RowVector3d(0.1, 0, 0)).norm() < 1e-9)
+        return last(i, 2);
+    return 0.0;
+  };
+  for (const bool slopes : {false, true}) {
+    const double coarse = height(0.025, slopes), middle = height(0.0125, slopes),
+                 fine = height(0.00625, slopes);
+    const double order = std::log2(std::abs((coarse - middle) / (middle - fine)));
+    EXPECT_EQ(order > 1.5, slopes) << order;
+  }
+}
+
+}  // namespace
+}  // namespace flash::sysid

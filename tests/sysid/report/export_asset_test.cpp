@@ -1,0 +1,103 @@
+#include "sysid/report/export_asset.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/data/temporary_folder.h"
+#include "tests/sysid/summary_fixture.h"
+
+namespace flash::sysid {
+namespace {
+
+data::Asset towel() {
+  data::Asset asset;
+  asset.mesh = "sheet:0.4x0.4:0.02";
+  asset.young = 1e5;
+  asset.thickness = 0.001;
+  asset.bending_rigidity = 5e-5;
+  asset.areal_density = 0.25;
+  return asset;
+}
+
+TEST(ExportAsset, TakesEstimatesWhereKnownAndTheAssetsValueElsewhere) {
+  const data::Asset tuned = tuned_asset(towel(), example_summary());
+  EXPECT_EQ(tuned.bending_rigidity, 1.1e-4);  // identified: the estimate, not the best grid value 1e-4
+  EXPECT_EQ(tuned.poisson, 0.3);              // not identifiable: the asset's, not the best candidate's 0.2
+  EXPECT_EQ(tuned.young, 3e4);
+  EXPECT_EQ(tuned.areal_density, 0.2);
+  const nlohmann::json identification = nlohmann::json::parse(tuned.identification);
+  EXPECT_TRUE(identification["estimate"]["poisson"].is_null());
+  EXPECT_TRUE(identification["interval95"]["poisson"].is_null());
+  EXPECT_EQ(identification["fixed"]["poisson"]["value"], 0.3);
+  EXPECT_EQ(identification["fixed"]["poisson"]["source"], "assumed");
+  EXPECT_EQ(identification["interval95"]["bending"][0], 8e-5);
+}
+
+TEST(ExportAsset, AValueThatIsKeptKeepsItsSource) {
+  data::Asset asset = towel();
+  asset.identification = R"({"fixed": {"poisson": {"value": 0.3, "source": "measured"}}})";
+  const auto source = [&] {
+    return nlohmann::json::parse(
+        tuned_asset(asset, example_summary()).identification)["fixed"]["poisson"]["source"];
+  };
+  EXPECT_EQ(source(), "measured");
+  asset.identification = R"({"identifiable": {"poisson": "yes"}, "fixed": {}})";
+  EXPECT_EQ(source(), "identified");
+}
+
+// The asset file's sheet is only where the search began.
+TEST(ExportAsset, IsOfTheSheetThatWasIdentified) {
+  Summary summary = example_summary();
+  summary.settings["object_mesh"] = "sheet:0.30x0.24:0.01";
+  summary.parameters.front().name = "areal_density";  // not identifiable: the mass of the asset by this area
+  summary.parameters.front().values = {0.1, 0.2, 0.3};
+  data::Asset asset = towel();
+  asset.areal_density.reset();
+  asset.mass = 0.018;
+  const data::Asset tuned = tuned_asset(asset, summary);
+  EXPECT_EQ(tuned.mesh, "sheet:0.30x0.24:0.01");
+  EXPECT_NEAR(*tuned.areal_density, 0.018 / (0.30 * 0.24), 1e-12);
+  std::vector<std::string> notices;
+  const data::Asset published = data::express_as(tuned, data::AssetFormat::published, 0.30 * 0.24, notices);
+  EXPECT_NEAR(*published.object_mass, 0.018, 1e-12);
+}
+
+TEST(ExportAsset, RandomizesOverTheIntervalOrAllThatWasSearched) {
+  const auto ranges = randomization_ranges(example_summary());
+  EXPECT_EQ(ranges.at("bending"), (std::array<double, 2>{8e-5, 1.5e-4}));
+  EXPECT_EQ(ranges.at("poisson"), (std::array<double, 2>{0.0, 0.4}));
+}
+
+TEST(ExportAsset, IsAnAssetThatLoadsWithItsIdentification) {
+  const data::TemporaryFolder folder;
+  data::save_asset(tuned_asset(towel(), example_summary()), folder / "tuned.json");
+  const data::Asset loaded = data::load_asset(folder / "tuned.json");
+  EXPECT_EQ(loaded.bending_rigidity, 1.1e-4);
+  const nlohmann::json identification = nlohmann::json::parse(loaded.identification);
+  EXPECT_EQ(identification["recordings"][0]["name"], "lift");
+  EXPECT_EQ(identification["identifiable"]["poisson"], "no");
+  EXPECT_EQ(identification["fixed"]["friction"]["source"], "measured");
+  EXPECT_EQ(identification["horizon_s"], 1.9);
+  EXPECT_EQ(identification["covariance_log"]["parameters"][1], "bending");
+  for (const char* field : {"estimate", "interval95", "score_m", "solver", "tool_version", "randomization"})
+    EXPECT_TRUE(identification.contains(field)) << field;
+}
+
+// The plate formula goes on ruling D where it ruled before and nobody searched D.
+TEST(ExportAsset, LeavesThePlateFormulaInCharge) {
+  data::Asset asset = towel();
+  asset.bending_rigidity.reset();
+  Summary summary = example_summary();
+  summary.parameters.pop_back();
+  EXPECT_FALSE(tuned_asset(asset, summary).bending_rigidity.has_value());
+}
+
+TEST(ExportAsset, RefusesASearchWithoutACandidate) {
+  Summary summary = example_summary();
+  summary.best.clear();
+  EXPECT_THROW(tuned_asset(towel(), summary), data::InputError);
+}
+
+}  // namespace
+}  // namespace flash::sysid
