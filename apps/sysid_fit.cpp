@@ -155,7 +155,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     replays.push_back(
         sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common))));
   std::vector<std::string> notices;
-  settings.grid.base = material_base(asset, replays.front().sheet.rest, notices);
+  settings.grid.base = material_base(asset, replays.front().sheet().rest, notices);
   const std::size_t batch =
       std::max<std::size_t>(2 * settings.start.size() + 1, settings.global.generations > 0 ? 16 : 0);
   sysid::check_job(

@@ -112,6 +112,15 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
   return replays;
 }
 
+// What all candidates had in common.
+void tell_what_was_shared(const std::vector<sysid::Replay>& replays, const CommonOptions& options) {
+  for (const sysid::Replay& replay : replays)
+    say(options, replay.recording.name + ": one plan of the mesh, " +
+                     std::to_string(sim::count_bending_operators(*replay.plan)) +
+                     " bending operators; held " + std::to_string(sysid::scored_steps(replay).size()) +
+                     " of " + std::to_string(replay.steps + 1) + " steps a candidate");
+}
+
 // The best candidate over the observations, recording by recording; kept with the run.
 std::vector<sysid::Overlay> keep_best(const sysid::GridResults& results, const sysid::Summary& summary,
                                       const std::vector<sysid::Replay>& replays,
@@ -176,7 +185,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
 
   std::vector<std::string> notices;
   const sysid::GridSettings settings =
-      grid_settings(options, material_base(asset, replays.front().sheet.rest, notices), threads);
+      grid_settings(options, material_base(asset, replays.front().sheet().rest, notices), threads);
   sysid::check_grasp_axes(settings.axes, replays);
   sysid::check_grasp_axes(settings.fixed, replays);
   if (!options.no_solver_check)  // which halves the step
@@ -192,7 +201,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   for (const std::string& notice : notices) say(options.common, notice);
   say(options.common,
       data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) + " candidates, " +
-          data::format_count(static_cast<std::size_t>(replays.front().sheet.rest.vertices.rows())) +
+          data::format_count(static_cast<std::size_t>(replays.front().sheet().rest.vertices.rows())) +
           " vertices, " + std::to_string(threads) + " threads, about " +
           data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) + " MB of memory");
   const auto kept = [&] {
@@ -209,6 +218,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
               &stop_on_signals()))
         return kept();
     }
+    if (options.common.verbose) tell_what_was_shared(replays, options.common);
     return conclude(asset, replays, settings, store, options, device, begin);
   } catch (const data::Stopped&) {
     return kept();

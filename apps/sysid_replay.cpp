@@ -128,17 +128,19 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;
-  const sysid::MaterialBase base = material_base(asset, replay.sheet.rest, notices);
+  const sysid::MaterialBase base = material_base(asset, replay.sheet().rest, notices);
   const std::vector<sysid::Axis> axes = parse_fixed(options.fixed);
   sysid::check_grasp_axes(axes, {replay});
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
-  sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1));
+  sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1, options.every_step));
   check_output(options.out, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 
   const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
-  const sysid::ReplayResult motion = std::move(sysid::run(replay, {candidate}).front());
+  sysid::ReplayResult motion;
+  sysid::run(replay, {candidate}, options.every_step ? every_step(replay) : scored_steps(replay),
+             [&](std::size_t, sysid::ReplayResult result) { motion = std::move(result); });
   const sysid::CandidateResult result =
       sysid::score_motions({replay}, {motion}, score_settings(options.replay));
   if (result.status == sysid::CandidateStatus::diverged)

@@ -102,4 +102,9 @@ const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingMode
   return *entry;
 }
 
+std::size_t count_bending_operators(const SheetPlan& plan) {
+  const std::lock_guard lock(plan.bending->mutex);
+  return plan.bending->made.size();
+}
+
 }  // namespace flash::sim

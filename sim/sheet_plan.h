@@ -67,4 +67,7 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
                                         double poissons_ratio);
 
+/// Bending operators that were made for a plan so far.
+std::size_t count_bending_operators(const SheetPlan& plan);
+
 }  // namespace flash::sim

@@ -371,4 +371,6 @@ StepReport Solver::step(Environment& environment) {
   return advance(environment, h, w.settings.halvings, w);
 }
 
+void Solver::forget() { workspace_->refactor = true; }
+
 }  // namespace flash::sim

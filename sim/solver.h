@@ -18,7 +18,7 @@ struct SolverSettings {
   int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
   double exit_speed = 1.0;      ///< at which vertices that start inside an obstacle come out, at most [m/s]
   int halvings = 8;  ///< a step that cannot be solved is repeated in two halves, each so again, so often
-  const std::atomic<bool>* stop = nullptr;  ///< once set, simulate ends before its next step
+  const std::atomic<bool>* stop = nullptr;  ///< once set, a batch ends before its next step
 };
 
 /// How one step of one environment went.
@@ -51,7 +51,7 @@ inline constexpr double solver_bytes_per_vertex = 14e3;
 /// Steps an environment by implicit Euler: semi-smooth Newton on the potential of the step, feasible at every
 /// iterate. A step that does not converge, or whose potential or energy would end above where it began, is
 /// repeated in halves. Holds what depends on the sheet and the last factorization, which later steps start
-/// from: one Solver an environment.
+/// from: one Solver an environment, and last digits that depend on where it began, unless it forgets.
 class Solver {
  public:
   Solver(const Sheet& sheet, const SolverSettings& settings);
@@ -62,26 +62,18 @@ class Solver {
   /// Advances environment.state by one time step. An unconverged step is reported, never thrown.
   StepReport step(Environment& environment);
 
+  /// The next step starts as that of a new Solver does.
+  void forget();
+
   struct Workspace;  ///< of its own
 
  private:
   std::unique_ptr<Workspace> workspace_;
 };
 
-/// Positions of every step (index 0 is the start) and the reports of the steps.
-struct Rollout {
-  std::vector<data::Points> positions;
-  std::vector<StepReport> reports;
-};
-
 /// The larger one; infinity where either is not a number, which std::max may lose.
 inline double worst(double a, double b) {
   return a >= b ? a : b >= a ? b : std::numeric_limits<double>::infinity();
 }
-
-/// Runs `steps` steps of each environment, environments spread over `threads`. Result i equals environment i
-/// alone, bitwise. Throws what a worker threw, and data::Stopped where settings.stop ended it.
-std::vector<Rollout> simulate(const Sheet& sheet, std::vector<Environment> environments, int steps,
-                              const SolverSettings& settings, int threads);
 
 }  // namespace flash::sim

@@ -237,20 +237,20 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
 
   Replay replay;
   replay.recording = synthetic.recording;
-  replay.sheet = sim::make_sheet(mesh);
   replay.settings.solver = solver;
   replay.settings.clamp_slopes = settings.clamp_slopes;
-  if (settings.clamp_slopes) stiffen_clamped(replay);
+  sim::Sheet sheet = sim::make_sheet(mesh);
+  if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
+  replay.plan = sim::make_sheet_plan(sheet);
   replay.steps = steps_in(settings.duration + settings.rest, solver.time_step);
+  for (const data::RecordedKeyframe& keyframe : synthetic.recording.keyframes)
+    replay.observations.push_back({.t = keyframe.time + settings.time_offset});
   check_job({replay}, 1, estimate_batch({replay}, 1));
-  const sim::Rollout rollout = std::move(
-      sim::simulate(replay.sheet, {make_environment(replay, {material, {}})}, replay.steps, solver, 1)
-          .front());
-  const auto missed = std::count_if(rollout.reports.begin(), rollout.reports.end(),
-                                    [](const sim::StepReport& report) { return !report.converged; });
-  synthetic.unconverged_share = static_cast<double>(missed) / std::max(1, replay.steps);
-
-  const Motion motion{0.0, solver.time_step, rollout.positions};
+  Motion motion;
+  run(replay, {{material, {}}}, scored_steps(replay), [&](std::size_t, ReplayResult result) {
+    synthetic.unconverged_share = result.unconverged_share;
+    motion = std::move(result.motion);
+  });
   std::mt19937_64 random(settings.seed + 1);
   for (data::RecordedKeyframe& keyframe : synthetic.recording.keyframes) {
     const double t = keyframe.time + settings.time_offset;
@@ -274,11 +274,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
     contour.rowwise() += settings.cloud_offset.transpose();
     synthetic.clouds.push_back(std::move(cloud));
     synthetic.contours.push_back(std::move(contour));
-    if (settings.forces) {
-      const double step =
-          std::clamp(std::round(t / solver.time_step), 1.0, static_cast<double>(replay.steps));
-      keyframe.force = rollout.reports[static_cast<std::size_t>(step) - 1].grasp_forces.back();
-    }
+    if (settings.forces) keyframe.force = force_at(motion, t);
   }
   return synthetic;
 }

@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
-#include <condition_variable>
-#include <exception>
 #include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
-#include <thread>
 
 #include "data/error.h"
 #include "sysid/replay/motion_store.h"
@@ -67,107 +64,107 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
 
 namespace {
 
-CandidateResult score_candidate(const std::vector<Replay>& replays, const GridSettings& settings,
-                                const std::vector<Axis>& axes, const std::vector<double>& values,
-                                const std::optional<MotionStore>& kept) {
-  const ReplayCandidate candidate = make_candidate(settings.base, axes, values);
-  std::vector<ReplayResult> motions;
-  for (const Replay& replay : replays)
-    motions.push_back(kept ? kept->run(replay, candidate) : std::move(run(replay, {candidate}).front()));
-  CandidateResult result = score_motions(replays, motions, settings.score);
-  result.values.assign(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(settings.axes.size()));
-  return result;
+/// Appends results in order of id as they come, and tells how far the search is.
+class Results {
+ public:
+  Results(ResultsStore& store, int total, const std::function<void(const Progress&)>& progress)
+      : store_(store), progress_(progress) {
+    state_.total = total;
+    state_.done = done_before_ = static_cast<int>(store.results().candidates.size());
+    state_.best_score = std::numeric_limits<double>::infinity();
+    for (const CandidateResult& result : store.results().candidates)
+      state_.best_score = std::min(state_.best_score, result.score);
+  }
+
+  /// Of the candidate that is `place`th of those that were wanted.
+  void take(std::size_t place, CandidateResult result) {
+    const std::scoped_lock lock(mutex_);
+    state_.best_score = std::min(state_.best_score, result.score);
+    ++state_.done;
+    finished_.emplace(place, std::move(result));
+    std::vector<CandidateResult> next;
+    for (; !finished_.empty() && finished_.begin()->first == next_to_write_; ++next_to_write_) {
+      next.push_back(std::move(finished_.begin()->second));
+      finished_.erase(finished_.begin());
+    }
+    if (!next.empty()) store_.append(next);
+    const double seconds = std::chrono::duration<double>(Clock::now() - begin_).count();
+    state_.candidates_per_second = (state_.done - done_before_) / std::max(seconds, 1e-9);
+    state_.seconds_left = (state_.total - state_.done) / state_.candidates_per_second;
+    if (progress_) progress_(state_);
+  }
+
+  bool complete() const { return state_.done == state_.total; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  ResultsStore& store_;
+  const std::function<void(const Progress&)>& progress_;
+  Progress state_;
+  int done_before_ = 0;
+  Clock::time_point begin_ = Clock::now();
+  std::mutex mutex_;
+  std::size_t next_to_write_ = 0;
+  std::map<std::size_t, CandidateResult> finished_;  ///< those that wait for one before them
+};
+
+/// Simulates candidates on every replay, as a batch each, and scores each on the thread that finished it.
+void score_candidates(const std::vector<Replay>& replays, const ScoreSettings& settings,
+                      const std::vector<ReplayCandidate>& candidates, const std::optional<MotionStore>& kept,
+                      const std::function<void(std::size_t, CandidateResult)>& scored) {
+  std::vector<std::vector<ReplayResult>> motions(candidates.size());
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    const auto finished = [&](std::size_t i, ReplayResult result) {
+      motions[i].push_back(std::move(result));
+      if (r + 1 < replays.size()) return;
+      scored(i, score_motions(replays, motions[i], settings));
+      motions[i].clear();
+    };
+    if (kept)
+      kept->run(replays[r], candidates, finished);
+    else
+      run(replays[r], candidates, scored_steps(replays[r]), finished);
+  }
 }
 
 }  // namespace
 
 bool grid_search(const std::vector<Replay>& replays, const GridSettings& settings, ResultsStore& store,
                  const std::function<void(const Progress&)>& progress, const std::atomic<bool>* stop) {
-  using Clock = std::chrono::steady_clock;
   std::vector<Axis> axes = settings.axes;
   axes.insert(axes.end(), settings.fixed.begin(), settings.fixed.end());
   check_axes(axes, settings.base.material.constitutive);
   const std::vector<std::vector<double>> grid = cartesian_product(axes);
-
   std::vector<int> wanted;
   for (int id = 0; id < static_cast<int>(grid.size()); ++id) {
     if (!store.contains(id)) wanted.push_back(id);
   }
-  Progress state;
-  state.total = static_cast<int>(grid.size());
-  state.done = state.total - static_cast<int>(wanted.size());
-  const int done_before = state.done;
-  state.best_score = std::numeric_limits<double>::infinity();
-  for (const CandidateResult& result : store.results().candidates) {
-    state.best_score = std::min(state.best_score, result.score);
-  }
-
-  std::vector<Replay> single =
-      replays;  // one candidate a thread: the solver is not to spawn threads of its own
-  for (Replay& replay : single) {
-    replay.settings.threads = 1;
+  std::vector<Replay> batched = replays;
+  for (Replay& replay : batched) {
+    replay.settings.threads = settings.threads;
+    replay.settings.envs = settings.envs;
     if (stop != nullptr) replay.settings.solver.stop = stop;
   }
   const std::optional<MotionStore> kept =
       settings.rollouts.empty() ? std::nullopt : std::optional<MotionStore>(settings.rollouts);
-  const Clock::time_point begin = Clock::now();
-  std::mutex mutex;  // of all below
-  std::condition_variable written;
-  std::size_t next = 0, next_to_write = 0;  // indices into wanted
-  std::map<std::size_t, CandidateResult> finished;
-  std::exception_ptr failure;
-  bool stopped = false;
-  const auto work = [&] {
-    std::unique_lock lock(mutex);
+  Results results(store, static_cast<int>(grid.size()), progress);
+  const auto at_once = static_cast<std::size_t>(std::max(1, settings.envs));
+  for (std::size_t first = 0; first < wanted.size(); first += at_once) {
+    std::vector<ReplayCandidate> candidates;
+    for (std::size_t i = first; i < std::min(wanted.size(), first + at_once); ++i)
+      candidates.push_back(make_candidate(settings.base, axes, grid[wanted[i]]));
     try {
-      while (true) {
-        // Results are written in order of id: those that come early wait, a batch of them at most.
-        written.wait(lock, [&] {
-          return failure || stopped || next >= wanted.size() ||
-                 next < next_to_write + static_cast<std::size_t>(settings.envs);
-        });
-        if (failure || stopped || next >= wanted.size()) return;
-        const std::size_t i = next++;
-        lock.unlock();
-        if (stop != nullptr && *stop) throw data::Stopped();
-        CandidateResult result = score_candidate(single, settings, axes, grid[wanted[i]], kept);
-        result.id = wanted[i];
-        lock.lock();
-
-        state.best_score = std::min(state.best_score, result.score);
-        ++state.done;
-        finished.emplace(i, std::move(result));
-        std::vector<CandidateResult> batch;
-        for (; !finished.empty() && finished.begin()->first == next_to_write; ++next_to_write) {
-          batch.push_back(std::move(finished.begin()->second));
-          finished.erase(finished.begin());
-        }
-        if (!batch.empty()) store.append(batch);
-        written.notify_all();
-        const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-        state.candidates_per_second = (state.done - done_before) / std::max(seconds, 1e-9);
-        state.seconds_left = (state.total - state.done) / state.candidates_per_second;
-        if (progress) progress(state);
-      }
+      score_candidates(batched, settings.score, candidates, kept, [&](std::size_t i, CandidateResult result) {
+        const std::vector<double>& values = grid[wanted[first + i]];
+        result.id = wanted[first + i];
+        result.values.assign(values.begin(), values.begin() + std::ssize(settings.axes));
+        results.take(first + i, std::move(result));
+      });
     } catch (const data::Stopped&) {
-      if (!lock.owns_lock()) lock.lock();
-      stopped = true;
-      written.notify_all();
-    } catch (...) {
-      if (!lock.owns_lock()) lock.lock();
-      failure = std::current_exception();
-      written.notify_all();
+      return results.complete();
     }
-  };
-  {
-    std::vector<std::jthread> workers;
-    const int threads = std::clamp(std::min(settings.threads, settings.envs), 1,
-                                   std::max(1, static_cast<int>(wanted.size())));
-    for (int t = 1; t < threads; ++t) workers.emplace_back(work);
-    work();
   }
-  if (failure) std::rethrow_exception(failure);
-  return state.done == state.total;
+  return results.complete();
 }
 
 }  // namespace flash::sysid

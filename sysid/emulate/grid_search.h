@@ -22,8 +22,8 @@ struct GridSettings {
   std::vector<Axis> axes;   ///< searched; the last runs fastest
   std::vector<Axis> fixed;  ///< one value each
   ScoreSettings score;
-  int envs = 64;         ///< candidates in work at the same time, at most
-  int threads = 1;       ///< each takes one candidate at a time
+  int envs = 64;  ///< candidates in a batch, at most
+  int threads = 1;
   std::string rollouts;  ///< folder that keeps the motions (MotionStore); empty: none are kept
 };
 
@@ -42,8 +42,8 @@ ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettin
 CandidateResult score_motions(const std::vector<Replay>& replays, const std::vector<ReplayResult>& results,
                               const ScoreSettings& settings);
 
-/// Simulates and scores every candidate of the grid that `store` does not hold yet and appends it there. Each
-/// thread takes one candidate at a time, through all recordings. Candidates that diverge or miss the
+/// Simulates and scores every candidate of the grid that `store` does not hold yet and appends it there,
+/// `envs` candidates at a time, a batch a recording. Candidates that diverge or miss the
 /// tolerance are marked, never a reason to stop. Results are appended in order of id, so that the files do
 /// not depend on threads; an end at any moment loses at most `envs` of them. `progress` is called after each
 /// candidate, one thread at a time; `stop`, once set, ends the search after the steps in work, and the

@@ -25,17 +25,21 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
   for (const Replay& replay : replays) {
     const double vertices = vertices_of(replay);
     solver = std::max(solver, sim::solver_bytes_per_vertex * vertices);
-    motion += (replay.steps + 1) * vertices * bytes_per_position;
+    motion += 2 * motion_bytes(replay);  // in its batch, and until all recordings are scored
     kept += kept_steps(replay) * vertices * bytes_per_position;
   }
   const double candidates = count_candidates(settings.axes);
-  const double at_once = std::min<double>(
-      {static_cast<double>(settings.threads), static_cast<double>(settings.envs), candidates});
+  const double at_once = std::min<double>(settings.envs, candidates);
+  const double threads = std::min<double>(settings.threads, at_once);
   const bool keeps = !settings.rollouts.empty();
-  estimate.simulation = at_once * (solver + motion);
-  if (solver_check) estimate.simulation = std::max(estimate.simulation, kFiner * (solver + motion));
-  if (solver_check && keeps) estimate.simulation = kFiner * at_once * (solver + motion);
-  estimate.steps = estimate.simulation * motion / (solver + motion);
+  const double finer_at_once = keeps ? at_once : 1, finer_threads = keeps ? threads : 1;
+  estimate.steps = at_once * motion;
+  estimate.simulation = threads * solver + estimate.steps;
+  if (solver_check) {
+    estimate.steps = std::max(estimate.steps, kFiner * finer_at_once * motion);
+    estimate.simulation =
+        std::max(estimate.simulation, kFiner * (finer_threads * solver + finer_at_once * motion));
+  }
   if (!keeps) return estimate;
   const double finer = solver_check ? count_candidates(thinned(settings.axes)) : 0;
   // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer

@@ -1,6 +1,5 @@
 #include "sysid/emulate/two_mesh_motions.h"
 
-#include "data/parallel.h"
 #include "sysid/replay/half_cell.h"
 #include "sysid/replay/surface_distance.h"
 
@@ -26,11 +25,10 @@ void keep_read(const Replay& replay, Motion& motion) {
 std::optional<std::vector<Motion>> motions_over(const Replay& replay, const std::vector<Axis>& axes,
                                                 const GridSettings& grid, const MotionStore& store) {
   const std::vector<std::vector<double>> points = cartesian_product(axes);
+  std::vector<ReplayCandidate> candidates;
+  for (const std::vector<double>& point : points) candidates.push_back(candidate_at(point, grid));
   std::vector<std::optional<Motion>> motions(points.size());
-  Replay single = replay;  // one motion a thread
-  single.settings.threads = 1;
-  data::for_each_in_parallel(points.size(), grid.threads, [&](std::size_t i) {
-    ReplayResult result = store.run(single, candidate_at(points[i], grid));
+  store.run(replay, candidates, [&](std::size_t i, ReplayResult result) {
     keep_read(replay, result.motion);
     if (result.finite) motions[i] = std::move(result.motion);
   });

@@ -13,11 +13,11 @@ namespace {
 
 using Change = std::function<void(ReplaySettings&)>;
 
-/// The same recording under other settings, keyframes weighing as they do.
+/// The same recording and sheet under other settings of the solver, keyframes weighing as they do.
 Replay changed(const Replay& replay, const Change& change) {
   ReplaySettings settings = replay.settings;
   change(settings);
-  Replay result = make_replay(replay.recording, settings);
+  Replay result = make_replay(replay.recording, settings, replay.plan);
   for (std::size_t k = 0; k < replay.observations.size(); ++k)
     result.observations[k].weight = replay.observations[k].weight;
   return result;

@@ -83,14 +83,14 @@ data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridg
   return targets;
 }
 
-void stiffen_clamped(Replay& replay) {
+void stiffen_clamped(const Replay& replay, sim::Sheet& sheet) {
   for (const data::RecordedGrasp& grasp : replay.recording.grasps) {
     if (shape_of(grasp, replay.settings) != data::GraspShape::clamp || grasp.from > replay.beginning ||
         !std::isinf(grasp.to))
       continue;
     std::vector<bool> held(static_cast<std::size_t>(replay.recording.mesh.vertices.rows()), false);
     for (const int vertex : patch_of(replay, grasp, {})) held[static_cast<std::size_t>(vertex)] = true;
-    for (sim::RestTriangle& triangle : replay.sheet.triangles)
+    for (sim::RestTriangle& triangle : sheet.triangles)
       if (std::all_of(triangle.vertices.begin(), triangle.vertices.end(),
                       [&](int vertex) { return held[static_cast<std::size_t>(vertex)]; }))
         triangle.stiff = true;

@@ -28,6 +28,6 @@ data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridg
                            double pitch);
 
 /// Makes stiff the triangles inside patches that a clamp takes at the beginning and never lets go.
-void stiffen_clamped(Replay& replay);
+void stiffen_clamped(const Replay& replay, sim::Sheet& sheet);
 
 }  // namespace flash::sysid

@@ -7,16 +7,24 @@
 #include "data/text.h"
 
 namespace flash::sysid {
-double vertices_of(const Replay& replay) { return static_cast<double>(replay.sheet.rest.vertices.rows()); }
+double vertices_of(const Replay& replay) { return static_cast<double>(replay.sheet().rest.vertices.rows()); }
 
-MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates) {
+double motion_bytes(const Replay& replay, bool all_steps) {
+  const double positions = all_steps ? replay.steps + 1 : static_cast<double>(scored_steps(replay).size());
+  const double a_step = sizeof(sim::StepStats) +
+                        2 * bytes_per_position * static_cast<double>(1 + replay.recording.grasps.size());
+  return positions * vertices_of(replay) * bytes_per_position + replay.steps * a_step;
+}
+
+MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates, bool all_steps) {
   MemoryEstimate estimate;
   const auto count = static_cast<double>(candidates);
   for (const Replay& replay : replays) {
     const double threads = std::min<double>(replay.settings.threads, count);
+    const double at_once = std::min<double>(replay.settings.envs, count);
     estimate.simulation =
         std::max(estimate.simulation, threads * sim::solver_bytes_per_vertex * vertices_of(replay));
-    estimate.steps += count * (replay.steps + 1) * vertices_of(replay) * bytes_per_position;
+    estimate.steps += (count + at_once) * motion_bytes(replay, all_steps);
   }
   estimate.simulation += estimate.steps;
   return estimate;

@@ -7,8 +7,8 @@ namespace flash::sysid {
 /// Memory that a job will take at its peak [bytes].
 struct MemoryEstimate {
   double program = 60e6;  ///< itself, with what scoring takes; measured
-  double simulation = 0;  ///< solvers and motions in work at once, one candidate a thread
-  double steps = 0;       ///< the part of `simulation` that grows with the number of steps
+  double simulation = 0;  ///< solvers, one a thread, and the scored steps of all that are in work at once
+  double steps = 0;       ///< the part of `simulation` that grows with the number of steps and keyframes
   double kept = 0;        ///< motions over the grid and about its finer mesh, where rollouts are kept
   double total() const { return program + simulation + kept; }
 };
@@ -19,8 +19,12 @@ inline constexpr double bytes_per_position = 3 * sizeof(double);
 /// Of the sheet that is simulated.
 double vertices_of(const Replay& replay);
 
-/// Of `candidates` simulated in one batch (`run`), their motions kept together.
-MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates);
+/// Of what a batch holds of one candidate: positions at the scored steps, or at all, and how each step went.
+double motion_bytes(const Replay& replay, bool all_steps = false);
+
+/// Of `candidates` simulated together (`run`), all results kept.
+MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates,
+                              bool all_steps = false);
 
 /// Refuses what this machine cannot finish. Throws data::InputError, saying what would help, where the memory
 /// goes beyond `limit` [bytes] (0: unknown), and where `candidates` on every replay take years.

@@ -13,7 +13,7 @@
 namespace flash::sysid {
 namespace {
 
-constexpr const char* kMagic = "flash-rollout/1\n";
+constexpr const char* kMagic = "flash-rollout/2\n";
 
 /// Numbers as the bytes they are.
 class Bytes {
@@ -78,23 +78,7 @@ class BytesReader {
   std::size_t place_ = 0;
 };
 
-/// The first step and those around each keyframe, as far as its clock may be off.
-std::vector<bool> wanted_steps(const Replay& replay) {
-  std::vector<bool> wanted(static_cast<std::size_t>(replay.steps) + 1, false);
-  wanted.front() = true;
-  const double step = replay.settings.solver.time_step, room = replay.recording.nuisance.time;
-  const auto index = [&](double t) { return (t - replay.start) / step; };
-  for (const Observation& observation : replay.observations) {
-    const auto first = static_cast<long>(std::floor(index(observation.t - room) - 1e-6));
-    const auto last = static_cast<long>(std::ceil(index(observation.t + room) + 1e-6));
-    for (long i = std::max(first, 0L); i <= std::min(last, static_cast<long>(replay.steps)); ++i)
-      wanted[static_cast<std::size_t>(i)] = true;
-    if (last >= replay.steps) wanted.back() = true;
-  }
-  return wanted;
-}
-
-std::string key_of(const Replay& replay, const sim::Environment& world, const std::vector<bool>& wanted) {
+std::string key_of(const Replay& replay, const sim::Environment& world, const std::vector<int>& kept) {
   Bytes bytes;
   bytes.add_text(FLASH_VERSION);
   bytes.add_matrix(replay.recording.mesh.vertices);
@@ -121,22 +105,20 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
       bytes.add_matrix(grasp.gripper.poses[i].matrix());
     }
   }
-  for (const sim::RestTriangle& triangle : replay.sheet.triangles)
+  for (const sim::RestTriangle& triangle : replay.sheet().triangles)
     if (triangle.stiff) bytes.add_matrix(triangle.vertices);
-  for (const bool step : wanted) bytes.add(static_cast<char>(step));
+  for (const int step : kept) bytes.add(step);
   return data::sha256(bytes.text());
 }
 
-void save(const ReplayResult& result, const std::vector<bool>& wanted, const std::string& path) {
+void save(const ReplayResult& result, const std::vector<int>& kept, const std::string& path) {
   Bytes bytes;
   for (const double value : {result.motion.start, result.motion.step, result.residual_max,
                              result.penetration_max, result.unconverged_share})
     bytes.add(value);
   bytes.add(static_cast<char>(result.converged));
   bytes.add(static_cast<char>(result.finite));
-  bytes.add(static_cast<std::int64_t>(result.motion.positions.size()));
-  for (std::size_t i = 0; i < result.motion.positions.size(); ++i)
-    if (wanted[i]) bytes.add_matrix(result.motion.positions[i]);
+  for (const int step : kept) bytes.add_matrix(result.motion.positions[static_cast<std::size_t>(step)]);
   data::Points forces(static_cast<Eigen::Index>(result.motion.forces.size()), 3);
   for (Eigen::Index i = 0; i < forces.rows(); ++i)
     forces.row(i) = result.motion.forces[static_cast<std::size_t>(i)].transpose();
@@ -144,7 +126,7 @@ void save(const ReplayResult& result, const std::vector<bool>& wanted, const std
   data::write_atomically(path, kMagic + bytes.text());
 }
 
-ReplayResult load(const std::vector<bool>& wanted, const std::string& path) {
+ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std::string& path) {
   BytesReader bytes(data::read_file(path), path);
   ReplayResult result;
   for (double* value : {&result.motion.start, &result.motion.step, &result.residual_max,
@@ -152,10 +134,9 @@ ReplayResult load(const std::vector<bool>& wanted, const std::string& path) {
     *value = bytes.take<double>();
   result.converged = bytes.take<char>() != 0;
   result.finite = bytes.take<char>() != 0;
-  const auto count = static_cast<std::size_t>(bytes.take<std::int64_t>());
-  result.motion.positions.resize(std::min(count, wanted.size()));
-  for (std::size_t i = 0; i < result.motion.positions.size(); ++i)
-    if (wanted[i]) result.motion.positions[i] = bytes.take_matrix<data::Points>();
+  result.motion.positions.assign(static_cast<std::size_t>(replay.steps) + 1, data::Points(0, 3));
+  for (const int step : kept)
+    result.motion.positions[static_cast<std::size_t>(step)] = bytes.take_matrix<data::Points>();
   const auto forces = bytes.take_matrix<data::Points>();
   for (Eigen::Index i = 0; i < forces.rows(); ++i)
     result.motion.forces.emplace_back(forces.row(i).transpose());
@@ -169,16 +150,34 @@ MotionStore::MotionStore(const std::string& folder) : folder_(folder) {
   std::filesystem::create_directories(folder);
 }
 
+void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
+                      const std::function<void(std::size_t, ReplayResult)>& finished) const {
+  const std::vector<int> kept = scored_steps(replay);
+  const auto path_of = [&](const ReplayCandidate& candidate) {
+    const std::string key = key_of(replay, make_environment(replay, candidate), kept);
+    return (std::filesystem::path(folder_) / (key + ".rollout")).string();
+  };
+  std::vector<std::size_t> missing;
+  std::vector<ReplayCandidate> simulated;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const std::string path = path_of(candidates[i]);
+    if (std::filesystem::exists(path)) {
+      finished(i, load(replay, kept, path));
+    } else {
+      missing.push_back(i);
+      simulated.push_back(candidates[i]);
+    }
+  }
+  sysid::run(replay, simulated, kept, [&](std::size_t k, ReplayResult result) {
+    save(result, kept, path_of(simulated[k]));
+    finished(missing[k], std::move(result));
+  });
+}
+
 ReplayResult MotionStore::run(const Replay& replay, const ReplayCandidate& candidate) const {
-  const std::vector<bool> wanted = wanted_steps(replay);
-  const std::string key = key_of(replay, make_environment(replay, candidate), wanted);
-  const std::string path = (std::filesystem::path(folder_) / (key + ".rollout")).string();
-  if (std::filesystem::exists(path)) return load(wanted, path);
-  ReplayResult result = std::move(sysid::run(replay, {candidate}).front());
-  save(result, wanted, path);
-  for (std::size_t i = 0; i < result.motion.positions.size(); ++i)
-    if (!wanted[i]) result.motion.positions[i].resize(0, 3);
-  return result;
+  ReplayResult only;
+  run(replay, {candidate}, [&](std::size_t, ReplayResult result) { only = std::move(result); });
+  return only;
 }
 
 }  // namespace flash::sysid

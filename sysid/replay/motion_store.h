@@ -15,8 +15,12 @@ class MotionStore {
   /// Creates the folder. Throws std::runtime_error where it cannot.
   explicit MotionStore(const std::string& folder);
 
-  /// The candidate's motion, from the folder where it is there, else simulated and kept. Positions between
-  /// keyframes are empty. Throws data::InputError naming a file that is not a motion.
+  /// The candidates' motions at the scored steps, from the folder where they are there, else simulated and
+  /// kept. `finished` as in sysid::run. Throws data::InputError naming a file that is not a motion.
+  void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
+           const std::function<void(std::size_t, ReplayResult)>& finished) const;
+
+  /// That of one candidate.
   ReplayResult run(const Replay& replay, const ReplayCandidate& candidate) const;
 
  private:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "data/error.h"
 #include "data/mesh_io.h"
@@ -97,13 +98,13 @@ int steps_in(double duration, double step) {
                          data::format_short(1.01 * duration / data::max_steps) + " s");
 }
 
-Replay make_replay(const data::Recording& recording, const ReplaySettings& settings) {
+Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
+                   std::shared_ptr<const sim::SheetPlan> plan) {
   Replay replay;
   replay.recording = recording;
   replay.settings = settings;
   replay.object_mesh = recording.mesh_spec;
   if (!settings.mesh.empty()) replace_mesh(replay.recording, settings.mesh);
-  replay.sheet = sim::make_sheet(replay.recording.mesh);
   replay.up = upward(recording);
 
   // Marks are named by vertices of the recording's own mesh.
@@ -132,7 +133,13 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
     replay.beginning = std::min(replay.beginning, grasp.from);
     closes = closes || shape_of(grasp, settings) == data::GraspShape::pinch;
   }
-  if (settings.clamp_slopes) stiffen_clamped(replay);
+  if (plan) {
+    replay.plan = std::move(plan);
+  } else {
+    sim::Sheet sheet = sim::make_sheet(replay.recording.mesh);
+    if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
+    replay.plan = sim::make_sheet_plan(sheet);
+  }
   const double pre_roll = settings.pre_roll.value_or(closes ? 0.4 : 0.0);
   const double step = settings.solver.time_step;
   replay.start = replay.beginning - steps_in(pre_roll, step) * step;
@@ -169,32 +176,84 @@ sim::Environment make_environment(const Replay& replay, const ReplayCandidate& c
   return environment;
 }
 
-std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates) {
-  std::vector<sim::Environment> environments;
-  for (const ReplayCandidate& candidate : candidates)
-    environments.push_back(make_environment(replay, candidate));
-  std::vector<sim::Rollout> rollouts = sim::simulate(replay.sheet, std::move(environments), replay.steps,
-                                                     replay.settings.solver, replay.settings.threads);
-  std::vector<ReplayResult> results;
-  for (sim::Rollout& rollout : rollouts) {
-    ReplayResult& result = results.emplace_back();
-    result.motion = {replay.start, replay.settings.solver.time_step, std::move(rollout.positions)};
-    for (const sim::StepReport& report : rollout.reports)
-      result.motion.forces.push_back(report.grasp_forces.empty() ? Eigen::Vector3d::Zero()
-                                                                 : report.grasp_forces.back());
-    int missed = 0;
-    for (const sim::StepReport& report : rollout.reports) {
-      missed += !(report.converged && std::isfinite(report.residual));
-      result.residual_max = sim::worst(result.residual_max, report.residual);
-      result.penetration_max = sim::worst(result.penetration_max, report.penetration_max);
-    }
-    result.converged = missed == 0;
-    result.unconverged_share =
-        rollout.reports.empty() ? 0 : missed / static_cast<double>(rollout.reports.size());
-    result.finite =
-        std::all_of(result.motion.positions.begin(), result.motion.positions.end(),
-                    [](const data::Points& p) { return p.allFinite() && p.cwiseAbs().maxCoeff() < 1e4; });
+std::vector<int> scored_steps(const Replay& replay) {
+  const double step = replay.settings.solver.time_step, room = replay.recording.nuisance.time;
+  const auto index = [&](double t) { return (t - replay.start) / step; };
+  std::vector<int> steps = {0};
+  for (const Observation& observation : replay.observations) {
+    const double first = std::floor(index(observation.t - room) - kSameStep);
+    const double last = std::ceil(index(observation.t + room) + kSameStep);
+    for (double i = std::max(first, 0.0); i <= std::min<double>(last, replay.steps); ++i)
+      steps.push_back(static_cast<int>(i));
+    if (last >= replay.steps) steps.push_back(replay.steps);
   }
+  std::sort(steps.begin(), steps.end());
+  steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
+  return steps;
+}
+
+std::vector<int> every_step(const Replay& replay) {
+  std::vector<int> steps(static_cast<std::size_t>(replay.steps) + 1);
+  std::iota(steps.begin(), steps.end(), 0);
+  return steps;
+}
+
+namespace {
+
+ReplayResult result_of(const Replay& replay, const std::vector<int>& kept, const sim::Batch& batch,
+                       int environment) {
+  ReplayResult result;
+  Motion& motion = result.motion;
+  motion = {replay.start, replay.settings.solver.time_step, {}};
+  motion.positions.assign(static_cast<std::size_t>(replay.steps) + 1, data::Points(0, 3));
+  const auto in_reach = [](const auto& x) { return x.allFinite() && x.cwiseAbs().maxCoeff() < 1e4; };
+  result.finite = in_reach(batch.state(environment).positions);
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    const auto x = batch.kept_positions(environment, static_cast<int>(k));
+    result.finite = result.finite && in_reach(x);
+    motion.positions[static_cast<std::size_t>(kept[k])] = x;
+  }
+  const std::span<const sim::StepStats> stats = batch.stats(environment);
+  int missed = 0;
+  for (const sim::StepStats& step : stats) {
+    missed += !(step.converged && std::isfinite(step.residual));
+    result.residual_max = sim::worst(result.residual_max, step.residual);
+    result.penetration_max = sim::worst(result.penetration_max, step.penetration_max);
+  }
+  result.converged = missed == 0;
+  result.unconverged_share = stats.empty() ? 0 : missed / static_cast<double>(stats.size());
+
+  const sim::View<double> forces = batch.grasp_forces();
+  motion.forces.assign(stats.size(), Eigen::Vector3d::Zero());
+  if (forces.shape[2] == 0) return result;
+  const double* last =
+      forces.data + environment * forces.strides[0] + (forces.shape[2] - 1) * forces.strides[2];
+  for (Eigen::Vector3d& force : motion.forces) {
+    force = Eigen::Map<const Eigen::Vector3d>(last);
+    last += forces.strides[1];
+  }
+  return result;
+}
+
+}  // namespace
+
+void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, const std::vector<int>& kept,
+         const std::function<void(std::size_t, ReplayResult)>& finished) {
+  sim::BatchSettings settings;
+  settings.solver = replay.settings.solver;
+  settings.steps = replay.steps;
+  settings.kept_steps = kept;
+  settings.threads = replay.settings.threads;
+  sim::replay_in_batches(
+      replay.plan, candidates.size(), replay.settings.envs, settings,
+      [&](std::size_t i) { return make_environment(replay, candidates[i]); },
+      [&](std::size_t i, const sim::Batch& batch, int e) { finished(i, result_of(replay, kept, batch, e)); });
+}
+
+std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates) {
+  std::vector<ReplayResult> results(candidates.size());
+  run(replay, candidates, scored_steps(replay),
+      [&](std::size_t i, ReplayResult result) { results[i] = std::move(result); });
   return results;
 }
 

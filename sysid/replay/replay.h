@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -6,7 +7,7 @@
 #include <vector>
 
 #include "data/recording.h"
-#include "sim/solver.h"
+#include "sim/batch.h"
 #include "sysid/replay/motion.h"
 #include "sysid/replay/observation.h"
 #include "sysid/replay/sheet_distance.h"
@@ -26,6 +27,7 @@ struct ReplaySettings {
   double score_from = -std::numeric_limits<double>::infinity();  ///< keyframes before carry no weight [s]
   double score_to = std::numeric_limits<double>::infinity();     ///< keyframes after carry no weight [s]
   int min_points = 20;  ///< keyframes of fewer points carry no weight
+  int envs = 64;        ///< candidates simulated side by side, at most
   int threads = 1;
 };
 
@@ -44,7 +46,7 @@ struct ReplayCandidate {
   ReplayNuisance nuisance;
 };
 
-/// One candidate's simulated motion and how the solver fared.
+/// One candidate's simulated motion, its positions at the steps that were wanted, and how the solver fared.
 struct ReplayResult {
   Motion motion;
   bool converged = false;        ///< every step
@@ -59,7 +61,7 @@ struct Replay {
   data::Recording recording;
   std::string
       object_mesh;  ///< mesh specification or file of the recording itself, whatever settings.mesh says
-  sim::Sheet sheet;
+  std::shared_ptr<const sim::SheetPlan> plan;    ///< of the sheet that is simulated
   std::shared_ptr<const SheetDistance> queries;  ///< of the sheet at rest
   ReplaySettings settings;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity; the table normal without gravity
@@ -70,18 +72,35 @@ struct Replay {
   int steps = 0;
   std::vector<Observation> observations;
   std::vector<std::string> notices;
+
+  const sim::Sheet& sheet() const { return plan->sheet; }
 };
 
 /// Steps of `step` that it takes to cover `duration` [s]. Throws data::InputError where they are more than
 /// data::max_steps.
 int steps_in(double duration, double step);
 
-/// Throws data::InputError where mesh, grasps, clouds or the number of steps cannot be used.
-Replay make_replay(const data::Recording& recording, const ReplaySettings& settings);
+/// Throws data::InputError where mesh, grasps, clouds or the number of steps cannot be used. A `plan` that is
+/// given is that of the same sheet, made for another replay of it.
+Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
+                   std::shared_ptr<const sim::SheetPlan> plan = nullptr);
 
 /// The simulated world of one candidate, before its first step.
 sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate);
 
+/// The steps that a score of the replay reads, ascending: the first, and those around each keyframe, as far
+/// as its clock may be off.
+std::vector<int> scored_steps(const Replay& replay);
+
+/// All of them.
+std::vector<int> every_step(const Replay& replay);
+
+/// Simulates the candidates, replay.settings.envs of them at once. Only positions at the steps `kept` are
+/// held; others are empty. The thread that simulated a candidate calls `finished` with its number and result.
+void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, const std::vector<int>& kept,
+         const std::function<void(std::size_t, ReplayResult)>& finished);
+
+/// The same for the scored steps, all results together.
 std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates);
 
 }  // namespace flash::sysid

@@ -136,7 +136,7 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
   const Replay& replay = replays.front();
   auto& texts = summary.settings;
   texts["mesh"] = replay.recording.mesh_spec + " (" +
-                  data::format_count(static_cast<std::size_t>(replay.sheet.rest.vertices.rows())) +
+                  data::format_count(static_cast<std::size_t>(replay.sheet().rest.vertices.rows())) +
                   " vertices)";
   texts["object_mesh"] = data::is_mesh_spec(replay.object_mesh)
                              ? replay.object_mesh

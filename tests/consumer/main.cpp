@@ -1,6 +1,6 @@
 #include <iostream>
 
-#include "sim/solver.h"
+#include "sim/batch.h"
 
 int main() {
   flash::data::TriangleMesh mesh;
@@ -12,7 +12,7 @@ int main() {
   flash::sim::Environment falling;
   falling.state.positions = mesh.vertices;
   falling.state.velocities = flash::data::Points::Zero(3, 3);
-  const flash::sim::SolverSettings settings;
-  const auto rollout = flash::sim::simulate(sheet, {falling}, 10, settings, 1).front();
-  std::cout << rollout.positions.back()(0, 2) - 1.0 << '\n';
+  flash::sim::Batch batch(flash::sim::make_sheet_plan(sheet), {falling}, {.steps = 10});
+  batch.advance(10);
+  std::cout << batch.state(0).positions(0, 2) - 1.0 << '\n';
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "sheet_scene.h"
+#include "sim/batch.h"
 
 namespace flash::sim {
 namespace {
@@ -83,9 +84,10 @@ TEST(Dynamics, EachEnvironmentHasItsOwnFriction) {
   std::vector<Environment> environments;
   const double angle = std::atan(0.3);
   for (const double friction : {0.299, 0.301}) environments.push_back(on_incline(sheet, angle, 0, friction));
-  const auto rollouts = simulate(sheet, environments, 50, {.tolerance = 1e-10}, 2);
-  EXPECT_GT(rollouts[0].positions.back()(0, 0) - sheet.rest.vertices(0, 0), 1e-4);
-  EXPECT_EQ(rollouts[1].positions.back()(0, 0), sheet.rest.vertices(0, 0));
+  Batch batch(make_sheet_plan(sheet), environments, {.solver = {.tolerance = 1e-10}, .steps = 50});
+  batch.advance(50);
+  EXPECT_GT(batch.state(0).positions(0, 0) - sheet.rest.vertices(0, 0), 1e-4);
+  EXPECT_EQ(batch.state(1).positions(0, 0), sheet.rest.vertices(0, 0));
 }
 
 TEST(Dynamics, ASlidingSheetStopsAfterTheDiscreteDistance) {
@@ -124,25 +126,6 @@ TEST(Dynamics, InternalForcesNeitherPushNorTurn) {
     }
     EXPECT_LT(gained.colwise().sum().norm(), 1e-9 * gained.norm());
     EXPECT_LT(turn.norm(), 1e-9 * scale);
-  }
-}
-
-TEST(Dynamics, ABatchEqualsItsEnvironmentsAloneBitForBit) {
-  const Sheet sheet = small_sheet();
-  std::vector<Environment> environments;
-  for (const double stiffness : {30.0, 100.0, 300.0}) {
-    Environment environment = on_incline(sheet, 0.1, 0.3, 0.2);
-    environment.material.membrane_stiffness = stiffness;
-    environment.state.positions.col(2).array() += 0.02;
-    environment.state.positions(0, 2) += 0.01;
-    environments.push_back(environment);
-  }
-  const auto batch = simulate(sheet, environments, 30, {}, 2);
-  const auto reversed = simulate(sheet, {environments.rbegin(), environments.rend()}, 30, {}, 1);
-  for (size_t e = 0; e < environments.size(); ++e) {
-    const auto alone = simulate(sheet, {environments[e]}, 30, {}, 1);
-    EXPECT_EQ(batch[e].positions.back(), alone[0].positions.back());
-    EXPECT_EQ(batch[e].positions.back(), reversed[environments.size() - 1 - e].positions.back());
   }
 }
 

@@ -33,7 +33,7 @@ TEST(SearchMemory, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
   }
   ASSERT_LT(steps.size(), static_cast<std::size_t>(replay.steps));
   const double motion = static_cast<double>(steps.size() * sizeof(double)) *
-                        static_cast<double>(replay.sheet.rest.vertices.size());
+                        static_cast<double>(replay.sheet().rest.vertices.size());
   // Three of the search's mesh while three of four times as many vertices are made splines of, held twice.
   EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).kept, (3 + 2 * 3 * 4) * motion);
 }
@@ -42,13 +42,20 @@ TEST(SearchMemory, GrowsWithWhatIsInWorkAtOnce) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_lift(folder)};
   GridSettings grid = grid_over("1e-4:4e-4:9:log");
-  const double one = estimate_memory(replays, grid, false).simulation;
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * one);  // of half the cell
-  grid.threads = 6;
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, false).simulation, 6 * one);
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 6 * one);  // checks come one by one
-  grid.envs = 5;                                                               // the fewer of the two
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, false).simulation, 5 * one);
+  const auto simulation = [&](int envs, int threads) {
+    grid.envs = envs;
+    grid.threads = threads;
+    return estimate_memory(replays, grid, false).simulation;
+  };
+  // A solver a thread; of each candidate the motion in its batch and the one that is scored.
+  const double solver = sim::solver_bytes_per_vertex * vertices_of(replays.front());
+  EXPECT_DOUBLE_EQ(simulation(9, 6) - simulation(9, 1), 5 * solver);
+  EXPECT_DOUBLE_EQ(simulation(9, 1) - simulation(4, 1), 5 * 2 * motion_bytes(replays.front()));
+  EXPECT_DOUBLE_EQ(simulation(64, 1), simulation(9, 1));  // there are no more candidates
+  EXPECT_DOUBLE_EQ(simulation(5, 6), simulation(5, 5));   // nor threads than environments
+  // The check on half the cell takes one candidate of four times as many vertices.
+  const double one = simulation(1, 1);
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * one);
 }
 
 }  // namespace

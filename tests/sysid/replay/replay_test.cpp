@@ -223,10 +223,13 @@ TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {
     replay.recording = recording;
     replay.recording.mesh = data::parse_mesh_spec("sheet:0.2x0.05:" + std::to_string(cell));
     replay.recording.start = replay.recording.mesh.vertices;
-    replay.sheet = sim::make_sheet(replay.recording.mesh);
-    if (slopes) stiffen_clamped(replay);
+    sim::Sheet sheet = sim::make_sheet(replay.recording.mesh);
+    if (slopes) stiffen_clamped(replay, sheet);
+    replay.plan = sim::make_sheet_plan(sheet);
     replay.steps = 30;
-    const data::Points& last = run(replay, {{material, {}}}).front().motion.positions.back();
+    data::Points last;
+    run(replay, {{material, {}}}, {replay.steps},
+        [&](std::size_t, ReplayResult result) { last = result.motion.positions.back(); });
     for (Eigen::Index i = 0; i < last.rows(); ++i)
       if ((replay.recording.mesh.vertices.row(i) - Eigen::RowVector3d(0.1, 0, 0)).norm() < 1e-9)
         return last(i, 2);

@@ -1,0 +1,187 @@
+#include "sim/batch.h"
+
+#include <algorithm>
+#include <optional>
+#include <stdexcept>
+
+#include "data/error.h"
+#include "data/parallel.h"
+
+namespace flash::sim {
+
+using data::Points;
+
+struct Batch::Storage {
+  std::shared_ptr<const SheetPlan> plan;
+  std::vector<Environment> environments;
+  BatchSettings settings;
+  std::vector<std::optional<Solver>> solvers;  ///< of environments under way
+  int step = 0;
+  std::ptrdiff_t vertices = 0, grasps = 0;
+  std::vector<double> positions, velocities, kept, grasp_forces;
+  std::vector<StepStats> stats;
+
+  std::ptrdiff_t steps() const { return settings.steps - settings.first_step; }
+
+  double* kept_at(std::ptrdiff_t e, std::ptrdiff_t index) {
+    return kept.data() + (e * static_cast<std::ptrdiff_t>(settings.kept_steps.size()) + index) * 3 * vertices;
+  }
+
+  /// Keeps the positions of environment e where they are wanted.
+  void keep(int e, int at) {
+    const auto& wanted = settings.kept_steps;
+    const auto found = std::lower_bound(wanted.begin(), wanted.end(), at);
+    if (found == wanted.end() || *found != at) return;
+    const Points& x = environments[e].state.positions;
+    std::copy(x.data(), x.data() + x.size(), kept_at(e, found - wanted.begin()));
+  }
+
+  /// Copies the state of environment e to where all are side by side.
+  void show(int e) {
+    const State& state = environments[e].state;
+    std::copy(state.positions.data(), state.positions.data() + 3 * vertices,
+              positions.data() + e * 3 * vertices);
+    std::copy(state.velocities.data(), state.velocities.data() + 3 * vertices,
+              velocities.data() + e * 3 * vertices);
+  }
+
+  void take_step(int e, int before) {
+    std::optional<Solver>& solver = solvers[e];
+    if (!solver) solver.emplace(plan, settings.solver);
+    if (before % restart_interval == 0) solver->forget();
+    const StepReport report = solver->step(environments[e]);
+    const std::ptrdiff_t place = e * steps() + before - settings.first_step;
+    stats[place] = {report.residual,       report.penetration_max, report.iterations, report.solves,
+                    report.factorizations, report.substeps,        report.converged};
+    for (std::ptrdiff_t k = 0; k < grasps; ++k)
+      std::copy(report.grasp_forces[k].data(), report.grasp_forces[k].data() + 3,
+                grasp_forces.data() + (place * grasps + k) * 3);
+    keep(e, before + 1);
+  }
+};
+
+namespace {
+
+void check(const SheetPlan& plan, const std::vector<Environment>& environments,
+           const BatchSettings& settings) {
+  const auto require = [](bool met, const char* what) {
+    if (!met) throw std::invalid_argument(what);
+  };
+  require(settings.first_step >= 0 && settings.steps >= settings.first_step,
+          "batch: the steps have to ascend from first_step to steps");
+  const std::vector<int>& kept = settings.kept_steps;
+  require(std::adjacent_find(kept.begin(), kept.end(), std::greater_equal<>()) == kept.end(),
+          "batch: kept_steps have to ascend");
+  require(kept.empty() || (kept.front() >= settings.first_step && kept.back() <= settings.steps),
+          "batch: kept_steps have to lie between first_step and steps");
+  for (const Environment& environment : environments) {
+    require(environment.state.positions.rows() == plan.pattern.size &&
+                environment.state.velocities.rows() == plan.pattern.size,
+            "batch: every environment needs a position and a velocity for each vertex of the plan");
+    require(environment.grasps.size() == environments.front().grasps.size(),
+            "batch: all environments need the same number of grasps");
+  }
+}
+
+/// Of numbers that lie densely, the last index fastest.
+View<double> dense(const std::vector<double>& numbers, std::vector<std::ptrdiff_t> shape, Device device) {
+  View<double> view{numbers.data(), std::move(shape), {}, device};
+  view.strides.resize(view.shape.size());
+  std::ptrdiff_t stride = 1;
+  for (std::size_t k = view.shape.size(); k-- > 0; stride *= view.shape[k]) view.strides[k] = stride;
+  return view;
+}
+
+}  // namespace
+
+Batch::Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments,
+             BatchSettings settings)
+    : storage_(std::make_unique<Storage>()) {
+  check(*plan, environments, settings);
+  Storage& s = *storage_;
+  s.plan = std::move(plan);
+  s.environments = std::move(environments);
+  s.settings = std::move(settings);
+  s.step = s.settings.first_step;
+  s.vertices = s.plan->pattern.size;
+  const std::size_t count = s.environments.size(), numbers = count * 3 * s.vertices;
+  s.grasps = count > 0 ? static_cast<std::ptrdiff_t>(s.environments.front().grasps.size()) : 0;
+  s.solvers.resize(count);
+  s.positions.resize(numbers);
+  s.velocities.resize(numbers);
+  s.kept.resize(numbers * s.settings.kept_steps.size());
+  s.stats.resize(count * s.steps());
+  s.grasp_forces.resize(3 * s.grasps * s.stats.size());
+  for (int e = 0; e < size(); ++e) {
+    s.keep(e, s.step);
+    s.show(e);
+  }
+}
+
+Batch::~Batch() = default;
+Batch::Batch(Batch&&) noexcept = default;
+
+int Batch::size() const { return static_cast<int>(storage_->environments.size()); }
+int Batch::step() const { return storage_->step; }
+
+void Batch::advance(int steps, const std::function<void(int)>& finished) {
+  Storage& s = *storage_;
+  if (steps < 0 || steps > s.settings.steps - s.step)
+    throw std::invalid_argument("batch: it cannot advance beyond its last step");
+  const std::atomic<bool>* stop = s.settings.solver.stop;
+  data::for_each_in_parallel(s.environments.size(), s.settings.threads, [&](std::size_t index) {
+    const int e = static_cast<int>(index);
+    for (int k = 0; k < steps; ++k) {
+      if (stop != nullptr && *stop) throw data::Stopped();
+      s.take_step(e, s.step + k);
+    }
+    s.show(e);
+    if (s.step + steps == s.settings.steps) s.solvers[e].reset();
+    if (finished) finished(e);
+  });
+  s.step += steps;
+}
+
+const State& Batch::state(int environment) const { return storage_->environments[environment].state; }
+
+View<double> Batch::positions() const {
+  return dense(storage_->positions, {size(), storage_->vertices, 3}, storage_->settings.device);
+}
+
+View<double> Batch::velocities() const {
+  return dense(storage_->velocities, {size(), storage_->vertices, 3}, storage_->settings.device);
+}
+
+View<double> Batch::kept_positions() const {
+  const Storage& s = *storage_;
+  return dense(s.kept, {size(), std::ssize(s.settings.kept_steps), s.vertices, 3}, s.settings.device);
+}
+
+View<double> Batch::grasp_forces() const {
+  const Storage& s = *storage_;
+  return dense(s.grasp_forces, {size(), s.steps(), s.grasps, 3}, s.settings.device);
+}
+
+std::span<const StepStats> Batch::stats(int environment) const {
+  const auto steps = static_cast<std::size_t>(storage_->steps());
+  return std::span(storage_->stats).subspan(environment * steps, steps);
+}
+
+Eigen::Map<const Points> Batch::kept_positions(int environment, int index) const {
+  return {storage_->kept_at(environment, index), storage_->vertices, 3};
+}
+
+void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t count, int at_once,
+                       const BatchSettings& settings,
+                       const std::function<Environment(std::size_t)>& environment_of,
+                       const std::function<void(std::size_t, const Batch&, int)>& finished) {
+  for (std::size_t first = 0; first < count; first += at_once) {
+    std::vector<Environment> environments;
+    for (std::size_t i = first; i < std::min(count, first + at_once); ++i)
+      environments.push_back(environment_of(i));
+    Batch batch(plan, std::move(environments), settings);
+    batch.advance(settings.steps - settings.first_step, [&](int e) { finished(first + e, batch, e); });
+  }
+}
+
+}  // namespace flash::sim

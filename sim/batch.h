@@ -1,0 +1,90 @@
+#pragma once
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "sim/environment.h"
+#include "sim/sheet_plan.h"
+#include "sim/solver.h"
+
+namespace flash::sim {
+
+/// Where a batch computes and keeps its numbers.
+enum class Device { cpu };
+
+/// Numbers that a Batch owns, as DLPack describes them: valid until the batch advances or ends.
+template <class Number>
+struct View {
+  const Number* data = nullptr;
+  std::vector<std::ptrdiff_t> shape, strides;  ///< strides in numbers, not bytes
+  Device device = Device::cpu;
+};
+
+/// How one step of one environment went, in numbers alone.
+struct StepStats {
+  double residual = 0;         ///< as in StepReport
+  double penetration_max = 0;  ///< deepest vertex below a surface [m]
+  int iterations = 0, solves = 0, factorizations = 0, substeps = 0;
+  bool converged = false;
+};
+
+struct BatchSettings {
+  SolverSettings solver{};
+  int steps = 0;                  ///< of the whole replay
+  std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; 0 is the start
+  int first_step = 0;             ///< at which the states of the environments stand
+  int threads = 1;                ///< 0: one a processor
+  Device device = Device::cpu;
+};
+
+/// Steps after which a solver forgets what it holds besides the state of its environment: a replay that goes
+/// on from a state at a multiple of them is bitwise the one that was not interrupted.
+inline constexpr int restart_interval = 50;
+
+/// Many environments over one plan, each with its own material, for a whole replay. Environment e of a batch
+/// equals the same environment alone, bitwise, on any number of threads and however often it advances.
+class Batch {
+ public:
+  /// Throws std::invalid_argument where the environments do not have the plan's vertices and the same number
+  /// of grasps, or the steps do not ascend from first_step to `steps`.
+  Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments, BatchSettings settings);
+  ~Batch();
+  Batch(Batch&&) noexcept;
+
+  int size() const;
+  int step() const;  ///< steps taken, first_step included
+
+  /// Takes the next `steps` steps of each environment. The thread that took them calls `finished` with the
+  /// number of the environment, so that its results can be used while others go on. Unconverged steps are
+  /// in the statistics, never thrown. Throws what a worker threw, data::Stopped where settings.solver.stop
+  /// ended it; after that the batch stands at no step.
+  void advance(int steps, const std::function<void(int)>& finished = {});
+
+  /// Of one environment: what another batch needs to go on from here.
+  const State& state(int environment) const;
+
+  View<double> positions() const;       ///< environments x vertices x 3 [m]
+  View<double> velocities() const;      ///< environments x vertices x 3 [m/s]
+  View<double> kept_positions() const;  ///< environments x kept steps x vertices x 3 [m]
+  View<double> grasp_forces() const;    ///< gripper on sheet: environments x steps x grasps x 3 [N]
+  std::span<const StepStats> stats(int environment) const;  ///< a step each, from first_step on
+
+  /// Positions of one environment at the kept step `index` of settings.kept_steps [m].
+  Eigen::Map<const data::Points> kept_positions(int environment, int index) const;
+
+ private:
+  struct Storage;
+  std::unique_ptr<Storage> storage_;
+};
+
+/// Replays any number of environments whole, in batches of at most `at_once`, so that memory holds those
+/// alone: `environment_of` makes number i just before its batch, `finished` gets i, its batch and its place
+/// there, on the thread that simulated it. Throws as Batch does.
+void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t count, int at_once,
+                       const BatchSettings& settings,
+                       const std::function<Environment(std::size_t)>& environment_of,
+                       const std::function<void(std::size_t, const Batch&, int)>& finished);
+
+}  // namespace flash::sim
