@@ -1,4 +1,4 @@
-#include "calib/plan.h"
+#include "calib/calibrate/next_poses.h"
 
 #include <cstdio>
 #include <iostream>
@@ -9,8 +9,8 @@
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
-#include "calib/calibrate_images.h"
-#include "calib/extrinsics.h"
+#include "calib/calibrate/calibrate_images.h"
+#include "calib/calibrate/extrinsics.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"

@@ -2,8 +2,8 @@
 #include <random>
 #include <vector>
 
-#include "calib/hand_eye.h"
-#include "calib/projection.h"
+#include "calib/geometry/projection.h"
+#include "calib/solve/errors_in_variables.h"
 
 namespace flash::calib {
 
