@@ -7,6 +7,7 @@
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
 #include "calib/detect/finder.h"
+#include "calib/detect/grey_image.h"
 #include "calib/detect/intrinsics.h"
 #include "data/error.h"
 #include "data/json_reader.h"

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calib/dataset/dataset.h"
+#include "calib/dataset/detection.h"
 #include "calib/dataset/target.h"
 #include "calib/detect/detect.h"
 #include "calib/solve/target_size.h"

@@ -22,14 +22,6 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
-std::vector<PoseLoop> loops_of(Setup setup, const std::vector<Observation>& observations) {
-  std::vector<PoseLoop> loops;
-  loops.reserve(observations.size());
-  for (const Observation& o : observations)
-    loops.push_back(pose_loop(setup, o.T_base_gripper, o.T_camera_target.front()));
-  return loops;
-}
-
 std::vector<Eigen::Isometry3d> target_poses(const std::vector<Observation>& observations) {
   std::vector<Eigen::Isometry3d> poses;
   poses.reserve(observations.size());
@@ -46,10 +38,10 @@ void expect_enough(std::size_t used, std::size_t all, int least) {
 
 /// Refuses input that closes only when it is read otherwise than stated, or not at all.
 void expect_convention(Setup setup, const std::vector<Observation>& observations,
-                       const std::vector<Symmetry>& symmetries, const Consistency& stated,
+                       const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
                        const CalibrateSettings& settings) {
   const std::optional<Finding> finding =
-      diagnose(setup, observations, symmetries, stated, settings.angles, settings.doctor);
+      check_convention(setup, observations, symmetries, stated, settings.angles, settings.convention);
   if (finding) throw data::InputError(finding->sentence);
   if (stated.found && stated.score < settings.hopeless) return;
   char text[240];
@@ -93,7 +85,7 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
       text, sizeof text,
       "would need its robot pose corrected by %.2f deg and %.1f mm, %.0f times what most views need",
       xi.tail<3>().norm() / kDegree, 1e3 * xi.head<3>().norm(), std::sqrt(squared[worst] / (6 * usual)));
-  ViewVerdict& verdict = result.repair.views[static_cast<std::size_t>(result.used[worst])];
+  ViewVerdict& verdict = result.selection.views[static_cast<std::size_t>(result.used[worst])];
   verdict.used = false;
   verdict.reason = text;
   observations.erase(observations.begin() + static_cast<std::ptrdiff_t>(worst));
@@ -102,10 +94,10 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
 }
 
 void report_views(Calibration& result) {
-  result.views.resize(result.repair.views.size());
+  result.views.resize(result.selection.views.size());
   for (std::size_t i = 0; i < result.views.size(); ++i) {
-    result.views[i].used = result.repair.views[i].used;
-    result.views[i].reason = result.repair.views[i].reason;
+    result.views[i].used = result.selection.views[i].used;
+    result.views[i].reason = result.selection.views[i].reason;
   }
   const Bundle& bundle = result.refined.bundle;
   for (const BundleView& view : bundle.views) {
@@ -149,24 +141,20 @@ void flag_wild_pixels(std::vector<ComparedMethod>& closed_forms) {
 
 void compare_methods(Calibration& result, const std::vector<Observation>& observations, const Bundle& plain,
                      RefineSettings settings, const CalibrateSettings& calibrate) {
-  const std::vector<PoseLoop> loops = loops_of(result.setup, observations);
+  const std::vector<PoseLoop> loops = pose_loops(result.setup, observations);
   const std::vector<Eigen::Isometry3d> poses = target_poses(observations);
   Bundle bundle = plain;
   settings.noise = result.refined.noise;
   const auto hold = [&](Method method) {
     return hold_out(result.refined.bundle, poses, method, settings, calibrate.folds, calibrate.threads);
   };
-  for (const ReferenceMethod& reference : reference_methods(loops)) {
-    ComparedMethod& method = result.comparison.emplace_back();
-    method.name = reference.name;
-    method.poses = reference.poses;
-    method.relative = reference.relative;
-    method.wild = reference.wild;
-    bundle.cameras.front() = reference.poses.X;
-    bundle.targets.front() = reference.poses.Z;
+  result.comparison = compare_closed_forms(loops, calibrate.closed_forms);
+  for (ComparedMethod& method : result.comparison) {
+    bundle.cameras.front() = method.poses.X;
+    bundle.targets.front() = method.poses.Z;
     method.px = reprojection_rms(bundle, false);
-    if (reference.name == "park") method.held_out = hold(Method::park);
-    if (reference.name == "shah") method.held_out = hold(Method::shah);
+    if (method.name == "park") method.held_out = hold(Method::park);
+    if (method.name == "shah") method.held_out = hold(Method::shah);
   }
   flag_wild_pixels(result.comparison);
   for (const Method kind : {Method::bundle, Method::errors_in_variables}) {
@@ -187,7 +175,7 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
                        const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                        const RefineSettings& refine_settings, const CalibrateSettings& settings) {
   for (;;) {
-    const HandEyePoses seed = shah(loops_of(result.setup, observations));
+    const HandEyePoses seed = shah(pose_loops(result.setup, observations));
     Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
     result.refined = refine(plain, refine_settings);
     const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
@@ -197,9 +185,9 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
 
 /// Errors that change smoothly with the robot's pose have a part that all views share: it comes on top.
 /// Returns by how much the variances have grown in the mean.
-double add_smooth_errors(Calibration& result, const BundleSettings& settings) {
+double add_correlated_pose_errors(Calibration& result, const BundleSettings& settings) {
   const SystematicUncertainty systematic = systematic_uncertainty(result.refined, settings);
-  const SmoothErrors& errors = result.smooth_errors.emplace(systematic.arms.front());
+  const CorrelatedPoseErrors& errors = result.pose_errors.emplace(systematic.arms.front());
   if (!errors.found) return 1;
   const Matrix6d noise = result.covariance;
   result.covariance = systematic.covariance.topLeftCorner<6, 6>();
@@ -267,8 +255,8 @@ void warn(Calibration& result) {
   if (missing > 0)
     result.warnings.push_back(std::to_string(missing) + " of " + std::to_string(result.views.size()) +
                               " views were not used");
-  if (result.repair.renumbered > 0)
-    result.warnings.push_back(std::to_string(result.repair.renumbered) +
+  if (result.selection.renumbered > 0)
+    result.warnings.push_back(std::to_string(result.selection.renumbered) +
                               " views had the target numbered from its other end; put right");
   if (!result.refined.converged) {
     result.warnings.insert(result.warnings.begin(), "the refinement did not converge");
@@ -278,6 +266,8 @@ void warn(Calibration& result) {
 
 }  // namespace
 
+bool has_pixels(const Calibration& calibration) { return !calibration.refined.bundle.cameras.empty(); }
+
 std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& all,
                                  const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings) {
   std::vector<Eigen::Isometry3d> reported;
@@ -286,9 +276,9 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
   expect_enough(reported.size(), all.size(), settings.least_views);
   const std::string reason = degeneracy(rotation_diversity(reported));
   if (!reason.empty()) throw data::InputError(reason);
-  result.repair = repair_views(result.setup, all, symmetries, settings.repair);
-  expect_convention(result.setup, all, symmetries, result.repair.consistency, settings);
-  std::vector<Observation> observations = used_observations(result.repair, &result.used);
+  result.selection = select_views(result.setup, all, symmetries, settings.selection);
+  expect_convention(result.setup, all, symmetries, result.selection.robust_seed, settings);
+  std::vector<Observation> observations = used_observations(result.selection, &result.used);
   expect_enough(observations.size(), all.size(), settings.least_views);
   return observations;
 }
@@ -316,7 +306,7 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
 
   RefineSettings refine_settings = settings.refine;
   refine_settings.bundle.unknowns.scales = settings.target_size == TargetSize::solved;
-  const auto start = std::tuple(observations, result.used, result.repair);
+  const auto start = std::tuple(observations, result.used, result.selection);
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
   const auto check_scale = [&] {
     const std::vector<ScaleCheck> checks = check_scales(result.refined, refine_settings);
@@ -329,7 +319,7 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
         "out, or add views farther apart");
   if (settings.target_size == TargetSize::automatic && result.scale && clearly_off(*result.scale)) {
     // Views that a wrong size made look wrong come back.
-    std::tie(observations, result.used, result.repair) = start;
+    std::tie(observations, result.used, result.selection) = start;
     refine_settings.bundle.unknowns.scales = true;
     plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
     check_scale();
@@ -347,7 +337,7 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.chain_rms = reprojection_rms(bundle, false);
   result.centre_rms = centre_rms(bundle, target_poses(observations));
   compare_methods(result, observations, plain, refine_settings, settings);
-  const double grown = add_smooth_errors(result, refine_settings.bundle);
+  const double grown = add_correlated_pose_errors(result, refine_settings.bundle);
   check_splits(result, refine_settings.bundle, settings, grown);
   finish(result, observations);
   return result;

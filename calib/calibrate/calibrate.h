@@ -3,7 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "calib/check/opencv_closed_forms.h"
+#include "calib/calibrate/method_comparison.h"
+#include "calib/dataset/symmetry.h"
 #include "calib/solve/convention_check.h"
 #include "calib/solve/errors_in_variables.h"
 #include "calib/solve/target_size.h"
@@ -15,26 +16,17 @@
 namespace flash::calib {
 
 struct CalibrateSettings {
-  RepairSettings repair;
-  DoctorSettings doctor;
+  ViewSelectionSettings selection;
+  ConventionSettings convention;
   std::vector<Eigen::Vector3d> angles;  ///< of each view, where the robot's file gave angles [rad]
   RefineSettings refine;
   int least_views = 4;    ///< fewer are refused
   double hopeless = 0.2;  ///< closing error of the majority beyond which nothing is solved, as `suspicious`
   double surprise = 35;   ///< squared size of a correction over that of most views, 6 degrees of freedom
   int folds = 10;         ///< of the held-out residuals
+  std::vector<ClosedForm> closed_forms = calib::closed_forms();  ///< of the comparison table
   TargetSize target_size = TargetSize::automatic;
   int threads = 1;  ///< of held-out residuals and splits; 0: one a processor
-};
-
-/// A method of the comparison table.
-struct ComparedMethod {
-  std::string name;
-  HandEyePoses poses;
-  ClosingError relative;  ///< rms of A X = X B over all pairs of views
-  double px = 0;          ///< reprojection through the chain, robot poses as reported, 2-D rms per corner
-  std::optional<HeldOut> held_out;
-  bool wild = false;
 };
 
 struct ViewResult {
@@ -47,7 +39,7 @@ struct ViewResult {
 
 struct Calibration {
   Setup setup = Setup::eye_in_hand;
-  Repair repair;
+  ViewSelection selection;
   std::vector<int> used;  ///< views in the solution, by their place in the set
   Refinement refined;
   HandEyePoses poses;
@@ -61,12 +53,15 @@ struct Calibration {
   RotationDiversity diversity;
   WeakestDirection weakest;
   std::optional<ScaleCheck> scale;
-  std::vector<SplitCheck> splits;             ///< of X, interleaved first; none where there are too few views
-  double covariance_factor = 1;               ///< by which the splits have widened the covariance
-  std::optional<SmoothErrors> smooth_errors;  ///< of the robot, which the covariance holds where found
-  std::vector<std::string> warnings;          ///< worst first
+  std::vector<SplitCheck> splits;  ///< of X, interleaved first; none where there are too few views
+  double covariance_factor = 1;    ///< by which the splits have widened the covariance
+  std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found
+  std::vector<std::string> warnings;                ///< worst first
   bool usable = true;
 };
+
+/// Pose pairs are seen by no camera.
+bool has_pixels(const Calibration& calibration);
 
 /// What all calibrations start with: enough views, enough axes, numbering and planar poses chosen, a
 /// convention that closes. Returns the observations in use and fills `result` so far. Throws
@@ -77,9 +72,9 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
 /// What all end with: views, observability, warnings.
 void finish(Calibration& result, const std::vector<Observation>& used);
 
-/// From observations to the answer: repair, seed, bundle, errors in variables, a second look for views that
-/// do not belong, held-out residuals, comparison. Throws data::InputError where too few views are left or
-/// nothing can be determined, with the one sentence that names the cause.
+/// From observations to the answer: views selected, seed, bundle, errors in variables, a second look for
+/// views that do not belong, held-out residuals, comparison. Throws data::InputError where too few views are
+/// left or nothing can be determined, with the one sentence that names the cause.
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& observations,
                       const CalibrateSettings& settings = {});

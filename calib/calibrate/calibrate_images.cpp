@@ -1,9 +1,9 @@
 #include "calib/calibrate/calibrate_images.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "calib/dataset/symmetry.h"
 #include "calib/solve/linearization.h"
 #include "data/error.h"
 
@@ -107,7 +107,7 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
       offset.sd *=
           std::sqrt(result.covariance.trace() / result.refined.covariance.topLeftCorner<6, 6>().trace());
       for (const std::size_t i : beyond)
-        result.repair.views[i].reason = result.views[i].reason =
+        result.selection.views[i].reason = result.views[i].reason =
             "its time lies beyond the poses of " + dataset.poses_path;
       return result;
     }
@@ -144,14 +144,9 @@ void report_depth(const DepthUse& use, const Unknowns& unknowns, ImageCalibratio
 
 }  // namespace
 
-std::vector<Symmetry> confusable_symmetries(const Target& target) {
-  std::vector<Symmetry> all = grid_symmetries(target_points(target));
-  if (target.kind != TargetKind::chessboard && target.kind != TargetKind::circle_grid) all.resize(1);
-  return all;
-}
-
 ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Target& target,
-                                  const std::vector<Detection>& detections, CalibrateSettings settings) {
+                                  const std::vector<Detection>& detections,
+                                  const std::optional<DepthViews>& depth, CalibrateSettings settings) {
   constexpr double kTie = 1.05;
   for (const Frame& frame : dataset.frames)
     if (frame.angles) settings.angles.push_back(*frame.angles);
@@ -161,11 +156,6 @@ ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Tar
     throw data::InputError(dataset.poses_path +
                            ": found one pose a picture, expected a stream of poses over time, with pictures "
                            "named by their time, to find a time offset");
-  std::optional<DepthViews> depth;
-  if (std::any_of(dataset.frames.begin(), dataset.frames.end(),
-                  [](const Frame& frame) { return !frame.depth.empty(); }))
-    depth = read_depth(dataset, detections);
-
   const Problem problem{setup, *dataset.camera, target_points(target), confusable_symmetries(target)};
   const std::vector<RefinerScore> ranking = rank_refiners(detections);
   const auto calibrated = [&](const std::string& refiner) {
@@ -188,21 +178,6 @@ ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Tar
   if (dataset.stream && !timed) check_time(dataset, settings, best.calibration);
   if (depth) report_depth(depth->use, settings.refine.bundle.unknowns, best);
   return best;
-}
-
-CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
-                       const Target& target, const Calibration& calibration) {
-  CellMember member{.arm = arm, .camera = camera, .setup = calibration.setup, .intrinsics = *dataset.camera};
-  member.points = target_points(target);
-  member.symmetries = confusable_symmetries(target);
-  member.poses = calibration.poses;
-  member.covariance = calibration.covariance;
-  for (const int i : calibration.used) {
-    const auto view = static_cast<std::size_t>(i);
-    member.observations.push_back(calibration.repair.observations[view]);
-    member.stamps.push_back(dataset.frames[view].stamp);
-  }
-  return member;
 }
 
 }  // namespace flash::calib

@@ -85,6 +85,21 @@ std::string size_notice(const ScaleCheck& scale) {
 
 }  // namespace
 
+CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
+                       const Target& target, const Calibration& calibration) {
+  CellMember member{.arm = arm, .camera = camera, .setup = calibration.setup, .intrinsics = *dataset.camera};
+  member.points = target_points(target);
+  member.symmetries = confusable_symmetries(target);
+  member.poses = calibration.poses;
+  member.covariance = calibration.covariance;
+  for (const int i : calibration.used) {
+    const auto view = static_cast<std::size_t>(i);
+    member.observations.push_back(calibration.selection.observations[view]);
+    member.stamps.push_back(dataset.frames[view].stamp);
+  }
+  return member;
+}
+
 Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::string>* notices) {
   const std::vector<std::string> arms = names_of(members, &CellMember::arm);
   const std::vector<std::string> cameras = names_of(members, &CellMember::camera);

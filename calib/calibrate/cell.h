@@ -1,10 +1,13 @@
 #pragma once
-#include <nlohmann/json_fwd.hpp>
-#include <optional>
+#include <Eigen/Geometry>
 #include <string>
 #include <vector>
 
+#include "calib/calibrate/calibrate.h"
 #include "calib/calibrate/extrinsics.h"
+#include "calib/dataset/dataset.h"
+#include "calib/dataset/symmetry.h"
+#include "calib/dataset/target.h"
 #include "calib/solve/target_size.h"
 
 namespace flash::calib {
@@ -21,6 +24,10 @@ struct CellMember {
   HandEyePoses poses = {};                     ///< of the calibration by itself
   Matrix6d covariance = Matrix6d::Zero();
 };
+
+/// The views in use as a member of a cell.
+CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
+                       const Target& target, const Calibration& calibration);
 
 /// A frame of the cell in the base of the first arm (eye-in-hand: cameras in the gripper).
 struct CellFrame {
@@ -52,8 +59,5 @@ Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& se
 
 /// Covariance of where a point lies, p in the frame's child, seen from its parent [m^2].
 Eigen::Matrix3d point_covariance(const CellFrame& frame, const Eigen::Vector3d& p);
-
-/// "flash-cell/1". workspace: a point in the first base; each base carries its standard deviation there.
-nlohmann::ordered_json to_json(const Cell& cell, const std::optional<Eigen::Vector3d>& workspace);
 
 }  // namespace flash::calib

@@ -1,11 +1,10 @@
 #pragma once
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "calib/calibrate/calibrate.h"
-#include "calib/detect/read_depth.h"
+#include "calib/dataset/depth_use.h"
 #include "calib/solve/time_offset.h"
 #include "data/extrinsics.h"
 
@@ -44,28 +43,10 @@ struct Extrinsics {
   ExtrinsicsInputs inputs;
 };
 
-const char* to_string(Setup setup);  ///< "eye-in-hand", "eye-to-hand"
-/// Throws data::InputError naming `source` and `field`.
-Setup parse_setup(const std::string& text, const std::string& source, const std::string& field);
-
 Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs);
-
-/// Everything that formats.md asks for: transform, covariance, noise, residuals, comparison, views,
-/// observability, findings, scale, warnings, provenance.
-nlohmann::ordered_json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code);
 
 /// Throws data::InputError naming file, field, what was found and what was expected; also where the
 /// calibration ended with exit code 3, unless `accept_unusable`, which is what --force says.
 Extrinsics load_extrinsics(const std::string& path, bool accept_unusable = false);
-
-/// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
-nlohmann::ordered_json to_json(const NamedTransform& transform);
-
-/// `ros2 run tf2_ros static_transform_publisher --x ... --frame-id parent --child-frame-id child`
-std::string ros_static_transform(const NamedTransform& transform);
-/// A fixed joint, roll, pitch and yaw about fixed x, y, z.
-std::string urdf_joint(const NamedTransform& transform);
-/// easy_handeye2's calibration file.
-std::string easy_handeye2(const NamedTransform& transform, Setup setup);
 
 }  // namespace flash::calib

@@ -124,7 +124,7 @@ Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
   Plan plan;
   plan.visible = static_cast<int>(candidates.size());
   double length = 0;
-  for (const Observation& observation : calibration.repair.observations)
+  for (const Observation& observation : calibration.selection.observations)
     if (!observation.T_camera_target.empty())
       length = std::max(length, observation.T_camera_target.front().translation().norm());
 

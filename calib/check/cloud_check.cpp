@@ -144,9 +144,9 @@ TargetCloud target_cloud(const data::DepthImage& depth, double depth_scale, cons
   return cloud;
 }
 
-Accumulation accumulate(Setup setup, const Eigen::Isometry3d& X, const std::vector<TargetCloud>& clouds,
+CloudCheck check_clouds(Setup setup, const Eigen::Isometry3d& X, const std::vector<TargetCloud>& clouds,
                         const std::vector<Eigen::Isometry3d>& T_base_gripper) {
-  Accumulation result;
+  CloudCheck result;
   std::vector<Resting> resting;
   std::vector<Plane> planes;
   std::map<int, std::pair<Eigen::Vector3d, int>> corner_sums;

@@ -6,7 +6,7 @@
 
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target.h"
-#include "calib/detect/rectifier.h"
+#include "calib/detect/grey_image.h"
 #include "data/camera.h"
 #include "data/depth_image.h"
 #include "data/picture.h"
@@ -38,7 +38,7 @@ struct CloudView {
 
 /// All views laid on each other in the frame in which the target rests: the base (eye-in-hand) or the
 /// gripper.
-struct Accumulation {
+struct CloudCheck {
   std::vector<CloudView> views;
   double thickness_mm = 0;  ///< rms distance of all points from their common plane
   double noise_mm =
@@ -51,7 +51,7 @@ struct Accumulation {
 };
 
 /// X as in Setup. Throws data::InputError where fewer than two views have points.
-Accumulation accumulate(Setup setup, const Eigen::Isometry3d& X, const std::vector<TargetCloud>& clouds,
+CloudCheck check_clouds(Setup setup, const Eigen::Isometry3d& X, const std::vector<TargetCloud>& clouds,
                         const std::vector<Eigen::Isometry3d>& T_base_gripper);
 
 }  // namespace flash::calib

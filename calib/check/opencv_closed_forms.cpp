@@ -1,8 +1,5 @@
 #include "calib/check/opencv_closed_forms.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 
@@ -63,42 +60,28 @@ HandEyePoses robot_world(const std::vector<PoseLoop>& loops, cv::RobotWorldHandE
           pose_of(R_base_world, t_base_world).inverse()};
 }
 
+/// None where OpenCV refuses the motion.
+template <class Solve, class Method>
+ClosedForm closed_form(const char* name, Solve solve, Method method) {
+  return {name, [solve, method](const std::vector<PoseLoop>& loops) -> std::optional<HandEyePoses> {
+            try {
+              return solve(loops, method);
+            } catch (const cv::Exception&) {
+              return std::nullopt;
+            }
+          }};
+}
+
 }  // namespace
 
-std::vector<ReferenceMethod> reference_methods(const std::vector<PoseLoop>& loops) {
-  std::vector<ReferenceMethod> methods;
-  const auto add = [&](const char* name, const auto& solve) {
-    ReferenceMethod method{.name = name, .poses = {}, .relative = {}};
-    try {
-      method.poses = solve();
-      method.relative = relative_rms(loops, method.poses.X);
-    } catch (const cv::Exception&) {
-      method.wild = true;  // some refuse a motion they cannot use
-    }
-    if (!method.poses.X.matrix().allFinite() || !std::isfinite(method.relative.rotation)) method.wild = true;
-    methods.push_back(method);
-  };
-  for (const auto& [name, method] : {std::pair{"tsai", cv::CALIB_HAND_EYE_TSAI},
-                                     {"park", cv::CALIB_HAND_EYE_PARK},
-                                     {"horaud", cv::CALIB_HAND_EYE_HORAUD},
-                                     {"andreff", cv::CALIB_HAND_EYE_ANDREFF},
-                                     {"daniilidis", cv::CALIB_HAND_EYE_DANIILIDIS}})
-    add(name, [&, method = method] { return hand_eye(loops, method); });
-  for (const auto& [name, method] :
-       {std::pair{"shah", cv::CALIB_ROBOT_WORLD_HAND_EYE_SHAH}, {"li", cv::CALIB_ROBOT_WORLD_HAND_EYE_LI}})
-    add(name, [&, method = method] { return robot_world(loops, method); });
-
-  double rotation = std::numeric_limits<double>::infinity(), translation = rotation;
-  for (const ReferenceMethod& method : methods) {
-    if (method.wild) continue;
-    rotation = std::min(rotation, method.relative.rotation);
-    translation = std::min(translation, method.relative.translation);
-  }
-  constexpr double kWild = 3;
-  for (ReferenceMethod& method : methods)
-    method.wild = method.wild || method.relative.rotation > kWild * rotation + 1e-6 ||
-                  method.relative.translation > kWild * translation + 1e-6;
-  return methods;
+std::vector<ClosedForm> opencv_closed_forms() {
+  return {closed_form("tsai", hand_eye, cv::CALIB_HAND_EYE_TSAI),
+          closed_form("park", hand_eye, cv::CALIB_HAND_EYE_PARK),
+          closed_form("horaud", hand_eye, cv::CALIB_HAND_EYE_HORAUD),
+          closed_form("andreff", hand_eye, cv::CALIB_HAND_EYE_ANDREFF),
+          closed_form("daniilidis", hand_eye, cv::CALIB_HAND_EYE_DANIILIDIS),
+          closed_form("shah", robot_world, cv::CALIB_ROBOT_WORLD_HAND_EYE_SHAH),
+          closed_form("li", robot_world, cv::CALIB_ROBOT_WORLD_HAND_EYE_LI)};
 }
 
 }  // namespace flash::calib

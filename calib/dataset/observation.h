@@ -3,14 +3,10 @@
 #include <string>
 #include <vector>
 
-namespace flash::calib {
+#include "calib/geometry/closed_form.h"
+#include "calib/geometry/setup.h"
 
-enum class Setup {
-  eye_in_hand,  ///< the camera rides on the gripper, the target stands still: X = T_gripper_camera, Z =
-                ///< T_base_target
-  eye_to_hand   ///< the camera stands still, the gripper holds the target: X = T_base_camera, Z =
-                ///< T_gripper_target
-};
+namespace flash::calib {
 
 /// What one view saw of the target, and where the robot said its gripper was.
 struct Observation {
@@ -24,5 +20,8 @@ struct Observation {
   Eigen::Matrix<double, 6, 1> velocity =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; of a stream
 };
+
+/// The closed chain through each view, with the first pose of its target.
+std::vector<PoseLoop> pose_loops(Setup setup, const std::vector<Observation>& observations);
 
 }  // namespace flash::calib

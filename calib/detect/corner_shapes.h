@@ -3,6 +3,7 @@
 #include <array>
 #include <optional>
 
+#include "calib/detect/grey_image.h"
 #include "calib/detect/rectifier.h"
 
 namespace flash::calib {

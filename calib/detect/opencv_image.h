@@ -4,7 +4,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "calib/detect/rectifier.h"
+#include "calib/detect/grey_image.h"
 
 namespace flash::calib {
 

@@ -25,7 +25,10 @@ std::string formatted(const char* format, const Values&... values) {
 
 }  // namespace
 
-DepthViews read_depth(const Dataset& dataset, const std::vector<Detection>& detections) {
+std::optional<DepthViews> read_depth(const Dataset& dataset, const std::vector<Detection>& detections) {
+  const bool none = std::all_of(dataset.frames.begin(), dataset.frames.end(),
+                                [](const Frame& frame) { return frame.depth.empty(); });
+  if (none) return std::nullopt;
   DepthViews views;
   views.points.resize(dataset.frames.size());
   DepthUse& use = views.use;

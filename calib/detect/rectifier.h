@@ -1,18 +1,10 @@
 #pragma once
 #include <Eigen/Core>
-#include <cstdint>
-#include <string>
 #include <vector>
 
 #include "data/camera.h"
-#include "data/depth_image.h"
 
 namespace flash::calib {
-
-using GreyImage = data::Image<std::uint8_t>;
-
-/// 8-bit grey of a png or jpg. Throws InputError where it cannot be read.
-GreyImage load_grey_image(const std::string& path);
 
 /// Between pixels as the lens draws them and rectified pixels, those of the same camera without distortion,
 /// in which straight things are straight. Tabulated for every pixel: shapes are fitted on the untouched pixel

@@ -1,8 +1,8 @@
 #pragma once
 #include <Eigen/Geometry>
 
-#include "calib/dataset/observation.h"
 #include "calib/geometry/pose.h"
+#include "calib/geometry/setup.h"
 
 namespace flash::calib {
 

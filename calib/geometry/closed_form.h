@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/dataset/observation.h"
+#include "calib/geometry/setup.h"
 
 namespace flash::calib {
 

@@ -1,7 +1,9 @@
+#include "calib/report/cell_json.h"
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "calib/calibrate/cell.h"
+#include "calib/report/extrinsics_json.h"
 
 namespace flash::calib {
 namespace {

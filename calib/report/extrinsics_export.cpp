@@ -1,7 +1,8 @@
+#include "calib/report/extrinsics_export.h"
+
 #include <cmath>
 #include <cstdio>
 
-#include "calib/calibrate/extrinsics.h"
 #include "data/trajectory.h"
 
 namespace flash::calib {
@@ -24,7 +25,7 @@ std::string formatted(const char* format, const Values&... values) {
 
 }  // namespace
 
-std::string ros_static_transform(const NamedTransform& transform) {
+std::string ros_static_transform(const data::NamedTransform& transform) {
   const Eigen::Matrix<double, 7, 1> v = data::to_vector(transform.T);
   return formatted(
       "ros2 run tf2_ros static_transform_publisher --x %.9g --y %.9g --z %.9g --qx %.9g --qy %.9g --qz %.9g "
@@ -33,7 +34,7 @@ std::string ros_static_transform(const NamedTransform& transform) {
       v[0], v[1], v[2], v[3], v[4], v[5], v[6], transform.parent.c_str(), transform.child.c_str());
 }
 
-std::string urdf_joint(const NamedTransform& transform) {
+std::string urdf_joint(const data::NamedTransform& transform) {
   const Eigen::Vector3d t = transform.T.translation(), rpy = roll_pitch_yaw(transform.T.linear());
   return formatted(
       "<joint name=\"%s_to_%s\" type=\"fixed\">\n  <parent link=\"%s\"/>\n  <child link=\"%s\"/>\n"
@@ -42,7 +43,7 @@ std::string urdf_joint(const NamedTransform& transform) {
       t.x(), t.y(), t.z(), rpy.x(), rpy.y(), rpy.z());
 }
 
-std::string easy_handeye2(const NamedTransform& transform, Setup setup) {
+std::string easy_handeye2(const data::NamedTransform& transform, Setup setup) {
   const Eigen::Matrix<double, 7, 1> v = data::to_vector(transform.T);
   const bool in_hand = setup == Setup::eye_in_hand;
   return formatted(

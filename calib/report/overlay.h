@@ -1,7 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 
-#include "calib/detect/rectifier.h"
+#include "calib/detect/grey_image.h"
 #include "data/picture.h"
 
 namespace flash::calib {

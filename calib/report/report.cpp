@@ -6,7 +6,9 @@
 #include <numeric>
 #include <string_view>
 
+#include "calib/detect/grey_image.h"
 #include "calib/geometry/chain.h"
+#include "calib/report/extrinsics_export.h"
 #include "data/html_page.h"
 #include "data/trajectory.h"
 
@@ -86,7 +88,7 @@ std::vector<SeenView> seen_views(const Calibration& calibration, const Eigen::Ma
     entry.corrected = view.pixels - residuals(bundle, view, true);
   }
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const Observation& observation = calibration.repair.observations[i];
+    const Observation& observation = calibration.selection.observations[i];
     if (!calibration.views[i].used && observation.pixels.cols() > 0) {
       seen[i].detected = observation.pixels;
       seen[i].projected = projected_by_chain(calibration, observation, points);
@@ -126,15 +128,15 @@ Json views(const Calibration& calibration, const std::vector<SeenView>& seen) {
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const ViewResult& view = calibration.views[i];
     const Vector6d& xi = view.correction;
-    all.push_back({{"image", calibration.repair.observations[i].image},
+    all.push_back({{"image", calibration.selection.observations[i].image},
                    {"used", view.used},
                    {"reason", view.reason},
-                   {"renumbered", view.used && calibration.repair.views[i].symmetry != 0},
+                   {"renumbered", view.used && calibration.selection.views[i].symmetry != 0},
                    {"px", view.px},
                    {"chain_px", seen[i].rms},
                    {"correction_mm", list(Eigen::Vector3d(1e3 * xi.head<3>()))},
                    {"correction_deg", list(Eigen::Vector3d(kDegrees * xi.tail<3>()))},
-                   {"gripper", pose(calibration.repair.observations[i].T_base_gripper)},
+                   {"gripper", pose(calibration.selection.observations[i].T_base_gripper)},
                    {"detected", pixels(seen[i].detected)},
                    {"projected", pixels(seen[i].projected)},
                    {"corrected", pixels(seen[i].corrected)}});

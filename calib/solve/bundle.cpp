@@ -1,10 +1,46 @@
+#include "calib/solve/bundle.h"
+
 #include <cmath>
 
-#include "calib/geometry/chain.h"
 #include "calib/geometry/projection.h"
-#include "calib/solve/bundle_adjustment.h"
 
 namespace flash::calib {
+
+Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
+                   const std::vector<Observation>& observations, const HandEyePoses& seed) {
+  Bundle bundle{.setup = setup,
+                .cameras = {seed.X},
+                .intrinsics = {camera},
+                .bases = {Eigen::Isometry3d::Identity()},
+                .targets = {seed.Z},
+                .scales = {1.0},
+                .time_offsets = {0.0},
+                .pivots = {Eigen::Vector3d::Zero()},
+                .poses = {},
+                .views = {}};
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const Observation& observation = observations[i];
+    RobotPose pose;
+    pose.T_base_gripper = observation.T_base_gripper;
+    pose.velocity = observation.velocity;
+    bundle.poses.push_back(pose);
+    BundleView view;
+    view.pose = static_cast<int>(i);
+    view.points = target_points(Eigen::all, observation.points);
+    view.pixels = observation.pixels;
+    view.depth_points = observation.depth_points;
+    bundle.views.push_back(std::move(view));
+  }
+  return bundle;
+}
+
+Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside) {
+  Bundle result = bundle;
+  std::erase_if(result.views, [&](const BundleView& view) {
+    return (fold[static_cast<std::size_t>(view.pose)] == part) != inside;
+  });
+  return result;
+}
 
 Eigen::Isometry3d predicted_pose(const Bundle& bundle, const BundleView& view, bool corrected) {
   return chain_of(bundle, view, corrected).target_in_camera();

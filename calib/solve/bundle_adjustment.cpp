@@ -10,7 +10,6 @@
 #include <memory>
 #include <optional>
 
-#include "calib/geometry/chain.h"
 #include "calib/geometry/projection.h"
 
 namespace flash::calib {

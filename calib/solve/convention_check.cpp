@@ -92,8 +92,8 @@ void add_angle_readings(const Reading& as_stated, const std::vector<Eigen::Vecto
   }
 }
 
-Consistency consistency_of(const Reading& reading, const std::vector<Observation>& observations,
-                           const std::vector<Symmetry>& symmetries, const ConsistencySettings& settings) {
+RobustSeed robust_seed_of(const Reading& reading, const std::vector<Observation>& observations,
+                          const std::vector<Symmetry>& symmetries, const RobustSeedSettings& settings) {
   std::vector<Eigen::Isometry3d> robot;
   std::vector<std::vector<Eigen::Isometry3d>> candidates(observations.size());
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -103,12 +103,12 @@ Consistency consistency_of(const Reading& reading, const std::vector<Observation
       for (const Eigen::Isometry3d& T : observations[i].T_camera_target)
         candidates[i].push_back(T * symmetry.turn.inverse());
   }
-  return find_consistency(robot, candidates, settings);
+  return find_robust_seed(robot, candidates, settings);
 }
 
 /// Eye-to-hand with its poses is eye-in-hand with their inverses: the same equations. What tells them apart
 /// is which of the two constant transforms is short enough for a mount.
-void name_setup(Setup stated, const Consistency& found, std::string& sentence) {
+void name_setup(Setup stated, const RobustSeed& found, std::string& sentence) {
   const bool stated_in_hand = stated == Setup::eye_in_hand;
   const double camera = found.poses.X.translation().norm(), target = found.poses.Z.translation().norm();
   // In the found reading X is base <- camera if the camera stands still, gripper <- camera if it rides.
@@ -122,10 +122,10 @@ void name_setup(Setup stated, const Consistency& found, std::string& sentence) {
         std::string(stated_in_hand ? "eye-to-hand)" : "eye-in-hand)");
 }
 
-std::string closing_text(const Consistency& consistency) {
+std::string closing_text(const RobustSeed& robust_seed) {
   char text[80];
-  std::snprintf(text, sizeof text, "%.2f deg and %.1f mm", consistency.rotation * 180 / M_PI,
-                1e3 * consistency.translation);
+  std::snprintf(text, sizeof text, "%.2f deg and %.1f mm", robust_seed.rotation * 180 / M_PI,
+                1e3 * robust_seed.translation);
   return text;
 }
 
@@ -167,13 +167,14 @@ std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observa
   return readings;
 }
 
-std::optional<Finding> diagnose(Setup setup, const std::vector<Observation>& observations,
-                                const std::vector<Symmetry>& symmetries, const Consistency& stated,
-                                const std::vector<Eigen::Vector3d>& angles, const DoctorSettings& settings) {
+std::optional<Finding> check_convention(Setup setup, const std::vector<Observation>& observations,
+                                        const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                        const std::vector<Eigen::Vector3d>& angles,
+                                        const ConventionSettings& settings) {
   if (stated.found && stated.score < settings.suspicious) return std::nullopt;
   Finding best{.sentence = {}, .stated = stated, .found = {}};
   for (const Reading& reading : alternative_readings(setup, observations, angles)) {
-    const Consistency found = consistency_of(reading, observations, symmetries, settings.consistency);
+    const RobustSeed found = robust_seed_of(reading, observations, symmetries, settings.robust_seed);
     if (!found.found || (stated.found && found.score * settings.better > stated.score)) continue;
     // A simpler reading, which comes first, is left only for one that closes clearly better.
     if (best.found.found && found.score > 0.7 * best.found.score) continue;

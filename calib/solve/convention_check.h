@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "calib/dataset/observation.h"
+#include "calib/dataset/symmetry.h"
 #include "calib/solve/robust_seed.h"
-#include "calib/solve/view_selection.h"
 
 namespace flash::calib {
 
@@ -24,22 +24,22 @@ struct Reading {
 std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
                                           const std::vector<Eigen::Vector3d>& angles = {});
 
-struct DoctorSettings {
-  ConsistencySettings consistency{.triples = 100, .kept = 3};
+struct ConventionSettings {
+  RobustSeedSettings robust_seed{.triples = 100, .kept = 3};
   double suspicious = 0.035;  ///< closing error of the majority, rotation [rad] and translation over distance
   double better = 4;          ///< how many times better another reading has to close
 };
 
 struct Finding {
   std::string sentence;
-  Consistency stated, found;  ///< how the input closes as it is stated, and as the finding reads it
+  RobustSeed stated, found;  ///< how the input closes as it is stated, and as the finding reads it
 };
 
 /// Tries the readings where the stated one closes badly. Empty where it closes well, or where no other closes
 /// clearly better.
-std::optional<Finding> diagnose(Setup setup, const std::vector<Observation>& observations,
-                                const std::vector<Symmetry>& symmetries, const Consistency& stated,
-                                const std::vector<Eigen::Vector3d>& angles = {},
-                                const DoctorSettings& settings = {});
+std::optional<Finding> check_convention(Setup setup, const std::vector<Observation>& observations,
+                                        const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                        const std::vector<Eigen::Vector3d>& angles = {},
+                                        const ConventionSettings& settings = {});
 
 }  // namespace flash::calib

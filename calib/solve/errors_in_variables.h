@@ -1,9 +1,6 @@
 #pragma once
-#include <string>
-#include <vector>
+#include <Eigen/Core>
 
-#include "calib/dataset/observation.h"
-#include "calib/geometry/closed_form.h"
 #include "calib/solve/bundle_adjustment.h"
 
 namespace flash::calib {
@@ -35,34 +32,5 @@ NoiseLevels uniform_noise(const Bundle& bundle, double corner, double rotation, 
 /// rotation and robot translation estimated from the same data by restricted maximum likelihood. The
 /// covariance is the inverse of the information that is left for the shared unknowns.
 Refinement refine(Bundle bundle, const RefineSettings& settings = {});
-
-/// The bundle with the views of the poses whose `fold` is `part`, or of all others.
-Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside);
-
-/// The bundle of one camera and one arm. points: the target's, 3 x N; poses: seed.
-Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
-                   const std::vector<Observation>& observations, const HandEyePoses& seed);
-
-/// The pose that fits the pixels best, by Gauss and Newton from a pose nearby.
-Eigen::Isometry3d fitted_pose(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
-                              const Eigen::Matrix2Xd& pixels, Eigen::Isometry3d T_camera_target);
-
-/// Residuals of views that took no part in the solution, predicted without a correction.
-struct HeldOut {
-  double px = 0;          ///< 2-D rms per corner
-  double mm = 0;          ///< rms distance of the target's centre from where the view alone puts it
-  double deg = 0;         ///< rms angle, likewise
-  std::vector<int> fold;  ///< of each pose
-};
-
-enum class Method { park, shah, bundle, errors_in_variables };
-const char* to_string(Method method);
-
-/// Every view left out once, in `folds` interleaved parts (a pose each when there are no more than that).
-/// Nothing of it stays in the solution: errors in variables estimates the noise levels anew, from those of
-/// `settings`; only the pivots are kept. Parts are solved on as many threads (0: one a processor), to the
-/// same digits.
-HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
-                 const RefineSettings& settings, int folds = 10, int threads = 1);
 
 }  // namespace flash::calib

@@ -1,9 +1,5 @@
 #include "calib/solve/pose_space.h"
 
-#include <Eigen/Cholesky>
-#include <algorithm>
-#include <cmath>
-
 #include "calib/geometry/pose.h"
 #include "calib/solve/reml.h"
 
@@ -38,32 +34,6 @@ LinearModel linearize(const std::vector<PoseLoop>& loops, const HandEyePoses& po
   return model;
 }
 
-std::vector<PoseLoop> loops_of(Setup setup, const std::vector<Observation>& observations) {
-  std::vector<PoseLoop> loops;
-  loops.reserve(observations.size());
-  for (const Observation& o : observations)
-    loops.push_back(pose_loop(setup, o.T_base_gripper, o.T_camera_target.front()));
-  return loops;
-}
-
-template <class Fit>
-HeldOut hold_out_pairs(const std::vector<PoseLoop>& loops, int folds, const Fit& fit) {
-  const int count = static_cast<int>(loops.size()), parts = std::min(folds, count);
-  HeldOut held;
-  for (int part = 0; part < parts; ++part) {
-    std::vector<PoseLoop> train, test;
-    for (int i = 0; i < count; ++i)
-      (i % parts == part ? test : train).push_back(loops[static_cast<std::size_t>(i)]);
-    const ClosingError error = closing_rms(test, fit(train));
-    held.mm += std::pow(1e3 * error.translation, 2) * static_cast<double>(test.size()) / count;
-    held.deg += std::pow(error.rotation * 180 / M_PI, 2) * static_cast<double>(test.size()) / count;
-  }
-  for (int i = 0; i < count; ++i) held.fold.push_back(i % parts);
-  held.mm = std::sqrt(held.mm);
-  held.deg = std::sqrt(held.deg);
-  return held;
-}
-
 }  // namespace
 
 PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePoses& seed) {
@@ -82,33 +52,6 @@ PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePos
   fit.rotation = sigmas[0];
   fit.translation = sigmas[1];
   return fit;
-}
-
-Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
-                            const CalibrateSettings& settings) {
-  Calibration result;
-  result.setup = setup;
-  const std::vector<Observation> observations = prepare(result, all, {Symmetry{}}, settings);
-  const std::vector<PoseLoop> loops = loops_of(setup, observations);
-  const PoseSpaceFit fit = fit_pose_space(loops, shah(loops));
-  result.poses = fit.poses;
-  result.covariance = fit.covariance.topLeftCorner<6, 6>();
-  result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation}, {0.0}};
-  result.refined.converged = fit.converged;
-  for (const ReferenceMethod& reference : reference_methods(loops)) {
-    result.comparison.push_back({reference.name, reference.poses, reference.relative, 0, {}, reference.wild});
-    if (reference.name == "park")
-      result.comparison.back().held_out = hold_out_pairs(loops, settings.folds, park);
-    if (reference.name == "shah")
-      result.comparison.back().held_out = hold_out_pairs(loops, settings.folds, shah);
-  }
-  result.held_out = hold_out_pairs(loops, settings.folds, [](const std::vector<PoseLoop>& train) {
-    return fit_pose_space(train, shah(train)).poses;
-  });
-  result.comparison.push_back(
-      {"pose_space", fit.poses, relative_rms(loops, fit.poses.X), 0, result.held_out, false});
-  finish(result, observations);
-  return result;
 }
 
 }  // namespace flash::calib

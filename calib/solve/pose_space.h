@@ -1,7 +1,7 @@
 #pragma once
+#include <Eigen/Core>
 #include <vector>
 
-#include "calib/calibrate/calibrate.h"
 #include "calib/geometry/closed_form.h"
 
 namespace flash::calib {
@@ -19,10 +19,5 @@ struct PoseSpaceFit {
 /// between the target as predicted, X^-1 G^-1 Z, and as seen, C; both noise levels by restricted maximum
 /// likelihood. Gauss and Newton.
 PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePoses& seed);
-
-/// calibrate() for views without points: repair, doctor, fit, held-out residuals in mm and deg, comparison.
-/// Throws data::InputError as calibrate() does.
-Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& observations,
-                            const CalibrateSettings& settings = {});
 
 }  // namespace flash::calib

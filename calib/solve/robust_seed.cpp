@@ -23,7 +23,7 @@ double median(std::vector<double> values) {
 class Search {
  public:
   Search(const std::vector<Eigen::Isometry3d>& robot, const Candidates& candidates,
-         const ConsistencySettings& settings)
+         const RobustSeedSettings& settings)
       : robot_(robot), candidates_(candidates), settings_(settings) {
     std::vector<double> distances;
     for (std::size_t i = 0; i < candidates.size(); ++i) {
@@ -38,8 +38,8 @@ class Search {
 
   std::size_t size() const { return views_.size(); }
 
-  Consistency judge(const HandEyePoses& poses) const {
-    Consistency result{.poses = poses, .choice = {}, .errors = {}};
+  RobustSeed judge(const HandEyePoses& poses) const {
+    RobustSeed result{.poses = poses, .choice = {}, .errors = {}};
     result.choice.assign(robot_.size(), 0);
     result.errors.assign(robot_.size(), {});
     for (const std::size_t i : views_) {
@@ -65,12 +65,12 @@ class Search {
   }
 
   /// Concentration steps: never raise the score, so they end.
-  Consistency concentrate(Consistency result) const {
+  RobustSeed concentrate(RobustSeed result) const {
     for (int step = 0; step < 20; ++step) {
       std::vector<PoseLoop> loops;
       for (const std::size_t i : best_views(result))
         loops.push_back({robot_[i], candidates_[i][static_cast<std::size_t>(result.choice[i])]});
-      const Consistency next = judge(shah(loops));
+      const RobustSeed next = judge(shah(loops));
       if (!(next.score < result.score)) break;
       result = next;
     }
@@ -79,7 +79,7 @@ class Search {
 
   /// All sets of candidates of three views whose motions turn by the same angles as the robot's. The first
   /// view keeps to its own family of a symmetric target: turning it in all views changes Z alone.
-  void try_triple(const std::array<std::size_t, 3>& views, std::vector<Consistency>& best) const {
+  void try_triple(const std::array<std::size_t, 3>& views, std::vector<RobustSeed>& best) const {
     const auto [a, b, c] = views;
     const Eigen::Matrix3d A_ab = relative(robot_[b].inverse(), robot_[a]);
     const Eigen::Matrix3d A_ac = relative(robot_[c].inverse(), robot_[a]);
@@ -114,7 +114,7 @@ class Search {
     return std::hypot(error.rotation, error.translation / distance_);
   }
 
-  std::vector<std::size_t> best_views(const Consistency& result) const {
+  std::vector<std::size_t> best_views(const RobustSeed& result) const {
     std::vector<std::size_t> order = views_;
     const auto nth = order.begin() + static_cast<std::ptrdiff_t>(std::min(majority_, order.size()) - 1);
     std::nth_element(order.begin(), nth, order.end(), [&](std::size_t i, std::size_t j) {
@@ -124,17 +124,17 @@ class Search {
     return order;
   }
 
-  void keep(Consistency found, std::vector<Consistency>& best) const {
+  void keep(RobustSeed found, std::vector<RobustSeed>& best) const {
     const auto place =
         std::upper_bound(best.begin(), best.end(), found,
-                         [](const Consistency& x, const Consistency& y) { return x.score < y.score; });
+                         [](const RobustSeed& x, const RobustSeed& y) { return x.score < y.score; });
     best.insert(place, std::move(found));
     if (best.size() > static_cast<std::size_t>(settings_.kept)) best.pop_back();
   }
 
   const std::vector<Eigen::Isometry3d>& robot_;
   const Candidates& candidates_;
-  const ConsistencySettings& settings_;
+  const RobustSeedSettings& settings_;
   std::vector<std::size_t> views_;  // that have candidates
   std::size_t majority_ = 3;
   double distance_ = 1;
@@ -142,17 +142,17 @@ class Search {
 
 }  // namespace
 
-Consistency find_consistency(const std::vector<Eigen::Isometry3d>& robot,
-                             const std::vector<std::vector<Eigen::Isometry3d>>& candidates,
-                             const ConsistencySettings& settings) {
+RobustSeed find_robust_seed(const std::vector<Eigen::Isometry3d>& robot,
+                            const std::vector<std::vector<Eigen::Isometry3d>>& candidates,
+                            const RobustSeedSettings& settings) {
   const Search search(robot, candidates, settings);
   if (search.size() < 3) return {};
   std::mt19937 random(settings.seed);
-  std::vector<Consistency> best;
+  std::vector<RobustSeed> best;
   for (int i = 0; i < settings.triples; ++i) search.try_triple(search.draw(random), best);
-  Consistency result;
-  for (const Consistency& candidate : best) {
-    Consistency refined = search.concentrate(candidate);
+  RobustSeed result;
+  for (const RobustSeed& candidate : best) {
+    RobustSeed refined = search.concentrate(candidate);
     if (!result.found || refined.score < result.score) result = std::move(refined);
   }
   return result;

@@ -5,7 +5,7 @@
 
 namespace flash::calib {
 
-struct ConsistencySettings {
+struct RobustSeedSettings {
   int triples = 200;          ///< of views that are tried
   int kept = 8;               ///< of the best, refined over all views
   double majority = 0.6;      ///< share of the views that has to agree
@@ -14,7 +14,7 @@ struct ConsistencySettings {
 };
 
 /// Hand-eye poses on which most views agree, and for each view the candidate that agrees best.
-struct Consistency {
+struct RobustSeed {
   HandEyePoses poses;
   std::vector<int> choice;           ///< index into the candidates of each view
   std::vector<ClosingError> errors;  ///< of that candidate
@@ -29,8 +29,8 @@ struct Consistency {
 /// concentration steps with Shah's method on the majority). robot: G of PoseLoop; candidates: poses of the
 /// target in the camera, one or more a view, none where the view is to be left out. Not found where fewer
 /// than three views have candidates or no three of them turn about two axes.
-Consistency find_consistency(const std::vector<Eigen::Isometry3d>& robot,
-                             const std::vector<std::vector<Eigen::Isometry3d>>& candidates,
-                             const ConsistencySettings& settings = {});
+RobustSeed find_robust_seed(const std::vector<Eigen::Isometry3d>& robot,
+                            const std::vector<std::vector<Eigen::Isometry3d>>& candidates,
+                            const RobustSeedSettings& settings = {});
 
 }  // namespace flash::calib

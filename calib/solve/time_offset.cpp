@@ -29,8 +29,8 @@ double score_at(Setup setup, const std::vector<Observation>& views, const std::v
       for (const Eigen::Isometry3d& T : views[i].T_camera_target)
         candidates[i].push_back(T * symmetry.turn.inverse());
   }
-  const Consistency consistency = find_consistency(robot, candidates, {.triples = 40, .kept = 2});
-  return consistency.found ? consistency.score : 1e9;
+  const RobustSeed robust_seed = find_robust_seed(robot, candidates, {.triples = 40, .kept = 2});
+  return robust_seed.found ? robust_seed.score : 1e9;
 }
 
 }  // namespace

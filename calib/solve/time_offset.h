@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "calib/dataset/observation.h"
+#include "calib/dataset/symmetry.h"
 #include "calib/geometry/pose.h"
-#include "calib/solve/view_selection.h"
 #include "data/trajectory.h"
 
 namespace flash::calib {

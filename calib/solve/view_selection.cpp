@@ -55,16 +55,16 @@ std::string closing_reason(const ClosingError& error, const ClosingError& usual)
 // Without noise everything closes to rounding.
 constexpr double kExact = 1e-5;
 
-void drop_outliers(const Consistency& consistency, double factor, std::vector<ViewVerdict>& views) {
+void drop_outliers(const RobustSeed& robust_seed, double factor, std::vector<ViewVerdict>& views) {
   std::vector<double> rotations, translations;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!views[i].used) continue;
-    rotations.push_back(consistency.errors[i].rotation);
-    translations.push_back(consistency.errors[i].translation);
+    rotations.push_back(robust_seed.errors[i].rotation);
+    translations.push_back(robust_seed.errors[i].translation);
   }
   const ClosingError usual{median(rotations), median(translations)};
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const ClosingError& error = consistency.errors[i];
+    const ClosingError& error = robust_seed.errors[i];
     views[i].error = error;
     if (views[i].used && (error.rotation > factor * usual.rotation + kExact ||
                           error.translation > factor * usual.translation + kExact))
@@ -92,78 +92,57 @@ int quotient(const std::vector<Symmetry>& symmetries, std::size_t index, const S
 
 }  // namespace
 
-std::vector<Symmetry> grid_symmetries(const Eigen::Matrix3Xd& points) {
-  std::vector<Symmetry> symmetries;
-  const Eigen::Vector3d centre = points.rowwise().mean();
-  const double size = (points.colwise() - centre).colwise().norm().maxCoeff();
-  for (int quarter = 0; quarter < 4; ++quarter) {
-    Symmetry symmetry;
-    symmetry.turn.linear() = rotation_exp({0, 0, quarter * M_PI / 2});
-    symmetry.turn.translation() = centre - symmetry.turn.linear() * centre;
-    for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      Eigen::Index nearest = 0;
-      const Eigen::Vector3d target = symmetry.turn * points.col(i);
-      if ((points.colwise() - target).colwise().norm().minCoeff(&nearest) > 1e-6 * size) break;
-      symmetry.permutation.push_back(static_cast<int>(nearest));
-    }
-    if (static_cast<Eigen::Index>(symmetry.permutation.size()) == points.cols())
-      symmetries.push_back(symmetry);
-  }
-  return symmetries;
-}
-
-Repair repair_views(Setup setup, const std::vector<Observation>& observations,
-                    const std::vector<Symmetry>& symmetries, const RepairSettings& settings) {
-  Repair repair;
-  repair.views.resize(observations.size());
-  repair.observations = observations;
-  drop_unusable(observations, repair.views);
+ViewSelection select_views(Setup setup, const std::vector<Observation>& observations,
+                           const std::vector<Symmetry>& symmetries, const ViewSelectionSettings& settings) {
+  ViewSelection selection;
+  selection.views.resize(observations.size());
+  selection.observations = observations;
+  drop_unusable(observations, selection.views);
 
   // Candidates of a view: every pose in every numbering, T turn^-1.
   std::vector<Eigen::Isometry3d> robot;
   std::vector<std::vector<Eigen::Isometry3d>> candidates(observations.size());
   for (std::size_t i = 0; i < observations.size(); ++i) {
     robot.push_back(pose_loop(setup, observations[i].T_base_gripper, Eigen::Isometry3d::Identity()).G);
-    if (!repair.views[i].used) continue;
+    if (!selection.views[i].used) continue;
     for (const Symmetry& symmetry : symmetries)
       for (const Eigen::Isometry3d& T : observations[i].T_camera_target)
         candidates[i].push_back(T * symmetry.turn.inverse());
   }
-  repair.consistency = find_consistency(robot, candidates, settings.consistency);
-  if (!repair.consistency.found) return repair;
+  selection.robust_seed = find_robust_seed(robot, candidates, settings.robust_seed);
+  if (!selection.robust_seed.found) return selection;
 
   for (std::size_t i = 0; i < observations.size(); ++i) {
-    if (!repair.views[i].used) continue;
-    const auto choice = static_cast<std::size_t>(repair.consistency.choice[i]);
-    repair.views[i].symmetry = static_cast<int>(choice / observations[i].T_camera_target.size());
+    if (!selection.views[i].used) continue;
+    const auto choice = static_cast<std::size_t>(selection.robust_seed.choice[i]);
+    selection.views[i].symmetry = static_cast<int>(choice / observations[i].T_camera_target.size());
   }
   // All views turned alike close as well: most keep the numbering of their detector.
-  const Symmetry& common = symmetries[most_common(repair.views, symmetries.size())];
-  repair.consistency.poses.Z = repair.consistency.poses.Z * common.turn;
+  const Symmetry& common = symmetries[most_common(selection.views, symmetries.size())];
+  selection.robust_seed.poses.Z = selection.robust_seed.poses.Z * common.turn;
   for (std::size_t i = 0; i < observations.size(); ++i) {
-    ViewVerdict& view = repair.views[i];
+    ViewVerdict& view = selection.views[i];
     if (!view.used) continue;
     view.symmetry = quotient(symmetries, static_cast<std::size_t>(view.symmetry), common);
     const Symmetry& symmetry = symmetries[static_cast<std::size_t>(view.symmetry)];
-    for (int& point : repair.observations[i].points)
+    for (int& point : selection.observations[i].points)
       point = symmetry.permutation[static_cast<std::size_t>(point)];
-    const auto choice = static_cast<std::size_t>(repair.consistency.choice[i]);
-    repair.observations[i].T_camera_target = {candidates[i][choice] * common.turn};
+    const auto choice = static_cast<std::size_t>(selection.robust_seed.choice[i]);
+    selection.observations[i].T_camera_target = {candidates[i][choice] * common.turn};
   }
-  drop_outliers(repair.consistency, settings.outlier, repair.views);
-  repair.renumbered =
-      static_cast<int>(std::count_if(repair.views.begin(), repair.views.end(), [](const ViewVerdict& view) {
-        return view.used && view.symmetry != 0;
-      }));
-  return repair;
+  drop_outliers(selection.robust_seed, settings.outlier, selection.views);
+  selection.renumbered = static_cast<int>(
+      std::count_if(selection.views.begin(), selection.views.end(),
+                    [](const ViewVerdict& view) { return view.used && view.symmetry != 0; }));
+  return selection;
 }
 
-std::vector<Observation> used_observations(const Repair& repair, std::vector<int>* index) {
+std::vector<Observation> used_observations(const ViewSelection& selection, std::vector<int>* index) {
   std::vector<Observation> used;
   if (index) index->clear();
-  for (std::size_t i = 0; i < repair.views.size(); ++i) {
-    if (!repair.views[i].used) continue;
-    used.push_back(repair.observations[i]);
+  for (std::size_t i = 0; i < selection.views.size(); ++i) {
+    if (!selection.views[i].used) continue;
+    used.push_back(selection.observations[i]);
     if (index) index->push_back(static_cast<int>(i));
   }
   return used;

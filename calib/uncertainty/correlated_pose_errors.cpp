@@ -279,7 +279,7 @@ struct Reach {
 
 /// The fields of one arm for each reach; `errors` says whether they are worth their parameters.
 std::vector<Reach> fit_fields(const std::vector<PoseInformation>& all, const Refinement& refined, int arm,
-                              const std::vector<std::size_t>& poses, SmoothErrors& errors) {
+                              const std::vector<std::size_t>& poses, CorrelatedPoseErrors& errors) {
   std::vector<const PoseInformation*> parts;
   std::vector<PoseModes> modes;
   for (const std::size_t i : thinned(poses)) {
@@ -312,7 +312,8 @@ std::vector<Reach> fit_fields(const std::vector<PoseInformation>& all, const Ref
 }  // namespace
 
 SystematicUncertainty systematic_uncertainty(const Refinement& refined, const BundleSettings& settings) {
-  SystematicUncertainty result{refined.covariance, std::vector<SmoothErrors>(refined.bundle.bases.size())};
+  SystematicUncertainty result{refined.covariance,
+                               std::vector<CorrelatedPoseErrors>(refined.bundle.bases.size())};
   const std::vector<PoseInformation> all = informations(refined, settings);
   const Eigen::Index s = refined.covariance.rows();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(s, s);
@@ -324,7 +325,7 @@ SystematicUncertainty systematic_uncertainty(const Refinement& refined, const Bu
   }
   const Eigen::LDLT<Eigen::MatrixXd> shared(information);
   for (int arm = 0; arm < static_cast<int>(result.arms.size()); ++arm) {
-    SmoothErrors& errors = result.arms[static_cast<std::size_t>(arm)];
+    CorrelatedPoseErrors& errors = result.arms[static_cast<std::size_t>(arm)];
     const std::vector<std::size_t> poses = poses_of(all, refined.bundle, arm);
     if (poses.size() < 8) continue;
     const std::vector<Reach> reaches = fit_fields(all, refined, arm, poses, errors);

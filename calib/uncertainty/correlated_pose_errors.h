@@ -8,7 +8,7 @@ namespace flash::calib {
 /// Errors of one arm's poses that change smoothly with the pose, as those of joints' zeros, link lengths,
 /// gravity or a lens do. What they have in common over all views of a session moves camera and target alike
 /// and leaves no residual: no scatter shows it, but how they change from pose to pose tells their size.
-struct SmoothErrors {
+struct CorrelatedPoseErrors {
   double gain = 0;         ///< fall of -2 log restricted likelihood against errors that are independent
   bool found = false;      ///< the gain is more than chance gives once in twenty
   double translation = 0;  ///< standard deviation per axis: of the gripper's place [m],
@@ -20,7 +20,7 @@ struct SmoothErrors {
 /// A covariance of the shared unknowns that knows of smooth errors, for the solution as it is.
 struct SystematicUncertainty {
   Eigen::MatrixXd covariance;
-  std::vector<SmoothErrors> arms;
+  std::vector<CorrelatedPoseErrors> arms;
 };
 
 /// Fits to each arm Gaussian random fields over place and attitude (Matern 5/2; Rasmussen and Williams 2006)

@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <functional>
 
-#include "calib/calibrate/extrinsics.h"
 #include "calib/geometry/pose.h"
 #include "data/atomic_file.h"
 #include "data/depth_image.h"

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calib/dataset/target.h"
+#include "calib/detect/grey_image.h"
 #include "calib/detect/rectifier.h"
 #include "data/camera.h"
 

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "calib/calibrate/calibrate_images.h"
+#include "calib/detect/detect.h"
 #include "calib/solve/linearization.h"
 #include "data/depth_image.h"
 #include "tests/calib/hand_eye_scene.h"
@@ -151,7 +152,7 @@ class RenderedDepth : public testing::Test {
     settings.cache = *folder_ / "cache";
     const std::vector<Detection> detections = detect(dataset, target, settings);
     change(dataset);
-    return calibrate_images(*dataset.setup, dataset, target, detections);
+    return calibrate_images(*dataset.setup, dataset, target, detections, read_depth(dataset, detections));
   }
 
   static data::TemporaryFolder* folder_;

@@ -4,6 +4,9 @@
 #include <cstdio>
 
 #include "calib/calibrate/calibrate_images.h"
+#include "calib/check/opencv_closed_forms.h"
+#include "calib/detect/detect.h"
+#include "calib/detect/read_depth.h"
 #include "tests/calib/rendered_set.h"
 #include "tests/data/temporary_folder.h"
 
@@ -29,7 +32,10 @@ TEST(PanTilt, FortyPicturesWithDepthAreSolvedAndTheWeakestDirectionIsNamed) {
     detecting.cache = folder / "cache";
     CalibrateSettings solving;
     solving.target_size = size;
-    return calibrate_images(*dataset.setup, dataset, target, detect(dataset, target, detecting), solving);
+    solving.closed_forms = opencv_closed_forms();
+    const std::vector<Detection> detections = detect(dataset, target, detecting);
+    return calibrate_images(*dataset.setup, dataset, target, detections, read_depth(dataset, detections),
+                            solving);
   };
   const ImageCalibration rgbd = solved(true), rgb = solved(false);
   const Calibration& result = rgbd.calibration;

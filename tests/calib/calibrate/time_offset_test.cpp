@@ -7,6 +7,8 @@
 #include <functional>
 
 #include "calib/calibrate/calibrate_images.h"
+#include "calib/detect/detect.h"
+#include "calib/geometry/projection.h"
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/calib/rendered_set.h"
 #include "tests/data/temporary_folder.h"
@@ -107,7 +109,7 @@ struct StreamScene {
     CalibrateSettings settings;
     settings.folds = 2;
     settings.refine.bundle.unknowns.time_offsets = time_offset;
-    return calibrate_images(Setup::eye_in_hand, dataset, target, detections, settings);
+    return calibrate_images(Setup::eye_in_hand, dataset, target, detections, std::nullopt, settings);
   }
 };
 
@@ -181,7 +183,7 @@ TEST(TimeOffset, OfARenderedStreamIsFound) {
   CalibrateSettings solving;
   solving.refine.bundle.unknowns.time_offsets = true;
   const ImageCalibration result =
-      calibrate_images(*dataset.setup, dataset, target, detect(dataset, target), solving);
+      calibrate_images(*dataset.setup, dataset, target, detect(dataset, target), std::nullopt, solving);
   ASSERT_TRUE(result.time_offset);
   const Vector6d error = motion_between(result.calibration.poses.X, truth.X);
   std::printf("offset %.2f +- %.2f ms; off by %.3f mm\n", 1e3 * result.time_offset->estimate,

@@ -139,7 +139,7 @@ TEST_P(Traps, FortyPercentFlippedBoardsArePutRight) {
     if (i % 5 < 2) flip(scene.observations[i], symmetries[1]);
   const Calibration result = calibrated(scene);
   expect_right(result, scene);
-  EXPECT_EQ(result.repair.renumbered, 8);
+  EXPECT_EQ(result.selection.renumbered, 8);
   EXPECT_EQ(result.used.size(), scene.observations.size());
 }
 

@@ -114,7 +114,7 @@ INSTANTIATE_TEST_SUITE_P(
                     ClosingCase{Setup::eye_to_hand, "apriltag:36h11:0:0.09", 16, 0.7, 1.2}));
 
 // A small depth camera: its noise is what the clouds of forty views laid on each other are thick by.
-TEST(Accumulation, FortyViewsAreAsThinAsOne) {
+TEST(CloudCheck, FortyViewsAreAsThinAsOne) {
   data::CameraIntrinsics camera = small_camera();
   camera.width = 320;
   camera.height = 240;
@@ -139,7 +139,7 @@ TEST(Accumulation, FortyViewsAreAsThinAsOne) {
     clouds.push_back(target_cloud(depth, kCount, set.images[v], camera, set.observations[v]));
     robot.push_back(set.observations[v].T_base_gripper);
   }
-  const Accumulation right = accumulate(set.setup, calibration.poses.X, clouds, robot);
+  const CloudCheck right = check_clouds(set.setup, calibration.poses.X, clouds, robot);
   ASSERT_EQ(right.views.size(), 40u);
   // Noise along the ray, seen across the plane: at most that of the depth.
   EXPECT_GT(right.noise_mm, 0.8 * 1e3 * kNoise);
@@ -152,8 +152,8 @@ TEST(Accumulation, FortyViewsAreAsThinAsOne) {
               right.thickness_mm, right.noise_mm, right.offset_mm, right.shift_mm);
 
   // Off by 5 mm and a degree: seen at once.
-  const Accumulation wrong =
-      accumulate(set.setup, calibration.poses.X * pose({0.003, 0, 0.004}, {0.0175, 0, 0}), clouds, robot);
+  const CloudCheck wrong =
+      check_clouds(set.setup, calibration.poses.X * pose({0.003, 0, 0.004}, {0.0175, 0, 0}), clouds, robot);
   EXPECT_GT(wrong.thickness_mm, 2 * right.thickness_mm);
   EXPECT_GT(wrong.shift_mm, 1);
   EXPECT_EQ(wrong.pattern.width, 640);

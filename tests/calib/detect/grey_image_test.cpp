@@ -1,4 +1,4 @@
-#include "calib/detect/rectifier.h"
+#include "calib/detect/grey_image.h"
 
 #include <gtest/gtest.h>
 

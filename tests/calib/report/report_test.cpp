@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/report/extrinsics_json.h"
 #include "data/picture.h"
 #include "tests/calib/hand_eye_scene.h"
 #include "tests/data/temporary_folder.h"

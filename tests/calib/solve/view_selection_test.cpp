@@ -11,7 +11,7 @@ namespace {
 using Mount = calib::Setup;  // testing::Test has a private member of the name Setup
 
 // A board turned as a whole closes as well as the board as it was numbered: no residual tells them apart.
-TEST(Repair, MostViewsKeepTheNumberingOfTheirDetector) {
+TEST(ViewSelection, MostViewsKeepTheNumberingOfTheirDetector) {
   for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
     for (unsigned seed = 1; seed <= 8; ++seed) {
       SceneSettings settings = protocol_settings(setup);
@@ -27,15 +27,15 @@ TEST(Repair, MostViewsKeepTheNumberingOfTheirDetector) {
         Eigen::Isometry3d& T = scene.observations[i].T_camera_target.front();
         T = T * symmetries[1].turn.inverse();
       }
-      const Repair repair = repair_views(setup, scene.observations, symmetries);
-      for (std::size_t i = 0; i < repair.views.size(); ++i) {
-        EXPECT_EQ(repair.views[i].symmetry, flipped(i) ? 1 : 0) << "seed " << seed << ", view " << i;
-        for (std::size_t k = 0; k < repair.observations[i].points.size(); ++k)
-          ASSERT_EQ(repair.observations[i].points[k], static_cast<int>(k));
+      const ViewSelection selection = select_views(setup, scene.observations, symmetries);
+      for (std::size_t i = 0; i < selection.views.size(); ++i) {
+        EXPECT_EQ(selection.views[i].symmetry, flipped(i) ? 1 : 0) << "seed " << seed << ", view " << i;
+        for (std::size_t k = 0; k < selection.observations[i].points.size(); ++k)
+          ASSERT_EQ(selection.observations[i].points[k], static_cast<int>(k));
       }
-      EXPECT_EQ(repair.renumbered, static_cast<int>(repair.views.size() / 3));
+      EXPECT_EQ(selection.renumbered, static_cast<int>(selection.views.size() / 3));
       // The seed stands at the true end of the board, whose ends are 0.24 m apart; it knows it to 2 cm.
-      EXPECT_LT((repair.consistency.poses.Z.translation() - scene.truth.Z.translation()).norm(), 0.02);
+      EXPECT_LT((selection.robust_seed.poses.Z.translation() - scene.truth.Z.translation()).norm(), 0.02);
     }
 }
 

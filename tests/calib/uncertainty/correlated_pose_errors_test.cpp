@@ -30,7 +30,7 @@ double squared_distance(const HandEyeScene& scene, const Refinement& solution,
   return error.dot(covariance.topLeftCorner<6, 6>().ldlt().solve(error));
 }
 
-TEST(SmoothErrors, NoiseAloneRarelyShowsThemAndThenChangesNothing) {
+TEST(CorrelatedPoseErrors, NoiseAloneRarelyShowsThemAndThenChangesNothing) {
   // Once in twenty; more than five of twenty happen in one of 3,000 such tests.
   int found = 0;
   for (unsigned seed = 31; seed <= 50; ++seed) {
@@ -44,7 +44,7 @@ TEST(SmoothErrors, NoiseAloneRarelyShowsThemAndThenChangesNothing) {
   EXPECT_LE(found, 5);
 }
 
-TEST(SmoothErrors, OfAWrongKinematicModelAreFoundAndMostlyCovered) {
+TEST(CorrelatedPoseErrors, OfAWrongKinematicModelAreFoundAndMostlyCovered) {
   // A field is a stand-in for joints that it knows nothing of, so half of the arms are asked, not 95 %. Of
   // what noise alone states, zeros of 0.3 deg leave next to none.
   int found = 0, by_noise = 0, covered = 0;
@@ -81,7 +81,7 @@ void add_field(HandEyeScene& scene, double size, double length, unsigned seed) {
     scene.observations[static_cast<std::size_t>(i)].T_base_gripper.translation() += field.row(i).transpose();
 }
 
-TEST(SmoothErrors, AFieldThatWasDrawnIsFoundInItsSizeAndCovered) {
+TEST(CorrelatedPoseErrors, AFieldThatWasDrawnIsFoundInItsSizeAndCovered) {
   // 3 mm over 0.3 m, half as long again as the mean distance of two poses is. 40 trials: 38 are inside where
   // sizes are known; they are estimated from a handful of modes that can be seen.
   int found = 0, by_noise = 0, covered = 0;
@@ -102,7 +102,7 @@ TEST(SmoothErrors, AFieldThatWasDrawnIsFoundInItsSizeAndCovered) {
   EXPECT_GE(covered, 32);
 }
 
-TEST(SmoothErrors, AreTheSameHoweverTheBaseIsTurned) {
+TEST(CorrelatedPoseErrors, AreTheSameHoweverTheBaseIsTurned) {
   HandEyeScene scene = make_arm_scene(noisy(), {.zero_deg = 1}, 0.6, tag_points(), 101);
   const SystematicUncertainty here = systematic_uncertainty(refined(scene), {});
   const Eigen::Isometry3d turn = make_pose(Eigen::Vector3d::Zero(), {0.3, -1.1, 2.0});
@@ -115,7 +115,7 @@ TEST(SmoothErrors, AreTheSameHoweverTheBaseIsTurned) {
   EXPECT_LT((a - b).norm(), 0.05 * a.norm());
 }
 
-TEST(SmoothErrors, DoNotHangOnTheLastDigits) {
+TEST(CorrelatedPoseErrors, DoNotHangOnTheLastDigits) {
   // Two runs of a detector find corners that differ by rounding.
   for (const unsigned seed : {101U, 103U, 105U, 107U}) {
     HandEyeScene scene = make_arm_scene(noisy(), {.zero_deg = 1}, 0.6, tag_points(), seed);

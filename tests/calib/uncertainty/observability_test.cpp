@@ -5,9 +5,6 @@
 #include <Eigen/Cholesky>
 
 #include "calib/calibrate/calibrate.h"
-#include "calib/calibrate/next_poses.h"
-#include "calib/solve/pose_space.h"
-#include "data/error.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {
@@ -76,56 +73,6 @@ TEST(Observability, SpreadOfTurnsIsThatOfTheirLogarithms) {
   EXPECT_NEAR(diversity.spread[1], std::sqrt((0.04 + 4 * 0.01) / 6), 1e-3);
   EXPECT_LT(diversity.spread[2], 0.011);  // what turns about x and y leave about z, half their product
   EXPECT_TRUE(degeneracy(diversity).empty());
-}
-
-TEST(Plan, AddedViewsLowerTheUncertaintyAsPredicted) {
-  SceneSettings settings = protocol_settings(Setup::eye_in_hand);
-  settings.views = 8;
-  settings.robot_deg = 0.1;
-  settings.robot_mm = 1;
-  const HandEyeScene scene = make_scene(settings, board_points(), 3);
-  const Calibration result = calibrate(Setup::eye_in_hand, scene.camera, scene.points,
-                                       grid_symmetries(scene.points), scene.observations);
-  PlanSettings wanted;
-  wanted.poses = 4;
-  wanted.candidates = 400;
-  wanted.upper.z() = 1.0;
-  const Plan plan = plan_poses(result, scene.points, wanted);
-  ASSERT_EQ(plan.poses.size(), 4U);
-  double before = plan.translation_sd;
-  for (const PlannedPose& pose : plan.poses) {
-    EXPECT_LE(pose.translation_sd, before + 1e-12);
-    EXPECT_LE(pose.T_base_gripper.translation().z(), 1.0);
-    before = pose.translation_sd;
-  }
-  // Chosen views do better than as many again of the same kind: sqrt(8 / 12).
-  EXPECT_LT(before, std::sqrt(8.0 / 12) * plan.translation_sd);
-  wanted.lower.z() = 1.0;
-  wanted.upper.z() = 0.9;
-  EXPECT_THROW(plan_poses(result, scene.points, wanted), data::InputError);
-}
-
-TEST(PoseSpace, StatedUncertaintyIsTrue) {
-  constexpr int kTrials = 40;
-  double chi_square = 0, rotation = 0, translation = 0;
-  for (unsigned trial = 0; trial < kTrials; ++trial) {
-    SceneSettings settings = protocol_settings(Setup::eye_to_hand);
-    settings.corner_px = 0.001;
-    settings.robot_deg = 0.2;
-    settings.robot_mm = 1;
-    const HandEyeScene scene = make_scene(settings, board_points(), 50 + trial);
-    const PoseSpaceFit fit = fit_pose_space(loops_of(scene), park(loops_of(scene)));
-    EXPECT_TRUE(fit.converged);
-    const Vector6d error = motion_between(fit.poses.X, scene.truth.X);
-    chi_square += error.dot(fit.covariance.topLeftCorner<6, 6>().ldlt().solve(error)) / kTrials;
-    rotation += fit.rotation * 180 / M_PI / kTrials;
-    translation += 1e3 * fit.translation / kTrials;
-  }
-  EXPECT_GT(chi_square, 4.4);  // 240 degrees of freedom over 40, 99.8 %
-  EXPECT_LT(chi_square, 7.9);
-  EXPECT_NEAR(rotation, 0.2, 0.01);
-  // The target hangs 0.12 m from the gripper: a turn of 0.2 deg adds 0.4 mm across.
-  EXPECT_NEAR(translation, 1.05, 0.12);
 }
 
 }  // namespace
