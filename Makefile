@@ -16,7 +16,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate reference fuzz configure-test format check-format tidy install clean
+.PHONY: help demo configure build test validate reference fuzz configure-test format check-format check-includes tidy install clean
 .PHONY: bench random-scenes packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -75,6 +75,9 @@ format: packages-check  ## Lay out all sources as .clang-format says
 
 check-format: packages-check  ## Name the sources that `make format` would change
 	$(sources) | xargs -r clang-format --dry-run --Werror
+
+check-includes:  ## Name the includes that go against the order of the folders
+	scripts/check_includes
 
 tidy: configure-test packages-check  ## Defects found by clang-tidy (.clang-tidy)
 	scripts/tidy $(BUILD)

@@ -9,10 +9,14 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
-#include "calib/calibrate_images.h"
-#include "calib/extrinsics.h"
-#include "calib/pose_space.h"
-#include "calib/report.h"
+#include "calib/calibrate/calibrate_images.h"
+#include "calib/calibrate/calibrate_pairs.h"
+#include "calib/calibrate/extrinsics.h"
+#include "calib/check/opencv_closed_forms.h"
+#include "calib/detect/read_depth.h"
+#include "calib/report/extrinsics_export.h"
+#include "calib/report/extrinsics_json.h"
+#include "calib/report/report.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -124,7 +128,8 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
     const std::vector<calib::Detection> detections =
         detect_all(dataset, target, options.dataset, options.common);
     phases.end("corners");
-    solved = calib::calibrate_images(setup, dataset, target, detections, settings);
+    solved = calib::calibrate_images(setup, dataset, target, detections,
+                                     calib::read_depth(dataset, detections), settings);
   }
   phases.end("solving");
   return solved;
@@ -141,6 +146,7 @@ int run_handeye(const HandEyeOptions& options) {
   calib::CalibrateSettings settings;
   constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
   if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
+  settings.closed_forms = calib::opencv_closed_forms();
   settings.target_size = options.target_size;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = options.time_offset;
@@ -168,7 +174,7 @@ int run_handeye(const HandEyeOptions& options) {
   if (!options.common.quiet)
     for (const calib::ViewResult& view : solved.calibration.views)
       if (!view.used)
-        warn_calib(solved.calibration.repair
+        warn_calib(solved.calibration.selection
                        .observations[static_cast<std::size_t>(&view - solved.calibration.views.data())]
                        .image +
                    ": not used: " + view.reason);

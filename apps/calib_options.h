@@ -3,10 +3,11 @@
 #include <string>
 #include <vector>
 
-#include "calib/dataset.h"
-#include "calib/detect.h"
-#include "calib/target.h"
-#include "calib/target_size.h"
+#include "calib/dataset/dataset.h"
+#include "calib/dataset/detection.h"
+#include "calib/dataset/target.h"
+#include "calib/detect/detect.h"
+#include "calib/solve/target_size.h"
 
 namespace flash {
 

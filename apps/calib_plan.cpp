@@ -1,4 +1,4 @@
-#include "calib/plan.h"
+#include "calib/calibrate/next_poses.h"
 
 #include <cstdio>
 #include <iostream>
@@ -9,8 +9,9 @@
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
-#include "calib/calibrate_images.h"
-#include "calib/extrinsics.h"
+#include "calib/calibrate/calibrate_images.h"
+#include "calib/detect/read_depth.h"
+#include "calib/report/extrinsics_json.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -68,8 +69,10 @@ int run_plan(const PlanOptions& options) {
   const calib::Setup setup =
       options.setup.empty() ? *dataset.setup : calib::parse_setup(options.setup, "command line", "--setup");
   const calib::Target target = target_of(options.dataset, dataset);
-  const calib::ImageCalibration solved = calib::calibrate_images(
-      setup, dataset, target, detect_all(dataset, target, options.dataset, options.common));
+  const std::vector<calib::Detection> detections =
+      detect_all(dataset, target, options.dataset, options.common);
+  const calib::ImageCalibration solved =
+      calib::calibrate_images(setup, dataset, target, detections, calib::read_depth(dataset, detections));
   calib::PlanSettings settings = options.settings;
   if (options.criterion == "determinant") settings.criterion = calib::PlanCriterion::determinant;
   if (!options.lower.empty()) settings.lower = Eigen::Vector3d::Map(options.lower.data());

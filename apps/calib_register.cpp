@@ -9,8 +9,10 @@
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
-#include "calib/calibrate_images.h"
-#include "calib/register.h"
+#include "calib/calibrate/calibrate_images.h"
+#include "calib/calibrate/cell.h"
+#include "calib/detect/read_depth.h"
+#include "calib/report/cell_json.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -68,7 +70,8 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   settings.target_size = options.target_size;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = time_offset;
-  const calib::ImageCalibration solved = calib::calibrate_images(kind, dataset, target, detections, settings);
+  const calib::ImageCalibration solved = calib::calibrate_images(
+      kind, dataset, target, detections, calib::read_depth(dataset, detections), settings);
   if (!options.common.quiet) {
     const std::size_t all = solved.calibration.views.size(), used = solved.calibration.used.size();
     if (used < all)

@@ -7,10 +7,10 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
-#include "calib/accumulation.h"
-#include "calib/extrinsics.h"
-#include "calib/overlay.h"
-#include "calib/validate.h"
+#include "calib/calibrate/extrinsics.h"
+#include "calib/check/cloud_check.h"
+#include "calib/check/projection_check.h"
+#include "calib/report/overlay.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -63,7 +63,7 @@ void draw_views(const std::vector<ValidatedView>& views, const calib::Projection
                      (fs::path(folder) / "corners" / picture_name(views[i].frame->name)).string());
 }
 
-std::optional<calib::Accumulation> accumulate(const calib::Dataset& dataset,
+std::optional<calib::CloudCheck> check_clouds(const calib::Dataset& dataset,
                                               const calib::Extrinsics& extrinsics,
                                               const std::vector<ValidatedView>& views,
                                               const calib::ProjectionCheck& check) {
@@ -79,10 +79,10 @@ std::optional<calib::Accumulation> accumulate(const calib::Dataset& dataset,
     poses.push_back(observation.T_base_gripper);
   }
   if (clouds.empty()) return std::nullopt;
-  return calib::accumulate(extrinsics.setup, extrinsics.transform.T, clouds, poses);
+  return calib::check_clouds(extrinsics.setup, extrinsics.transform.T, clouds, poses);
 }
 
-nlohmann::ordered_json cloud_json(const calib::Accumulation& clouds) {
+nlohmann::ordered_json cloud_json(const calib::CloudCheck& clouds) {
   nlohmann::ordered_json json = {{"thickness_mm", clouds.thickness_mm}, {"noise_mm", clouds.noise_mm},
                                  {"offset_mm", clouds.offset_mm},       {"pattern_shift_mm", clouds.shift_mm},
                                  {"trimmed", clouds.trimmed},           {"views", nlohmann::json::array()}};
@@ -98,7 +98,7 @@ nlohmann::ordered_json cloud_json(const calib::Accumulation& clouds) {
 
 nlohmann::ordered_json result_json(const ValidateOptions& options, const std::vector<std::string>& warnings,
                                    const calib::ProjectionCheck& check, bool pixels,
-                                   const std::optional<calib::Accumulation>& clouds) {
+                                   const std::optional<calib::CloudCheck>& clouds) {
   nlohmann::ordered_json json;
   json["schema"] = "flash-validation/1";
   json["extrinsics"] = options.extrinsics;
@@ -121,7 +121,7 @@ nlohmann::ordered_json result_json(const ValidateOptions& options, const std::ve
   return json;
 }
 
-void print_table(const calib::ProjectionCheck& check, const std::optional<calib::Accumulation>& clouds) {
+void print_table(const calib::ProjectionCheck& check, const std::optional<calib::CloudCheck>& clouds) {
   std::printf("%-24s %10s %10s %9s %9s\n", "view", "corners px", "centre px", "mm", "deg");
   for (const calib::ViewProjection& view : check.views)
     std::printf("%-24s %10.2f %10.2f %9.2f %9.3f\n", view.image.c_str(), view.corner_rms, view.centre,
@@ -161,8 +161,8 @@ int run_validate(const ValidateOptions& options) {
     warn_calib(
         "the target is not where it was at the calibration; --refit-target takes its place from these views");
 
-  const std::optional<calib::Accumulation> clouds =
-      pairs ? std::nullopt : accumulate(dataset, extrinsics, views, check);
+  const std::optional<calib::CloudCheck> clouds =
+      pairs ? std::nullopt : check_clouds(dataset, extrinsics, views, check);
   const std::string text =
       data::format_json(result_json(options, extrinsics.warnings, check, !pairs, clouds)) + '\n';
   if (!options.out.empty()) {

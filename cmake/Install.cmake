@@ -19,13 +19,17 @@ function(flash_library module)
 endfunction()
 
 # Headers by their path from the root, so that `#include "sim/solver.h"` reads the same inside and outside; those of
-# sysid, which is not installed as a whole, in sysid/CMakeLists.txt.
+# calib and sysid, of which a part is installed, in their own CMakeLists.txt.
 function(flash_install)
   foreach(module data sim)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${module} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/flash
             FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE)
   endforeach()
   set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/flash)
+  set(has_calib OFF)
+  if(TARGET flash_calib)
+    set(has_calib ON)
+  endif()
   install(EXPORT flashTargets NAMESPACE flash:: DESTINATION ${destination})
   configure_package_config_file(${PROJECT_SOURCE_DIR}/cmake/flashConfig.cmake.in
                                 ${PROJECT_BINARY_DIR}/flashConfig.cmake INSTALL_DESTINATION ${destination})

@@ -2,8 +2,9 @@
 #include <random>
 #include <vector>
 
-#include "calib/hand_eye.h"
-#include "calib/projection.h"
+#include "calib/geometry/pose_from_pixels.h"
+#include "calib/geometry/projection.h"
+#include "calib/solve/errors_in_variables.h"
 
 namespace flash::calib {
 
@@ -111,12 +112,29 @@ inline HandEyeScene make_scene(const SceneSettings& settings, const Eigen::Matri
   return scene;
 }
 
+inline Eigen::Matrix3Xd protocol_points(Setup setup) {
+  return setup == Setup::eye_in_hand ? board_points() : tag_points();
+}
+
+inline HandEyeScene protocol_scene(Setup setup, double robot_deg, double robot_mm, unsigned seed) {
+  SceneSettings settings = protocol_settings(setup);
+  settings.robot_deg = robot_deg;
+  settings.robot_mm = robot_mm;
+  return make_scene(settings, protocol_points(setup), seed);
+}
+
 inline std::vector<PoseLoop> loops_of(const HandEyeScene& scene) {
   std::vector<PoseLoop> loops;
   for (const Observation& observation : scene.observations)
     loops.push_back(
         pose_loop(scene.settings.setup, observation.T_base_gripper, observation.T_camera_target.front()));
   return loops;
+}
+
+/// The bundle at the closed form of Shah.
+inline Bundle seeded_bundle(const HandEyeScene& scene) {
+  return make_bundle(scene.settings.setup, scene.camera, scene.points, scene.observations,
+                     shah(loops_of(scene)));
 }
 
 }  // namespace flash::calib

@@ -5,8 +5,7 @@
 #include <filesystem>
 #include <functional>
 
-#include "calib/extrinsics.h"
-#include "calib/pose.h"
+#include "calib/geometry/pose.h"
 #include "data/atomic_file.h"
 #include "data/depth_image.h"
 #include "data/error.h"

@@ -1,8 +1,8 @@
 #pragma once
 #include <string>
 
-#include "calib/closed_form.h"
-#include "calib/observation.h"
+#include "calib/dataset/observation.h"
+#include "calib/geometry/closed_form.h"
 
 namespace flash::calib {
 

@@ -3,8 +3,9 @@
 #include <random>
 #include <vector>
 
-#include "calib/rectifier.h"
-#include "calib/target.h"
+#include "calib/dataset/target.h"
+#include "calib/detect/grey_image.h"
+#include "calib/detect/rectifier.h"
 #include "data/camera.h"
 
 namespace flash::calib {

@@ -1,4 +1,5 @@
-# Run with cmake -P: BUILD (tree to install), SOURCE (the consumer), CONFIG, GENERATOR, CXX, FLAGS.
+# Run with cmake -P: BUILD (tree to install), SOURCE (the consumer), CONFIG, GENERATOR, CXX, FLAGS, CALIB (whether
+# flash::calib is installed).
 set(work ${BUILD}/consumer)
 file(REMOVE_RECURSE ${work})
 
@@ -20,4 +21,8 @@ run(${work}/build/consumer)
 # Ten steps of 0.01 s of implicit Euler from rest fall by g h^2 n (n + 1) / 2 = 9.81 * 1e-4 * 55 = 0.0539550 m.
 if(NOT output MATCHES "^-0\\.05395")
   message(FATAL_ERROR "the consumer printed ${output}, expected -0.05395")
+endif()
+
+if(CALIB)
+  run(${work}/build/hand_eye)
 endif()

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "calib/smooth_errors.h"
+#include "calib/uncertainty/correlated_pose_errors.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {

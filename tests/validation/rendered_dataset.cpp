@@ -10,7 +10,7 @@
 #include <iostream>
 #include <string>
 
-#include "calib/extrinsics.h"
+#include "calib/calibrate/extrinsics.h"
 #include "tests/calib/rendered_set.h"
 
 namespace flash::calib {

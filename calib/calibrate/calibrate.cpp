@@ -1,0 +1,346 @@
+#include "calib/calibrate/calibrate.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <tuple>
+
+#include "calib/geometry/projection.h"
+#include "calib/solve/linearization.h"
+#include "data/error.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr double kDegree = M_PI / 180;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+std::vector<Eigen::Isometry3d> target_poses(const std::vector<Observation>& observations) {
+  std::vector<Eigen::Isometry3d> poses;
+  poses.reserve(observations.size());
+  for (const Observation& o : observations) poses.push_back(o.T_camera_target.front());
+  return poses;
+}
+
+void expect_enough(std::size_t used, std::size_t all, int least) {
+  if (used >= static_cast<std::size_t>(least)) return;
+  throw data::InputError(std::to_string(used) + " of " + std::to_string(all) +
+                         " views can be used: at least " + std::to_string(least) +
+                         " are needed, and 12 or more for an answer to trust; add views");
+}
+
+/// Refuses input that closes only when it is read otherwise than stated, or not at all.
+void expect_convention(Setup setup, const std::vector<Observation>& observations,
+                       const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                       const CalibrateSettings& settings) {
+  const std::optional<Finding> finding =
+      check_convention(setup, observations, symmetries, stated, settings.angles, settings.convention);
+  if (finding) throw data::InputError(finding->sentence);
+  if (stated.found && stated.score < settings.hopeless) return;
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "robot and camera do not tell of the same motion: most views close to no better than %.1f deg and "
+      "%.0f mm, and no other convention explains them; check that each image stands beside its pose",
+      stated.rotation / kDegree, 1e3 * stated.translation);
+  throw data::InputError(text);
+}
+
+/// Squared length of each correction in its own noise levels: near chi-square with six degrees of freedom. No
+/// robot is taken to be better than 0.1 mm and 0.1 mrad.
+std::vector<double> squared_corrections(const Refinement& refined) {
+  constexpr double kLeast = 1e-4;
+  std::vector<double> squared;
+  for (const RobotPose& pose : refined.bundle.poses) {
+    const auto arm = static_cast<std::size_t>(pose.arm);
+    const Eigen::Vector3d& pivot = refined.bundle.pivots[arm];
+    squared.push_back((pose.correction * pivot - pivot).squaredNorm() /
+                          std::pow(std::max(kLeast, refined.noise.translation[arm]), 2) +
+                      rotation_log(pose.correction.linear()).squaredNorm() /
+                          std::pow(std::max(kLeast, refined.noise.rotation[arm]), 2));
+  }
+  return squared;
+}
+
+/// Drops the view whose correction no longer looks like those of most views; false where there is none.
+bool drop_worst(Calibration& result, std::vector<Observation>& observations, double surprise) {
+  const std::vector<double> squared = squared_corrections(result.refined);
+  const auto worst = static_cast<std::size_t>(
+      std::distance(squared.begin(), std::max_element(squared.begin(), squared.end())));
+  constexpr double kMedianOfChiSquare6 = 5.348;
+  const double usual = std::max(median(squared) / kMedianOfChiSquare6, 1e-12);
+  // Corrections far inside the corner noise say nothing.
+  if (squared[worst] < surprise * std::max(usual, 0.05)) return false;
+  const Vector6d xi =
+      motion_between(Eigen::Isometry3d::Identity(), result.refined.bundle.poses[worst].correction);
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "would need its robot pose corrected by %.2f deg and %.1f mm, %.0f times what most views need",
+      xi.tail<3>().norm() / kDegree, 1e3 * xi.head<3>().norm(), std::sqrt(squared[worst] / (6 * usual)));
+  ViewVerdict& verdict = result.selection.views[static_cast<std::size_t>(result.used[worst])];
+  verdict.used = false;
+  verdict.reason = text;
+  observations.erase(observations.begin() + static_cast<std::ptrdiff_t>(worst));
+  result.used.erase(result.used.begin() + static_cast<std::ptrdiff_t>(worst));
+  return true;
+}
+
+void report_views(Calibration& result) {
+  result.views.resize(result.selection.views.size());
+  for (std::size_t i = 0; i < result.views.size(); ++i) {
+    result.views[i].used = result.selection.views[i].used;
+    result.views[i].reason = result.selection.views[i].reason;
+  }
+  const Bundle& bundle = result.refined.bundle;
+  for (const BundleView& view : bundle.views) {
+    ViewResult& entry =
+        result.views[static_cast<std::size_t>(result.used[static_cast<std::size_t>(view.pose)])];
+    const auto rms = [&](bool corrected) {
+      return std::sqrt(residuals(bundle, view, corrected).squaredNorm() /
+                       static_cast<double>(view.points.cols()));
+    };
+    entry.px = rms(true);
+    entry.chain_px = rms(false);
+    entry.correction = motion_between(Eigen::Isometry3d::Identity(),
+                                      bundle.poses[static_cast<std::size_t>(view.pose)].correction);
+  }
+}
+
+/// Of the projected middle of the target against where the view's own pose puts it.
+double centre_rms(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target) {
+  double sum = 0;
+  for (const BundleView& view : bundle.views) {
+    const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics.front());
+    const Eigen::Vector3d centre = view.points.rowwise().mean();
+    const double scale = bundle.scales[static_cast<std::size_t>(view.target)];
+    sum += (project(intrinsics, predicted_pose(bundle, view, false) * (scale * centre)) -
+            project(intrinsics, T_camera_target[static_cast<std::size_t>(view.pose)] * centre))
+               .squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(bundle.views.size()));
+}
+
+/// A method can close A X = X B as well as others and still be far off in a direction that motions hardly
+/// show: then the target lies elsewhere in the pictures.
+void flag_wild_pixels(std::vector<ComparedMethod>& closed_forms) {
+  constexpr double kWild = 10;
+  double least = std::numeric_limits<double>::infinity();
+  for (const ComparedMethod& method : closed_forms)
+    if (!method.wild && method.px < least) least = method.px;
+  for (ComparedMethod& method : closed_forms)
+    method.wild = method.wild || !(method.px <= kWild * least + 1e-3);
+}
+
+void compare_methods(Calibration& result, const std::vector<Observation>& observations, const Bundle& plain,
+                     RefineSettings settings, const CalibrateSettings& calibrate) {
+  const std::vector<PoseLoop> loops = pose_loops(result.setup, observations);
+  const std::vector<Eigen::Isometry3d> poses = target_poses(observations);
+  Bundle bundle = plain;
+  settings.noise = result.refined.noise;
+  const auto hold = [&](Method method) {
+    return hold_out(result.refined.bundle, poses, method, settings, calibrate.folds, calibrate.threads);
+  };
+  result.comparison = compare_closed_forms(loops, calibrate.closed_forms);
+  for (ComparedMethod& method : result.comparison) {
+    bundle.cameras.front() = method.poses.X;
+    bundle.targets.front() = method.poses.Z;
+    method.px = reprojection_rms(bundle, false);
+    if (method.name == "park") method.held_out = hold(Method::park);
+    if (method.name == "shah") method.held_out = hold(Method::shah);
+  }
+  flag_wild_pixels(result.comparison);
+  for (const Method kind : {Method::bundle, Method::errors_in_variables}) {
+    const Bundle& solved = kind == Method::bundle ? plain : result.refined.bundle;
+    ComparedMethod& method = result.comparison.emplace_back();
+    method.name = to_string(kind);
+    method.poses = {solved.cameras.front(), solved.targets.front()};
+    method.relative = relative_rms(loops, method.poses.X);
+    method.px = reprojection_rms(solved, false);
+    method.held_out = hold(kind);
+  }
+  result.held_out = *result.comparison.back().held_out;
+}
+
+/// Errors in variables again and again, without the view that no longer looks like the rest, until all do.
+/// Returns the bundle at its seed.
+Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observations,
+                       const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                       const RefineSettings& refine_settings, const CalibrateSettings& settings) {
+  for (;;) {
+    const HandEyePoses seed = shah(pose_loops(result.setup, observations));
+    Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
+    result.refined = refine(plain, refine_settings);
+    const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
+    if (few || !drop_worst(result, observations, settings.surprise)) return plain;
+  }
+}
+
+/// Errors that change smoothly with the robot's pose have a part that all views share: it comes on top.
+/// Returns by how much the variances have grown in the mean.
+double add_correlated_pose_errors(Calibration& result, const BundleSettings& settings) {
+  const SystematicUncertainty systematic = systematic_uncertainty(result.refined, settings);
+  const CorrelatedPoseErrors& errors = result.pose_errors.emplace(systematic.arms.front());
+  if (!errors.found) return 1;
+  const Matrix6d noise = result.covariance;
+  result.covariance = systematic.covariance.topLeftCorner<6, 6>();
+  const int scale = shared_columns(result.refined.bundle, settings.unknowns).scales.front();
+  if (result.scale && scale >= 0) result.scale->sd = std::sqrt(systematic.covariance(scale, scale));
+  const double grown = noise.ldlt().solve(result.covariance).trace() / 6;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the robot's errors change smoothly with its pose, as those of a kinematic model or a lens do: "
+      "what is alike in all views cannot be seen, and was added to the stated standard deviations, "
+      "which it raised by %.1f",
+      std::sqrt(grown));
+  result.warnings.emplace_back(text);
+  return grown;
+}
+
+/// Halves of few views determine too little by themselves. grown: what has been added for errors that halves
+/// by place would show as well.
+void check_splits(Calibration& result, const BundleSettings& settings, const CalibrateSettings& calibrate,
+                  double grown) {
+  if (result.used.size() < 4 * static_cast<std::size_t>(calibrate.least_views)) return;
+  const std::vector<SplitCheck> systematic = check_systematic(result.refined, settings, 0, calibrate.threads);
+  result.splits = {check_halves(result.refined, settings, Split::interleaved)};
+  result.splits.insert(result.splits.end(), systematic.begin(), systematic.end());
+  const SplitCheck* worst = nullptr;
+  result.covariance_factor = split_inflation(systematic, &worst);
+  result.covariance_factor = std::max(1.0, result.covariance_factor / grown);
+  if (worst == nullptr || result.covariance_factor == 1) return;
+  result.covariance *= result.covariance_factor;
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "%s differ by %.1f mm and %.2f deg, more than noise explains: drift, or errors that depend on "
+      "the pose; the stated standard deviations were raised by %.1f",
+      describe(worst->split).c_str(), 1e3 * worst->apart.head<3>().norm(),
+      worst->apart.tail<3>().norm() / kDegree, std::sqrt(result.covariance_factor));
+  result.warnings.emplace_back(text);
+}
+
+void warn_of_scale(Calibration& result) {
+  if (!result.scale) return;
+  const double off = std::abs(result.scale->estimate - 1), sd = result.scale->sd;
+  if (!result.scale->solved && (off < 0.01 || off < 5 * sd)) return;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the data want a target %.4f +- %.4f (2 sd) times as large as stated: measure its squares, or the "
+      "intrinsics or the robot's unit are wrong%s",
+      result.scale->estimate, 2 * sd,
+      result.scale->solved ? "; the answer is for a target of that size (--target-size stated keeps "
+                             "the stated one)"
+                           : "");
+  result.warnings.insert(result.warnings.begin(), text);
+  if (off > 0.03) result.usable = false;
+}
+
+void warn(Calibration& result) {
+  std::size_t missing = 0;
+  for (const ViewResult& view : result.views) missing += view.used ? 0 : 1;
+  if (result.used.size() < 10)
+    result.warnings.push_back(
+        std::to_string(result.used.size()) +
+        " views: noise levels and uncertainty are themselves uncertain; 15 or more are better");
+  if (missing > 0)
+    result.warnings.push_back(std::to_string(missing) + " of " + std::to_string(result.views.size()) +
+                              " views were not used");
+  if (result.selection.renumbered > 0)
+    result.warnings.push_back(std::to_string(result.selection.renumbered) +
+                              " views had the target numbered from its other end; put right");
+  if (!result.refined.converged) {
+    result.warnings.insert(result.warnings.begin(), "the refinement did not converge");
+    result.usable = false;
+  }
+}
+
+}  // namespace
+
+bool has_pixels(const Calibration& calibration) { return !calibration.refined.bundle.cameras.empty(); }
+
+std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& all,
+                                 const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings) {
+  std::vector<Eigen::Isometry3d> reported;
+  for (const Observation& observation : all)
+    if (!observation.T_camera_target.empty()) reported.push_back(observation.T_base_gripper);
+  expect_enough(reported.size(), all.size(), settings.least_views);
+  const std::string reason = degeneracy(rotation_diversity(reported));
+  if (!reason.empty()) throw data::InputError(reason);
+  result.selection = select_views(result.setup, all, symmetries, settings.selection);
+  expect_convention(result.setup, all, symmetries, result.selection.robust_seed, settings);
+  std::vector<Observation> observations = used_observations(result.selection, &result.used);
+  expect_enough(observations.size(), all.size(), settings.least_views);
+  return observations;
+}
+
+void finish(Calibration& result, const std::vector<Observation>& used) {
+  report_views(result);
+  std::vector<Eigen::Isometry3d> robot;
+  std::vector<double> distances;
+  for (const Observation& observation : used) {
+    robot.push_back(observation.T_base_gripper);
+    distances.push_back(observation.T_camera_target.front().translation().norm());
+  }
+  result.diversity = rotation_diversity(robot);
+  result.weakest = weakest_direction(result.covariance, median(distances), "camera");
+  warn(result);
+  warn_of_scale(result);
+}
+
+Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                      const CalibrateSettings& settings) {
+  Calibration result;
+  result.setup = setup;
+  std::vector<Observation> observations = prepare(result, all, symmetries, settings);
+
+  RefineSettings refine_settings = settings.refine;
+  refine_settings.bundle.unknowns.scales = settings.target_size == TargetSize::solved;
+  const auto start = std::tuple(observations, result.used, result.selection);
+  Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
+  const auto check_scale = [&] {
+    const std::vector<ScaleCheck> checks = check_scales(result.refined, refine_settings);
+    if (!checks.empty()) result.scale = checks.front();
+  };
+  check_scale();
+  if (settings.target_size == TargetSize::solved && !result.scale)
+    throw data::InputError(
+        "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
+        "out, or add views farther apart");
+  if (settings.target_size == TargetSize::automatic && result.scale && clearly_off(*result.scale)) {
+    // Views that a wrong size made look wrong come back.
+    std::tie(observations, result.used, result.selection) = start;
+    refine_settings.bundle.unknowns.scales = true;
+    plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
+    check_scale();
+  }
+  if (result.scale) result.scale->solved = refine_settings.bundle.unknowns.scales;
+  BundleSettings exact_robot = settings.refine.bundle;
+  exact_robot.unknowns.corrections = false;
+  exact_robot.huber = 0;
+  solve_bundle(plain, result.refined.noise, exact_robot);
+
+  const Bundle& bundle = result.refined.bundle;
+  result.poses = {bundle.cameras.front(), bundle.targets.front()};
+  result.covariance = result.refined.covariance.topLeftCorner<6, 6>();
+  result.corner_rms = reprojection_rms(bundle, true);
+  result.chain_rms = reprojection_rms(bundle, false);
+  result.centre_rms = centre_rms(bundle, target_poses(observations));
+  compare_methods(result, observations, plain, refine_settings, settings);
+  const double grown = add_correlated_pose_errors(result, refine_settings.bundle);
+  check_splits(result, refine_settings.bundle, settings, grown);
+  finish(result, observations);
+  return result;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,82 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/calibrate/method_comparison.h"
+#include "calib/dataset/symmetry.h"
+#include "calib/solve/convention_check.h"
+#include "calib/solve/errors_in_variables.h"
+#include "calib/solve/target_size.h"
+#include "calib/solve/view_selection.h"
+#include "calib/uncertainty/correlated_pose_errors.h"
+#include "calib/uncertainty/observability.h"
+#include "calib/uncertainty/split_check.h"
+
+namespace flash::calib {
+
+struct CalibrateSettings {
+  ViewSelectionSettings selection;
+  ConventionSettings convention;
+  std::vector<Eigen::Vector3d> angles;  ///< of each view, where the robot's file gave angles [rad]
+  RefineSettings refine;
+  int least_views = 4;    ///< fewer are refused
+  double hopeless = 0.2;  ///< closing error of the majority beyond which nothing is solved, as `suspicious`
+  double surprise = 35;   ///< squared size of a correction over that of most views, 6 degrees of freedom
+  int folds = 10;         ///< of the held-out residuals
+  std::vector<ClosedForm> closed_forms = calib::closed_forms();  ///< of the comparison table
+  TargetSize target_size = TargetSize::automatic;
+  int threads = 1;  ///< of held-out residuals and splits; 0: one a processor
+};
+
+struct ViewResult {
+  bool used = true;
+  std::string reason;
+  double px = 0;                           ///< reprojection with the view's correction, 2-D rms per corner
+  double chain_px = 0;                     ///< without
+  Vector6d correction = Vector6d::Zero();  ///< of the robot's pose, of a used view
+};
+
+struct Calibration {
+  Setup setup = Setup::eye_in_hand;
+  ViewSelection selection;
+  std::vector<int> used;  ///< views in the solution, by their place in the set
+  Refinement refined;
+  HandEyePoses poses;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of X, right perturbation (dt, dtheta)
+  double corner_rms = 0;                   ///< with corrections, 2-D rms per corner [px]
+  double chain_rms = 0;                    ///< without [px]
+  double centre_rms = 0;  ///< of the target's projected middle against the view's own pose, without [px]
+  HeldOut held_out;
+  std::vector<ComparedMethod> comparison;
+  std::vector<ViewResult> views;
+  RotationDiversity diversity;
+  WeakestDirection weakest;
+  std::optional<ScaleCheck> scale;
+  std::vector<SplitCheck> splits;  ///< of X, interleaved first; none where there are too few views
+  double covariance_factor = 1;    ///< by which the splits have widened the covariance
+  std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found
+  std::vector<std::string> warnings;                ///< worst first
+  bool usable = true;
+};
+
+/// Pose pairs are seen by no camera.
+bool has_pixels(const Calibration& calibration);
+
+/// What all calibrations start with: enough views, enough axes, numbering and planar poses chosen, a
+/// convention that closes. Returns the observations in use and fills `result` so far. Throws
+/// data::InputError.
+std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& observations,
+                                 const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings);
+
+/// What all end with: views, observability, warnings.
+void finish(Calibration& result, const std::vector<Observation>& used);
+
+/// From observations to the answer: views selected, seed, bundle, errors in variables, a second look for
+/// views that do not belong, held-out residuals, comparison. Throws data::InputError where too few views are
+/// left or nothing can be determined, with the one sentence that names the cause.
+Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& observations,
+                      const CalibrateSettings& settings = {});
+
+}  // namespace flash::calib

@@ -1,0 +1,183 @@
+#include "calib/calibrate/calibrate_images.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "calib/dataset/symmetry.h"
+#include "calib/solve/linearization.h"
+#include "data/error.h"
+
+namespace flash::calib {
+namespace {
+
+/// A view for each picture, without poses where the target was not found.
+std::vector<Observation> views_of(const std::vector<Detection>& detections, const std::string& refiner) {
+  const std::vector<Observation> found = observations_of(detections, refiner);
+  std::vector<Observation> views;
+  auto next = found.begin();
+  for (const Detection& detection : detections) {
+    Observation missing;
+    missing.image = detection.image;
+    views.push_back(detection.readings.empty() ? missing : *next++);
+  }
+  return views;
+}
+
+template <class... Values>
+std::string formatted(const char* format, const Values&... values) {
+  char text[320];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+/// What calibrate() is called with, apart from the views.
+struct Problem {
+  Setup setup;
+  const data::CameraIntrinsics& camera;
+  Eigen::Matrix3Xd points;
+  std::vector<Symmetry> symmetries;
+
+  Calibration solve(const std::vector<Observation>& views, const CalibrateSettings& settings) const {
+    return calibrate(setup, camera, points, symmetries, views, settings);
+  }
+};
+
+TimeOffset offset_left(const Refinement& refined, const Unknowns& unknowns) {
+  const int column = shared_columns(refined.bundle, unknowns).time_offsets.front();
+  return {refined.bundle.time_offsets.front(), std::sqrt(refined.covariance(column, column))};
+}
+
+/// Warns where the poses' clock and the pictures' differ, in a solution that took them to be one.
+void check_time(const Dataset& dataset, const CalibrateSettings& settings, Calibration& result) {
+  RefineSettings with_offset = settings.refine;
+  with_offset.estimate_pivots = false;
+  with_offset.noise = result.refined.noise;
+  with_offset.bundle.unknowns.time_offsets = true;
+  Bundle bundle = result.refined.bundle;
+  double squares = 0;
+  for (std::size_t k = 0; k < bundle.poses.size(); ++k) {
+    const Frame& frame = dataset.frames[static_cast<std::size_t>(result.used[k])];
+    const std::optional<Motion> motion = motion_at(*dataset.stream, frame.stamp);
+    if (motion) bundle.poses[k].velocity = motion->velocity;
+    squares += bundle.poses[k].velocity.head<3>().squaredNorm();
+  }
+  if (squares < 1e-6 * static_cast<double>(bundle.poses.size())) return;  // slower than 1 mm/s
+  const TimeOffset offset = offset_left(refine(std::move(bundle), with_offset), with_offset.bundle.unknowns);
+  if (!(std::abs(offset.estimate) > 5 * offset.sd)) return;
+  result.warnings.insert(
+      result.warnings.begin(),
+      formatted("pictures and poses are %.1f +- %.1f ms apart: --time-offset takes that into account",
+                1e3 * offset.estimate, 1e3 * offset.sd));
+}
+
+/// Solves with the poses as the stream has them at the pictures' times, and again at the times found, until
+/// less than a twentieth of a standard deviation is left: velocities then need to hold for no time at all.
+Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
+                             const std::vector<Observation>& views, const CalibrateSettings& settings,
+                             TimeOffset& offset) {
+  constexpr int kRounds = 6;
+  constexpr double kUnknown = 0.1;  // a standard deviation that says nothing [s]
+  std::vector<double> stamps;
+  for (const Frame& frame : dataset.frames) stamps.push_back(frame.stamp);
+  offset.estimate = coarse_offset(problem.setup, *dataset.stream, stamps, views, problem.symmetries);
+  CalibrateSettings quick = settings;
+  quick.folds = 2;
+  for (int round = 0;; ++round) {
+    std::vector<std::size_t> beyond;
+    const std::vector<Observation> moved_views =
+        placed(*dataset.stream, stamps, offset.estimate, views, &beyond);
+    const double speed = rms_speed(moved_views);
+    if (speed < 1e-3)
+      throw data::InputError(
+          "the robot stands still at every picture: a time offset cannot be determined, and none is needed; "
+          "leave --time-offset out");
+    const bool last = round == kRounds;
+    Calibration result = problem.solve(moved_views, last ? settings : quick);
+    const TimeOffset left = offset_left(result.refined, settings.refine.bundle.unknowns);
+    offset.sd = left.sd;
+    if (!(offset.sd < kUnknown))
+      throw data::InputError(
+          formatted("the robot moves too slowly at the pictures (%.1f mm/s) to find a time offset (it would "
+                    "be known to "
+                    "+- %.0f ms); leave --time-offset out",
+                    1e3 * speed, 1e3 * offset.sd));
+    if (last) {
+      offset.estimate += left.estimate;
+      // Widened as much as the transform's was.
+      offset.sd *=
+          std::sqrt(result.covariance.trace() / result.refined.covariance.topLeftCorner<6, 6>().trace());
+      for (const std::size_t i : beyond)
+        result.selection.views[i].reason = result.views[i].reason =
+            "its time lies beyond the poses of " + dataset.poses_path;
+      return result;
+    }
+    if (std::abs(left.estimate) < 0.05 * left.sd)
+      round = kRounds - 1;  // once more, with everything that the answer holds
+    else
+      offset.estimate += left.estimate;
+  }
+}
+
+/// What the solution says of the depth that took part, and what people should know of it.
+void report_depth(const DepthUse& use, const Unknowns& unknowns, ImageCalibration& result) {
+  DepthUse& depth = result.depth.emplace(use);
+  Calibration& calibration = result.calibration;
+  for (const std::string& reason : depth.unreadable)
+    calibration.warnings.push_back(reason + "; the view was used without depth");
+  if (!depth.used) {
+    calibration.warnings.push_back("depth was not used: " + depth.reason);
+    return;
+  }
+  const Refinement& refined = calibration.refined;
+  const int column = shared_columns(refined.bundle, unknowns).depth_scales.front();
+  if (column < 0) return;
+  depth.sigma = refined.noise.depth.front();
+  depth.over_corners = refined.bundle.depth_scales.front();
+  depth.over_corners_sd = std::sqrt(refined.covariance(column, column));
+  const double off = std::abs(depth.over_corners - 1);
+  if (off > 0.01 && off > 5 * depth.over_corners_sd)
+    calibration.warnings.push_back(
+        formatted("depth puts the target at %.4f +- %.4f times the distance that its corners say: depth, the "
+                  "target's size or the lens is wrong by that much",
+                  depth.over_corners, 2 * depth.over_corners_sd));
+}
+
+}  // namespace
+
+ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Target& target,
+                                  const std::vector<Detection>& detections,
+                                  const std::optional<DepthViews>& depth, CalibrateSettings settings) {
+  constexpr double kTie = 1.05;
+  for (const Frame& frame : dataset.frames)
+    if (frame.angles) settings.angles.push_back(*frame.angles);
+  if (settings.angles.size() != dataset.frames.size()) settings.angles.clear();
+  const bool timed = settings.refine.bundle.unknowns.time_offsets;
+  if (timed && !dataset.stream)
+    throw data::InputError(dataset.poses_path +
+                           ": found one pose a picture, expected a stream of poses over time, with pictures "
+                           "named by their time, to find a time offset");
+  const Problem problem{setup, *dataset.camera, target_points(target), confusable_symmetries(target)};
+  const std::vector<RefinerScore> ranking = rank_refiners(detections);
+  const auto calibrated = [&](const std::string& refiner) {
+    std::vector<Observation> views = views_of(detections, refiner);
+    for (std::size_t i = 0; depth && i < views.size(); ++i) views[i].depth_points = depth->points[i];
+    ImageCalibration result{.calibration = {}, .refiner = refiner};
+    if (timed)
+      result.calibration = calibrate_stream(problem, dataset, views, settings, result.time_offset.emplace());
+    else
+      result.calibration = problem.solve(views, settings);
+    return result;
+  };
+  ImageCalibration best = calibrated(ranking.front().refiner);
+  for (std::size_t i = 1; i < ranking.size() && ranking[i].rms <= kTie * ranking.front().rms; ++i) {
+    ImageCalibration other = calibrated(ranking[i].refiner);
+    if (other.calibration.held_out.px < best.calibration.held_out.px) best = std::move(other);
+  }
+  for (std::size_t i = 0; i < detections.size(); ++i)
+    if (!detections[i].reason.empty()) best.calibration.views[i].reason = detections[i].reason;
+  if (dataset.stream && !timed) check_time(dataset, settings, best.calibration);
+  if (depth) report_depth(depth->use, settings.refine.bundle.unknowns, best);
+  return best;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,56 @@
+#include "calib/calibrate/calibrate_pairs.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/solve/pose_space.h"
+
+namespace flash::calib {
+namespace {
+
+template <class Fit>
+HeldOut hold_out_pairs(const std::vector<PoseLoop>& loops, int folds, const Fit& fit) {
+  const int count = static_cast<int>(loops.size()), parts = std::min(folds, count);
+  HeldOut held;
+  for (int part = 0; part < parts; ++part) {
+    std::vector<PoseLoop> train, test;
+    for (int i = 0; i < count; ++i)
+      (i % parts == part ? test : train).push_back(loops[static_cast<std::size_t>(i)]);
+    const ClosingError error = closing_rms(test, fit(train));
+    held.mm += std::pow(1e3 * error.translation, 2) * static_cast<double>(test.size()) / count;
+    held.deg += std::pow(error.rotation * 180 / M_PI, 2) * static_cast<double>(test.size()) / count;
+  }
+  for (int i = 0; i < count; ++i) held.fold.push_back(i % parts);
+  held.mm = std::sqrt(held.mm);
+  held.deg = std::sqrt(held.deg);
+  return held;
+}
+
+}  // namespace
+
+Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
+                            const CalibrateSettings& settings) {
+  Calibration result;
+  result.setup = setup;
+  const std::vector<Observation> observations = prepare(result, all, {Symmetry{}}, settings);
+  const std::vector<PoseLoop> loops = pose_loops(setup, observations);
+  const PoseSpaceFit fit = fit_pose_space(loops, shah(loops));
+  result.poses = fit.poses;
+  result.covariance = fit.covariance.topLeftCorner<6, 6>();
+  result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation}, {0.0}};
+  result.refined.converged = fit.converged;
+  result.comparison = compare_closed_forms(loops, settings.closed_forms);
+  for (ComparedMethod& method : result.comparison) {
+    if (method.name == "park") method.held_out = hold_out_pairs(loops, settings.folds, park);
+    if (method.name == "shah") method.held_out = hold_out_pairs(loops, settings.folds, shah);
+  }
+  result.held_out = hold_out_pairs(loops, settings.folds, [](const std::vector<PoseLoop>& train) {
+    return fit_pose_space(train, shah(train)).poses;
+  });
+  result.comparison.push_back(
+      {"pose_space", fit.poses, relative_rms(loops, fit.poses.X), 0, result.held_out, false});
+  finish(result, observations);
+  return result;
+}
+
+}  // namespace flash::calib

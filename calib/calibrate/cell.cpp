@@ -1,0 +1,256 @@
+#include "calib/calibrate/cell.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+
+#include "calib/solve/linearization.h"
+#include "calib/uncertainty/correlated_pose_errors.h"
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::calib {
+namespace {
+
+/// Names in the order in which they come.
+std::vector<std::string> names_of(const std::vector<CellMember>& members, std::string CellMember::*name) {
+  std::vector<std::string> names;
+  for (const CellMember& member : members)
+    if (std::find(names.begin(), names.end(), member.*name) == names.end()) names.push_back(member.*name);
+  return names;
+}
+
+std::size_t index_of(const std::vector<std::string>& names, const std::string& name) {
+  return static_cast<std::size_t>(std::distance(names.begin(), std::find(names.begin(), names.end(), name)));
+}
+
+/// The member with its target turned so that its Z lies nearest to `target`: cameras on two sides of a plain
+/// board number it from different ends, each without a contradiction of its own.
+CellMember aligned(CellMember member, const Eigen::Isometry3d& target, std::vector<std::string>* notices) {
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t s = 0; s < member.symmetries.size(); ++s) {
+    const Eigen::Isometry3d turned = member.poses.Z * member.symmetries[s].turn.inverse();
+    const double angle = rotation_angle(turned.linear().transpose() * target.linear());
+    if (angle >= least) continue;
+    least = angle;
+    best = s;
+  }
+  if (best == 0) return member;
+  const Symmetry& symmetry = member.symmetries[best];
+  member.poses.Z = member.poses.Z * symmetry.turn.inverse();
+  for (Observation& observation : member.observations) {
+    for (int& point : observation.points) point = symmetry.permutation[static_cast<std::size_t>(point)];
+    for (Eigen::Isometry3d& T : observation.T_camera_target) T = T * symmetry.turn.inverse();
+  }
+  if (notices)
+    notices->push_back(member.camera +
+                       " numbers the target from its other end than the first camera; turned");
+  return member;
+}
+
+/// Places of arms and cameras in the world, filled in as members connect them.
+struct Layout {
+  std::vector<std::optional<Eigen::Isometry3d>> bases, cameras, targets;
+};
+
+/// eye-to-hand: C = B X, Z of the arm. eye-in-hand: C = X, and the target, one for all, stands at B Z.
+void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout& layout) {
+  std::optional<Eigen::Isometry3d>& B = layout.bases[arm];
+  std::optional<Eigen::Isometry3d>& C = layout.cameras[camera];
+  const bool in_hand = member.setup == Setup::eye_in_hand;
+  std::optional<Eigen::Isometry3d>& Z = layout.targets[in_hand ? 0 : arm];
+  if (in_hand) {
+    if (!B && Z) B = *Z * member.poses.Z.inverse();
+    if (!C) C = member.poses.X;
+    if (!Z && B) Z = *B * member.poses.Z;
+  } else {
+    if (!B && C) B = *C * member.poses.X.inverse();
+    if (!C && B) C = *B * member.poses.X;
+    if (!Z) Z = member.poses.Z;
+  }
+}
+
+std::string size_notice(const ScaleCheck& scale) {
+  char text[200];
+  std::snprintf(
+      text, sizeof text,
+      "a target is taken to be %.4f +- %.4f (2 sd) times as large as stated, as the data want it: measure it",
+      scale.estimate, 2 * scale.sd);
+  return text;
+}
+
+}  // namespace
+
+CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
+                       const Target& target, const Calibration& calibration) {
+  CellMember member{.arm = arm, .camera = camera, .setup = calibration.setup, .intrinsics = *dataset.camera};
+  member.points = target_points(target);
+  member.symmetries = confusable_symmetries(target);
+  member.poses = calibration.poses;
+  member.covariance = calibration.covariance;
+  for (const int i : calibration.used) {
+    const auto view = static_cast<std::size_t>(i);
+    member.observations.push_back(calibration.selection.observations[view]);
+    member.stamps.push_back(dataset.frames[view].stamp);
+  }
+  return member;
+}
+
+Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::string>* notices) {
+  const std::vector<std::string> arms = names_of(members, &CellMember::arm);
+  const std::vector<std::string> cameras = names_of(members, &CellMember::camera);
+  const bool in_hand = members.front().setup == Setup::eye_in_hand;
+  Layout layout;
+  layout.bases.resize(arms.size());
+  layout.cameras.resize(cameras.size());
+  layout.targets.resize(in_hand ? 1 : arms.size());
+  layout.bases.front() = Eigen::Isometry3d::Identity();
+
+  Bundle bundle;
+  bundle.setup = members.front().setup;
+  bundle.intrinsics.resize(cameras.size());
+  std::map<std::pair<std::size_t, double>, int> pose_of;
+  for (const CellMember& given : members) {
+    if (given.setup != bundle.setup)
+      throw data::InputError(given.camera + ": found " + to_string(given.setup) + ", expected " +
+                             to_string(bundle.setup) + " as of the first");
+    const std::size_t arm = index_of(arms, given.arm), camera = index_of(cameras, given.camera);
+    const std::size_t target = in_hand ? 0 : arm;
+    const std::optional<Eigen::Isometry3d>& B = layout.bases[arm];
+    const std::optional<Eigen::Isometry3d>& Z = layout.targets[target];
+    const bool comparable = Z && (!in_hand || B);
+    const CellMember member =
+        comparable ? aligned(given, in_hand ? Eigen::Isometry3d(B->inverse() * *Z) : *Z, notices) : given;
+    place(member, arm, camera, layout);
+    if (!layout.bases[arm] || !layout.cameras[camera])
+      throw data::InputError(given.arm + " and " + given.camera +
+                             " have nothing in common with the arms and cameras before them");
+    bundle.intrinsics[camera] = member.intrinsics;
+    for (std::size_t i = 0; i < member.observations.size(); ++i) {
+      const Observation& observation = member.observations[i];
+      const auto [entry, fresh] =
+          pose_of.try_emplace({arm, member.stamps[i]}, static_cast<int>(bundle.poses.size()));
+      if (fresh) {
+        RobotPose pose;
+        pose.arm = static_cast<int>(arm);
+        pose.T_base_gripper = observation.T_base_gripper;
+        bundle.poses.push_back(pose);
+      }
+      BundleView view;
+      view.pose = entry->second;
+      view.camera = static_cast<int>(camera);
+      view.target = static_cast<int>(target);
+      view.points = member.points(Eigen::all, observation.points);
+      view.pixels = observation.pixels;
+      view.depth_points = observation.depth_points;
+      bundle.views.push_back(std::move(view));
+    }
+  }
+  for (const auto& B : layout.bases) bundle.bases.push_back(*B);
+  for (const auto& C : layout.cameras) bundle.cameras.push_back(*C);
+  for (const auto& Z : layout.targets) bundle.targets.push_back(*Z);
+  bundle.scales.assign(bundle.targets.size(), 1.0);
+  bundle.time_offsets.assign(bundle.bases.size(), 0.0);
+  bundle.pivots.assign(bundle.bases.size(), Eigen::Vector3d::Zero());
+  return bundle;
+}
+
+Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& given, TargetSize size) {
+  Cell cell{.joint = true};
+  RefineSettings settings = given;
+  settings.bundle.unknowns.scales = size == TargetSize::solved;
+  const Bundle start = cell_bundle(members, &cell.notices);
+  Refinement refined = refine(start, settings);
+  cell.scales = check_scales(refined, settings);
+  if (size == TargetSize::automatic && std::any_of(cell.scales.begin(), cell.scales.end(), clearly_off)) {
+    settings.bundle.unknowns.scales = true;
+    refined = refine(start, settings);
+    cell.scales = check_scales(refined, settings);
+  }
+  if (size == TargetSize::solved && cell.scales.empty())
+    throw data::InputError(
+        "the data do not tell the size of the targets: the robots move too little; leave --target-size "
+        "solved out, or add views farther apart");
+  if (!refined.converged) cell.notices.emplace_back("the joint refinement did not converge");
+  const SystematicUncertainty systematic = systematic_uncertainty(refined, settings.bundle);
+  const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
+  for (std::size_t i = 0; i < cell.scales.size(); ++i)
+    if (const int column = columns.scales[i]; column >= 0)
+      cell.scales[i].sd = std::sqrt(systematic.covariance(column, column));
+  for (ScaleCheck& scale : cell.scales) {
+    scale.solved = settings.bundle.unknowns.scales;
+    if (scale.solved) cell.notices.push_back(size_notice(scale));
+  }
+  const std::vector<std::string> arms = names_of(members, &CellMember::arm);
+  const std::vector<std::string> cameras = names_of(members, &CellMember::camera);
+  const auto block = [&](int column) -> Matrix6d {
+    return column < 0 ? Matrix6d(Matrix6d::Zero())
+                      : Matrix6d(systematic.covariance.block<6, 6>(column, column));
+  };
+  // How much of what halves show has been added already.
+  const auto grown = [&](int column) {
+    if (column < 0) return 1.0;
+    const Matrix6d noise = refined.covariance.block<6, 6>(column, column);
+    return std::max(1.0, noise.ldlt().solve(block(column)).trace() / 6);
+  };
+  for (std::size_t a = 0; a < arms.size(); ++a)
+    if (systematic.arms[a].found)
+      cell.notices.push_back(arms[a] +
+                             ": the robot's errors change smoothly with its pose; what they have in common "
+                             "was added to the standard deviations");
+  const std::string world = arms.front();
+  const auto widened = [&](std::size_t base) {
+    if (refined.bundle.poses.size() < 16) return 1.0;
+    const std::vector<SplitCheck> checks = check_systematic(refined, settings.bundle, base);
+    const SplitCheck* worst = nullptr;
+    const int column = base == 0 ? columns.cameras.front() : columns.bases[base];
+    const double factor = std::max(1.0, split_inflation(checks, &worst) / grown(column));
+    if (worst != nullptr && factor > 1)
+      cell.notices.push_back((base == 0 ? cameras.front() : arms[base]) + ": " + describe(worst->split) +
+                             " differ by more than noise explains; its standard deviations were raised by " +
+                             data::format_short(std::sqrt(factor)));
+    return factor;
+  };
+  for (std::size_t a = 1; a < arms.size(); ++a)
+    cell.bases.push_back({{world, arms[a], refined.bundle.bases[a]}, widened(a) * block(columns.bases[a])});
+  const std::string parent = refined.bundle.setup == Setup::eye_in_hand ? "gripper" : world;
+  const double camera_factor = widened(0);
+  for (std::size_t c = 0; c < cameras.size(); ++c)
+    cell.cameras.push_back(
+        {{parent, cameras[c], refined.bundle.cameras[c]}, camera_factor * block(columns.cameras[c])});
+  cell.noise = refined.noise;
+  cell.corner_rms = reprojection_rms(refined.bundle, true);
+  cell.chain_rms = reprojection_rms(refined.bundle, false);
+  return cell;
+}
+
+Cell compose_cell(const std::vector<std::string>& arms, const std::vector<Extrinsics>& calibrations) {
+  Cell cell;
+  const Extrinsics& first = calibrations.front();
+  for (std::size_t i = 0; i < calibrations.size(); ++i) {
+    const Extrinsics& other = calibrations[i];
+    if (other.setup != Setup::eye_to_hand)
+      throw data::InputError(arms[i] +
+                             ": found eye-in-hand, expected eye-to-hand: a camera that rides on one arm "
+                             "does not stand still for the other");
+    if (i == 0) continue;
+    // X_A Exp(a) Exp(-b) X_B^-1: the difference of both perturbations, carried through X_B.
+    const Matrix6d carry = adjoint(other.transform.T);
+    cell.bases.push_back({{arms.front(), arms[i], first.transform.T * other.transform.T.inverse()},
+                          carry * (first.covariance + other.covariance) * carry.transpose()});
+  }
+  cell.cameras.push_back({{arms.front(), "camera", first.transform.T}, first.covariance});
+  return cell;
+}
+
+Eigen::Matrix3d point_covariance(const CellFrame& frame, const Eigen::Vector3d& p) {
+  Eigen::Matrix<double, 3, 6> J;
+  J << frame.transform.T.linear(), -frame.transform.T.linear() * skew(p);
+  return J * frame.covariance * J.transpose();
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,63 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "calib/calibrate/calibrate.h"
+#include "calib/calibrate/extrinsics.h"
+#include "calib/dataset/dataset.h"
+#include "calib/dataset/symmetry.h"
+#include "calib/dataset/target.h"
+#include "calib/solve/target_size.h"
+
+namespace flash::calib {
+
+/// What one camera saw of one arm. All members of a cell are eye-to-hand, or all eye-in-hand.
+struct CellMember {
+  std::string arm, camera;  ///< names; members that share one share its unknowns
+  Setup setup = Setup::eye_to_hand;
+  data::CameraIntrinsics intrinsics;
+  Eigen::Matrix3Xd points = {};  ///< of the target
+  std::vector<Symmetry> symmetries = {};
+  std::vector<Observation> observations = {};  ///< in use, T_camera_target the chosen pose alone
+  std::vector<double> stamps = {};             ///< equal stamps of one arm are one pose of it
+  HandEyePoses poses = {};                     ///< of the calibration by itself
+  Matrix6d covariance = Matrix6d::Zero();
+};
+
+/// The views in use as a member of a cell.
+CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
+                       const Target& target, const Calibration& calibration);
+
+/// A frame of the cell in the base of the first arm (eye-in-hand: cameras in the gripper).
+struct CellFrame {
+  NamedTransform transform;
+  Matrix6d covariance = Matrix6d::Zero();  ///< right perturbation (dt, dtheta) [m, rad]
+};
+
+struct Cell {
+  bool joint = false;  ///< one solution from all images; otherwise composed of single calibrations
+  std::vector<CellFrame> bases = {}, cameras = {};
+  NoiseLevels noise = {};
+  std::vector<ScaleCheck> scales = {};   ///< of the targets; none where composed
+  double corner_rms = 0, chain_rms = 0;  ///< with and without corrections, 2-D rms per corner [px]
+  std::vector<std::string> notices = {};
+};
+
+/// T_armA_armB = X_A X_B^-1 for every further calibration on one camera that stands still, with the
+/// covariances of both. Throws data::InputError where one is eye-in-hand.
+Cell compose_cell(const std::vector<std::string>& arms, const std::vector<Extrinsics>& calibrations);
+
+/// The bundle of all members: bases, cameras, targets and robot corrections in one, first arm and first
+/// member leading. Targets that are seen in the other family of their symmetry are turned first. Throws
+/// data::InputError where a member has neither its arm nor its camera in common with those before it.
+Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::string>* notices = nullptr);
+
+/// Solved by errors in variables. Intrinsics: how many of fx fy cx cy ... of each camera are solved for.
+Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& settings = {},
+                TargetSize size = TargetSize::automatic);
+
+/// Covariance of where a point lies, p in the frame's child, seen from its parent [m^2].
+Eigen::Matrix3d point_covariance(const CellFrame& frame, const Eigen::Vector3d& p);
+
+}  // namespace flash::calib

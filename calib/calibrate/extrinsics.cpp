@@ -1,0 +1,101 @@
+#include "calib/calibrate/extrinsics.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "data/error.h"
+#include "data/json_reader.h"
+
+namespace flash::calib {
+
+namespace fs = std::filesystem;
+
+ExtrinsicsInputs relative_to(ExtrinsicsInputs inputs, const std::string& out) {
+  if (out.empty()) return inputs;
+  const fs::path folder = fs::weakly_canonical(fs::absolute(out)).parent_path();
+  for (std::string* path : {&inputs.dataset, &inputs.target, &inputs.poses, &inputs.camera})
+    if (!path->empty() && fs::exists(*path))  // a target may be words
+      *path = fs::weakly_canonical(fs::absolute(*path)).lexically_relative(folder).string();
+  return inputs;
+}
+
+std::string resolved(const std::string& path, const std::string& calibration) {
+  const fs::path beside = fs::weakly_canonical(fs::absolute(calibration).parent_path() / path);
+  if (fs::exists(beside)) return beside.string();
+  if (fs::exists(path)) return path;
+  throw data::input_error(calibration, "provenance",
+                          "found " + path + ", which is neither " + beside.string() + " nor " +
+                              fs::weakly_canonical(fs::absolute(path)).string() +
+                              ", expected where it was when the file was written");
+}
+
+Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs) {
+  const bool in_hand = calibration.setup == Setup::eye_in_hand;
+  Extrinsics extrinsics;
+  extrinsics.setup = calibration.setup;
+  extrinsics.pixels = has_pixels(calibration);
+  extrinsics.method = extrinsics.pixels ? to_string(Method::errors_in_variables) : "pose_space";
+  extrinsics.transform = {in_hand ? "gripper" : "base", "camera", calibration.poses.X};
+  extrinsics.target_pose = {in_hand ? "base" : "gripper", "target", calibration.poses.Z};
+  extrinsics.covariance = calibration.covariance;
+  extrinsics.corner_px = calibration.refined.noise.corner.front();
+  extrinsics.robot_rotation_rad = calibration.refined.noise.rotation.front();
+  extrinsics.robot_translation_m = calibration.refined.noise.translation.front();
+  extrinsics.inputs = inputs;
+  return extrinsics;
+}
+
+Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
+  const nlohmann::json file = data::load_json(path);
+  const data::JsonObject object(file, path);
+  const data::CameraPose pose = data::read_camera_pose(object, accept_unusable);
+  Extrinsics extrinsics;
+  extrinsics.setup = parse_setup(object.string("setup"), path, "setup");
+  extrinsics.method = object.string("method");
+  extrinsics.transform = pose.transform;
+  extrinsics.warnings = pose.warnings;
+  extrinsics.usable = pose.usable;
+  extrinsics.target_pose = data::read_transform(object.object("target_pose"));
+  const nlohmann::json& covariance = object.raw("covariance");
+  if (!covariance.is_array() || covariance.size() != 6) throw object.error("covariance", "6 x 6 numbers");
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    const nlohmann::json& row = covariance[static_cast<std::size_t>(i)];
+    if (!row.is_array() || row.size() != 6) throw object.error("covariance", "6 x 6 numbers");
+    for (Eigen::Index j = 0; j < 6; ++j) {
+      const nlohmann::json& value = row[static_cast<std::size_t>(j)];
+      if (!value.is_number()) throw object.error("covariance", "6 x 6 numbers");
+      extrinsics.covariance(i, j) = value.get<double>();
+    }
+  }
+  if (!extrinsics.covariance.isApprox(extrinsics.covariance.transpose(), 1e-6) ||
+      extrinsics.covariance.diagonal().minCoeff() < 0)
+    throw object.error("covariance", "a symmetric matrix");
+  if (object.has("sigmas")) {
+    const data::JsonObject sigmas = object.object("sigmas");
+    extrinsics.pixels = sigmas.has("corner_px");
+    extrinsics.corner_px = sigmas.not_negative("corner_px", 0);
+    extrinsics.robot_rotation_rad = sigmas.not_negative("robot_rotation_rad");
+    extrinsics.robot_translation_m = sigmas.not_negative("robot_translation_m");
+  }
+  if (object.has("scale")) {
+    const data::JsonObject scale = object.object("scale");
+    if (scale.boolean("solved", false)) extrinsics.target_scale = scale.positive("estimate");
+  }
+  if (object.has("provenance")) {
+    const data::JsonObject from = object.object("provenance");
+    extrinsics.inputs = {from.string("dataset", ""), from.string("target", ""), from.string("poses", ""),
+                         from.string("camera", ""), from.string("refiner", "")};
+    if (from.has("depth_scale")) {
+      DepthUse& depth = extrinsics.inputs.depth.emplace();
+      depth.used = true;
+      depth.scale = from.positive("depth_scale");
+    }
+  }
+  if (object.has("time_offset")) {
+    const data::JsonObject offset = object.object("time_offset");
+    extrinsics.inputs.time_offset = {offset.number("estimate_s"), offset.not_negative("sd_s")};
+  }
+  return extrinsics;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,52 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/calibrate/calibrate.h"
+#include "calib/dataset/depth_use.h"
+#include "calib/solve/time_offset.h"
+#include "data/extrinsics.h"
+
+namespace flash::calib {
+
+using data::NamedTransform;
+
+/// What a calibration was made from, so that it can be made again, and what took part beside the corners.
+struct ExtrinsicsInputs {
+  std::string dataset, target, poses, camera, refiner;
+  std::optional<DepthUse> depth = {};
+  std::optional<TimeOffset> time_offset = {};
+};
+
+/// The same with paths as a reader of the file `out` needs them: relative to its folder, so that file and
+/// dataset can be moved together. Nothing changes where `out` is empty.
+ExtrinsicsInputs relative_to(ExtrinsicsInputs inputs, const std::string& out);
+
+/// A path of the provenance: from the folder of the calibration, else from the current one. Throws
+/// data::InputError where it is at neither.
+std::string resolved(const std::string& path, const std::string& calibration);
+
+/// "flash-extrinsics/1", as far as other programs need it.
+struct Extrinsics {
+  Setup setup = Setup::eye_in_hand;
+  std::string method;
+  NamedTransform transform;                ///< gripper <- camera (eye-in-hand) or base <- camera
+  NamedTransform target_pose;              ///< base <- target (eye-in-hand) or gripper <- target
+  Matrix6d covariance = Matrix6d::Zero();  ///< of the transform, right perturbation (dt, dtheta) [m, rad]
+  double target_scale =
+      1;  ///< size of the target that transform and target_pose are for, over the stated one
+  double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
+  bool pixels = true;                 ///< false: of pose pairs, which have no corners
+  std::vector<std::string> warnings;  ///< of the calibration, worst first
+  bool usable = true;                 ///< false: it ended with exit code 3
+  ExtrinsicsInputs inputs;
+};
+
+Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs);
+
+/// Throws data::InputError naming file, field, what was found and what was expected; also where the
+/// calibration ended with exit code 3, unless `accept_unusable`, which is what --force says.
+Extrinsics load_extrinsics(const std::string& path, bool accept_unusable = false);
+
+}  // namespace flash::calib

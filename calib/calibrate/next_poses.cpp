@@ -1,0 +1,158 @@
+#include "calib/calibrate/next_poses.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "calib/geometry/projection.h"
+#include "calib/solve/linearization.h"
+#include "data/error.h"
+
+namespace flash::calib {
+namespace {
+
+struct Candidate {
+  Eigen::Isometry3d T_base_gripper;
+  Eigen::MatrixXd information;  // of the shared unknowns
+};
+
+/// Seen whole, from the front, with a margin.
+bool visible(const Eigen::Isometry3d& T_camera_target, const data::CameraIntrinsics& camera,
+             const Eigen::Matrix3Xd& points, const PlanSettings& settings) {
+  const Eigen::Vector3d sight = (T_camera_target * Eigen::Vector3d(points.rowwise().mean())).normalized();
+  if (sight.dot(T_camera_target.linear().col(2)) < std::cos(settings.steepest)) return false;
+  const IntrinsicsVector intrinsics = to_vector(camera);
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const Eigen::Vector3d q = T_camera_target * points.col(i);
+    if (!(q.z() > 0.02)) return false;
+    const Eigen::Vector2d px = project(intrinsics, q);
+    if (px.minCoeff() < settings.margin_px || px.x() > camera.width - settings.margin_px ||
+        px.y() > camera.height - settings.margin_px)
+      return false;
+  }
+  return true;
+}
+
+/// What one more view tells of the shared unknowns: its corners, with its robot pose known to its noise.
+Eigen::MatrixXd view_information(Bundle bundle, const Eigen::Isometry3d& T_base_gripper,
+                                 const Eigen::Matrix3Xd& points, const NoiseLevels& noise,
+                                 const Unknowns& unknowns, const SharedColumns& columns) {
+  RobotPose pose;
+  pose.T_base_gripper = T_base_gripper;
+  bundle.poses = {pose};
+  BundleView view;
+  view.points = points;
+  view.pixels = Eigen::Matrix2Xd::Zero(2, points.cols());
+  double count = 0;
+  // The residual of these pixels is of no account: only its derivatives are.
+  const Eigen::MatrixXd gram = corner_gram(bundle, view, unknowns, columns, noise.corner.front(), 0, count) /
+                               (noise.corner.front() * noise.corner.front());
+  const int s = columns.count;
+  Matrix6d own = gram.topLeftCorner<6, 6>();
+  own.diagonal().head<3>().array() += 1 / (noise.translation.front() * noise.translation.front());
+  own.diagonal().tail<3>().array() += 1 / (noise.rotation.front() * noise.rotation.front());
+  const Eigen::MatrixXd cross = gram.block(0, 6, 6, s);
+  return gram.block(6, 6, s, s) - cross.transpose() * own.ldlt().solve(cross);
+}
+
+Matrix6d camera_covariance(const Eigen::MatrixXd& information) {
+  return information.ldlt()
+      .solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()))
+      .topLeftCorner<6, 6>();
+}
+
+double worth(const Matrix6d& covariance, PlanCriterion criterion, double length) {
+  if (criterion == PlanCriterion::determinant) return covariance.determinant();
+  return covariance.topLeftCorner<3, 3>().trace() +
+         length * length * covariance.bottomRightCorner<3, 3>().trace();
+}
+
+std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const PlanSettings& settings) {
+  Eigen::Vector3d lower = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity()), upper = -lower;
+  std::vector<Eigen::Isometry3d> used;
+  for (const RobotPose& pose : bundle.poses) {
+    used.push_back(pose.T_base_gripper);
+    lower = lower.cwiseMin(pose.T_base_gripper.translation());
+    upper = upper.cwiseMax(pose.T_base_gripper.translation());
+  }
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(settings.reach);
+  lower = (lower - reach).cwiseMax(settings.lower);
+  upper = (upper + reach).cwiseMin(settings.upper);
+  if ((lower.array() > upper.array()).any())
+    throw data::InputError("plan: the bounds lie outside of what the poses so far can reach");
+  const Eigen::Matrix3d mean = mean_pose(used).linear();
+  std::mt19937 random(settings.seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<Eigen::Isometry3d> poses;
+  for (int i = 0; i < settings.candidates; ++i) {
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    for (int k = 0; k < 3; ++k) T.translation()[k] = lower[k] + (upper[k] - lower[k]) * uniform(random);
+    // Half from views that are known to work, turned; half from their mean orientation.
+    const auto from = static_cast<std::size_t>(uniform(random) * static_cast<double>(used.size()));
+    const double heading = 2 * M_PI * uniform(random), tilt = settings.tilt * std::sqrt(uniform(random));
+    const double turn = settings.turn * (2 * uniform(random) - 1);
+    T.linear() = (i % 2 == 0 ? mean : used[from].linear()) *
+                 rotation_exp({tilt * std::cos(heading), tilt * std::sin(heading), 0}) *
+                 rotation_exp({0, 0, turn});
+    poses.push_back(T);
+  }
+  return poses;
+}
+
+}  // namespace
+
+Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
+                const PlanSettings& settings) {
+  const Bundle& bundle = calibration.refined.bundle;
+  const NoiseLevels& noise = calibration.refined.noise;
+  const Unknowns unknowns;  // lens, sizes and times as they are
+  const SharedColumns columns = shared_columns(bundle, unknowns);
+  std::vector<Candidate> candidates;
+  for (const Eigen::Isometry3d& T : draw_poses(bundle, settings)) {
+    const PoseLoop loop = pose_loop(bundle.setup, T, Eigen::Isometry3d::Identity());
+    const Eigen::Isometry3d T_camera_target =
+        calibration.poses.X.inverse() * loop.G.inverse() * calibration.poses.Z;
+    if (!visible(T_camera_target, bundle.intrinsics.front(), points, settings)) continue;
+    candidates.push_back({T, view_information(bundle, T, points, noise, unknowns, columns)});
+  }
+  if (candidates.empty())
+    throw data::InputError("plan: of " + std::to_string(settings.candidates) +
+                           " poses within the bounds none sees the whole target; widen the bounds");
+  Plan plan;
+  plan.visible = static_cast<int>(candidates.size());
+  double length = 0;
+  for (const Observation& observation : calibration.selection.observations)
+    if (!observation.T_camera_target.empty())
+      length = std::max(length, observation.T_camera_target.front().translation().norm());
+
+  const auto sd = [](const Matrix6d& covariance, bool rotation) {
+    return std::sqrt(
+        (rotation ? covariance.bottomRightCorner<3, 3>() : covariance.topLeftCorner<3, 3>()).trace() / 3);
+  };
+  Eigen::MatrixXd information =
+      calibration.refined.covariance.topLeftCorner(columns.count, columns.count).inverse();
+  const Matrix6d start = camera_covariance(information);
+  plan.translation_sd = sd(start, false);
+  plan.rotation_sd = sd(start, true);
+  for (int i = 0; i < settings.poses; ++i) {
+    const Candidate* best = nullptr;
+    Matrix6d best_covariance;
+    double least = std::numeric_limits<double>::infinity();
+    for (const Candidate& candidate : candidates) {
+      const Matrix6d covariance = camera_covariance(information + candidate.information);
+      const double value = worth(covariance, settings.criterion, length);
+      if (!(value < least)) continue;
+      least = value;
+      best = &candidate;
+      best_covariance = covariance;
+    }
+    information += best->information;
+    plan.poses.push_back({best->T_base_gripper, sd(best_covariance, false), sd(best_covariance, true)});
+  }
+  return plan;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,49 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "calib/calibrate/calibrate.h"
+
+namespace flash::calib {
+
+enum class PlanCriterion {
+  determinant,  ///< smallest volume of the uncertain region (D-optimal)
+  trace         ///< smallest sum of variances, a radian counting as the target's distance (A-optimal)
+};
+
+struct PlanSettings {
+  int poses = 5;
+  PlanCriterion criterion = PlanCriterion::trace;
+  Eigen::Vector3d lower = Eigen::Vector3d::Constant(-1e9);  ///< of the gripper in the base [m]
+  Eigen::Vector3d upper = Eigen::Vector3d::Constant(1e9);
+  double reach =
+      0.10;  ///< how far beyond the box of the poses already used candidates go, where bounds allow [m]
+  double tilt = 0.6;      ///< of the gripper from the mean orientation, at most [rad]
+  double turn = 1.2;      ///< about its axis from the mean orientation, at most [rad]
+  double margin_px = 20;  ///< of the target's points from the edge of the picture
+  double steepest = 1.1;  ///< angle between line of sight and the target's normal, at most [rad]
+  int candidates = 2000;
+  unsigned seed = 1;
+};
+
+struct PlannedPose {
+  Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
+  double translation_sd = 0;  ///< of X once this pose and those before it are taken, rms of three axes [m]
+  double rotation_sd = 0;     ///< likewise [rad]
+};
+
+struct Plan {
+  double translation_sd = 0, rotation_sd = 0;  ///< of X as it is
+  std::vector<PlannedPose> poses;              ///< in the order of their worth
+  int visible = 0;                             ///< candidates that see the whole target
+};
+
+/// Next poses, one after the other, each the candidate that lowers the predicted covariance of X most: the
+/// information of a view with the noise levels of the calibration, its robot correction marginalised, is
+/// added to what is there. Candidates are drawn around the poses used, kept within the bounds, and must see
+/// all of the target. Throws data::InputError where none does.
+Plan plan_poses(const Calibration& calibration, const Eigen::Matrix3Xd& points,
+                const PlanSettings& settings = {});
+
+}  // namespace flash::calib

@@ -1,0 +1,298 @@
+#include "calib/dataset/dataset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+
+#include "calib/dataset/kalibr.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/text.h"
+
+namespace flash::calib {
+namespace {
+
+namespace fs = std::filesystem;
+using data::input_error;
+using data::InputError;
+
+constexpr double kLargestGap = 0.5;  // between poses of a stream that are interpolated [s]
+
+std::vector<fs::path> files_in(const fs::path& folder, const std::vector<std::string>& endings,
+                               const std::string& beginning = "") {
+  std::vector<fs::path> files;
+  if (!fs::is_directory(folder)) return files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (!entry.is_regular_file() || !entry.path().filename().string().starts_with(beginning)) continue;
+    if (std::find(endings.begin(), endings.end(), data::lower_extension(entry.path().string())) !=
+        endings.end())
+      files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::vector<fs::path> find_images(const fs::path& folder) {
+  for (const char* name : {"images", "rgb", "color", "image", "."}) {
+    std::vector<fs::path> images = files_in(folder / name, {".png", ".jpg", ".jpeg"});
+    if (!images.empty()) return images;
+  }
+  return {};
+}
+
+std::vector<fs::path> pair_files(const fs::path& folder) {
+  std::vector<fs::path> files = files_in(folder, {".samples"});
+  if (fs::exists(folder / "pose_samples.json")) files.push_back(folder / "pose_samples.json");
+  return files;
+}
+
+/// Lists of poses beside the pictures, and folders of one pose a file.
+std::vector<fs::path> pose_sources(const fs::path& folder) {
+  std::vector<fs::path> sources;
+  for (const char* name : {"poses.tum", "poses.csv", "poses.txt", "gripper.tum"})
+    if (fs::exists(folder / name)) sources.push_back(folder / name);
+  if (!files_in(folder / "poses", {".yaml", ".yml"}).empty()) sources.push_back(folder / "poses");
+  if (!files_in(folder, {".yaml", ".yml"}, "pose").empty()) sources.push_back(folder);
+  return sources;
+}
+
+std::vector<RecordedPose> load_poses(const fs::path& source) {
+  if (!fs::is_directory(source)) return load_pose_list(source.string());
+  std::vector<fs::path> files = files_in(source, {".yaml", ".yml"}, "pose");
+  if (files.empty()) files = files_in(source, {".yaml", ".yml"});
+  if (files.empty()) throw InputError(source.string() + ": found no poses, expected a YAML file for each");
+  std::vector<RecordedPose> poses;
+  for (const fs::path& file : files) poses.push_back(load_pose_yaml(file.string()));
+  return poses;
+}
+
+data::CameraIntrinsics load_camera(const std::string& path) {
+  return fs::path(path).filename().string().find("camchain") != std::string::npos
+             ? load_camchain(path)
+             : data::load_camera_intrinsics(path);
+}
+
+std::string find_camera(const fs::path& folder) {
+  for (const fs::path& place : {folder, folder.parent_path()}) {
+    for (const char* name : {"camera_info.yaml", "camera_info.yml", "camera.yaml", "camera.yml",
+                             "intrinsics.yaml", "intrinsics.yml", "calibration.yml", "calibration.yaml"})
+      if (fs::exists(place / name)) return (place / name).string();
+    for (const fs::path& file : files_in(place, {".yaml", ".yml"}))
+      if (file.filename().string().find("camchain") != std::string::npos) return file.string();
+  }
+  return "";
+}
+
+/// Time in a file name that is nothing but a number: seconds, or nanoseconds.
+std::optional<double> time_in_name(const fs::path& path) {
+  std::optional<double> time = data::parse_number(path.stem().string());
+  if (!time || !std::isfinite(*time)) return std::nullopt;
+  return std::abs(*time) > 1e14 ? *time * 1e-9 : *time;
+}
+
+/// Pairs pictures with poses, by the poses' own word.
+class PosePairing {
+ public:
+  PosePairing(std::vector<RecordedPose> poses, std::string source)
+      : poses_(std::move(poses)), source_(std::move(source)) {
+    bool whole = true;
+    for (std::size_t i = 0; i < poses_.size(); ++i) {
+      const RecordedPose& pose = poses_[i];
+      named_ = named_ || !pose.image.empty();
+      whole = whole && pose.stamp == std::floor(pose.stamp) && std::abs(pose.stamp) < 1e8;
+      const bool fresh = pose.image.empty()
+                             ? by_stamp_.emplace(pose.stamp, i).second
+                             : by_name_.emplace(fs::path(pose.image).filename().string(), i).second;
+      if (!fresh)
+        throw InputError(source_ + ": two poses for " +
+                         (pose.image.empty() ? "stamp " + data::format_number(pose.stamp) : pose.image));
+    }
+    by_time_ = !named_ && !whole;
+  }
+
+  bool by_time() const { return by_time_; }
+
+  void pair(Frame& frame, const fs::path& image) const {
+    const RecordedPose* found = nullptr;
+    if (named_) {
+      const auto entry = by_name_.find(image.filename().string());
+      if (entry == by_name_.end())
+        throw InputError(image.string() + ": no pose names this picture in " + source_);
+      found = &poses_[entry->second];
+    } else if (by_time_) {
+      pair_by_time(frame, image);
+      return;
+    } else {
+      const std::optional<long> number = number_in_name(image.string());
+      if (!number)
+        throw InputError(image.string() + ": found no number in the file name, expected that of its pose");
+      const auto entry = by_stamp_.find(static_cast<double>(*number));
+      if (entry == by_stamp_.end())
+        throw InputError(image.string() + ": no pose with number " + std::to_string(*number) + " in " +
+                         source_ + " (" + std::to_string(poses_.size()) + " poses, " +
+                         data::format_number(by_stamp_.begin()->first) + " to " +
+                         data::format_number(by_stamp_.rbegin()->first) + ')');
+      frame.stamp = static_cast<double>(*number);
+      found = &poses_[entry->second];
+    }
+    frame.T_base_gripper = found->pose;
+    frame.angles = found->angles;
+  }
+
+  data::Trajectory stream() const {
+    data::Trajectory trajectory;
+    for (const auto& [stamp, i] : by_stamp_) {
+      trajectory.times.push_back(stamp);
+      trajectory.poses.push_back(poses_[i].pose);
+    }
+    return trajectory;
+  }
+
+ private:
+  void pair_by_time(Frame& frame, const fs::path& image) const {
+    const std::optional<double> time = time_in_name(image);
+    if (!time) throw InputError(image.string() + ": expected a time as the file name, as in " + source_);
+    frame.stamp = *time;
+    const auto after = by_stamp_.lower_bound(*time - 1e-6);
+    const bool exact = after != by_stamp_.end() && std::abs(after->first - *time) < 1e-6;
+    if (exact) {
+      frame.T_base_gripper = poses_[after->second].pose;
+      return;
+    }
+    if (after == by_stamp_.begin() || after == by_stamp_.end())
+      throw InputError(image.string() + ": time " + data::format_number(*time) + " s lies outside of " +
+                       source_ + " (" + data::format_number(by_stamp_.begin()->first) + " to " +
+                       data::format_number(by_stamp_.rbegin()->first) + " s)");
+    const double gap = after->first - std::prev(after)->first;
+    if (gap > kLargestGap)
+      throw InputError(image.string() + ": falls into a gap of " + data::format_short(gap) + " s in " +
+                       source_);
+    frame.T_base_gripper =
+        data::pose_at({{std::prev(after)->first, after->first},
+                       {poses_[std::prev(after)->second].pose, poses_[after->second].pose}},
+                      *time);
+  }
+
+  std::vector<RecordedPose> poses_;
+  std::string source_;
+  std::map<double, std::size_t> by_stamp_;
+  std::map<std::string, std::size_t> by_name_;
+  bool named_ = false, by_time_ = false;
+};
+
+void read_target(const fs::path& folder, Dataset& dataset) {
+  const fs::path file = folder / "target.json";
+  if (!fs::exists(file)) return;
+  const nlohmann::json json = data::load_json(file.string());
+  const data::JsonObject object(json, file.string());
+  object.expect_fields({"setup", "target"});
+  dataset.target = object.string("target", "");
+  const std::string setup = object.string("setup", "");
+  if (setup == "eye-in-hand")
+    dataset.setup = Setup::eye_in_hand;
+  else if (setup == "eye-to-hand")
+    dataset.setup = Setup::eye_to_hand;
+  else if (!setup.empty())
+    throw object.error("setup", "eye-in-hand or eye-to-hand");
+}
+
+void read_pairs(const fs::path& file, Dataset& dataset) {
+  dataset.poses_path = file.string();
+  for (const PosePair& pair : load_pose_pairs(file.string())) {
+    Frame frame;
+    frame.stamp = static_cast<double>(dataset.frames.size());
+    frame.name = "sample " + std::to_string(dataset.frames.size());
+    frame.T_base_gripper = pair.T_base_gripper;
+    frame.T_camera_target = pair.T_camera_target;
+    dataset.frames.push_back(std::move(frame));
+  }
+}
+
+/// The one source of poses, or none where none is asked for.
+std::string choose_poses(const fs::path& folder, const DatasetOptions& options) {
+  if (!options.poses.empty() || !options.needs_poses) return options.poses;
+  const std::vector<fs::path> sources = pose_sources(folder);
+  if (sources.empty())
+    throw InputError(folder.string() +
+                     ": found no poses, expected poses.tum, poses.csv or poses/*.yaml (or name them)");
+  if (sources.size() > 1)
+    throw InputError(folder.string() + ": found poses in " + sources[0].filename().string() + " and in " +
+                     sources[1].filename().string() + ", expected one (name it)");
+  return sources.front().string();
+}
+
+void read_pictures(const fs::path& folder, const DatasetOptions& options, Dataset& dataset) {
+  const std::vector<fs::path> images = find_images(folder);
+  if (images.empty())
+    throw InputError(folder.string() + ": found no pictures, expected images/*.png or *.jpg");
+  dataset.camera_path = options.camera.empty() ? find_camera(folder) : options.camera;
+  if (!dataset.camera_path.empty()) dataset.camera = load_camera(dataset.camera_path);
+  if (!dataset.camera && options.needs_camera)
+    throw InputError(folder.string() +
+                     ": found no intrinsics, expected camera_info.yaml (ROS), calibration.yml (OpenCV) or "
+                     "camchain.yaml (Kalibr)");
+  dataset.poses_path = choose_poses(folder, options);
+  std::optional<PosePairing> pairing;
+  std::size_t poses = 0;
+  if (!dataset.poses_path.empty()) {
+    std::vector<RecordedPose> list = load_poses(dataset.poses_path);
+    poses = list.size();
+    pairing.emplace(std::move(list), dataset.poses_path);
+  }
+  for (const fs::path& image : images) {
+    Frame frame;
+    frame.name = image.filename().string();
+    frame.image = image.string();
+    frame.stamp =
+        static_cast<double>(number_in_name(frame.image).value_or(static_cast<long>(dataset.frames.size())));
+    const fs::path depth = folder / "depth" / (image.stem().string() + ".png");
+    if (options.depth && fs::exists(depth)) frame.depth = depth.string();
+    if (pairing) pairing->pair(frame, image);
+    dataset.frames.push_back(std::move(frame));
+  }
+  std::stable_sort(dataset.frames.begin(), dataset.frames.end(),
+                   [](const Frame& a, const Frame& b) { return a.stamp < b.stamp; });
+  if (pairing && pairing->by_time()) dataset.stream = pairing->stream();
+  if (pairing && !pairing->by_time() && poses > images.size())
+    dataset.notices.push_back(std::to_string(poses - images.size()) + " of " + std::to_string(poses) +
+                              " poses in " + dataset.poses_path + " have no picture");
+}
+
+}  // namespace
+
+Dataset load_dataset(const std::string& path, const DatasetOptions& options) {
+  Dataset dataset;
+  dataset.source = path;
+  dataset.depth_scale = options.depth_scale;
+  if (!fs::exists(path)) throw InputError(path + ": no such folder or file");
+  if (!fs::is_directory(path)) {
+    read_pairs(path, dataset);
+    return dataset;
+  }
+  const fs::path folder = fs::path(path).lexically_normal();
+  read_target(folder, dataset);
+  const std::vector<fs::path> pairs = pair_files(folder);
+  if (find_images(folder).empty() && pairs.size() == 1) {
+    read_pairs(pairs.front(), dataset);
+    return dataset;
+  }
+  read_pictures(folder, options, dataset);
+  return dataset;
+}
+
+std::vector<Observation> pair_observations(const Dataset& dataset) {
+  std::vector<Observation> observations;
+  for (const Frame& frame : dataset.frames) {
+    if (!frame.T_camera_target) continue;
+    Observation observation;
+    observation.image = frame.name;
+    observation.T_base_gripper = frame.T_base_gripper;
+    observation.pixels.resize(2, 0);
+    observation.T_camera_target = {*frame.T_camera_target};
+    observations.push_back(std::move(observation));
+  }
+  return observations;
+}
+
+}  // namespace flash::calib

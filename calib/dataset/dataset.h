@@ -1,0 +1,57 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/dataset/observation.h"
+#include "calib/dataset/pose_file.h"
+#include "data/camera.h"
+#include "data/trajectory.h"
+
+namespace flash::calib {
+
+/// One view: a picture and where the robot was.
+struct Frame {
+  std::string name;   ///< file name of the picture, for messages; "sample 3" of a set of pairs
+  std::string image;  ///< path; empty in a set of pairs
+  std::string depth;  ///< path of the 16-bit depth picture; empty where there is none
+  double stamp = 0;   ///< number of the picture, or its time [s]
+  Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
+  std::optional<Eigen::Vector3d> angles;  ///< the rotation as written, where it came as angles [rad]
+  std::optional<Eigen::Isometry3d> T_camera_target;  ///< in a set of pairs
+};
+
+struct Dataset {
+  std::string source;                            ///< the folder or file
+  std::string poses_path;                        ///< where the poses come from; empty without poses
+  std::string camera_path;                       ///< where the intrinsics come from; empty without
+  std::optional<data::CameraIntrinsics> camera;  ///< as the file says it
+  std::vector<Frame> frames;                     ///< in order of stamp
+  std::optional<data::Trajectory> stream;        ///< poses over time, where pictures fall between them
+  double depth_scale = 0.001;                    ///< [m] a count of the depth pictures
+  std::optional<Setup> setup;                    ///< as target.json says it
+  std::string target;                            ///< as target.json says it, for parse_target; or empty
+  std::vector<std::string> notices;              ///< what a reader should know
+};
+
+struct DatasetOptions {
+  std::string poses = {};    ///< file or folder; empty: found by name in the dataset
+  std::string camera = {};   ///< intrinsics file; empty: found by name in the dataset
+  bool needs_poses = true;   ///< without: pictures alone, as for intrinsics
+  bool needs_camera = true;  ///< of sets with pictures
+  double depth_scale = 0.001;
+  bool depth = true;  ///< look for depth pictures
+};
+
+/// A folder with images/ (or rgb/, color/, or the pictures themselves; jpg or png, sorted), poses.tum |
+/// poses.csv | poses.txt | poses/*.yaml | pose*.yaml, camera_info.yaml (ROS), *.yml (OpenCV) or
+/// camchain*.yaml (Kalibr), target.json, and depth/ with 16-bit png of the same names. Or a set of pairs: a
+/// .samples or pose_samples.json file, or a folder with one. Pictures pair with poses by file name, by the
+/// last number in it, or by time: where stamps are times, the pose is interpolated within `stream`. Throws
+/// InputError: nothing found, two sources of poses, a picture without a pose.
+Dataset load_dataset(const std::string& path, const DatasetOptions& options = {});
+
+/// Observations of a set of pairs: poses, no points.
+std::vector<Observation> pair_observations(const Dataset& dataset);
+
+}  // namespace flash::calib

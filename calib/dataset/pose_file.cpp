@@ -1,0 +1,373 @@
+#include "calib/dataset/pose_file.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/text.h"
+#include "data/trajectory.h"
+
+namespace flash::calib {
+namespace {
+
+using data::input_error;
+using data::InputError;
+using Columns = std::map<std::string, std::size_t>;
+
+Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vector4d& xyzw,
+                          const std::string& path, const std::string& where) {
+  if (std::abs(xyzw.norm() - 1) > 1e-3)
+    throw input_error(
+        path, where,
+        "quaternion has length " + data::format_short(xyzw.norm()) + ", expected 1 (order x y z w)");
+  Eigen::Matrix<double, 7, 1> row;
+  row << translation, xyzw;
+  return data::from_vector(row);
+}
+
+Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path, const std::string& where) {
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  const double off = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm();
+  if (!(off < 1e-3) || rotation.determinant() < 0 ||
+      (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6)
+    throw input_error(path, where, "expected a rotation and a translation as 4 x 4, last row 0 0 0 1");
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+  pose.translation() = matrix.topRightCorner<3, 1>();
+  return pose;
+}
+
+// No arm reaches 10 m: half of the poses beyond that are in another unit.
+void expect_metres(std::vector<double> distances, const std::string& path) {
+  if (distances.empty()) return;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  if (*middle > 10)
+    throw input_error(path, "translations",
+                      "half of them are beyond " + data::format_short(*middle) +
+                          " m, expected metres (are these millimetres?)");
+}
+
+void expect_plausible(const std::vector<RecordedPose>& poses, const std::string& path) {
+  std::vector<double> distances;
+  for (const RecordedPose& pose : poses) distances.push_back(pose.pose.translation().norm());
+  expect_metres(distances, path);
+}
+
+std::string trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(" \t\r\"#"), end = text.find_last_not_of(" \t\r\"");
+  return begin == std::string_view::npos ? std::string() : std::string(text.substr(begin, end + 1 - begin));
+}
+
+/// The name of a column as we call it: EuRoC and others say it in more words.
+std::string column_name(const std::string& header) {
+  std::string name = header.substr(0, header.find(" ["));
+  std::transform(name.begin(), name.end(), name.begin(), [](unsigned char c) { return std::tolower(c); });
+  static const std::map<std::string, std::string> aliases = {{"x", "tx"},
+                                                             {"y", "ty"},
+                                                             {"z", "tz"},
+                                                             {"p_rs_r_x", "tx"},
+                                                             {"p_rs_r_y", "ty"},
+                                                             {"p_rs_r_z", "tz"},
+                                                             {"q_rs_w", "qw"},
+                                                             {"q_rs_x", "qx"},
+                                                             {"q_rs_y", "qy"},
+                                                             {"q_rs_z", "qz"},
+                                                             {"timestamp", "t"},
+                                                             {"time", "t"},
+                                                             {"stamp", "t"},
+                                                             {"frame", "index"},
+                                                             {"id", "index"},
+                                                             {"file", "image"},
+                                                             {"filename", "image"},
+                                                             {"name", "image"},
+                                                             {"roll", "rx"},
+                                                             {"pitch", "ry"},
+                                                             {"yaw", "rz"},
+                                                             {"roll_deg", "rx_deg"},
+                                                             {"pitch_deg", "ry_deg"},
+                                                             {"yaw_deg", "rz_deg"}};
+  const auto found = aliases.find(name);
+  return found == aliases.end() ? name : found->second;
+}
+
+/// The cells of a CSV line, by the names of its columns.
+struct CsvLine {
+  const std::string& path;
+  const Columns& columns;
+  std::vector<std::string> cells;
+  int number;
+
+  bool has(const std::string& column) const { return columns.count(column) > 0; }
+  const std::string& text(const std::string& column) const { return cells[columns.at(column)]; }
+  double value(const std::string& column) const {
+    const std::optional<double> found = data::parse_number(text(column));
+    if (!found || !std::isfinite(*found))
+      throw input_error(path, "line " + std::to_string(number) + ", " + column,
+                        "found \"" + text(column) + "\", expected a finite number");
+    return *found;
+  }
+  Eigen::Vector3d vector(const std::array<const char*, 3>& names, const std::string& ending = "") const {
+    return {value(names[0] + ending), value(names[1] + ending), value(names[2] + ending)};
+  }
+};
+
+RecordedPose pose_of(const CsvLine& line) {
+  RecordedPose pose;
+  const std::string where = "line " + std::to_string(line.number);
+  const Eigen::Vector3d translation = line.vector({"tx", "ty", "tz"});
+  if (line.has("qw")) {
+    const Eigen::Vector3d axis = line.vector({"qx", "qy", "qz"});
+    pose.pose = pose_of(translation, {axis.x(), axis.y(), axis.z(), line.value("qw")}, line.path, where);
+  } else {
+    Eigen::Matrix3d rotation;
+    if (line.has("rotvec_x")) {
+      const Eigen::Vector3d vector = line.vector({"rotvec_x", "rotvec_y", "rotvec_z"});
+      rotation = Eigen::AngleAxisd(vector.norm(), vector.norm() > 0 ? Eigen::Vector3d(vector.normalized())
+                                                                    : Eigen::Vector3d::UnitX().eval())
+                     .toRotationMatrix();
+    } else {
+      const bool degrees = line.has("rx_deg");
+      pose.angles = line.vector({"rx", "ry", "rz"}, degrees ? "_deg" : "") * (degrees ? M_PI / 180 : 1);
+      if (!degrees && pose.angles->cwiseAbs().maxCoeff() > 2 * M_PI + 1e-6)
+        throw input_error(line.path, where,
+                          "angle of " + data::format_short(pose.angles->cwiseAbs().maxCoeff()) +
+                              " rad is beyond a full turn (degrees? name the columns rx_deg ry_deg rz_deg)");
+      rotation = rotation_from_angles(*pose.angles);
+    }
+    pose.pose.linear() = rotation;
+    pose.pose.translation() = translation;
+  }
+  if (line.has("image"))
+    pose.image = line.text("image");
+  else
+    pose.stamp = line.value(line.has("index") ? "index" : "t");
+  if (std::abs(pose.stamp) > 1e14) pose.stamp *= 1e-9;  // EuRoC counts nanoseconds
+  return pose;
+}
+
+void expect_columns(const Columns& columns, const std::string& path) {
+  const auto all = [&](std::initializer_list<const char*> names) {
+    return std::all_of(names.begin(), names.end(), [&](const char* name) { return columns.count(name) > 0; });
+  };
+  if (!all({"image"}) && !all({"index"}) && !all({"t"}))
+    throw input_error(path, "header", "found none of the columns image, index, t");
+  if (!all({"tx", "ty", "tz"})) throw input_error(path, "header", "expected the columns tx, ty, tz [m]");
+  if (!all({"qx", "qy", "qz", "qw"}) && !all({"rx", "ry", "rz"}) && !all({"rx_deg", "ry_deg", "rz_deg"}) &&
+      !all({"rotvec_x", "rotvec_y", "rotvec_z"}))
+    throw input_error(path, "header",
+                      "found no rotation, expected qx,qy,qz,qw or rx,ry,rz or rotvec_x,rotvec_y,rotvec_z");
+}
+
+std::vector<RecordedPose> load_csv(const std::string& path) {
+  const std::string text = data::read_file(path);
+  std::vector<RecordedPose> poses;
+  Columns columns;
+  const char* separator = ",";
+  data::LineReader lines(text);
+  for (std::string_view line; lines.next(line);) {
+    if (trimmed(line).empty() || (!columns.empty() && line.front() == '#')) continue;
+    if (columns.empty() && line.find(';') != std::string_view::npos) separator = ";";
+    std::vector<std::string> cells;
+    for (const std::string_view cell : data::split(line, separator)) cells.push_back(trimmed(cell));
+    if (columns.empty()) {
+      for (std::size_t c = 0; c < cells.size(); ++c) columns[column_name(cells[c])] = c;
+      expect_columns(columns, path);
+      continue;
+    }
+    if (cells.size() < columns.size())
+      throw input_error(
+          path, "line " + std::to_string(lines.number()),
+          "found " + std::to_string(cells.size()) + " columns, expected " + std::to_string(columns.size()));
+    poses.push_back(pose_of(CsvLine{path, columns, std::move(cells), lines.number()}));
+  }
+  if (poses.empty()) throw InputError(path + ": found no poses below its header");
+  return poses;
+}
+
+YAML::Node load_yaml(const std::string& path) {
+  std::string text = data::read_file(path);
+  if (text.starts_with("%YAML:")) text.erase(0, text.find('\n'));  // OpenCV's own first line is no YAML
+  try {
+    return YAML::Load(text);
+  } catch (const YAML::Exception& error) {
+    throw InputError(path + ": not valid YAML: line " + std::to_string(error.mark.line + 1) + ": " +
+                     error.msg);
+  }
+}
+
+double number(const YAML::Node& node, const std::string& path, const std::string& field) {
+  const std::optional<double> value =
+      node.IsDefined() && node.IsScalar() ? data::parse_number(node.Scalar()) : std::nullopt;
+  if (!value || !std::isfinite(*value)) throw input_error(path, field, "missing, expected a finite number");
+  return *value;
+}
+
+/// All numbers below a node, in order.
+std::vector<double> numbers(const YAML::Node& node, const std::string& path, const std::string& field) {
+  if (node.IsScalar()) return {number(node, path, field)};
+  std::vector<double> values;
+  for (const YAML::Node& item : node)
+    for (const double value : numbers(item, path, field)) values.push_back(value);
+  return values;
+}
+
+Eigen::Vector3d xyz(const YAML::Node& node, const std::string& path, const std::string& field) {
+  return {number(node["x"], path, field + ".x"), number(node["y"], path, field + ".y"),
+          number(node["z"], path, field + ".z")};
+}
+
+/// {translation, rotation} or {position, orientation}, each with named parts.
+Eigen::Isometry3d named_pose(const YAML::Node& node, const std::string& path, const std::string& field) {
+  const bool ros_pose = node.IsMap() && node["position"];
+  const char* const first = ros_pose ? "position" : "translation";
+  const char* const second = ros_pose ? "orientation" : "rotation";
+  if (!node.IsMap() || !node[first] || !node[first].IsMap() || !node[second] || !node[second].IsMap())
+    throw input_error(path, field, "expected translation {x, y, z} and rotation {x, y, z, w}");
+  const Eigen::Vector3d axis = xyz(node[second], path, field + '.' + second);
+  return pose_of(xyz(node[first], path, field + '.' + first),
+                 {axis.x(), axis.y(), axis.z(), number(node[second]["w"], path, field + '.' + second + ".w")},
+                 path, field);
+}
+
+Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::string& path) {
+  if (values.size() == 16)
+    return pose_of(Eigen::Matrix<double, 4, 4, Eigen::RowMajor>(values.data()), path, "matrix");
+  if (values.size() == 6) {  // ViSP
+    const Eigen::Vector3d turn(values[3], values[4], values[5]);
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    if (turn.norm() > 0) pose.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    pose.translation() << values[0], values[1], values[2];
+    return pose;
+  }
+  if (values.size() == 7)
+    return pose_of({values[0], values[1], values[2]}, {values[3], values[4], values[5], values[6]}, path,
+                   "pose");
+  throw InputError(
+      path + ": found " + std::to_string(values.size()) +
+      " numbers, expected a pose: 16 (matrix), 7 (x y z qx qy qz qw) or 6 (x y z and axis times angle)");
+}
+
+std::vector<PosePair> load_samples(const std::string& path) {
+  const YAML::Node file = load_yaml(path);
+  const YAML::Node samples = file.IsMap() ? file["samples"] : file;
+  if (!samples.IsDefined() || !samples.IsSequence())
+    throw input_error(path, "samples", "missing, expected a list of {robot, tracking}");
+  std::vector<PosePair> pairs;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const std::string field = "samples[" + std::to_string(i) + "]";
+    const YAML::Node sample = samples[i];
+    if (!sample.IsMap() || !sample["robot"] || !sample["tracking"])
+      throw input_error(path, field, "expected robot and tracking");
+    pairs.push_back({named_pose(sample["robot"], path, field + ".robot"),
+                     named_pose(sample["tracking"], path, field + ".tracking")});
+  }
+  return pairs;
+}
+
+Eigen::Isometry3d json_matrix(const nlohmann::json& rows, const std::string& path, const std::string& field) {
+  Eigen::Matrix4d matrix;
+  const bool four = rows.is_array() && rows.size() == 4;
+  for (std::size_t r = 0; four && r < 4; ++r)
+    for (std::size_t c = 0; c < 4; ++c) {
+      if (!rows[r].is_array() || rows[r].size() != 4 || !rows[r][c].is_number())
+        throw input_error(path, field, "expected four rows of four numbers");
+      matrix(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = rows[r][c].get<double>();
+    }
+  if (!four) throw input_error(path, field, "expected four rows of four numbers");
+  return pose_of(matrix, path, field);
+}
+
+std::vector<PosePair> load_moveit(const std::string& path) {
+  const nlohmann::json file = data::load_json(path);
+  if (!file.is_array() || file.empty())
+    throw InputError(path + ": expected a list of [effector in world, object in sensor] matrices");
+  std::vector<PosePair> pairs;
+  for (std::size_t i = 0; i < file.size(); ++i) {
+    const std::string field = "pair " + std::to_string(i);
+    if (!file[i].is_array() || file[i].size() != 2)
+      throw input_error(path, field, "expected two 4 x 4 matrices");
+    pairs.push_back({json_matrix(file[i][0], path, field), json_matrix(file[i][1], path, field)});
+  }
+  return pairs;
+}
+
+}  // namespace
+
+Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& angles, const std::string& order) {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  for (int k = 0; k < 3; ++k)
+    rotation = Eigen::AngleAxisd(angles[k], Eigen::Vector3d::Unit(order[static_cast<std::size_t>(k)] - 'x')) *
+               rotation;
+  return rotation;
+}
+
+std::optional<long> number_in_name(const std::string& path) {
+  const std::string name = std::filesystem::path(path).stem().string();
+  const std::size_t end = name.find_last_of("0123456789");
+  if (end == std::string::npos) return std::nullopt;
+  std::size_t begin = end;
+  while (begin > 0 && std::isdigit(static_cast<unsigned char>(name[begin - 1]))) --begin;
+  return data::parse_integer(name.substr(begin, end + 1 - begin));
+}
+
+std::vector<RecordedPose> load_pose_list(const std::string& path) {
+  std::vector<RecordedPose> poses;
+  if (data::lower_extension(path) == ".csv") {
+    poses = load_csv(path);
+  } else {
+    const data::Trajectory trajectory = data::load_tum(path);
+    for (std::size_t i = 0; i < trajectory.times.size(); ++i)
+      poses.push_back({"", trajectory.times[i], trajectory.poses[i], std::nullopt});
+  }
+  expect_plausible(poses, path);
+  return poses;
+}
+
+RecordedPose load_pose_yaml(const std::string& path) {
+  RecordedPose pose;
+  const std::optional<long> stamp = number_in_name(path);
+  if (!stamp) throw InputError(path + ": found no number in the file name, expected that of its image");
+  pose.stamp = static_cast<double>(*stamp);
+  YAML::Node file = load_yaml(path);
+  if (file.IsMap() && file.size() == 1 && !file.begin()->second.IsScalar()) file = file.begin()->second;
+  if (file.IsMap() && file["pose"]) file = file["pose"];
+  if (file.IsMap() && file["qw"]) {
+    pose.pose = pose_of(xyz(file, path, "pose"),
+                        {number(file["qx"], path, "qx"), number(file["qy"], path, "qy"),
+                         number(file["qz"], path, "qz"), number(file["qw"], path, "qw")},
+                        path, "pose");
+  } else if (file.IsMap() && file["data"]) {
+    pose.pose = pose_of_numbers(numbers(file["data"], path, "data"), path);
+  } else if (file.IsMap()) {
+    pose.pose = named_pose(file, path, "pose");
+  } else {
+    pose.pose = pose_of_numbers(numbers(file, path, "pose"), path);
+  }
+  expect_metres({pose.pose.translation().norm()}, path);
+  return pose;
+}
+
+std::vector<PosePair> load_pose_pairs(const std::string& path) {
+  const std::vector<PosePair> pairs =
+      data::lower_extension(path) == ".json" ? load_moveit(path) : load_samples(path);
+  if (pairs.empty()) throw InputError(path + ": found no samples");
+  std::vector<double> robot, tracking;
+  for (const PosePair& pair : pairs) {
+    robot.push_back(pair.T_base_gripper.translation().norm());
+    tracking.push_back(pair.T_camera_target.translation().norm());
+  }
+  expect_metres(robot, path);
+  expect_metres(tracking, path);
+  return pairs;
+}
+
+}  // namespace flash::calib

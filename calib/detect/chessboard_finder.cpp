@@ -1,0 +1,186 @@
+#include <algorithm>
+#include <cmath>
+
+#include "calib/detect/corner_shapes.h"
+#include "calib/detect/finder.h"
+#include "calib/detect/opencv_image.h"
+
+namespace flash::calib {
+namespace {
+
+using Corners = std::vector<Eigen::Vector2d>;
+
+constexpr double kLargestDisc = 9;     // of a crossing [px]; beyond it little is gained
+constexpr double kSmallestDisc = 2.5;  // [px]
+constexpr int kSearchWidth = 800;      // of the picture that is searched [px]
+constexpr double kLeastShare = 0.8;    // of the corners must show a crossing
+
+/// Corners of a board, row by row.
+struct Grid {
+  int columns = 0, rows = 0;
+  Corners corners;
+
+  std::size_t index(int c, int r) const { return static_cast<std::size_t>(r * columns + c); }
+  const Eigen::Vector2d& at(int c, int r) const { return corners[index(c, r)]; }
+  /// Towards the next corner along x or y, from the neighbours on both sides where there are two.
+  Eigen::Vector2d step(int c, int r, bool along_x) const {
+    const int last = (along_x ? columns : rows) - 1, k = along_x ? c : r;
+    const int before = std::max(0, k - 1), after = std::min(last, k + 1);
+    const Eigen::Vector2d difference = along_x ? at(after, r) - at(before, r) : at(c, after) - at(c, before);
+    return difference / (after - before);
+  }
+};
+
+double brightness(const GreyImage& image, const Eigen::Vector2d& place) {
+  double sum = 0;
+  const int x0 = static_cast<int>(std::lround(place.x())), y0 = static_cast<int>(std::lround(place.y()));
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx)
+      sum += image.at(std::clamp(x0 + dx, 0, image.width - 1), std::clamp(y0 + dy, 0, image.height - 1));
+  return sum / 9;
+}
+
+/// Above zero where the squares that share the colour of the one between the first four corners are the
+/// darker.
+double darkness_of_first(const GreyImage& image, const Grid& grid) {
+  double sum[2] = {0, 0};
+  int count[2] = {0, 0};
+  for (int r = 0; r + 1 < grid.rows; ++r)
+    for (int c = 0; c + 1 < grid.columns; ++c) {
+      const Eigen::Vector2d middle =
+          (grid.at(c, r) + grid.at(c + 1, r) + grid.at(c, r + 1) + grid.at(c + 1, r + 1)) / 4;
+      sum[(c + r) % 2] += brightness(image, middle);
+      ++count[(c + r) % 2];
+    }
+  return sum[1] / std::max(1, count[1]) - sum[0] / std::max(1, count[0]);
+}
+
+/// x to the right of y as one faces the board, and a black square between the first four corners where a turn
+/// can bring one there: libraries leave both open.
+void put_in_order(const GreyImage& image, Grid& grid) {
+  const Eigen::Vector2d x = grid.at(grid.columns - 1, 0) - grid.at(0, 0),
+                        y = grid.at(0, grid.rows - 1) - grid.at(0, 0);
+  if (x.x() * y.y() - x.y() * y.x() < 0)
+    for (int r = 0; r < grid.rows; ++r)
+      std::reverse(grid.corners.begin() + r * grid.columns, grid.corners.begin() + (r + 1) * grid.columns);
+  if (darkness_of_first(image, grid) > 0) return;
+  if ((grid.columns + grid.rows) % 2 == 1) {
+    std::reverse(grid.corners.begin(), grid.corners.end());
+  } else if (grid.columns == grid.rows && grid.columns % 2 == 1) {
+    Grid turned = grid;
+    for (int r = 0; r < grid.rows; ++r)
+      for (int c = 0; c < grid.columns; ++c)
+        turned.corners[grid.index(c, r)] = grid.at(r, grid.columns - 1 - c);
+    grid = turned;
+  }
+}
+
+/// On a picture made small: the corners are only seeds, and what takes long on a large one is what is not
+/// found.
+Corners find_classic(const GreyImage& image, const Target& target) {
+  const double scale = std::min(1.0, static_cast<double>(kSearchWidth) / image.width);
+  cv::Mat picture = as_mat(image);
+  if (scale < 1) cv::resize(picture, picture, {}, scale, scale, cv::INTER_AREA);
+  std::vector<cv::Point2f> corners;
+  if (!cv::findChessboardCorners(picture, {target.columns, target.rows}, corners,
+                                 cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE))
+    return {};
+  Corners places;
+  for (const Eigen::Vector2d& corner : to_eigen(corners))
+    places.emplace_back((corner.array() + 0.5) / scale - 0.5);
+  return places;
+}
+
+Corners find_sectors(const GreyImage& image, const Target& target) {
+  std::vector<cv::Point2f> corners;
+  const bool found = cv::findChessboardCornersSB(as_mat(image), {target.columns, target.rows}, corners,
+                                                 cv::CALIB_CB_NORMALIZE_IMAGE);
+  return found ? to_eigen(corners) : Corners();
+}
+
+Sighting all_points(const char* refiner, const Corners& corners) {
+  Sighting sighting{refiner, {}, corners};
+  for (std::size_t i = 0; i < corners.size(); ++i) sighting.points.push_back(static_cast<int>(i));
+  return sighting;
+}
+
+int half_window(const Grid& grid) {
+  double least = 1e9;
+  for (int r = 0; r < grid.rows; ++r)
+    for (int c = 0; c < grid.columns; ++c)
+      least = std::min({least, grid.step(c, r, true).norm(), grid.step(c, r, false).norm()});
+  return std::clamp(static_cast<int>(0.4 * least), 2, 8);
+}
+
+Sighting fit_crossings(const GreyImage& image, const Rectifier& rectifier, const Grid& seed) {
+  Grid grid = seed;
+  for (Eigen::Vector2d& corner : grid.corners) corner = rectifier.rectified(corner);
+  Sighting sighting{kImageModel, {}, {}};
+  for (int r = 0; r < grid.rows; ++r)
+    for (int c = 0; c < grid.columns; ++c) {
+      const Eigen::Vector2d x = grid.step(c, r, true), y = grid.step(c, r, false);
+      // The next lines of the board pass at the height of the parallelogram between them.
+      const double height = std::abs(x.x() * y.y() - x.y() * y.x()) / std::max(x.norm(), y.norm());
+      const double radius = std::min(kLargestDisc, 0.9 * height - 0.5);
+      if (radius < kSmallestDisc) continue;
+      if (const auto crossing = fit_crossing(image, rectifier, grid.at(c, r), x, y, radius)) {
+        sighting.points.push_back(static_cast<int>(grid.index(c, r)));
+        sighting.pixels.push_back(rectifier.distorted(*crossing));
+      }
+    }
+  return sighting;
+}
+
+/// A board with a row or a column less than stated shows an outer one that has no crossings.
+bool lacks_a_side(const Sighting& sighting, const Target& target) {
+  int first_row = 0, last_row = 0, first_column = 0, last_column = 0;
+  for (const int point : sighting.points) {
+    const int c = point % target.columns, r = point / target.columns;
+    first_row += r == 0;
+    last_row += r == target.rows - 1;
+    first_column += c == 0;
+    last_column += c == target.columns - 1;
+  }
+  return 2 * std::min(first_row, last_row) < target.columns ||
+         2 * std::min(first_column, last_column) < target.rows;
+}
+
+}  // namespace
+
+Finder chessboard_finder(const Target& target, const Rectifier& rectifier) {
+  return [target, &rectifier](const GreyImage& image) {
+    const int count = target.columns * target.rows;
+    Found found;
+    Sighting fitted{kImageModel, {}, {}};
+    Grid seed;
+    const Corners classic = find_classic(image, target), sectors = find_sectors(image, target);
+    for (const Corners* corners : {&classic, &sectors}) {
+      if (corners->empty()) continue;
+      Grid grid{target.columns, target.rows, *corners};
+      put_in_order(image, grid);
+      if (corners == &sectors) found.sightings.push_back(all_points("sectors", grid.corners));
+      if (static_cast<int>(fitted.points.size()) == count) continue;
+      Sighting candidate = fit_crossings(image, rectifier, grid);
+      if (candidate.points.size() <= fitted.points.size()) continue;
+      fitted = std::move(candidate);
+      seed = std::move(grid);
+    }
+    if (classic.empty() && sectors.empty()) {
+      found.reason = "no chessboard of " + std::to_string(target.columns) + " x " +
+                     std::to_string(target.rows) + " inner corners";
+      return found;
+    }
+    if (static_cast<double>(fitted.points.size()) < kLeastShare * count || lacks_a_side(fitted, target)) {
+      found.sightings.clear();
+      found.reason = "a chessboard was found, but only " + std::to_string(fitted.points.size()) + " of its " +
+                     std::to_string(count) + " corners show a crossing";
+      return found;
+    }
+    found.sightings.push_back(
+        {"corner_sub_pix", fitted.points, corner_sub_pix(image, fitted.pixels, half_window(seed))});
+    found.sightings.push_back(std::move(fitted));
+    return found;
+  };
+}
+
+}  // namespace flash::calib

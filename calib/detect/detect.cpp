@@ -1,0 +1,171 @@
+#include "calib/detect/detect.h"
+
+#include <algorithm>
+#include <atomic>
+#include <exception>
+#include <mutex>
+#include <thread>
+
+#include "calib/detect/detection_cache.h"
+#include "calib/detect/finder.h"
+#include "calib/detect/planar_pose.h"
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr double kAlwaysGood = 2;  // small markers, seen aslant, vary by that much [px]
+
+Observation observe(const Frame& frame, const Sighting& sighting) {
+  Observation observation;
+  observation.image = frame.name;
+  observation.T_base_gripper = frame.T_base_gripper;
+  observation.points = sighting.points;
+  observation.pixels.resize(2, static_cast<Eigen::Index>(sighting.pixels.size()));
+  for (std::size_t i = 0; i < sighting.pixels.size(); ++i)
+    observation.pixels.col(static_cast<Eigen::Index>(i)) = sighting.pixels[i];
+  return observation;
+}
+
+Eigen::Matrix3Xd chosen(const Eigen::Matrix3Xd& points, const std::vector<int>& ids) {
+  Eigen::Matrix3Xd result(3, static_cast<Eigen::Index>(ids.size()));
+  for (std::size_t i = 0; i < ids.size(); ++i) result.col(static_cast<Eigen::Index>(i)) = points.col(ids[i]);
+  return result;
+}
+
+/// The poses of each reading; drops those that no pose fits.
+void add_poses(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points, double largest_rms,
+               Detection& detection) {
+  double least = 1e300;
+  for (CornerReading& reading : detection.readings) {
+    Observation& observation = reading.observation;
+    for (const PlanarPose& pose :
+         planar_poses(camera, chosen(points, observation.points), observation.pixels)) {
+      if (observation.T_camera_target.empty()) observation.pose_rms = pose.rms;
+      observation.T_camera_target.push_back(pose.T_camera_target);
+    }
+    if (!observation.T_camera_target.empty()) least = std::min(least, observation.pose_rms);
+  }
+  std::erase_if(detection.readings, [&](const CornerReading& reading) {
+    return reading.observation.T_camera_target.empty() || reading.observation.pose_rms > largest_rms;
+  });
+  std::stable_sort(detection.readings.begin(), detection.readings.end(),
+                   [](const CornerReading& a, const CornerReading& b) {
+                     return a.observation.pose_rms < b.observation.pose_rms;
+                   });
+  if (detection.readings.empty())
+    detection.reason = least < 1e300
+                           ? "the corners fit the target no better than " + data::format_short(least) + " px"
+                           : "the corners fit no pose of the target";
+}
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+Found find_in(const Frame& frame, const Dataset& dataset, const Rectifier& rectifier, const Finder& finder) {
+  Found found;
+  try {
+    const GreyImage image = load_grey_image(frame.image);
+    if (image.width != rectifier.width() || image.height != rectifier.height())
+      found.reason = "the picture is " + size_text(image.width, image.height) + ", " +
+                     (dataset.camera ? dataset.camera_path : std::string("the first")) + " says " +
+                     size_text(rectifier.width(), rectifier.height());
+    else
+      found = finder(image);
+  } catch (const data::InputError& error) {
+    found.reason = error.what();
+  }
+  return found;
+}
+
+/// A view that fits far worse than the others of its set shows wrong corners.
+void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detections) {
+  std::vector<double> rms;
+  for (const Detection& detection : detections)
+    if (!detection.readings.empty()) rms.push_back(detection.readings.front().observation.pose_rms);
+  if (rms.empty()) return;
+  std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
+  const double limit = std::max(kAlwaysGood, settings.largest_ratio * rms[rms.size() / 2]);
+  for (Detection& detection : detections) {
+    if (detection.readings.empty()) continue;
+    const double found = detection.readings.front().observation.pose_rms;
+    if (found > limit) {
+      detection.readings.clear();
+      detection.reason = "the corners fit the target to " + data::format_short(found) +
+                         " px, the usual view to " + data::format_short(rms[rms.size() / 2]) + " px";
+    }
+    std::erase_if(detection.readings,
+                  [&](const CornerReading& reading) { return reading.observation.pose_rms > limit; });
+  }
+}
+
+Rectifier make_rectifier(const Dataset& dataset) {
+  if (dataset.camera) return Rectifier(*dataset.camera);
+  std::string reason;
+  for (const Frame& frame : dataset.frames) try {
+      const GreyImage image = load_grey_image(frame.image);
+      return {image.width, image.height};
+    } catch (const data::InputError& error) {
+      if (reason.empty()) reason = error.what();
+    }
+  throw data::InputError(reason.empty() ? dataset.source + ": found no pictures" : reason);
+}
+
+}  // namespace
+
+std::vector<Detection> detect(const Dataset& dataset, const Target& target, const DetectSettings& settings,
+                              const std::function<void(int, int)>& progress) {
+  const Rectifier rectifier = make_rectifier(dataset);
+  const Eigen::Matrix3Xd points = target_points(target);
+  const int count = static_cast<int>(dataset.frames.size());
+  std::vector<Detection> detections(dataset.frames.size());
+  const DetectionCache cache(settings.cache, dataset.camera, target);
+
+  std::atomic<int> next{0};
+  std::mutex mutex;
+  int done = 0;
+  std::exception_ptr failure;
+  const auto work = [&] {
+    try {
+      const Finder finder = make_finder(target, rectifier);
+      for (int k = next++; k < count; k = next++) {
+        const Frame& frame = dataset.frames[static_cast<std::size_t>(k)];
+        Detection& detection = detections[static_cast<std::size_t>(k)];
+        const Found found =
+            cache.get(frame.image, [&] { return find_in(frame, dataset, rectifier, finder); });
+        detection.image = frame.name;
+        detection.reason = found.reason;
+        for (const Sighting& sighting : found.sightings)
+          detection.readings.push_back({sighting.refiner, observe(frame, sighting)});
+        if (dataset.camera && detection.reason.empty())
+          add_poses(*dataset.camera, points, settings.largest_rms, detection);
+        const std::lock_guard lock(mutex);
+        if (progress) progress(++done, count);
+      }
+    } catch (...) {
+      const std::lock_guard lock(mutex);
+      failure = std::current_exception();
+      next = count;
+    }
+  };
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int threads = std::clamp(settings.threads > 0 ? settings.threads : processors, 1, std::max(1, count));
+  std::vector<std::thread> pool;
+  for (int i = 1; i < threads; ++i) pool.emplace_back(work);
+  work();
+  for (std::thread& thread : pool) thread.join();
+  if (failure) std::rethrow_exception(failure);
+
+  drop_misfits(settings, detections);
+  const bool none = std::all_of(detections.begin(), detections.end(),
+                                [](const Detection& detection) { return detection.readings.empty(); });
+  if (none)
+    throw data::InputError(
+        dataset.source + ": the target is seen in none of " + std::to_string(count) + " pictures; " +
+        (detections.empty() ? "" : detections.front().image + ": " + detections.front().reason));
+  return detections;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,26 @@
+#pragma once
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "calib/dataset/dataset.h"
+#include "calib/dataset/detection.h"
+#include "calib/dataset/target.h"
+
+namespace flash::calib {
+
+struct DetectSettings {
+  int threads = 0;           ///< 0: as many as there are processors
+  std::string cache;         ///< folder that keeps what was found, by content; empty: none
+  double largest_rms = 10;   ///< a view whose pose fits no better shows no target [px]
+  double largest_ratio = 6;  ///< nor one worse than that many times the usual view of the set, above 2 px
+};
+
+/// Looks for the target in every picture of a set; a detection for each frame, in their order. Without
+/// intrinsics observations carry no poses. `progress` is called after each picture (done, of how many), one
+/// at a time. Throws InputError where no picture shows the target, with the reason of the first.
+std::vector<Detection> detect(const Dataset& dataset, const Target& target,
+                              const DetectSettings& settings = {},
+                              const std::function<void(int, int)>& progress = {});
+
+}  // namespace flash::calib

@@ -1,0 +1,83 @@
+#include "calib/detect/detection_cache.h"
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/sha256.h"
+#include "data/text.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr int kFinderVersion = 1;  // counts changes of what the finders return
+
+std::optional<Found> read(const std::string& path) {
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    const nlohmann::json json = data::load_json(path);
+    Found found;
+    found.reason = json.at("reason").get<std::string>();
+    for (const nlohmann::json& item : json.at("sightings")) {
+      Sighting sighting{item.at("refiner").get<std::string>(), item.at("points").get<std::vector<int>>(), {}};
+      for (const nlohmann::json& pixel : item.at("pixels"))
+        sighting.pixels.emplace_back(pixel.at(0).get<double>(), pixel.at(1).get<double>());
+      if (sighting.pixels.size() != sighting.points.size()) return std::nullopt;
+      found.sightings.push_back(std::move(sighting));
+    }
+    return found;
+  } catch (const std::exception&) {
+    return std::nullopt;
+  }
+}
+
+void write(const Found& found, const std::string& path) {
+  nlohmann::json json = {{"reason", found.reason}, {"sightings", nlohmann::json::array()}};
+  for (const Sighting& sighting : found.sightings) {
+    nlohmann::json pixels = nlohmann::json::array();
+    for (const Eigen::Vector2d& pixel : sighting.pixels) pixels.push_back({pixel.x(), pixel.y()});
+    json["sightings"].push_back(
+        {{"refiner", sighting.refiner}, {"points", sighting.points}, {"pixels", std::move(pixels)}});
+  }
+  data::write_atomically(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+}
+
+}  // namespace
+
+DetectionCache::DetectionCache(std::string folder, const std::optional<data::CameraIntrinsics>& camera,
+                               const Target& target)
+    : folder_(std::move(folder)) {
+  if (folder_.empty()) return;
+  const auto add = [&](double value) { key_ += data::format_number(value) + ' '; };
+  key_ = std::string(FLASH_VERSION) + ' ' + std::to_string(kFinderVersion) + ' ' + target.dictionary + ' ';
+  for (const double value :
+       {static_cast<double>(target.kind), static_cast<double>(target.columns),
+        static_cast<double>(target.rows), target.spacing, target.marker_size, target.marker_gap,
+        static_cast<double>(target.first_id), static_cast<double>(target.has_origin)})
+    add(value);
+  if (!camera) return;
+  for (const double value :
+       {static_cast<double>(camera->width), static_cast<double>(camera->height), camera->fx, camera->fy,
+        camera->cx, camera->cy, static_cast<double>(camera->model)})
+    add(value);
+  for (const double value : camera->distortion) add(value);
+}
+
+Found DetectionCache::get(const std::string& image, const std::function<Found()>& find) const {
+  if (folder_.empty()) return find();
+  std::string bytes;
+  try {
+    bytes = data::read_file(image);
+  } catch (const data::InputError&) {
+    return find();  // says why it cannot be read
+  }
+  const std::string path = (std::filesystem::path(folder_) / (data::sha256(key_ + bytes) + ".json")).string();
+  if (std::optional<Found> kept = read(path)) return std::move(*kept);
+  Found found = find();
+  write(found, path);
+  return found;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,43 @@
+#pragma once
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "calib/dataset/target.h"
+#include "calib/detect/grey_image.h"
+#include "calib/detect/rectifier.h"
+
+namespace flash::calib {
+
+/// Points of the target as one refiner places them.
+struct Sighting {
+  std::string refiner;
+  std::vector<int> points;              ///< columns of target_points
+  std::vector<Eigen::Vector2d> pixels;  ///< distorted; pixel centres are whole numbers
+};
+
+/// What a picture shows of the target: a sighting for each refiner, or why there is none.
+struct Found {
+  std::vector<Sighting> sightings;
+  std::string reason;
+};
+
+/// Looks for one target in pictures of one camera; not to be shared between threads. The rectifier must
+/// outlive it.
+using Finder = std::function<Found(const GreyImage&)>;
+
+/// Name of the refiner that fits the brightness of shapes to the pixels (calib/corner_shapes.h). The others
+/// are those of the libraries: corner_sub_pix and sectors (OpenCV), apriltag, blobs.
+inline const char* const kImageModel = "image_model";
+
+Finder make_finder(const Target& target, const Rectifier& rectifier);
+
+/// The kinds behind make_finder.
+Finder chessboard_finder(const Target& target, const Rectifier& rectifier);
+Finder aruco_finder(const Target& target, const Rectifier& rectifier);  ///< aruco and aruco_grid
+Finder charuco_finder(const Target& target, const Rectifier& rectifier);
+Finder apriltag_finder(const Target& target, const Rectifier& rectifier);  ///< apriltag and aprilgrid
+Finder circle_finder(const Target& target, const Rectifier& rectifier);
+
+}  // namespace flash::calib

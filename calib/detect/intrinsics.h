@@ -1,0 +1,42 @@
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "calib/dataset/observation.h"
+#include "calib/dataset/target.h"
+#include "calib/geometry/projection.h"
+#include "data/camera.h"
+
+namespace flash::calib {
+
+struct IntrinsicsSettings {
+  data::DistortionModel model = data::DistortionModel::plumb_bob;
+  double largest_ratio = 4;  ///< a view worse than that many times the usual one, and above 1 px, is left out
+};
+
+struct IntrinsicsView {
+  std::string image;
+  double rms = 0;      ///< reprojection, 2-D rms per corner [px]
+  std::string reason;  ///< why it was left out; empty where it was not
+};
+
+struct IntrinsicsEstimate {
+  data::CameraIntrinsics camera;
+  IntrinsicsVector sd =
+      IntrinsicsVector::Zero();  ///< standard deviations, from the residuals; poses marginalised
+  double rms = 0;                ///< reprojection, 2-D rms per corner [px]
+  double corner_sd =
+      0;  ///< of where the worst corner of the picture is projected, for a fixed ray; 100 at most [px]
+  double coverage = 0;  ///< share of the picture within the outline of all corners
+  double tilt = 0;      ///< largest angle between the target's normals of two views [rad]
+  std::vector<IntrinsicsView> views;
+  std::vector<std::string> warnings;  ///< what these pictures do not determine
+};
+
+/// Camera from views of a flat target (Zhang 2000, by OpenCV), views that do not fit left out. Points and
+/// pixels of the observations alone are used. Throws data::InputError below three usable views.
+IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<Observation>& observations,
+                                        int width, int height, const IntrinsicsSettings& settings = {});
+
+}  // namespace flash::calib

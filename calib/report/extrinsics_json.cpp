@@ -1,0 +1,156 @@
+#include "calib/report/extrinsics_json.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "data/trajectory.h"
+
+namespace flash::calib {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double kDegrees = 180 / M_PI;
+
+template <class Vector>
+Json list(const Vector& v) {
+  Json values = Json::array();
+  for (Eigen::Index i = 0; i < v.size(); ++i) values.push_back(v[i]);
+  return values;
+}
+
+template <class Matrix>
+Json rows(const Matrix& m) {
+  Json values = Json::array();
+  for (Eigen::Index i = 0; i < m.rows(); ++i) values.push_back(list(m.row(i)));
+  return values;
+}
+
+Json comparison_json(const Calibration& calibration) {
+  const bool pixels = has_pixels(calibration);
+  Json methods = Json::object();
+  for (const ComparedMethod& method : calibration.comparison) {
+    Json entry = {{"relative_deg", method.relative.rotation * kDegrees},
+                  {"relative_mm", 1e3 * method.relative.translation},
+                  {"reprojection_rms_px", pixels ? Json(method.px) : Json(nullptr)}};
+    if (method.held_out) {
+      entry["heldout_px"] = pixels ? Json(method.held_out->px) : Json(nullptr);
+      entry["heldout_mm"] = method.held_out->mm;
+      entry["heldout_deg"] = method.held_out->deg;
+    }
+    entry["wild"] = method.wild;
+    entry["translation"] = list(method.poses.X.translation());
+    entry["rotation_xyzw"] = list(data::to_vector(method.poses.X).tail<4>());
+    methods[method.name] = std::move(entry);
+  }
+  return methods;
+}
+
+Json views_json(const Calibration& calibration) {
+  const bool pixels = has_pixels(calibration);
+  Json views = Json::array();
+  for (std::size_t i = 0; i < calibration.views.size(); ++i) {
+    const ViewResult& view = calibration.views[i];
+    Json entry = {{"image", calibration.selection.observations[i].image}, {"used", view.used}};
+    entry["reason"] = view.used ? Json(nullptr) : Json(view.reason);
+    entry["px"] = view.used && pixels ? Json(view.px) : Json(nullptr);
+    if (view.used && pixels) {
+      entry["chain_px"] = view.chain_px;
+      entry["correction_mm"] = 1e3 * view.correction.head<3>().norm();
+      entry["correction_deg"] = view.correction.tail<3>().norm() * kDegrees;
+    }
+    if (view.used) entry["renumbered"] = calibration.selection.views[i].symmetry != 0;
+    views.push_back(std::move(entry));
+  }
+  return views;
+}
+
+Json depth_json(const DepthUse& depth) {
+  return {{"used", depth.used},
+          {"reason", depth.used ? Json(nullptr) : Json(depth.reason)},
+          {"views", depth.views},
+          {"pixel_noise_m", depth.pixel_noise},
+          {"over_corners", depth.over_corners},
+          {"over_corners_sd", depth.over_corners_sd}};
+}
+
+}  // namespace
+
+Json to_json(const NamedTransform& transform) {
+  const Eigen::Matrix<double, 7, 1> v = data::to_vector(transform.T);
+  return {{"parent", transform.parent},
+          {"child", transform.child},
+          {"translation", list(v.head<3>())},
+          {"rotation_xyzw", list(v.tail<4>())}};
+}
+
+Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code) {
+  const Extrinsics extrinsics = extrinsics_of(calibration, inputs);
+  const Vector6d sd = calibration.covariance.diagonal().cwiseSqrt();
+  Json json = {{"schema", "flash-extrinsics/1"},
+               {"setup", to_string(extrinsics.setup)},
+               {"method", extrinsics.method},
+               {"transform", to_json(extrinsics.transform)},
+               {"target_pose", to_json(extrinsics.target_pose)},
+               {"covariance", rows(calibration.covariance)}};
+  json["predicted_sd"] = {{"translation_mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
+                          {"rotation_deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
+  const auto px = [&](double value) { return extrinsics.pixels ? Json(value) : Json(nullptr); };
+  json["sigmas"] = {
+      {"corner_px", px(extrinsics.corner_px)},
+      {"robot_rotation_rad", extrinsics.robot_rotation_rad},
+      {"robot_translation_m", extrinsics.robot_translation_m},
+      {"depth_m", inputs.depth && inputs.depth->used ? Json(inputs.depth->sigma) : Json(nullptr)}};
+  json["residuals"] = {{"reprojection_rms_px", px(calibration.chain_rms)},
+                       {"corner_rms_px", px(calibration.corner_rms)},
+                       {"centre_rms_px", px(calibration.centre_rms)},
+                       {"heldout_px", px(calibration.held_out.px)},
+                       {"heldout_mm", calibration.held_out.mm},
+                       {"heldout_deg", calibration.held_out.deg}};
+  json["depth"] = inputs.depth ? depth_json(*inputs.depth) : Json(nullptr);
+  json["time_offset"] = inputs.time_offset ? Json{{"estimate_s", inputs.time_offset->estimate},
+                                                  {"sd_s", inputs.time_offset->sd}}
+                                           : Json(nullptr);
+  json["comparison"] = comparison_json(calibration);
+  json["views"] = views_json(calibration);
+  json["observability"] = {
+      {"turn_spread_deg", list(Eigen::Vector3d(kDegrees * calibration.diversity.spread))},
+      {"first_axis_share", calibration.diversity.first_share},
+      {"condition", calibration.weakest.condition},
+      {"weakest", calibration.weakest.name},
+      {"weakest_mm", 1e3 * calibration.weakest.translation},
+      {"weakest_deg", kDegrees * calibration.weakest.rotation}};
+  json["convention_findings"] = Json::array();
+  json["scale"] = calibration.scale ? Json{{"estimate", calibration.scale->estimate},
+                                           {"sd", calibration.scale->sd},
+                                           {"solved", calibration.scale->solved}}
+                                    : Json(nullptr);
+  json["splits"] = nullptr;
+  if (!calibration.splits.empty()) {
+    json["splits"] = {{"covariance_factor", calibration.covariance_factor}};
+    for (const SplitCheck& check : calibration.splits)
+      json["splits"][to_string(check.split)] = {{"apart_mm", 1e3 * check.apart.head<3>().norm()},
+                                                {"apart_deg", kDegrees * check.apart.tail<3>().norm()},
+                                                {"chi_square", check.chi_square}};
+  }
+  json["smooth_errors"] = nullptr;
+  if (calibration.pose_errors) {
+    const CorrelatedPoseErrors& errors = *calibration.pose_errors;
+    json["smooth_errors"] = {{"found", errors.found},
+                             {"gain", errors.gain},
+                             {"translation_m", errors.translation},
+                             {"rotation_rad", errors.rotation},
+                             {"about_base_rad", errors.about_base},
+                             {"reach", errors.reach}};
+  }
+  json["warnings"] = calibration.warnings;
+  json["exit_code"] = exit_code;
+  json["provenance"] = {{"tool", "flash-calib"},    {"version", FLASH_VERSION}, {"dataset", inputs.dataset},
+                        {"target", inputs.target},  {"poses", inputs.poses},    {"camera", inputs.camera},
+                        {"refiner", inputs.refiner}};
+  json["provenance"]["depth_scale"] =
+      inputs.depth && inputs.depth->used ? Json(inputs.depth->scale) : Json(nullptr);
+  return json;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,15 @@
+#pragma once
+#include <nlohmann/json_fwd.hpp>
+
+#include "calib/calibrate/extrinsics.h"
+
+namespace flash::calib {
+
+/// Everything that formats.md asks for: transform, covariance, noise, residuals, comparison, views,
+/// observability, findings, scale, warnings, provenance.
+nlohmann::ordered_json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code);
+
+/// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
+nlohmann::ordered_json to_json(const NamedTransform& transform);
+
+}  // namespace flash::calib

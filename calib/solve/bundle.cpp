@@ -1,0 +1,82 @@
+#include "calib/solve/bundle.h"
+
+#include <cmath>
+
+#include "calib/geometry/projection.h"
+
+namespace flash::calib {
+
+Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
+                   const std::vector<Observation>& observations, const HandEyePoses& seed) {
+  Bundle bundle{.setup = setup,
+                .cameras = {seed.X},
+                .intrinsics = {camera},
+                .bases = {Eigen::Isometry3d::Identity()},
+                .targets = {seed.Z},
+                .scales = {1.0},
+                .time_offsets = {0.0},
+                .pivots = {Eigen::Vector3d::Zero()},
+                .poses = {},
+                .views = {}};
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const Observation& observation = observations[i];
+    RobotPose pose;
+    pose.T_base_gripper = observation.T_base_gripper;
+    pose.velocity = observation.velocity;
+    bundle.poses.push_back(pose);
+    BundleView view;
+    view.pose = static_cast<int>(i);
+    view.points = target_points(Eigen::all, observation.points);
+    view.pixels = observation.pixels;
+    view.depth_points = observation.depth_points;
+    bundle.views.push_back(std::move(view));
+  }
+  return bundle;
+}
+
+Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside) {
+  Bundle result = bundle;
+  std::erase_if(result.views, [&](const BundleView& view) {
+    return (fold[static_cast<std::size_t>(view.pose)] == part) != inside;
+  });
+  return result;
+}
+
+Eigen::Isometry3d predicted_pose(const Bundle& bundle, const BundleView& view, bool corrected) {
+  return chain_of(bundle, view, corrected).target_in_camera();
+}
+
+Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected) {
+  const RobotPose& pose = bundle.poses[static_cast<std::size_t>(view.pose)];
+  const auto arm = static_cast<std::size_t>(pose.arm);
+  return {bundle.setup,
+          bundle.cameras[static_cast<std::size_t>(view.camera)],
+          bundle.bases[arm],
+          pose.T_base_gripper,
+          corrected ? pose.correction : Eigen::Isometry3d::Identity(),
+          bundle.targets[static_cast<std::size_t>(view.target)],
+          bundle.time_offsets[arm],
+          pose.velocity};
+}
+
+Eigen::Matrix2Xd residuals(const Bundle& bundle, const BundleView& view, bool corrected) {
+  const Eigen::Isometry3d T = predicted_pose(bundle, view, corrected);
+  const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics[static_cast<std::size_t>(view.camera)]);
+  const double scale = bundle.scales[static_cast<std::size_t>(view.target)];
+  Eigen::Matrix2Xd result(2, view.points.cols());
+  for (Eigen::Index i = 0; i < view.points.cols(); ++i)
+    result.col(i) = view.pixels.col(i) - project(intrinsics, T * (scale * view.points.col(i)));
+  return result;
+}
+
+double reprojection_rms(const Bundle& bundle, bool corrected) {
+  double sum = 0;
+  Eigen::Index count = 0;
+  for (const BundleView& view : bundle.views) {
+    sum += residuals(bundle, view, corrected).squaredNorm();
+    count += view.points.cols();
+  }
+  return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
+}
+
+}  // namespace flash::calib

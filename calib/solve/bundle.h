@@ -1,0 +1,71 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "calib/dataset/observation.h"
+#include "calib/geometry/chain.h"
+#include "calib/geometry/closed_form.h"
+#include "calib/geometry/pose.h"
+#include "data/camera.h"
+
+namespace flash::calib {
+
+/// Where a robot said its gripper was, and how it was wrong.
+struct RobotPose {
+  int arm = 0;
+  Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d correction = Eigen::Isometry3d::Identity();  ///< true pose = T_base_gripper * correction
+  Vector6d velocity = Vector6d::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; for the time offset
+};
+
+/// One target in one image.
+struct BundleView {
+  int pose = 0, camera = 0, target = 0;
+  Eigen::Matrix3Xd points;        ///< in the target frame [m]
+  Eigen::Matrix2Xd pixels;        ///< where they were seen [px]
+  Eigen::Matrix3Xd depth_points;  ///< on the target's plane, measured by depth, in the camera frame [m]; or
+                                  ///< none
+};
+
+/// Everything that is known and looked for. One hand-eye calibration has one camera, arm and target; several
+/// arms on one camera, or several cameras on one arm, share them (see Chain).
+struct Bundle {
+  Setup setup = Setup::eye_in_hand;
+  std::vector<Eigen::Isometry3d> cameras;          ///< C: in the gripper (eye-in-hand) or the world
+  std::vector<data::CameraIntrinsics> intrinsics;  ///< of each camera
+  std::vector<Eigen::Isometry3d> bases;    ///< B: of each arm in the world, which is the first arm's base
+  std::vector<Eigen::Isometry3d> targets;  ///< Z: in the world (eye-in-hand) or a gripper
+  std::vector<double> scales;              ///< of each target: true size over stated size
+  std::vector<double> time_offsets;        ///< tau of each arm [s]
+  std::vector<double> depth_scales = {};   ///< of each camera: depth over distance; empty: 1
+  std::vector<Eigen::Vector3d> pivots;     ///< of each arm, in its gripper: where errors of rotation and of
+                                           ///< translation are independent [m]
+  std::vector<RobotPose> poses;
+  std::vector<BundleView> views;
+};
+
+/// The bundle of one camera and one arm. points: the target's, 3 x N; poses: seed.
+Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
+                   const std::vector<Observation>& observations, const HandEyePoses& seed);
+
+/// The bundle with the views of the poses whose `fold` is `part`, or of all others.
+Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside);
+
+/// Depth over distance of a camera.
+inline double depth_scale(const Bundle& bundle, std::size_t camera) {
+  return bundle.depth_scales.empty() ? 1 : bundle.depth_scales[camera];
+}
+
+/// The closed chain through one view, with the correction of the robot's pose or without.
+Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected = true);
+
+/// Pose of the target in the camera, with the correction of the robot's pose or without.
+Eigen::Isometry3d predicted_pose(const Bundle& bundle, const BundleView& view, bool corrected = true);
+
+/// Seen minus projected [px], 2 x N.
+Eigen::Matrix2Xd residuals(const Bundle& bundle, const BundleView& view, bool corrected = true);
+
+/// 2-D rms per corner over all views [px].
+double reprojection_rms(const Bundle& bundle, bool corrected = true);
+
+}  // namespace flash::calib

@@ -1,0 +1,326 @@
+#include "calib/solve/bundle_adjustment.h"
+
+#include <ceres/ceres.h>
+#if __has_include(<glog/logging.h>)
+#include <glog/logging.h>
+#endif
+
+#include <array>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+#include "calib/geometry/projection.h"
+
+namespace flash::calib {
+namespace {
+
+using Jacobian7 = Eigen::Matrix<double, Eigen::Dynamic, 7, Eigen::RowMajor>;
+using PoseBlock = std::array<double, 7>;  // t, then q as x y z w
+
+PoseBlock block_of(const Eigen::Isometry3d& T) {
+  const Eigen::Quaterniond q(T.linear());
+  return {T.translation().x(), T.translation().y(), T.translation().z(), q.x(), q.y(), q.z(), q.w()};
+}
+
+Eigen::Isometry3d pose_of(const double* block) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = Eigen::Map<const Eigen::Vector3d>(block);
+  T.linear() =
+      Eigen::Quaterniond(Eigen::Map<const Eigen::Vector4d>(block + 3)).normalized().toRotationMatrix();
+  return T;
+}
+
+/// SE(3) under the right perturbation. Cost functions put their derivative with respect to the perturbation
+/// into the first six columns of the ambient Jacobian and zero into the last, which PlusJacobian = [I; 0]
+/// hands through: what reaches the solver is exact.
+class PoseManifold final : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return 7; }
+  int TangentSize() const override { return 6; }
+  bool Plus(const double* x, const double* delta, double* result) const override {
+    const PoseBlock block = block_of(moved(pose_of(x), Eigen::Map<const Vector6d>(delta)));
+    std::copy(block.begin(), block.end(), result);
+    return true;
+  }
+  bool PlusJacobian(const double*, double* jacobian) const override {
+    Eigen::Map<Eigen::Matrix<double, 7, 6, Eigen::RowMajor>>(jacobian).setIdentity();
+    return true;
+  }
+  bool Minus(const double* y, const double* x, double* difference) const override {
+    Eigen::Map<Vector6d>(difference, 6) = motion_between(pose_of(x), pose_of(y));
+    return true;
+  }
+  bool MinusJacobian(const double*, double* jacobian) const override {
+    Eigen::Map<Eigen::Matrix<double, 6, 7, Eigen::RowMajor>>(jacobian).setIdentity();
+    return true;
+  }
+};
+
+template <class Rows>
+void set_pose_jacobian(double* target, const Rows& rows) {
+  if (!target) return;
+  Eigen::Map<Jacobian7> jacobian(target, rows.rows(), 7);
+  jacobian.leftCols<6>() = rows;
+  jacobian.col(6).setZero();
+}
+
+/// The chain through one view, made anew only when its links have moved: all corners of a view are evaluated
+/// one after the other. Blocks: camera, base, target, correction; time offset.
+class ViewChain {
+ public:
+  ViewChain(Setup setup, const RobotPose& pose) : setup_(setup), pose_(pose) {}
+
+  const Chain& at(double const* const* x, double tau) {
+    std::array<double, 29> links;
+    for (std::size_t k = 0; k < 4; ++k) std::copy(x[k], x[k] + 7, links.begin() + 7 * k);
+    links.back() = tau;
+    if (!chain_ || links != links_) {
+      chain_.emplace(setup_, pose_of(x[0]), pose_of(x[1]), pose_.T_base_gripper, pose_of(x[3]), pose_of(x[2]),
+                     tau, pose_.velocity);
+      links_ = links;
+    }
+    return *chain_;
+  }
+
+ private:
+  Setup setup_;
+  const RobotPose& pose_;
+  std::array<double, 29> links_ = {};
+  std::optional<Chain> chain_;
+};
+
+/// Blocks: camera, base, target, correction, intrinsics, scale, time offset.
+class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1> {
+ public:
+  CornerCost(std::shared_ptr<ViewChain> chain, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel,
+             double sigma)
+      : chain_(std::move(chain)), point_(point), pixel_(pixel), weight_(1 / sigma) {}
+
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const Chain& chain = chain_->at(x, *x[6]);
+    const Eigen::Vector3d p = *x[5] * point_;
+    const Eigen::Vector3d q = chain.target_in_camera() * p;
+    if (!(q.z() > 1e-6)) return false;
+    Eigen::Matrix<double, 2, 3> d_point;
+    Eigen::Matrix<double, 2, kIntrinsics> d_intrinsics;
+    const Eigen::Map<const IntrinsicsVector> intrinsics(x[4]);
+    const Eigen::Vector2d seen =
+        project(intrinsics, q, jacobians ? &d_point : nullptr, jacobians ? &d_intrinsics : nullptr);
+    Eigen::Map<Eigen::Vector2d>(residual, 2) = weight_ * (seen - pixel_);
+    if (!jacobians) return true;
+    d_point *= weight_;
+    const Chain::Derivative d_correction = chain.d_correction(p);
+    set_pose_jacobian(jacobians[0], d_point * chain.d_camera(q));
+    set_pose_jacobian(jacobians[1], d_point * chain.d_base(d_correction));
+    set_pose_jacobian(jacobians[2], d_point * chain.d_target(p));
+    set_pose_jacobian(jacobians[3], d_point * d_correction);
+    if (jacobians[4]) {
+      Eigen::Map<Eigen::Matrix<double, 2, kIntrinsics, Eigen::RowMajor>> d(jacobians[4]);
+      d = weight_ * d_intrinsics;
+    }
+    if (jacobians[5]) Eigen::Map<Eigen::Vector2d>(jacobians[5], 2) = d_point * chain.d_scale(point_);
+    if (jacobians[6]) Eigen::Map<Eigen::Vector2d>(jacobians[6], 2) = d_point * chain.d_time(d_correction);
+    return true;
+  }
+
+ private:
+  std::shared_ptr<ViewChain> chain_;
+  Eigen::Vector3d point_;
+  Eigen::Vector2d pixel_;
+  double weight_;
+};
+
+/// A depth along its ray against the target's plane. Blocks: camera, base, target, correction, time offset,
+/// scale of the depth.
+class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1, 1> {
+ public:
+  DepthCost(std::shared_ptr<ViewChain> chain, const Eigen::Vector3d& point, double sigma)
+      : chain_(std::move(chain)), point_(point), weight_(1 / sigma) {}
+
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const Chain& chain = chain_->at(x, *x[4]);
+    const Eigen::Vector3d point = point_ / *x[5];
+    const DepthResidual depth = depth_residual(chain, point);
+    *residual = weight_ * depth.value;
+    if (!jacobians) return true;
+    const Eigen::RowVector3d d_point = -weight_ * depth.d_material;
+    const Chain::Derivative d_correction = chain.d_correction(depth.material);
+    set_pose_jacobian(jacobians[0], d_point * chain.d_camera(point));
+    set_pose_jacobian(jacobians[1], d_point * chain.d_base(d_correction));
+    set_pose_jacobian(jacobians[2], d_point * chain.d_target(depth.material));
+    set_pose_jacobian(jacobians[3], d_point * d_correction);
+    if (jacobians[4]) *jacobians[4] = d_point.dot(chain.d_time(d_correction));
+    if (jacobians[5]) *jacobians[5] = -weight_ * point.z() / *x[5];
+    return true;
+  }
+
+ private:
+  std::shared_ptr<ViewChain> chain_;
+  Eigen::Vector3d point_;
+  double weight_;
+};
+
+class CorrectionPrior final : public ceres::SizedCostFunction<6, 7> {
+ public:
+  CorrectionPrior(double translation, double rotation, Eigen::Vector3d pivot)
+      : translation_(1 / translation), rotation_(1 / rotation), pivot_(std::move(pivot)) {}
+
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const Eigen::Isometry3d D = pose_of(x[0]);
+    const Eigen::Vector3d angle = rotation_log(D.linear());
+    Eigen::Map<Vector6d>(residual, 6) << translation_ * (D * pivot_ - pivot_), rotation_ * angle;
+    if (!jacobians) return true;
+    Matrix6d d = Matrix6d::Zero();
+    d.topLeftCorner<3, 3>() = translation_ * D.linear();
+    d.topRightCorner<3, 3>() = -translation_ * D.linear() * skew(pivot_);
+    d.bottomRightCorner<3, 3>() = rotation_ * right_jacobian_inverse(angle);
+    set_pose_jacobian(jacobians[0], d);
+    return true;
+  }
+
+ private:
+  double translation_, rotation_;
+  Eigen::Vector3d pivot_;
+};
+
+/// The bundle as blocks of numbers, as Ceres wants it.
+struct Blocks {
+  std::vector<PoseBlock> cameras, bases, targets, corrections;
+  std::vector<IntrinsicsVector> intrinsics;
+  std::vector<double> scales, time_offsets, depth_scales;
+
+  explicit Blocks(const Bundle& bundle)
+      : scales(bundle.scales), time_offsets(bundle.time_offsets), depth_scales(bundle.depth_scales) {
+    depth_scales.resize(bundle.cameras.size(), 1);
+    for (const Eigen::Isometry3d& T : bundle.cameras) cameras.push_back(block_of(T));
+    for (const Eigen::Isometry3d& T : bundle.bases) bases.push_back(block_of(T));
+    for (const Eigen::Isometry3d& T : bundle.targets) targets.push_back(block_of(T));
+    for (const RobotPose& pose : bundle.poses) corrections.push_back(block_of(pose.correction));
+    for (const data::CameraIntrinsics& camera : bundle.intrinsics) intrinsics.push_back(to_vector(camera));
+  }
+
+  void write_to(Bundle& bundle) const {
+    for (std::size_t i = 0; i < cameras.size(); ++i) bundle.cameras[i] = pose_of(cameras[i].data());
+    for (std::size_t i = 0; i < bases.size(); ++i) bundle.bases[i] = pose_of(bases[i].data());
+    for (std::size_t i = 0; i < targets.size(); ++i) bundle.targets[i] = pose_of(targets[i].data());
+    for (std::size_t i = 0; i < corrections.size(); ++i)
+      bundle.poses[i].correction = pose_of(corrections[i].data());
+    for (std::size_t i = 0; i < intrinsics.size(); ++i)
+      bundle.intrinsics[i] = with_vector(bundle.intrinsics[i], intrinsics[i]);
+    bundle.scales = scales;
+    bundle.time_offsets = time_offsets;
+    bundle.depth_scales = depth_scales;
+  }
+};
+
+void add_views(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, const NoiseLevels& noise,
+               const BundleSettings& settings) {
+  for (const BundleView& view : bundle.views) {
+    const RobotPose& pose = bundle.poses[static_cast<std::size_t>(view.pose)];
+    const auto camera = static_cast<std::size_t>(view.camera), arm = static_cast<std::size_t>(pose.arm),
+               target = static_cast<std::size_t>(view.target);
+    double* correction = blocks.corrections[static_cast<std::size_t>(view.pose)].data();
+    const auto chain = std::make_shared<ViewChain>(bundle.setup, pose);
+    for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
+      problem.AddResidualBlock(
+          new CornerCost(chain, view.points.col(i), view.pixels.col(i), noise.corner[camera]),
+          settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr, blocks.cameras[camera].data(),
+          blocks.bases[arm].data(), blocks.targets[target].data(), correction,
+          blocks.intrinsics[camera].data(), &blocks.scales[target], &blocks.time_offsets[arm]);
+    }
+    for (Eigen::Index i = 0; i < view.depth_points.cols(); ++i) {
+      problem.AddResidualBlock(new DepthCost(chain, view.depth_points.col(i), noise.depth[camera]),
+                               settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr,
+                               blocks.cameras[camera].data(), blocks.bases[arm].data(),
+                               blocks.targets[target].data(), correction, &blocks.time_offsets[arm],
+                               &blocks.depth_scales[camera]);
+    }
+  }
+}
+
+void hold(ceres::Problem& problem, double* block) {
+  if (problem.HasParameterBlock(block)) problem.SetParameterBlockConstant(block);
+}
+
+void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, const NoiseLevels& noise,
+                  const Unknowns& unknowns, ceres::ParameterBlockOrdering& order) {
+  auto* const manifold = new PoseManifold;  // the problem owns it
+  for (auto* list : {&blocks.cameras, &blocks.bases, &blocks.targets, &blocks.corrections})
+    for (PoseBlock& block : *list)
+      if (problem.HasParameterBlock(block.data())) problem.SetManifold(block.data(), manifold);
+  hold(problem, blocks.bases.front().data());
+  for (std::size_t i = 0; i < bundle.poses.size(); ++i) {
+    double* correction = blocks.corrections[i].data();
+    if (!problem.HasParameterBlock(correction)) continue;
+    if (unknowns.corrections) {
+      const auto arm = static_cast<std::size_t>(bundle.poses[i].arm);
+      problem.AddResidualBlock(
+          new CorrectionPrior(noise.translation[arm], noise.rotation[arm], bundle.pivots[arm]), nullptr,
+          correction);
+      order.AddElementToGroup(correction, 0);
+    } else {
+      hold(problem, correction);
+    }
+  }
+  for (IntrinsicsVector& block : blocks.intrinsics) {
+    if (!problem.HasParameterBlock(block.data())) continue;
+    std::vector<int> constant;
+    for (int i = unknowns.intrinsics; i < kIntrinsics; ++i) constant.push_back(i);
+    if (unknowns.intrinsics == 0)
+      hold(problem, block.data());
+    else if (!constant.empty())
+      problem.SetManifold(block.data(), new ceres::SubsetManifold(kIntrinsics, constant));
+  }
+  for (double& scale : blocks.scales)
+    if (!unknowns.scales) hold(problem, &scale);
+  for (double& tau : blocks.time_offsets)
+    if (!unknowns.time_offsets) hold(problem, &tau);
+  for (double& scale : blocks.depth_scales)
+    if (!unknowns.depth_scales) hold(problem, &scale);
+
+  std::vector<double*> all;
+  problem.GetParameterBlocks(&all);
+  for (double* block : all)
+    if (!order.IsMember(block)) order.AddElementToGroup(block, 1);
+}
+
+}  // namespace
+
+namespace {
+
+/// Ceres warns of singular steps on stderr, whatever its logging type; here they are an answer like others.
+void silence_ceres() {
+#if __has_include(<glog/logging.h>)
+  static const bool silent = [] {
+    FLAGS_minloglevel = google::GLOG_FATAL;
+    return true;
+  }();
+  static_cast<void>(silent);
+#endif
+}
+
+}  // namespace
+
+BundleSummary solve_bundle(Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings) {
+  silence_ceres();
+  Blocks blocks(bundle);
+  ceres::Problem problem;
+  add_views(problem, blocks, bundle, noise, settings);
+  ceres::Solver::Options options;
+  options.linear_solver_ordering = std::make_shared<ceres::ParameterBlockOrdering>();
+  set_unknowns(problem, blocks, bundle, noise, settings.unknowns, *options.linear_solver_ordering);
+  options.linear_solver_type = settings.unknowns.corrections ? ceres::DENSE_SCHUR : ceres::DENSE_QR;
+  options.max_num_iterations = settings.iterations;
+  options.function_tolerance = settings.tolerance;
+  options.parameter_tolerance = 1e-12;
+  options.gradient_tolerance = 1e-12;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(options, &problem, &summary);
+  blocks.write_to(bundle);
+  return {summary.final_cost, static_cast<int>(summary.iterations.size()),
+          summary.termination_type == ceres::CONVERGENCE};
+}
+
+}  // namespace flash::calib

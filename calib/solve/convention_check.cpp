@@ -1,0 +1,191 @@
+#include "calib/solve/convention_check.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "calib/dataset/pose_file.h"
+#include "calib/geometry/pose.h"
+
+namespace flash::calib {
+namespace {
+
+using Poses = std::vector<Eigen::Isometry3d>;
+
+Poses inverted(Poses poses) {
+  for (Eigen::Isometry3d& pose : poses) pose = pose.inverse();
+  return poses;
+}
+
+Poses scaled(Poses poses, double factor) {
+  for (Eigen::Isometry3d& pose : poses) pose.translation() *= factor;
+  return poses;
+}
+
+/// x y z w read from what was w x y z.
+Poses reordered_quaternions(Poses poses) {
+  for (Eigen::Isometry3d& pose : poses) {
+    const Eigen::Quaterniond q(pose.linear());
+    pose.linear() = Eigen::Quaterniond(q.x(), q.y(), q.z(), q.w()).toRotationMatrix();
+  }
+  return poses;
+}
+
+void add_pairings(const Reading& as_stated, std::vector<Reading>& readings) {
+  const auto count = static_cast<int>(as_stated.T_base_gripper.size());
+  for (const int shift : {-1, 1, -2, 2}) {
+    Reading reading = as_stated;
+    for (int i = 0; i < count; ++i) {
+      const int from = i + shift;
+      reading.known[static_cast<std::size_t>(i)] = from >= 0 && from < count;
+      if (from >= 0 && from < count)
+        reading.T_base_gripper[static_cast<std::size_t>(i)] =
+            as_stated.T_base_gripper[static_cast<std::size_t>(from)];
+    }
+    const std::string distance = std::abs(shift) == 1 ? "one" : "two";
+    reading.sentence = "images and poses are paired off by " + distance +
+                       ": each image belongs to the pose " + distance + (shift > 0 ? " after" : " before") +
+                       " its own";
+    readings.push_back(std::move(reading));
+  }
+}
+
+Poses with_angles(Poses poses, const std::vector<Eigen::Vector3d>& angles, const std::string& order,
+                  double factor) {
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    poses[i].linear() = rotation_from_angles(factor * angles[i], order);
+  return poses;
+}
+
+Poses with_rotation_vectors(Poses poses, const std::vector<Eigen::Vector3d>& angles, double factor) {
+  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].linear() = rotation_exp(factor * angles[i]);
+  return poses;
+}
+
+void add_angle_readings(const Reading& as_stated, const std::vector<Eigen::Vector3d>& angles,
+                        std::vector<Reading>& readings) {
+  struct Unit {
+    double factor;
+    const char* text;
+  };
+  constexpr double kDegree = M_PI / 180;
+  const std::array<Unit, 3> units{{{1, ""},
+                                   {kDegree, "angles are degrees where radians were expected"},
+                                   {1 / kDegree, "angles are radians where degrees were expected"}}};
+  for (const Unit& unit : units) {
+    const std::string prefix = unit.text[0] == 0 ? "" : std::string(unit.text) + ", and ";
+    // Fixed axes in the order of the letters; turning axes in the reverse order are the same.
+    for (const char* order : {"xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "zxz", "zyz"}) {
+      if (unit.factor == 1 && std::string(order) == "xyz") continue;
+      Reading reading = as_stated;
+      reading.T_base_gripper = with_angles(as_stated.T_base_gripper, angles, order, unit.factor);
+      reading.sentence = std::string(order) == "xyz"
+                             ? unit.text
+                             : prefix + "the three angles turn about fixed " + order + ", not fixed xyz";
+      readings.push_back(std::move(reading));
+    }
+    Reading reading = as_stated;
+    reading.T_base_gripper = with_rotation_vectors(as_stated.T_base_gripper, angles, unit.factor);
+    reading.sentence = prefix + "the three angles are a rotation vector, not roll, pitch, yaw";
+    readings.push_back(std::move(reading));
+  }
+}
+
+RobustSeed robust_seed_of(const Reading& reading, const std::vector<Observation>& observations,
+                          const std::vector<Symmetry>& symmetries, const RobustSeedSettings& settings) {
+  std::vector<Eigen::Isometry3d> robot;
+  std::vector<std::vector<Eigen::Isometry3d>> candidates(observations.size());
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    robot.push_back(pose_loop(reading.setup, reading.T_base_gripper[i], Eigen::Isometry3d::Identity()).G);
+    if (!reading.known[i]) continue;
+    for (const Symmetry& symmetry : symmetries)
+      for (const Eigen::Isometry3d& T : observations[i].T_camera_target)
+        candidates[i].push_back(T * symmetry.turn.inverse());
+  }
+  return find_robust_seed(robot, candidates, settings);
+}
+
+/// Eye-to-hand with its poses is eye-in-hand with their inverses: the same equations. What tells them apart
+/// is which of the two constant transforms is short enough for a mount.
+void name_setup(Setup stated, const RobustSeed& found, std::string& sentence) {
+  const bool stated_in_hand = stated == Setup::eye_in_hand;
+  const double camera = found.poses.X.translation().norm(), target = found.poses.Z.translation().norm();
+  // In the found reading X is base <- camera if the camera stands still, gripper <- camera if it rides.
+  const bool camera_rides = camera < target;
+  if (camera_rides != stated_in_hand)
+    sentence = stated_in_hand ? "the setup is eye-to-hand, not eye-in-hand (or the poses are T_gripper_base)"
+                              : "the setup is eye-in-hand, not eye-to-hand (or the poses are T_gripper_base)";
+  else
+    sentence =
+        "the poses are inverted: they are T_gripper_base where T_base_gripper is expected (or the setup is " +
+        std::string(stated_in_hand ? "eye-to-hand)" : "eye-in-hand)");
+}
+
+std::string closing_text(const RobustSeed& robust_seed) {
+  char text[80];
+  std::snprintf(text, sizeof text, "%.2f deg and %.1f mm", robust_seed.rotation * 180 / M_PI,
+                1e3 * robust_seed.translation);
+  return text;
+}
+
+}  // namespace
+
+std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
+                                          const std::vector<Eigen::Vector3d>& angles) {
+  Reading as_stated{.sentence = {}, .setup = setup, .T_base_gripper = {}, .known = {}};
+  for (const Observation& observation : observations)
+    as_stated.T_base_gripper.push_back(observation.T_base_gripper);
+  as_stated.known.assign(observations.size(), true);
+  const auto with = [&](std::string sentence, Poses poses) {
+    Reading reading = as_stated;
+    reading.sentence = std::move(sentence);
+    reading.T_base_gripper = std::move(poses);
+    return reading;
+  };
+  const Poses& poses = as_stated.T_base_gripper;
+  std::vector<Reading> readings;
+  readings.push_back(with("", inverted(poses)));  // named by what it finds
+  add_pairings(as_stated, readings);
+  readings.push_back(
+      with("translations of the robot are millimetres where metres were expected", scaled(poses, 1e-3)));
+  readings.push_back(
+      with("translations of the robot are inches where metres were expected", scaled(poses, 0.0254)));
+  readings.push_back(
+      with("translations of the robot are metres where millimetres were expected", scaled(poses, 1e3)));
+  readings.push_back(
+      with("quaternions are w x y z where x y z w was expected", reordered_quaternions(poses)));
+  if (angles.size() == observations.size()) add_angle_readings(as_stated, angles, readings);
+  // Two mistakes at once, the second being the direction of the poses or the setup.
+  const std::size_t single = readings.size();
+  for (std::size_t i = 1; i < single; ++i) {
+    Reading reading = readings[i];
+    reading.T_base_gripper = inverted(reading.T_base_gripper);
+    reading.sentence += "; and the poses are inverted, or the setup is the other one";
+    readings.push_back(std::move(reading));
+  }
+  return readings;
+}
+
+std::optional<Finding> check_convention(Setup setup, const std::vector<Observation>& observations,
+                                        const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                        const std::vector<Eigen::Vector3d>& angles,
+                                        const ConventionSettings& settings) {
+  if (stated.found && stated.score < settings.suspicious) return std::nullopt;
+  Finding best{.sentence = {}, .stated = stated, .found = {}};
+  for (const Reading& reading : alternative_readings(setup, observations, angles)) {
+    const RobustSeed found = robust_seed_of(reading, observations, symmetries, settings.robust_seed);
+    if (!found.found || (stated.found && found.score * settings.better > stated.score)) continue;
+    // A simpler reading, which comes first, is left only for one that closes clearly better.
+    if (best.found.found && found.score > 0.7 * best.found.score) continue;
+    best.found = found;
+    best.sentence = reading.sentence;
+    if (reading.sentence.empty()) name_setup(setup, found, best.sentence);
+  }
+  if (!best.found.found) return std::nullopt;
+  best.sentence += ": so the chain closes to " + closing_text(best.found) + ", as stated to " +
+                   (stated.found ? closing_text(stated) : std::string("nothing consistent"));
+  return best;
+}
+
+}  // namespace flash::calib

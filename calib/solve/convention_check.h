@@ -1,0 +1,45 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/dataset/observation.h"
+#include "calib/dataset/symmetry.h"
+#include "calib/solve/robust_seed.h"
+
+namespace flash::calib {
+
+/// Another way to read the input.
+struct Reading {
+  std::string sentence;  ///< what is wrong with the input if this reading is right
+  Setup setup = Setup::eye_in_hand;
+  std::vector<Eigen::Isometry3d> T_base_gripper;  ///< of each view
+  std::vector<bool> known;                        ///< views that have a pose in this reading
+};
+
+/// Readings of the same numbers under the conventions that people mix up: the other setup, inverted poses,
+/// both, millimetres and inches for metres, pairing off by one or two, quaternions w x y z for x y z w, and,
+/// where the file gave angles, other orders of the axes, degrees for radians and radians for degrees. angles:
+/// as the file gave them [rad], one a view, or none.
+std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
+                                          const std::vector<Eigen::Vector3d>& angles = {});
+
+struct ConventionSettings {
+  RobustSeedSettings robust_seed{.triples = 100, .kept = 3};
+  double suspicious = 0.035;  ///< closing error of the majority, rotation [rad] and translation over distance
+  double better = 4;          ///< how many times better another reading has to close
+};
+
+struct Finding {
+  std::string sentence;
+  RobustSeed stated, found;  ///< how the input closes as it is stated, and as the finding reads it
+};
+
+/// Tries the readings where the stated one closes badly. Empty where it closes well, or where no other closes
+/// clearly better.
+std::optional<Finding> check_convention(Setup setup, const std::vector<Observation>& observations,
+                                        const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                        const std::vector<Eigen::Vector3d>& angles = {},
+                                        const ConventionSettings& settings = {});
+
+}  // namespace flash::calib

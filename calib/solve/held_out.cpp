@@ -1,0 +1,119 @@
+#include "calib/solve/held_out.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/geometry/closed_form.h"
+#include "calib/geometry/pose_from_pixels.h"
+#include "data/parallel.h"
+
+namespace flash::calib {
+namespace {
+
+std::vector<PoseLoop> loops_of(const Bundle& bundle, const std::vector<BundleView>& views,
+                               const std::vector<Eigen::Isometry3d>& T_camera_target) {
+  std::vector<PoseLoop> loops;
+  loops.reserve(views.size());
+  for (const BundleView& view : views) {
+    const auto pose = static_cast<std::size_t>(view.pose);
+    loops.push_back(pose_loop(bundle.setup, bundle.poses[pose].T_base_gripper, T_camera_target[pose]));
+  }
+  return loops;
+}
+
+void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
+         const RefineSettings& settings) {
+  if (method == Method::errors_in_variables) {
+    RefineSettings anew = settings;
+    anew.estimate_pivots = false;
+    bundle = refine(std::move(bundle), anew).bundle;
+    return;
+  }
+  bundle.scales.assign(bundle.scales.size(), 1.0);
+  if (method == Method::bundle) {
+    for (RobotPose& pose : bundle.poses) pose.correction.setIdentity();
+    solve_bundle(bundle, settings.noise, {.unknowns = {.corrections = false}, .huber = 0});
+    return;
+  }
+  const std::vector<PoseLoop> loops = loops_of(bundle, bundle.views, T_camera_target);
+  const HandEyePoses poses = method == Method::park ? park(loops) : shah(loops);
+  bundle.cameras.front() = poses.X;
+  bundle.targets.front() = poses.Z;
+}
+
+}  // namespace
+
+const char* to_string(Method method) {
+  switch (method) {
+    case Method::park:
+      return "park";
+    case Method::shah:
+      return "shah";
+    case Method::bundle:
+      return "bundle";
+    case Method::errors_in_variables:
+      break;
+  }
+  return "errors_in_variables";
+}
+
+namespace {
+
+/// Sums of one part of the views, predicted by a solution without them.
+struct HeldOutSums {
+  double px = 0, mm = 0, deg = 0, corners = 0, views = 0;
+};
+
+HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target,
+                          Method method, const RefineSettings& settings, const std::vector<int>& fold,
+                          int part) {
+  HeldOutSums sums;
+  Bundle train = views_of(bundle, fold, part, false);
+  fit(train, T_camera_target, method, settings);
+  const Bundle test = views_of(bundle, fold, part, true);
+  for (const BundleView& view : test.views) {
+    const Eigen::Isometry3d predicted = predicted_pose(train, view, false);
+    // With lens and size of the target as they were solved for.
+    const Eigen::Matrix3Xd points = train.scales[static_cast<std::size_t>(view.target)] * view.points;
+    const Eigen::Isometry3d seen =
+        fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], points, view.pixels,
+                    T_camera_target[static_cast<std::size_t>(view.pose)]);
+    const Eigen::Vector3d centre = points.rowwise().mean();
+    const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
+    sums.px += residuals(train, view, false).squaredNorm();
+    sums.mm += (1e3 * (predicted * centre - seen * centre)).squaredNorm();
+    sums.deg += std::pow(angle * 180 / M_PI, 2);
+    sums.corners += static_cast<double>(view.points.cols());
+    ++sums.views;
+  }
+  return sums;
+}
+
+}  // namespace
+
+HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
+                 const RefineSettings& settings, int folds, int threads) {
+  const int count = static_cast<int>(bundle.poses.size());
+  const int parts = std::min(folds, count);
+  HeldOut result;
+  for (int i = 0; i < count; ++i) result.fold.push_back(i % parts);
+  std::vector<HeldOutSums> sums(static_cast<std::size_t>(parts));
+  data::for_each_in_parallel(sums.size(), threads, [&](std::size_t part) {
+    sums[part] =
+        hold_out_part(bundle, T_camera_target, method, settings, result.fold, static_cast<int>(part));
+  });
+  HeldOutSums all;
+  for (const HeldOutSums& part : sums) {
+    all.px += part.px;
+    all.mm += part.mm;
+    all.deg += part.deg;
+    all.corners += part.corners;
+    all.views += part.views;
+  }
+  result.px = std::sqrt(all.px / all.corners);
+  result.mm = std::sqrt(all.mm / all.views);
+  result.deg = std::sqrt(all.deg / all.views);
+  return result;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,192 @@
+#include "calib/solve/linearization.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/geometry/projection.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr int kOwn = 6;
+
+/// Rows of [d_correction d_shared residual] for one point.
+class RowBuilder {
+ public:
+  RowBuilder(const Bundle& bundle, const BundleView& view, const Unknowns& unknowns,
+             const SharedColumns& columns)
+      : columns_(columns),
+        own_(unknowns.corrections ? kOwn : 0),
+        chain_(chain_of(bundle, view)),
+        camera_(static_cast<std::size_t>(view.camera)),
+        target_(static_cast<std::size_t>(view.target)),
+        arm_(static_cast<std::size_t>(bundle.poses[static_cast<std::size_t>(view.pose)].arm)) {}
+
+  Eigen::Index width() const { return own_ + columns_.count + 1; }
+  const Chain& chain() const { return chain_; }
+  int first_shared() const { return own_; }
+
+  /// d_q: derivative of the residual with respect to the point in the camera frame.
+  template <int Rows>
+  void fill(const Eigen::Matrix<double, Rows, 3>& d_q, const Eigen::Vector3d& p, const Eigen::Vector3d& q,
+            Eigen::Matrix<double, Rows, Eigen::Dynamic>& rows) const {
+    const Chain::Derivative d_correction = chain_.d_correction(p);
+    rows.setZero(Rows, width());
+    if (own_ > 0) rows.leftCols(kOwn) = d_q * d_correction;
+    rows.middleCols(own_ + columns_.cameras[camera_], 6) = d_q * chain_.d_camera(q);
+    rows.middleCols(own_ + columns_.targets[target_], 6) = d_q * chain_.d_target(p);
+    if (columns_.bases[arm_] >= 0)
+      rows.middleCols(own_ + columns_.bases[arm_], 6) = d_q * chain_.d_base(d_correction);
+    if (columns_.time_offsets[arm_] >= 0)
+      rows.col(own_ + columns_.time_offsets[arm_]) = d_q * chain_.d_time(d_correction);
+  }
+
+ private:
+  const SharedColumns& columns_;
+  int own_;
+  Chain chain_;
+  std::size_t camera_, target_, arm_;
+};
+
+double huber_weight(double norm, double sigma, double huber) {
+  return huber > 0 && norm > huber * sigma ? huber * sigma / norm : 1.0;
+}
+
+Eigen::MatrixXd depth_gram(const Bundle& bundle, const BundleView& view, const Unknowns& unknowns,
+                           const SharedColumns& columns, double sigma, double huber, double& count) {
+  const RowBuilder builder(bundle, view, unknowns, columns);
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(builder.width(), builder.width());
+  Eigen::Matrix<double, 1, Eigen::Dynamic> row;
+  const auto camera = static_cast<std::size_t>(view.camera);
+  const double scale = depth_scale(bundle, camera);
+  for (Eigen::Index i = 0; i < view.depth_points.cols(); ++i) {
+    const Eigen::Vector3d point = view.depth_points.col(i) / scale;
+    const DepthResidual depth = depth_residual(builder.chain(), point);
+    builder.fill<1>(-depth.d_material, depth.material, point, row);
+    if (columns.depth_scales[camera] >= 0)
+      row[builder.first_shared() + columns.depth_scales[camera]] = -point.z() / scale;
+    row[builder.width() - 1] = depth.value;
+    const double weight = huber_weight(std::abs(depth.value), sigma, huber);
+    gram += weight * row.transpose() * row;
+    count += weight;
+  }
+  return gram;
+}
+
+/// The prior of a correction, linearised: its rotation and its translation.
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> prior_grams(const Eigen::Isometry3d& D,
+                                                        const Eigen::Vector3d& pivot, Eigen::Index width) {
+  const Eigen::Vector3d angle = rotation_log(D.linear());
+  Eigen::Matrix<double, 3, Eigen::Dynamic> rotation = Eigen::MatrixXd::Zero(3, width),
+                                           translation = Eigen::MatrixXd::Zero(3, width);
+  rotation.middleCols<3>(3) = right_jacobian_inverse(angle);
+  rotation.col(width - 1) = angle;
+  translation.leftCols<3>() = D.linear();
+  translation.middleCols<3>(3) = -D.linear() * skew(pivot);
+  translation.col(width - 1) = D * pivot - pivot;
+  return {rotation.transpose() * rotation, translation.transpose() * translation};
+}
+
+}  // namespace
+
+SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
+  SharedColumns columns;
+  const auto take = [&columns](std::vector<int>& list, std::size_t size, int width, std::size_t first = 0) {
+    list.assign(size, -1);
+    for (std::size_t i = first; i < size && width > 0; ++i) {
+      list[i] = columns.count;
+      columns.count += width;
+    }
+  };
+  take(columns.cameras, bundle.cameras.size(), 6);
+  take(columns.targets, bundle.targets.size(), 6);
+  take(columns.bases, bundle.bases.size(), 6, 1);
+  take(columns.intrinsics, bundle.cameras.size(), unknowns.intrinsics);
+  take(columns.scales, bundle.targets.size(), unknowns.scales ? 1 : 0);
+  take(columns.time_offsets, bundle.bases.size(), unknowns.time_offsets ? 1 : 0);
+  columns.depth_scales.assign(bundle.cameras.size(), -1);
+  for (const BundleView& view : bundle.views) {
+    int& column = columns.depth_scales[static_cast<std::size_t>(view.camera)];
+    if (unknowns.depth_scales && view.depth_points.cols() > 0 && column < 0) column = columns.count++;
+  }
+  return columns;
+}
+
+std::vector<double> to_components(const NoiseLevels& noise) {
+  std::vector<double> components;
+  for (const auto* list : {&noise.corner, &noise.depth, &noise.rotation, &noise.translation})
+    components.insert(components.end(), list->begin(), list->end());
+  return components;
+}
+
+NoiseLevels to_noise(const std::vector<double>& components, const NoiseLevels& like) {
+  NoiseLevels noise = like;
+  auto next = components.begin();
+  for (auto* list : {&noise.corner, &noise.depth, &noise.rotation, &noise.translation})
+    for (double& sigma : *list) sigma = *next++;
+  return noise;
+}
+
+Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const Unknowns& unknowns,
+                            const SharedColumns& columns, double sigma, double huber, double& count) {
+  const RowBuilder builder(bundle, view, unknowns, columns);
+  const auto camera = static_cast<std::size_t>(view.camera), target = static_cast<std::size_t>(view.target);
+  const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics[camera]);
+  const double scale = bundle.scales[target];
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(builder.width(), builder.width());
+  Eigen::Matrix<double, 2, Eigen::Dynamic> rows;
+  Eigen::Matrix<double, 2, 3> d_q;
+  Eigen::Matrix<double, 2, kIntrinsics> d_intrinsics;
+  for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
+    const Eigen::Vector3d p = scale * view.points.col(i);
+    const Eigen::Vector3d q = builder.chain().target_in_camera() * p;
+    const Eigen::Vector2d residual = project(intrinsics, q, &d_q, &d_intrinsics) - view.pixels.col(i);
+    builder.fill<2>(d_q, p, q, rows);
+    if (columns.intrinsics[camera] >= 0)
+      rows.middleCols(builder.first_shared() + columns.intrinsics[camera], unknowns.intrinsics) =
+          d_intrinsics.leftCols(unknowns.intrinsics);
+    if (columns.scales[target] >= 0)
+      rows.col(builder.first_shared() + columns.scales[target]) =
+          d_q * builder.chain().d_scale(view.points.col(i));
+    rows.col(builder.width() - 1) = residual;
+    const double weight = huber_weight(residual.norm(), sigma, huber);
+    gram += weight * rows.transpose() * rows;
+    count += 2 * weight;
+  }
+  return gram;
+}
+
+LinearModel linearize(const Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings) {
+  const SharedColumns columns = shared_columns(bundle, settings.unknowns);
+  const int cameras = static_cast<int>(bundle.cameras.size()), arms = static_cast<int>(bundle.bases.size());
+  LinearModel model;
+  model.groups = static_cast<int>(bundle.poses.size());
+  model.components = 2 * cameras + 2 * arms;
+  model.own = settings.unknowns.corrections ? kOwn : 0;
+  model.shared = columns.count;
+  for (const BundleView& view : bundle.views) {
+    const auto camera = static_cast<std::size_t>(view.camera);
+    GramBlock corners{.group = view.pose, .component = view.camera, .gram = {}};
+    corners.gram = corner_gram(bundle, view, settings.unknowns, columns, noise.corner[camera], settings.huber,
+                               corners.count);
+    model.blocks.push_back(std::move(corners));
+    if (view.depth_points.cols() == 0) continue;
+    GramBlock depths{.group = view.pose, .component = cameras + view.camera, .gram = {}};
+    depths.gram = depth_gram(bundle, view, settings.unknowns, columns, noise.depth[camera], settings.huber,
+                             depths.count);
+    model.blocks.push_back(std::move(depths));
+  }
+  if (!settings.unknowns.corrections) return model;
+  for (int i = 0; i < model.groups; ++i) {
+    // A pose that nothing saw still needs its prior to be determined; it then tells nothing of the noise.
+    const RobotPose& pose = bundle.poses[static_cast<std::size_t>(i)];
+    auto [rotation, translation] = prior_grams(
+        pose.correction, bundle.pivots[static_cast<std::size_t>(pose.arm)], model.own + model.shared + 1);
+    const double count = 3;
+    model.blocks.push_back({i, 2 * cameras + pose.arm, count, std::move(rotation)});
+    model.blocks.push_back({i, 2 * cameras + arms + pose.arm, count, std::move(translation)});
+  }
+  return model;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,32 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "calib/solve/bundle_adjustment.h"
+#include "calib/solve/reml.h"
+
+namespace flash::calib {
+
+/// Where the shared unknowns stand in the linearised problem; -1: not an unknown.
+struct SharedColumns {
+  std::vector<int> cameras, bases, targets;  ///< first of six, a right perturbation (dt, dtheta) each
+  std::vector<int> intrinsics;               ///< first of Unknowns::intrinsics
+  std::vector<int> scales, time_offsets, depth_scales;
+  int count = 0;
+};
+SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns);
+
+/// Components of variance in this order: corners and depths of each camera, rotation and translation of each
+/// arm.
+std::vector<double> to_components(const NoiseLevels& noise);
+NoiseLevels to_noise(const std::vector<double>& components, const NoiseLevels& like);
+
+/// The bundle's residuals linearised at its present state, with the corners' robust weights at `noise`.
+/// Groups are poses, whose own unknowns are their corrections (none where they are not unknowns).
+LinearModel linearize(const Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings);
+
+/// The part of one view alone: Gram matrix of [d_correction d_shared residual].
+Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const Unknowns& unknowns,
+                            const SharedColumns& columns, double corner, double huber, double& count);
+
+}  // namespace flash::calib

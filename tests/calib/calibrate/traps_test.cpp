@@ -1,0 +1,230 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "calib/calibrate/calibrate.h"
+#include "calib/dataset/pose_file.h"
+#include "data/error.h"
+#include "tests/calib/hand_eye_scene.h"
+
+namespace flash::calib {
+namespace {
+
+HandEyeScene scene_of(Setup setup, unsigned seed, int views = 20) {
+  SceneSettings settings = protocol_settings(setup);
+  settings.views = views;
+  settings.robot_deg = 0.05;
+  settings.robot_mm = 0.5;
+  HandEyeScene scene = make_scene(settings, board_points(), seed);
+  for (std::size_t i = 0; i < scene.observations.size(); ++i)
+    scene.observations[i].image = std::to_string(i) + ".png";
+  return scene;
+}
+
+Calibration calibrated(const HandEyeScene& scene, const CalibrateSettings& settings = {}) {
+  return calibrate(scene.settings.setup, scene.camera, scene.points, grid_symmetries(scene.points),
+                   scene.observations, settings);
+}
+
+/// The sentence with which the scene is refused; empty where it is not.
+std::string refusal(const HandEyeScene& scene, const CalibrateSettings& settings = {}) {
+  try {
+    calibrated(scene, settings);
+    return {};
+  } catch (const data::InputError& error) {
+    return error.what();
+  }
+}
+
+// Within four of its own standard deviations, and a robot's noise over the square root of the views.
+void expect_right(const Calibration& result, const HandEyeScene& scene) {
+  const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+  const Vector6d sd = result.covariance.diagonal().cwiseSqrt();
+  EXPECT_TRUE((error.cwiseAbs().array() < 4 * sd.array()).all())
+      << error.transpose() << " / " << sd.transpose();
+  EXPECT_LT(sd.head<3>().maxCoeff(), 2e-3);
+  EXPECT_TRUE(result.usable);
+}
+
+/// What the detector would have read from a board seen from its other end.
+void flip(Observation& observation, const Symmetry& turn) {
+  for (int& point : observation.points) point = turn.permutation[static_cast<std::size_t>(point)];
+  for (Eigen::Isometry3d& T : observation.T_camera_target) T = T * turn.turn.inverse();
+}
+
+class Traps : public testing::TestWithParam<Setup> {};
+INSTANTIATE_TEST_SUITE_P(HandEye, Traps, testing::Values(Setup::eye_in_hand, Setup::eye_to_hand));
+
+TEST_P(Traps, CleanSetPassesWithoutWarnings) {
+  const HandEyeScene scene = scene_of(GetParam(), 1);
+  const Calibration result = calibrated(scene);
+  expect_right(result, scene);
+  EXPECT_TRUE(result.warnings.empty()) << result.warnings.front();
+  EXPECT_EQ(result.used.size(), scene.observations.size());
+}
+
+TEST_P(Traps, InvertedPosesAreNamed) {
+  HandEyeScene scene = scene_of(GetParam(), 2);
+  for (Observation& o : scene.observations) o.T_base_gripper = o.T_base_gripper.inverse();
+  EXPECT_TRUE(refusal(scene).starts_with("the poses are inverted")) << refusal(scene);
+}
+
+TEST_P(Traps, SwappedSetupIsNamed) {
+  HandEyeScene scene = scene_of(GetParam(), 3);
+  const bool in_hand = GetParam() == Setup::eye_in_hand;
+  scene.settings.setup = in_hand ? Setup::eye_to_hand : Setup::eye_in_hand;
+  EXPECT_TRUE(refusal(scene).starts_with(in_hand ? "the setup is eye-in-hand" : "the setup is eye-to-hand"))
+      << refusal(scene);
+}
+
+TEST_P(Traps, PairingOffByOneIsNamed) {
+  HandEyeScene scene = scene_of(GetParam(), 4);
+  for (std::size_t i = scene.observations.size() - 1; i > 0; --i)
+    scene.observations[i].T_base_gripper = scene.observations[i - 1].T_base_gripper;
+  EXPECT_TRUE(refusal(scene).starts_with("images and poses are paired off by one")) << refusal(scene);
+}
+
+TEST_P(Traps, MillimetresAreNamed) {
+  HandEyeScene scene = scene_of(GetParam(), 5);
+  for (Observation& o : scene.observations) o.T_base_gripper.translation() *= 1e3;
+  EXPECT_TRUE(refusal(scene).starts_with("translations of the robot are millimetres")) << refusal(scene);
+}
+
+TEST_P(Traps, DegreesForRadiansAndOrdersOfAnglesAreNamed) {
+  struct Case {
+    std::function<Eigen::Vector3d(const Eigen::Matrix3d&)> written;
+    const char* start;
+  };
+  // Angles that a file would hold: found by solving R(angles) = R, here from Eigen's decomposition.
+  const auto xyz = [](const Eigen::Matrix3d& R) -> Eigen::Vector3d {
+    return R.eulerAngles(2, 1, 0).reverse();
+  };
+  const auto zyx = [](const Eigen::Matrix3d& R) -> Eigen::Vector3d {
+    return R.eulerAngles(0, 1, 2).reverse();
+  };
+  const Case cases[] = {
+      {[&](const Eigen::Matrix3d& R) -> Eigen::Vector3d { return xyz(R) * 180 / M_PI; },
+       "angles are degrees where radians were expected"},
+      {zyx, "the three angles turn about fixed zyx, not fixed xyz"},
+      {[](const Eigen::Matrix3d& R) { return rotation_log(R); }, "the three angles are a rotation vector"}};
+  for (const Case& trap : cases) {
+    HandEyeScene scene = scene_of(GetParam(), 6);
+    CalibrateSettings settings;
+    for (Observation& o : scene.observations) {
+      const Eigen::Vector3d angles = trap.written(o.T_base_gripper.linear());
+      settings.angles.push_back(angles);
+      o.T_base_gripper.linear() = rotation_from_angles(angles);
+    }
+    EXPECT_TRUE(refusal(scene, settings).starts_with(trap.start)) << refusal(scene, settings);
+  }
+}
+
+TEST_P(Traps, WrongSquareSizeIsMeasured) {
+  HandEyeScene scene = scene_of(GetParam(), 7);
+  scene.points /= 1.08;
+  for (Observation& o : scene.observations) o.T_camera_target.front().translation() /= 1.08;
+  const Calibration result = calibrated(scene);
+  EXPECT_FALSE(result.usable);
+  ASSERT_TRUE(result.scale);
+  EXPECT_NEAR(result.scale->estimate, 1.08, 4 * result.scale->sd);
+  EXPECT_LT(result.scale->sd, 0.01);
+  EXPECT_TRUE(result.warnings.front().starts_with("the data want a target 1.0")) << result.warnings.front();
+}
+
+TEST_P(Traps, FortyPercentFlippedBoardsArePutRight) {
+  HandEyeScene scene = scene_of(GetParam(), 8);
+  const std::vector<Symmetry> symmetries = grid_symmetries(scene.points);
+  ASSERT_EQ(symmetries.size(), 2U);
+  for (std::size_t i = 0; i < scene.observations.size(); ++i)
+    if (i % 5 < 2) flip(scene.observations[i], symmetries[1]);
+  const Calibration result = calibrated(scene);
+  expect_right(result, scene);
+  EXPECT_EQ(result.selection.renumbered, 8);
+  EXPECT_EQ(result.used.size(), scene.observations.size());
+}
+
+TEST_P(Traps, ThirtyPercentOutliersAreRejectedByName) {
+  HandEyeScene scene = scene_of(GetParam(), 9);
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < 6; ++i) {
+    Vector6d wrong;
+    for (int k = 0; k < 6; ++k) wrong[k] = normal(random) * (k < 3 ? 0.05 : 0.1);
+    Observation& o = scene.observations[3 * i];
+    o.T_base_gripper = moved(o.T_base_gripper, wrong);
+  }
+  const Calibration result = calibrated(scene);
+  expect_right(result, scene);
+  EXPECT_EQ(result.used.size(), 14U);
+  for (std::size_t i = 0; i < 20; ++i) {
+    EXPECT_EQ(result.views[i].used, i % 3 != 0 || i >= 18) << i;
+    EXPECT_EQ(result.views[i].reason.empty(), result.views[i].used);
+  }
+}
+
+TEST_P(Traps, CopiesCountOnce) {
+  HandEyeScene scene = scene_of(GetParam(), 10);
+  const Calibration once = calibrated(scene);
+  for (int i = 0; i < 10; ++i) scene.observations.push_back(scene.observations[static_cast<std::size_t>(i)]);
+  const Calibration twice = calibrated(scene);
+  EXPECT_EQ(twice.used.size(), 20U);
+  EXPECT_EQ(twice.views[20].reason, "a copy of 0.png");
+  EXPECT_LT((once.covariance - twice.covariance).norm(), 1e-6 * once.covariance.norm());
+}
+
+TEST_P(Traps, OneAxisIsRefusedWithItsName) {
+  HandEyeScene scene = scene_of(GetParam(), 11);
+  const Eigen::Isometry3d& X = scene.truth.X;
+  const Eigen::Isometry3d& Z = scene.truth.Z;
+  const Eigen::Isometry3d start = scene.true_poses.front();
+  for (std::size_t i = 0; i < scene.observations.size(); ++i) {
+    Vector6d turn = Vector6d::Zero();
+    turn[0] = 0.01 * static_cast<double>(i);
+    turn[5] = 0.05 * static_cast<double>(i);
+    Observation& o = scene.observations[i];
+    o.T_base_gripper = moved(start, turn);
+    o.T_camera_target = {GetParam() == Setup::eye_in_hand ? X.inverse() * o.T_base_gripper.inverse() * Z
+                                                          : X.inverse() * o.T_base_gripper * Z};
+  }
+  EXPECT_EQ(
+      refusal(scene),
+      "rotations turn about one axis only (1.0000 of the spread): translation along that axis, (0.00, 0.00, "
+      "1.00) of the gripper, cannot be determined; add views that tilt about another");
+}
+
+TEST_P(Traps, ThreeViewsAreRefused) {
+  EXPECT_TRUE(refusal(scene_of(GetParam(), 12, 3)).starts_with("3 of 3 views can be used: at least 4"));
+}
+
+TEST_P(Traps, ViewsWithoutTargetAreNamed) {
+  HandEyeScene scene = scene_of(GetParam(), 13);
+  scene.observations[4].T_camera_target.clear();
+  const Calibration result = calibrated(scene);
+  expect_right(result, scene);
+  EXPECT_EQ(result.views[4].reason, "the target was not found");
+}
+
+TEST(PlanarPose, SecondPlanarPoseIsChosenWhereItIsTheRightOne) {
+  SceneSettings settings = protocol_settings(Setup::eye_to_hand);
+  settings.robot_deg = 0.05;
+  settings.robot_mm = 0.5;
+  HandEyeScene scene = make_scene(settings, tag_points(), 14);
+  for (std::size_t i = 0; i < scene.observations.size(); i += 3) {
+    // The mirror image of the tilt about the line of sight, first in the list.
+    std::vector<Eigen::Isometry3d>& poses = scene.observations[i].T_camera_target;
+    const Eigen::Vector3d sight = poses.front().translation().normalized();
+    const Eigen::Vector3d normal = poses.front().linear().col(2);
+    Eigen::Isometry3d mirrored = poses.front();
+    mirrored.linear() = rotation_exp(2 * normal.cross(sight).normalized() * std::acos(normal.dot(sight))) *
+                        poses.front().linear();
+    poses.insert(poses.begin(), mirrored);
+  }
+  const Calibration result = calibrate(Setup::eye_to_hand, scene.camera, scene.points,
+                                       {grid_symmetries(scene.points).front()}, scene.observations);
+  EXPECT_GE(result.used.size(), 19U);
+  const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+  EXPECT_LT(error.head<3>().norm(), 5e-3);
+}
+
+}  // namespace
+}  // namespace flash::calib

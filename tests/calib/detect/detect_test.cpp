@@ -1,0 +1,81 @@
+#include "calib/detect/detect.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "data/depth_image.h"
+#include "tests/calib/rendered_view.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::calib {
+namespace {
+
+/// Rendered pictures in a folder, with poses and intrinsics.
+Dataset write_set(const data::TemporaryFolder& folder, const Target& target, int views) {
+  const data::CameraIntrinsics camera = small_camera();
+  const Renderer renderer(target, camera);
+  std::mt19937 random(5);
+  std::string poses;
+  for (int v = 0; v < views; ++v) {
+    std::filesystem::create_directories(folder / "images");
+    const Eigen::Isometry3d pose = random_view(target, camera, 0.4, 0.6, 0.6, random);
+    data::save_mask(renderer.draw(pose, random), folder / ("images/" + std::to_string(v) + ".png"));
+    poses += std::to_string(v) + " 0.1 0 0 0 0 0 1\n";
+  }
+  folder.write("poses.tum", poses);
+  data::save_camera_info(camera, folder / "camera_info.yaml");
+  return load_dataset(folder / "");
+}
+
+TEST(Detect, UnreadablePicturesAreNamedAndTheRestGoesOn) {
+  const data::TemporaryFolder folder;
+  const Target target = parse_target("chessboard:7x5:0.03");
+  const Dataset dataset = write_set(folder, target, 3);
+  folder.write("images/1.png", "not a picture");
+  const std::vector<Detection> detections = detect(dataset, target);
+  ASSERT_EQ(detections.size(), 3u);
+  EXPECT_NE(detections[1].reason.find("cannot be read"), std::string::npos);
+  EXPECT_TRUE(detections[1].readings.empty());
+  for (const int v : {0, 2}) {
+    ASSERT_FALSE(detections[static_cast<std::size_t>(v)].readings.empty());
+    const CornerReading& best = detections[static_cast<std::size_t>(v)].readings.front();
+    EXPECT_EQ(best.refiner, "image_model");
+    EXPECT_LT(best.observation.pose_rms, 0.05);
+  }
+  EXPECT_EQ(rank_refiners(detections).front().refiner, "image_model");
+  EXPECT_EQ(observations_of(detections, "sectors").size(), 2u);
+}
+
+TEST(Detect, WhatIsKeptIsWhatWasFound) {
+  const data::TemporaryFolder folder;
+  const Target target = parse_target("chessboard:7x5:0.03");
+  const Dataset dataset = write_set(folder, target, 1);
+  DetectSettings settings;
+  settings.cache = folder / "cache";
+  const std::vector<Detection> first = detect(dataset, target, settings),
+                               second = detect(dataset, target, settings);
+  const auto files = std::distance(std::filesystem::directory_iterator(folder / "cache"), {});
+  EXPECT_EQ(files, 1);
+  ASSERT_EQ(first[0].readings.size(), second[0].readings.size());
+  EXPECT_EQ(first[0].readings[0].observation.pixels, second[0].readings[0].observation.pixels);
+  // Another target is another question, and a broken file no answer.
+  EXPECT_THROW(detect(dataset, parse_target("chessboard:8x5:0.03"), settings), data::InputError);
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "cache"))
+    std::ofstream(entry.path()) << "{";
+  EXPECT_EQ(detect(dataset, target, settings)[0].readings[0].observation.pixels,
+            first[0].readings[0].observation.pixels);
+}
+
+TEST(Detect, NoTargetAnywhereIsAnError) {
+  const data::TemporaryFolder folder;
+  const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 2);
+  const std::string message =
+      data::input_error_of([&] { detect(dataset, parse_target("apriltag:36h11:0:0.05")); });
+  EXPECT_NE(message.find("seen in none of 2 pictures"), std::string::npos) << message;
+  EXPECT_NE(message.find("no tag of 36h11"), std::string::npos) << message;
+}
+
+}  // namespace
+}  // namespace flash::calib

@@ -1,0 +1,89 @@
+#include "calib/detect/intrinsics.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "data/error.h"
+#include "tests/calib/rendered_view.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::calib {
+namespace {
+
+data::CameraIntrinsics lens() {
+  data::CameraIntrinsics camera = small_camera();
+  camera.fx = 612;
+  camera.fy = 613.5;
+  camera.cx = 322;
+  camera.cy = 238;
+  camera.model = data::DistortionModel::plumb_bob;
+  camera.distortion = {-0.2, 0.06, 0.0008, -0.0005, 0};
+  return camera;
+}
+
+std::vector<Observation> views(const Target& target, int count, double tilt, double noise, unsigned seed) {
+  const Eigen::Matrix3Xd points = target_points(target);
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0, noise);
+  std::vector<Observation> list;
+  for (int v = 0; v < count; ++v) {
+    const Eigen::Isometry3d pose = random_view(target, lens(), 0.3, 0.5, tilt, random);
+    Observation view;
+    view.image = std::to_string(v);
+    view.pixels.resize(2, points.cols());
+    for (Eigen::Index i = 0; i < points.cols(); ++i) {
+      view.points.push_back(static_cast<int>(i));
+      view.pixels.col(i) =
+          *data::project(lens(), pose * points.col(i)) + Eigen::Vector2d(normal(random), normal(random));
+    }
+    list.push_back(std::move(view));
+  }
+  return list;
+}
+
+// Errors over their standard deviations, squared: one on the average where the standard deviations are true.
+TEST(Intrinsics, StandardDeviationsAreTrue) {
+  const Target target = parse_target("chessboard:9x6:0.025");
+  const IntrinsicsVector truth = to_vector(lens());
+  double sum = 0;
+  int count = 0;
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    const IntrinsicsEstimate estimate =
+        calibrate_intrinsics(target, views(target, 12, 0.7, 0.1, seed), 640, 480);
+    EXPECT_NEAR(estimate.rms, 0.1 * std::sqrt(2.0), 0.01);
+    const IntrinsicsVector found = to_vector(estimate.camera);
+    for (int i = 0; i < 4; ++i) {
+      sum += std::pow((found[i] - truth[i]) / estimate.sd[i], 2);
+      ++count;
+    }
+    EXPECT_GT(estimate.corner_sd, 0);
+  }
+  // 12 trials of 4 unknowns, strongly correlated in pairs: as 24 free ones, chi2 / 24 lies in 0.5 to 1.7 (95
+  // %).
+  EXPECT_GT(sum / count, 0.4);
+  EXPECT_LT(sum / count, 1.8);
+}
+
+TEST(Intrinsics, WhatPicturesDoNotDetermineIsSaid) {
+  const Target target = parse_target("chessboard:9x6:0.025");
+  const IntrinsicsEstimate flat = calibrate_intrinsics(target, views(target, 10, 0.05, 0.1, 1), 640, 480);
+  ASSERT_FALSE(flat.warnings.empty());
+  EXPECT_NE(flat.warnings.front().find("never tilted"), std::string::npos);
+  std::vector<Observation> few = views(target, 2, 0.5, 0.1, 1);
+  EXPECT_NE(data::input_error_of([&] { calibrate_intrinsics(target, few, 640, 480); }).find("found 2"),
+            std::string::npos);
+}
+
+TEST(Intrinsics, AViewWithWrongCornersIsLeftOut) {
+  const Target target = parse_target("chessboard:9x6:0.025");
+  std::vector<Observation> list = views(target, 10, 0.7, 0.1, 2);
+  // Half of the board numbered one column off.
+  list[3].pixels.leftCols(27) = list[3].pixels.middleCols(1, 27).eval();
+  const IntrinsicsEstimate estimate = calibrate_intrinsics(target, list, 640, 480);
+  EXPECT_FALSE(estimate.views[3].reason.empty());
+  EXPECT_NEAR(estimate.rms, 0.1 * std::sqrt(2.0), 0.02);
+}
+
+}  // namespace
+}  // namespace flash::calib

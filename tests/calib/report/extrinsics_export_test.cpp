@@ -1,0 +1,41 @@
+#include "calib/report/extrinsics_export.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "tests/calib/hand_eye_scene.h"
+
+namespace flash::calib {
+namespace {
+
+TEST(ExtrinsicsExport, RosUrdfAndEasyHandeyeSayTheSameTransform) {
+  for (const Eigen::Vector3d& rotation : {Eigen::Vector3d(0.3, -0.8, 2), Eigen::Vector3d(0, M_PI / 2, 0)}) {
+    const data::NamedTransform transform{"tool0", "camera", make_pose({0.1, -0.2, 0.3}, rotation)};
+    double x, y, z, r, p, w;
+    const std::string urdf = urdf_joint(transform);
+    ASSERT_EQ(std::sscanf(urdf.substr(urdf.find("xyz=")).c_str(), "xyz=\"%lf %lf %lf\" rpy=\"%lf %lf %lf\"",
+                          &x, &y, &z, &r, &p, &w),
+              6);
+    const Eigen::Matrix3d from_rpy =
+        (Eigen::AngleAxisd(w, Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(p, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(r, Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
+    EXPECT_LT((from_rpy - transform.T.linear()).norm(), 1e-7);  // nine digits
+    EXPECT_LT((Eigen::Vector3d(x, y, z) - transform.T.translation()).norm(), 1e-8);
+
+    const std::string ros = ros_static_transform(transform);
+    double qx, qy, qz, qw;
+    ASSERT_EQ(std::sscanf(ros.substr(ros.find("--qx")).c_str(), "--qx %lf --qy %lf --qz %lf --qw %lf", &qx,
+                          &qy, &qz, &qw),
+              4);
+    EXPECT_LT((Eigen::Quaterniond(qw, qx, qy, qz).toRotationMatrix() - transform.T.linear()).norm(), 1e-7);
+    EXPECT_NE(ros.find("--frame-id tool0 --child-frame-id camera"), std::string::npos);
+    const std::string calib = easy_handeye2(transform, Setup::eye_in_hand);
+    EXPECT_NE(calib.find("calibration_type: eye_in_hand"), std::string::npos);
+    EXPECT_NE(calib.find("robot_effector_frame: tool0"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace flash::calib
