@@ -20,6 +20,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/writable.h"
 
 namespace flash {
 namespace {
@@ -139,6 +140,8 @@ int run_handeye(const HandEyeOptions& options) {
   const std::string report = report_path(options);
   for (const std::string& path : {options.out, report})
     if (!path.empty()) check_calib_output(path, options.common);
+  for (const std::string& path : {options.ros, options.urdf, options.easy_handeye2})
+    if (!path.empty()) data::check_file_writable(path);
   Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
   phases.end("reading");

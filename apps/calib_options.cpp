@@ -8,7 +8,9 @@
 
 #include "apps/option_checks.h"
 #include "data/error.h"
+#include "data/message_line.h"
 #include "data/text.h"
+#include "data/writable.h"
 
 namespace flash {
 
@@ -91,15 +93,24 @@ std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const ca
 }
 
 void say(const CalibCommonOptions& options, const std::string& line) {
-  if (!options.quiet) std::cerr << line << '\n';
+  if (!options.quiet) std::cerr << data::message_line(line) << '\n';
 }
 
-void warn_calib(const std::string& line) { std::cerr << "flash-calib: warning: " << line << '\n'; }
+void warn_calib(const std::string& line) {
+  std::cerr << "flash-calib: warning: " << data::message_line(line) << '\n';
+}
 
 void check_calib_output(const std::string& path, const CalibCommonOptions& options) {
-  if (options.force || !std::filesystem::exists(path)) return;
-  if (std::filesystem::is_directory(path) && std::filesystem::is_empty(path)) return;
-  throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
+  if (!options.force && std::filesystem::exists(path) && !std::filesystem::is_directory(path))
+    throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
+  data::check_file_writable(path);
+}
+
+void check_calib_folder(const std::string& path, const CalibCommonOptions& options) {
+  if (!options.force && std::filesystem::exists(path) &&
+      !(std::filesystem::is_directory(path) && std::filesystem::is_empty(path)))
+    throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
+  data::check_folder_writable(path);
 }
 
 }  // namespace flash

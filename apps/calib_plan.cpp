@@ -49,12 +49,12 @@ nlohmann::ordered_json plan_json(const calib::Plan& plan, const PlanOptions& opt
 }
 
 void print(const calib::Plan& plan) {
-  std::printf("now: +- %.2f mm, %.3f deg an axis; of the candidates %d see the whole target\n",
+  std::printf("now: +- %.3g mm, %.3g deg an axis; of the candidates %d see the whole target\n",
               1e3 * plan.translation_sd, kDegrees * plan.rotation_sd, plan.visible);
   for (std::size_t i = 0; i < plan.poses.size(); ++i) {
     const Eigen::Vector3d t = plan.poses[i].T_base_gripper.translation();
     const Eigen::Quaterniond q(plan.poses[i].T_base_gripper.linear());
-    std::printf("%zu  (%.3f, %.3f, %.3f) m  xyzw (%.4f, %.4f, %.4f, %.4f)  then +- %.2f mm, %.3f deg\n",
+    std::printf("%zu  (%.3f, %.3f, %.3f) m  xyzw (%.4f, %.4f, %.4f, %.4f)  then +- %.3g mm, %.3g deg\n",
                 i + 1, t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w(), 1e3 * plan.poses[i].translation_sd,
                 kDegrees * plan.poses[i].rotation_sd);
   }

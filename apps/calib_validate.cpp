@@ -136,7 +136,7 @@ void print_table(const calib::ProjectionCheck& check, const std::optional<calib:
 }
 
 int run_validate(const ValidateOptions& options) {
-  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  if (!options.out.empty()) check_calib_folder(options.out, options.common);
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.common.force);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::Dataset dataset = load_dataset(options.dataset);

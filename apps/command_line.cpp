@@ -5,6 +5,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -22,6 +23,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/message_line.h"
 
 namespace flash {
 namespace {
@@ -30,6 +32,7 @@ namespace {
 std::atomic<bool> stop_asked = false;
 static_assert(std::atomic<bool>::is_always_lock_free);
 constexpr std::string_view kStopping = "\nstopping after this step; Ctrl-C again ends the program now\n";
+std::array<char, 64> ended_line{};
 
 void ask_to_stop(int signal) {
   if (stop_asked.exchange(true)) _exit(128 + signal);
@@ -38,11 +41,25 @@ void ask_to_stop(int signal) {
   errno = before;
 }
 
+/// Of verbs that have no steps to stop after, and of all before their first.
+void end_now(int /*signal*/) {
+  [[maybe_unused]] const ssize_t written =
+      ::write(STDERR_FILENO, ended_line.data(), std::strlen(ended_line.data()));
+  _exit(exit_failed);
+}
+
+void handle_signals(void (*handler)(int)) {
+  struct sigaction action = {};
+  action.sa_handler = handler;
+  action.sa_flags = SA_RESTART;
+  for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
+}
+
 // Messages of libraries may span lines; users and scripts read one.
 int report(const std::string& name, std::string message, int code) {
   while (!message.empty() && (message.back() == '\n' || message.back() == ' ')) message.pop_back();
   std::replace(message.begin(), message.end(), '\n', ' ');
-  std::cerr << name << ": " << message << std::endl;
+  std::cerr << name << ": " << data::message_line(message) << std::endl;
   return code;
 }
 
@@ -187,6 +204,9 @@ int run_tool(const char* name, const std::function<int()>& body) {
 
 int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& body) {
   occupy_closed_streams();
+  std::snprintf(ended_line.data(), ended_line.size(), "\n%s: stopped before the end\n",
+                app.get_name().c_str());
+  handle_signals(ask_to_stop);
   return run_tool(app.get_name().c_str(), [&] {
     check_verb(app, argc, argv);
     if (CLI::Option* const config = app.get_config_ptr()) config->check(check_config);
@@ -200,16 +220,14 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
       return report(app.get_name(), wrong_words(app, error, argc, argv), exit_bad_input);
     }
     check_no_empty_value(app);
+    handle_signals(end_now);
+    end_after_signal();
     return body();
   });
 }
 
 const std::atomic<bool>& stop_on_signals() {
-  struct sigaction action = {};
-  action.sa_handler = ask_to_stop;
-  action.sa_flags = SA_RESTART;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
+  handle_signals(ask_to_stop);
   return stop_asked;
 }
 

@@ -23,6 +23,9 @@ int run_tool(const char* name, const std::function<int()>& body);
 /// regular file, is no text, or names an option or a section that the tool does not have.
 int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& body);
 
+/// A signal before the body begins ends the tool as one between its steps would. In a body that never calls
+/// this, Ctrl-C and SIGTERM end the program at once, with one line and exit code 1.
+///
 /// From now on Ctrl-C and SIGTERM set the flag that this returns, and say at once on stderr that the program
 /// stops after the step in work. A second signal ends the program there, with the exit code 128 + signal.
 const std::atomic<bool>& stop_on_signals();

@@ -77,7 +77,9 @@ void add_bench_verb(CLI::App& app, Action& action) {
       ->check(thread_number())
       ->capture_default_str();
   verb.add_option("--time-step", benchmark.time_step, "[s]")->check(time_step())->capture_default_str();
-  positive("--tolerance", benchmark.tolerance, "On the residual |r| / |M g|");
+  verb.add_option("--tolerance", benchmark.tolerance, "On the residual |r| / |M g|")
+      ->check(number_between(1e-12, 1))
+      ->capture_default_str();
   positive("--young-min", benchmark.membrane_stiffness_min, "E t from [N/m]");
   positive("--young-max", benchmark.membrane_stiffness_max, "E t to [N/m]");
   positive("--bending-min", benchmark.bending_rigidity_min, "D from [N m]");

@@ -2,20 +2,26 @@
 
 #include <CLI/CLI.hpp>
 #include <chrono>
+#include <condition_variable>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stop_token>
 #include <thread>
+#include <utility>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
 #include "data/error.h"
+#include "data/message_line.h"
 #include "data/scene.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sim/scene_run.h"
 
 namespace flash {
@@ -26,6 +32,22 @@ struct RunOptions {
   int threads = 0, steps = -1;
   std::optional<double> duration;  // [s]
   bool quiet = false, verbose = false, json = false, force = false;
+};
+
+/// A line on stderr about what is being done, where that takes longer than two seconds.
+class SaidWhenSlow {
+ public:
+  explicit SaidWhenSlow(std::string line)
+      : thread_([line = std::move(line)](const std::stop_token& done) {
+          std::mutex mutex;
+          std::unique_lock lock(mutex);
+          std::condition_variable_any never;
+          never.wait_for(lock, done, std::chrono::seconds(2), [] { return false; });
+          if (!done.stop_requested()) std::cerr << data::message_line(line) << '\n';
+        }) {}
+
+ private:
+  std::jthread thread_;
 };
 
 /// Rate and time left, drawn over itself, once a run has taken two seconds.
@@ -100,6 +122,12 @@ int run(const RunOptions& options) {
   if (!options.force && fs::exists(options.out) &&
       !(fs::is_directory(options.out) && fs::is_empty(options.out)))
     throw data::InputError(options.out + ": exists already; choose another -o, or --force to overwrite");
+  data::check_folder_writable(options.out);
+  std::optional<SaidWhenSlow> phase;
+  const auto begin = [&](const std::string& what) {
+    if (!options.quiet) phase.emplace(what + " ...");
+  };
+  begin("reading " + options.scene);
   const data::Scene scene = data::load_scene(options.scene);
   ProgressLine progress(!options.quiet);
   sim::SceneRun settings;
@@ -107,9 +135,11 @@ int run(const RunOptions& options) {
   settings.threads =
       options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   settings.notice = [&](const std::string& notice) {
-    if (!options.quiet) std::cerr << notice << '\n';
+    if (!options.quiet) std::cerr << data::message_line(notice) << '\n';
   };
+  settings.phase = begin;
   settings.progress = [&](int done, int steps) {
+    phase.reset();
     const std::atomic<bool>& stop = stop_on_signals();  // until the first step there is nothing to keep
     progress.show(done, steps);
     return !stop;

@@ -28,7 +28,7 @@ struct ExportOptions {
 int run_export(const ExportOptions& options) {
   const sysid::Summary summary = sysid::load_search_folder(options.run).summary;
   const data::Asset base = data::load_asset(options.asset.empty() ? summary.asset : options.asset);
-  check_output(options.out, options.common);
+  check_output_file(options.out, options.common);
   const data::Asset tuned = sysid::tuned_asset(base, summary);
   std::vector<std::string> notices;
   const data::TriangleMesh mesh = data::load_asset_mesh(tuned);

@@ -144,6 +144,7 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
 }
 
 int run_fit(const CLI::App& verb, const FitOptions& options) {
+  stop_on_signals();
   choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const sysid::Summary found = sysid::load_summary((fs::path(options.start) / "summary.json").string());
@@ -198,6 +199,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     std::printf("%.3f mm from the observed points; %s\n%s\n", 1000 * result.best.score,
                 result.termination.c_str(), (fs::path(options.out) / "fit.json").c_str());
   }
+  for (const data::Recording& recording : recordings) warn_of_camera(recording);
   if (!result.best.converged)
     warn("the fitted candidate missed a step: raise --iterations or lower --time-step");
   if (result.stuck) warn(result.termination);

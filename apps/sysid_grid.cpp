@@ -11,6 +11,7 @@
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
+#include "data/message_line.h"
 #include "data/text.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
@@ -92,8 +93,9 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
   }
   for (const sysid::SummaryRecording& recording : summary.recordings)
     std::printf("%-16s %.2f mm from the observed points, offset %.1f %.1f %.1f mm, clock %.0f ms\n",
-                recording.name.c_str(), 1000 * recording.score, 1000 * recording.offset.x(),
-                1000 * recording.offset.y(), 1000 * recording.offset.z(), 1000 * recording.time_offset);
+                data::message_line(recording.name).c_str(), 1000 * recording.score,
+                1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
+                1000 * recording.time_offset);
   for (const sysid::SolverCheck& check : summary.solver_check)
     std::printf("%-24s moves the surface by %.2f mm, the score to %.2f mm\n", check.what.c_str(),
                 1000 * check.surface_change_m, 1000 * check.score);
@@ -175,6 +177,7 @@ int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
 }
 
 int run_grid(const CLI::App& verb, const GridOptions& options) {
+  stop_on_signals();
   const auto begin = std::chrono::steady_clock::now();
   const std::string device = choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
@@ -193,6 +196,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
       sysid::steps_in(2.0 * replay.steps * options.replay.time_step, options.replay.time_step);
   const sysid::MemoryEstimate memory = sysid::estimate_memory(replays, settings, !options.no_solver_check);
   sysid::check_job(replays, sysid::count_candidates(settings.axes), memory);
+  end_after_signal();
   sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
                             sysid::fingerprint(replays, settings),
                             options.resume         ? sysid::Existing::resume

@@ -15,7 +15,9 @@
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
 #include "data/error.h"
+#include "data/message_line.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sim/sheet.h"
 #include "sysid/report/recording_names.h"
 #include "sysid/report/summarize.h"
@@ -85,7 +87,7 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
       ->check(whole_number(1, 10000))
       ->capture_default_str();
   group.add_option("--tolerance", options.tolerance, "On the residual |r| / |M g|")
-      ->check(number_from(1e-12))  // of numbers with 16 digits
+      ->check(number_between(1e-12, 1))  // of numbers with 16 digits; at 1 nothing is solved
       ->capture_default_str();
   group.add_option("--grasp-shape", options.grasp_shape, "In place of the recording's")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}));
@@ -193,10 +195,18 @@ std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed) {
 }
 
 void say(const CommonOptions& options, const std::string& line) {
-  if (!options.quiet) std::cerr << line << '\n';
+  if (!options.quiet) std::cerr << data::message_line(line) << '\n';
 }
 
-void warn(const std::string& line) { std::cerr << "flash-sysid: warning: " << line << '\n'; }
+void warn(const std::string& line) {
+  std::cerr << "flash-sysid: warning: " << data::message_line(line) << '\n';
+}
+
+void warn_of_camera(const data::Recording& recording) {
+  if (!recording.camera) return;
+  for (const std::string& warning : recording.camera->warnings)
+    warn(recording.name + ": calibration of its camera: " + warning);
+}
 
 int thread_count(const CommonOptions& options) {
   return options.threads > 0 ? options.threads
@@ -210,9 +220,16 @@ std::string choose_device(const CommonOptions& options) {
 }
 
 void check_output(const std::string& path, const CommonOptions& options) {
-  if (options.force || !std::filesystem::exists(path)) return;
-  if (std::filesystem::is_directory(path) && std::filesystem::is_empty(path)) return;
-  throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
+  if (!options.force && std::filesystem::exists(path) &&
+      !(std::filesystem::is_directory(path) && std::filesystem::is_empty(path)))
+    throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
+  data::check_folder_writable(path);
+}
+
+void check_output_file(const std::string& path, const CommonOptions& options) {
+  if (!options.force && std::filesystem::exists(path) && !std::filesystem::is_directory(path))
+    throw data::InputError(path + ": exists already; choose another name, or --force to overwrite");
+  data::check_file_writable(path);
 }
 
 std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,

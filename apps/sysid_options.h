@@ -61,15 +61,21 @@ std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed);
 void say(const CommonOptions& options, const std::string& line);
 void warn(const std::string& line);
 
+/// What is known to be wrong with the calibration behind the recording's camera.
+void warn_of_camera(const data::Recording& recording);
+
 int thread_count(const CommonOptions& options);
 
 /// The device a search runs on. Throws data::InputError for cuda where the program has none; auto takes the
 /// CPU.
 std::string choose_device(const CommonOptions& options);
 
-/// Throws data::InputError where the folder or file exists already (a folder: with something in it) and
-/// --force is not given.
+/// Throws data::InputError where the folder holds something already and --force is not given, or where it
+/// cannot be written.
 void check_output(const std::string& path, const CommonOptions& options);
+
+/// The same of a file that exists already.
+void check_output_file(const std::string& path, const CommonOptions& options);
 
 /// The recordings in the folders, told apart by name (a warning says where one was renamed). Throws
 /// data::InputError where two of them are the same.

@@ -125,12 +125,12 @@ sysid::Replay virtual_replay(const std::string& kind, const data::Recording& lik
 }
 
 std::string spread_text(const sysid::Axis& axis, double spread) {
+  if (!axis.logarithmic) return "+-" + data::format_short(spread);
+  // What is beyond 1 has two digits at least.
+  const double factor = std::exp(spread);
+  const double digits = std::clamp(1 - std::floor(std::log10(factor - 1)), 2.0, 9.0);
   char text[32];
-  if (axis.logarithmic) {
-    std::snprintf(text, sizeof text, "x/: %.2f", std::exp(spread));
-  } else {
-    std::snprintf(text, sizeof text, "+-%.3f", spread);
-  }
+  std::snprintf(text, sizeof text, "x/: %.*f", static_cast<int>(digits), factor);
   return text;
 }
 
@@ -157,6 +157,7 @@ nlohmann::ordered_json plan_json(const std::vector<sysid::PlannedExperiment>& ex
 }
 
 int run_plan(const CLI::App& verb, const PlanOptions& options) {
+  stop_on_signals();
   choose_device(options.common);
   const int threads = thread_count(options.common);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
@@ -173,7 +174,7 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   for (const sysid::Axis& axis : settings.grid.axes)
     settings.at.push_back(
         std::clamp(current_value(settings.grid.base, axis.name), axis.values.front(), axis.values.back()));
-  check_output(options.out, options.common);
+  check_output_file(options.out, options.common);
   sysid::steps_in(kLongestExperiment, options.replay.time_step);  // refused before anything is simulated
 
   const data::SheetMaterial material = sysid::candidate_at(settings.at, settings.grid).material;

@@ -120,6 +120,7 @@ nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const s
 }
 
 int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
+  stop_on_signals();
   choose_device(options.common);
   const data::Recording recording = data::load_recording(options.recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
@@ -163,6 +164,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
     }
   draw_frames(overlay, frames, options.out);
 
+  warn_of_camera(recording);
   if (motion.penetration_max > 5e-3)
     warn("the gripper takes the sheet up to " + data::format_short(1e3 * motion.penetration_max) +
          " mm below the table: is the table's height right?");

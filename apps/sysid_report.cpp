@@ -44,7 +44,7 @@ int run_report(const ReportOptions& options) {
   // Its own report.html is the run's to replace; any other file is not.
   const std::string out =
       options.out.empty() ? (fs::path(options.run) / "report.html").string() : options.out;
-  if (!options.out.empty()) check_output(out, options.common);
+  if (!options.out.empty()) check_output_file(out, options.common);
   sysid::write_report(summary, results, overlays, settings, out);
   if (options.common.json) {
     std::cout << nlohmann::ordered_json{{"report", out}}.dump(2) << '\n';

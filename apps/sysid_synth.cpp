@@ -85,6 +85,7 @@ Eigen::Vector3d vector_of(const std::vector<double>& numbers) {
 }
 
 int run_synth(SynthOptions options) {
+  stop_on_signals();
   choose_device(options.common);
   const data::Asset asset = data::load_asset(options.asset);
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
@@ -97,6 +98,7 @@ int run_synth(SynthOptions options) {
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
   check_output(options.out, options.common);
+  if (!options.truth.empty()) check_output_file(options.truth, options.common);
   for (const std::string& notice : notices) say(options.common, notice);
 
   sysid::SynthSettings& settings = options.synth;

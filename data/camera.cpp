@@ -14,6 +14,8 @@
 namespace flash::data {
 namespace {
 
+constexpr double kMostPixels = 1e6;  // a tele lens of 0.1 deg, or a centre far beside the picture
+
 YAML::Node load_yaml(const std::string& path) {
   std::string text = read_file(path);
   // OpenCV's first line, "%YAML:1.0", is not the directive that YAML defines.
@@ -89,6 +91,11 @@ CameraIntrinsics load_camera_intrinsics(const std::string& path) {
   if (k.size() != 9 || k[0] <= 0 || k[4] <= 0 || k[8] != 1 || k[3] != 0 || k[6] != 0 || k[7] != 0)
     throw input_error(path, matrix_name, "expected 3 x 3: fx 0 cx, 0 fy cy, 0 0 1");
   if (k[1] != 0) throw input_error(path, matrix_name, "found skew " + format_short(k[1]) + ", expected 0");
+  for (const double value : k)
+    if (!(std::abs(value) <= kMostPixels))
+      throw input_error(
+          path, matrix_name,
+          "found " + format_short(value) + ", expected pixels, at most " + format_short(kMostPixels));
   camera.fx = k[0];
   camera.cx = k[2];
   camera.fy = k[4];

@@ -7,7 +7,6 @@
 #include "data/trajectory.h"
 
 namespace flash::data {
-namespace {
 
 std::vector<std::string> read_warnings(const JsonObject& file) {
   std::vector<std::string> warnings;
@@ -19,8 +18,6 @@ std::vector<std::string> read_warnings(const JsonObject& file) {
   }
   return warnings;
 }
-
-}  // namespace
 
 NamedTransform read_transform(const JsonObject& object) {
   object.expect_fields({"parent", "child", "translation", "rotation_xyzw"});

@@ -29,6 +29,9 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable);
 /// first pose counts. A camera on the gripper is refused too.
 CameraPose load_camera_pose(const std::string& path, bool accept_unusable);
 
+/// The field "warnings" of a calibration, or of what was made with one; empty where it is absent.
+std::vector<std::string> read_warnings(const JsonObject& file);
+
 /// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
 NamedTransform read_transform(const JsonObject& object);
 

@@ -16,6 +16,7 @@
 #include "data/procedural_mesh.h"
 #include "data/staged_folder.h"
 #include "data/text.h"
+#include "data/writable.h"
 
 namespace flash::data {
 namespace {
@@ -198,13 +199,15 @@ std::vector<std::string> compare_sides(const Recording& recording, const std::ve
 }
 
 /// Loads the recording as its users will, which checks it; what is wrong is not yet in a file of the user.
-void check_as_file(const Recording& recording, const std::string& path) {
+/// `doubt` is said where the grasp is wrong.
+void check_as_file(const Recording& recording, const std::string& path, const std::string& doubt) {
   save_recording(recording, path);
   try {
     load_recording(path);
   } catch (const InputError& error) {
     std::string message = error.what();
     if (message.starts_with(path)) message.replace(0, path.size(), "import");
+    if (message.starts_with("import: grasps")) message += doubt;
     throw InputError(message);
   }
 }
@@ -257,7 +260,11 @@ void import_frames(const ImportOptions& options, Recording& recording) {
   camera.intrinsics_path = options.intrinsics;
   const CameraPose pose = load_camera_pose(options.extrinsics, options.accept_unusable);
   camera.base_from_camera = pose.transform.T;
-  for (const std::string& warning : pose.warnings)
+  camera.warnings = pose.warnings;
+  if (!pose.usable)
+    camera.warnings.insert(camera.warnings.begin(),
+                           "flash-calib handeye ended with exit code 3, an answer that cannot be used");
+  for (const std::string& warning : camera.warnings)
     recording.notices.push_back(options.extrinsics + ": " + warning);
   camera.depth_scale = options.depth_scale;
   recording.camera = camera;
@@ -296,6 +303,7 @@ Recording import_recording(const ImportOptions& options) {
   const std::string path = (out / "recording.json").string();
   if (fs::exists(path) && !options.overwrite)
     throw InputError(path + ": exists already; choose another folder or --force");
+  check_folder_writable(options.out);
 
   Recording recording;
   recording.source = "import";
@@ -358,9 +366,14 @@ Recording import_recording(const ImportOptions& options) {
                       " under the gripper (--tool-at)");
   }
 
+  const std::string doubt =
+      corner && !options.table_height
+          ? "; or the table's height, guessed as " + format_short(table_height) +
+                " m from the gripper's start and the crop, is wrong: give it as --table-height"
+          : "";
   StagedFolder staged(options.out);
   copy_files(staged.path(), recording);
-  check_as_file(recording, (fs::path(staged.path()) / "recording.json").string());
+  check_as_file(recording, (fs::path(staged.path()) / "recording.json").string(), doubt);
   if (!options.asset.empty()) {
     if (!fs::exists(options.asset)) throw option_error("asset", options.asset, "a file");
     // Named as from the place where the recording will stand.

@@ -7,7 +7,9 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/extrinsics.h"
 #include "data/frame_files.h"
+#include "data/gravity.h"
 #include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
@@ -169,12 +171,13 @@ void read_grasps(const JsonObject& file, Recording& recording) {
 void read_camera(const JsonObject& file, Recording& recording) {
   if (!file.has("camera")) return;
   const JsonObject object = file.object("camera");
-  object.expect_fields({"intrinsics", "T_base_camera", "depth_scale"});
+  object.expect_fields({"intrinsics", "T_base_camera", "depth_scale", "warnings"});
   RecordedCamera camera;
   camera.intrinsics_path = existing_file(object, "intrinsics", recording.source);
   camera.intrinsics = load_camera_intrinsics(camera.intrinsics_path);
   camera.base_from_camera = read_pose(object, "T_base_camera");
   camera.depth_scale = object.positive("depth_scale", camera.depth_scale);
+  camera.warnings = read_warnings(object);
   recording.camera = camera;
 }
 
@@ -356,6 +359,7 @@ Recording load_recording(const std::string& path) {
   if (std::find(kinds.begin(), kinds.end(), recording.kind) == kinds.end())
     throw file.error("kind", "corner_lift, hang, bar_pull, bias_pull, drag, cantilever or free");
   recording.gravity = file.vector3("gravity", recording.gravity);
+  check_gravity(file, recording.gravity);
   read_object(file, recording);
   read_table(file, recording);
   read_trajectories(file, recording);

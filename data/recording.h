@@ -70,6 +70,7 @@ struct RecordedCamera {
   Eigen::Isometry3d base_from_camera = Eigen::Isometry3d::Identity();  ///< T_base_camera
   double depth_scale = 0.001;                                          ///< [m] a count of the depth images
   std::string intrinsics_path;
+  std::vector<std::string> warnings;  ///< of the calibration behind T_base_camera, worst first
 };
 
 /// A recorded interaction, "flash-recording/1".

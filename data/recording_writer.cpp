@@ -62,6 +62,8 @@ void save_recording(const Recording& recording, const std::string& path) {
     json["camera"] = {{"intrinsics", named(recording.camera->intrinsics_path)},
                       {"T_base_camera", numbers(to_vector(recording.camera->base_from_camera))},
                       {"depth_scale", recording.camera->depth_scale}};
+  if (recording.camera && !recording.camera->warnings.empty())
+    json["camera"]["warnings"] = recording.camera->warnings;
   json["crop"] = {{"min", numbers(recording.crop.min)}, {"max", numbers(recording.crop.max)}};
 
   json["keyframes"] = Json::array();

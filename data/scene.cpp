@@ -7,6 +7,7 @@
 #include "data/asset.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/gravity.h"
 #include "data/json_reader.h"
 #include "data/text.h"
 
@@ -65,6 +66,7 @@ void read_solver(const JsonObject& file, SceneSolver& solver) {
     solver.max_iterations = object.integer("iterations", solver.max_iterations);
     if (solver.max_iterations < 1) throw object.error("iterations", "a whole number from 1");
     solver.tolerance = object.positive("tolerance", solver.tolerance);
+    if (solver.tolerance > 1) throw object.error("tolerance", "a number above 0, at most 1");
     solver.exit_speed = object.positive("exit_speed", solver.exit_speed);
   }
 }
@@ -328,6 +330,7 @@ Scene load_scene(const std::string& path) {
   if (scene.time_step > max_time_step)
     throw file.error("timestep", "at most " + format_short(max_time_step) + " s");
   scene.gravity = file.vector("gravity", 3);
+  check_gravity(file, scene.gravity);
   read_duration(file, scene);
   read_solver(file, scene.solver);
   if (file.has("bending_model"))

@@ -5,10 +5,11 @@ namespace flash::data {
 
 /// A folder that readers see whole or not at all. Its files are written to another one, `PATH.PID-0.tmp` or,
 /// where PATH stands already, `PATH/.PID-0.tmp`, and publish() puts them in their place. What is not
-/// published leaves nothing behind, but after a kill the other folder.
+/// published leaves nothing behind, but after a kill the other folder: the next one of the same PATH removes
+/// it. Its writer holds a lock on it, by which those that still write are told from those that were killed.
 class StagedFolder {
  public:
-  /// Makes nothing: writers make the folders that they need.
+  /// Makes the other folder. Throws std::system_error.
   explicit StagedFolder(const std::string& path);
   ~StagedFolder();
   StagedFolder(const StagedFolder&) = delete;
@@ -23,8 +24,11 @@ class StagedFolder {
   void publish(const std::string& last);
 
  private:
+  void remove();
+
   std::string final_, staged_;
   std::string made_;  // the outermost folder on the way that has to be made, or empty
+  int lock_ = -1;
 };
 
 }  // namespace flash::data

@@ -77,13 +77,18 @@ std::string time_text(double seconds) {
   return text;
 }
 
+std::size_t vertices_of(const std::vector<SceneBody>& bodies) {
+  std::size_t vertices = 0;
+  for (const SceneBody& body : bodies) vertices += static_cast<std::size_t>(body.sheet.rest.vertices.rows());
+  return vertices;
+}
+
 void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies) {
-  double vertices = 0;
-  for (const SceneBody& body : bodies) vertices += static_cast<double>(body.sheet.rest.vertices.rows());
-  const double needed = solver_bytes_per_vertex * vertices, limit = data::memory_limit();
+  const std::size_t vertices = vertices_of(bodies);
+  const double needed = solver_bytes_per_vertex * static_cast<double>(vertices), limit = data::memory_limit();
   if (limit > 0 && needed > limit)
     throw data::input_error(scene.source, "objects",
-                            data::format_count(static_cast<std::size_t>(vertices)) + " vertices take about " +
+                            data::format_count(vertices) + " vertices take about " +
                                 data::format_count(static_cast<std::size_t>(needed / 1e6)) +
                                 " MB of memory, expected at most the " +
                                 data::format_count(static_cast<std::size_t>(limit / 1e6)) +
@@ -209,6 +214,11 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   if (run.notice)
     for (const std::string& notice : summary.notices) run.notice(notice);
 
+  const auto begins = [&](const std::string& what) {
+    if (run.phase) run.phase(what);
+  };
+  const std::string size = data::format_count(vertices_of(bodies)) + " vertices";
+  begins("setting up " + size);
   std::vector<Stepper> steppers;
   for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
 
@@ -241,6 +251,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     if (steps == 0) begin_writing();
     if (run.progress && !run.progress(0, steps)) summary.interrupted = steps > 0;
     bool done = false;
+    begins("solving the first step of " + size);
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
       bool arrived = true;
       for (SceneBody& body : bodies) {

@@ -31,6 +31,7 @@ struct SceneRun {
   int steps = -1;                                  ///< to run; below zero: the scene's
   int threads = 1;                                 ///< objects step in parallel
   std::function<void(const std::string&)> notice;  ///< told each notice before the first step
+  std::function<void(const std::string&)> phase;   ///< told what begins that may take minutes
   /// Before the first step and after each; false stops the run.
   std::function<bool(int done, int steps)> progress;
 };

@@ -62,6 +62,12 @@ data::CameraIntrinsics load_camchain(const std::string& path) {
   camera.height = static_cast<int>(size[1]);
   if (!(camera.fx > 0 && camera.fy > 0 && camera.width > 0 && camera.height > 0))
     throw input_error(path, "cam0.intrinsics", "expected focal lengths and a resolution above 0");
+  constexpr double kMostPixels = 1e6;
+  for (const double value : k)
+    if (!(std::abs(value) <= kMostPixels))
+      throw input_error(path, "cam0.intrinsics",
+                        "found " + data::format_short(value) + ", expected pixels, at most " +
+                            data::format_short(kMostPixels));
   const std::string model = word("distortion_model");
   if (model == "none" || model.empty()) return camera;
   if (model != "radtan")

@@ -230,6 +230,11 @@ CandidateResult read_result(const Row& row, const GridResults& grid) {
   result.penetration_max = row.not_negative("penetration_max_m");
   for (const char* name : {"offset_x", "offset_y", "offset_z", "time_offset_s", "yaw_rad"}) row.finite(name);
   result.status = status_of(row);
+  const std::string as_status = std::string(", as the status is ") + to_string(result.status);
+  if (result.converged != (result.status == CandidateStatus::ok))
+    throw row.error("converged", (result.converged ? "false" : "true") + as_status);
+  if (result.status != CandidateStatus::diverged && !std::isfinite(result.score))
+    throw row.error("score_m", "a finite number" + as_status);
   result.recordings.resize(grid.recordings.size());
   return result;
 }

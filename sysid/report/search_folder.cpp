@@ -19,6 +19,13 @@ void check_one_search(const std::string& folder, const SearchFolder& search) {
     throw data::input_error(path_of("results.csv"), "rows",
                             "found " + data::format_count(results.candidates.size()) + ", expected the " +
                                 data::format_count(candidates) + " candidates of summary.json");
+  const auto unconverged =
+      std::count_if(results.candidates.begin(), results.candidates.end(),
+                    [](const CandidateResult& c) { return c.status != CandidateStatus::ok; });
+  if (unconverged != summary.unconverged)
+    throw data::input_error(path_of("summary.json"), "unconverged",
+                            "found " + std::to_string(summary.unconverged) + ", expected the " +
+                                std::to_string(unconverged) + " of results.csv");
   for (const ParameterFinding& finding : summary.parameters)
     if (std::none_of(results.axes.begin(), results.axes.end(),
                      [&](const Axis& axis) { return axis.name == finding.name; }))

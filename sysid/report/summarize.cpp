@@ -90,6 +90,10 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
         warnings.push_back(replay.recording.name +
                            ": gravity is zero in recording.json: what is said of bending rests on inertia "
                            "alone, and is wrong where the sheet had weight");
+  for (const Replay& replay : replays)
+    if (replay.recording.camera)
+      for (const std::string& warning : replay.recording.camera->warnings)
+        warnings.push_back(replay.recording.name + ": calibration of its camera: " + warning);
   for (std::size_t r = 0; r < best.recordings.size(); ++r)
     for (const RegistrationParameter& parameter : registration_parameters) {
       if (!is_at_bound(best.recordings[r].bounds_hit, parameter)) continue;
@@ -243,7 +247,6 @@ std::string recording_sha256(const data::Recording& recording) {
 
 std::string observed_sha256(const data::Recording& recording) {
   std::vector<std::string> paths;
-  for (const auto& [name, path] : recording.trajectory_paths) paths.push_back(path);
   std::string forces;
   for (const data::RecordedKeyframe& keyframe : recording.keyframes) {
     add_files(keyframe, paths);

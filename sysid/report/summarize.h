@@ -24,8 +24,8 @@ Summary summarize(const GridResults& results, const GridVerdict& verdict, const 
 /// SHA-256 over recording.json and every file it names, in the order they are named, each as its own digest.
 std::string recording_sha256(const data::Recording& recording);
 
-/// SHA-256 of what was recorded alone: trajectories, the files of the keyframes and their forces. It stays
-/// the same where the recording is named or described anew.
+/// SHA-256 of what was observed alone: the files of the keyframes and their forces. It stays the same where
+/// the recording is named or described anew, or its trajectory is written anew.
 std::string observed_sha256(const data::Recording& recording);
 
 }  // namespace flash::sysid

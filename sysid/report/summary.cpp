@@ -210,7 +210,20 @@ void check_score(const std::string& path, const std::string& field, double score
                             "found " + data::format_short(score) + ", expected a number of 0 or above");
 }
 
+/// Only a search of which no candidate has a score is without them.
+void check_best(const Summary& summary, const std::string& path) {
+  if (summary.best.empty()) return;
+  const auto check = [&](const std::string& field, double value) {
+    if (!std::isfinite(value)) throw data::input_error(path, field, "found null, expected a number");
+  };
+  check("best.score", summary.best_score);
+  check("best.membrane_stiffness", summary.membrane_stiffness);
+  for (const SummaryRecording& recording : summary.recordings)
+    check("recordings." + recording.name + ".score", recording.score);
+}
+
 void check_values(const Summary& summary, const std::string& path) {
+  check_best(summary, path);
   for (const auto& [name, value] : summary.best) check_value(path, "best.parameters", name, value);
   for (const auto& [name, fixed] : summary.fixed) check_value(path, "fixed", name, fixed.value);
   check_score(path, "best.score", summary.best_score);

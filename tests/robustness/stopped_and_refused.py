@@ -58,6 +58,8 @@ def stops(sysid, root, asset, recording, run):
         out = root / f"stopped_{verb}"
         for number in (signal.SIGINT, signal.SIGTERM):
             job = start(sysid, verb, *words, "-o", out)
+            while verb == "grid" and not (out / "grid.json").exists() and job.poll() is None:
+                time.sleep(0.01)
             time.sleep(0.3)  # into its steps
             job.send_signal(number)
             error = end(job)

@@ -1,0 +1,186 @@
+#!/usr/bin/env python3
+"""Tampers with the results of a search that flash-sysid made itself, one field at a time, and hands them to export, report
+and grid --resume: each must refuse them with exit code 2 and one line that names file and field. What a kill leaves, a last
+line that is cut off or missing, --resume finds again. A recording is one trial under whatever name it is given."""
+import argparse
+import json
+import pathlib
+import shutil
+import sys
+import tempfile
+
+import program
+from malformed_inputs import Case, complaint, edited, rewritten, verbs, write_sound_files
+
+READERS = ("export", "report", "resume")
+AXES = ["--bending", "5e-5,1e-4,2e-4", "--no-solver-check", "--no-horizon", "--quiet"]  # as write_sound_files
+
+
+def results(change):
+    """Changes the list of whole lines of results.csv; the first is the header, the next are ids 0, 1 and 2."""
+    def apply(content):
+        return b"".join(line + b"\n" for line in change(content.split(b"\n")[:-1]))
+    return rewritten("run/results.csv", apply)
+
+
+def field(name, value, line=2):
+    """Another value in the column `name` of a line."""
+    def change(text):
+        words = text[line].split(b",")
+        words[text[0].split(b",").index(name.encode())] = value.encode()
+        return [*text[:line], b",".join(words), *text[line + 1:]]
+    return results(change)
+
+
+def both(*damages):
+    def damage(folder):
+        for each in damages:
+            each(folder)
+    return damage
+
+
+def table_cases(verb):
+    """results.csv, which all three read."""
+    yield Case(f"{verb}: a line twice", verb, results(lambda text: [*text, text[2]]), "results.csv:5", "id", "once")
+    yield Case(f"{verb}: an id twice, with another score", verb,
+               both(results(lambda text: [*text, text[2]]), field("score_m", "0.001", 4)), "results.csv:5", "once")
+    yield Case(f"{verb}: an id for two values", verb, field("id", "0"), "results.csv:3")
+    for value in ("3", "-1", "1e9", "2147483648", "99999999999999999999", "0.5", "", "nan", "0x1", "one"):
+        yield Case(f"{verb}: id \"{value}\"", verb, field("id", value), "results.csv:3", "id")
+    yield Case(f"{verb}: a line cut in the middle", verb,
+               results(lambda text: [*text[:2], text[2][:len(text[2]) // 2], *text[3:]]), "results.csv:3", "fields")
+    yield Case(f"{verb}: a line too long", verb, results(lambda text: [*text[:3], text[3] + b",0"]), "results.csv:4",
+               "fields")
+    yield Case(f"{verb}: no header", verb, results(lambda text: text[1:]), "results.csv")
+    yield Case(f"{verb}: empty", verb, rewritten("run/results.csv", lambda _: b""), "results.csv")
+    yield Case(f"{verb}: removed", verb, rewritten("run/results.csv", None), "results.csv")
+    yield Case(f"{verb}: zero bytes", verb, rewritten("run/results.csv", lambda content: content + bytes(4096)),
+               "results.csv:5")
+    for value in ("maybe", "TRUE", "1", ""):
+        yield Case(f"{verb}: converged \"{value}\"", verb, field("converged", value), "results.csv:3", "converged",
+                   "true or false")
+    yield Case(f"{verb}: not converged, status ok", verb, field("converged", "false"), "results.csv:3", "converged", "status")
+    yield Case(f"{verb}: converged, status unconverged", verb, field("status", "unconverged"), "results.csv:3", "converged",
+               "status")
+    yield Case(f"{verb}: converged, status diverged", verb, field("status", "diverged"), "results.csv:3", "converged",
+               "status")
+    for name, value in (("score_m", "null"), ("score_m", "nan"), ("score_m", "-5"), ("score_m", "inf"), ("bending", "1"),
+                        ("residual_max", "-1"), ("yaw_rad", "inf"), ("status", "")):
+        yield Case(f"{verb}: {name} \"{value}\"", verb, field(name, value), "results.csv:3", name)
+
+
+def summary_cases(verb):
+    file, bending = "run/summary.json", "parameters.bending."
+    decided = both(edited(file, bending + "identifiable", "yes"), edited(file, bending + "interval95", [6e-5, 1.5e-4]),
+                   edited(file, bending + "estimate", 1e-4))
+    for place in ("estimate", "interval95"):
+        yield Case(f"{verb}: {place} null", verb, both(decided, edited(file, bending + place, None)), "summary.json",
+                   f"bending.{place}", "found null")
+    for place, value in ((bending + "estimate", "1e-4"), (bending + "estimate", 5.0), (bending + "interval95", [None, None]),
+                         (bending + "identifiable", None), (bending + "profile.values", [None, None, None]),
+                         ("best.parameters.bending", None), ("best.score", None), ("best.membrane_stiffness", None),
+                         ("recordings.0.score", None), ("candidates", None), ("exit_code", None), ("warnings", [None]), ("unconverged", 1)):
+        last = [part for part in place.split(".") if not part.isdigit()][-1]
+        yield Case(f"{verb}: {place} {json.dumps(value)}", verb, both(decided, edited(file, place, value)), "summary.json",
+                   last)
+
+
+def cases():
+    for verb in READERS:
+        yield from table_cases(verb)
+        if verb != "resume":  # which writes the summary
+            yield from summary_cases(verb)
+            yield Case(f"{verb}: the last line cut off", verb,
+                       rewritten("run/results.csv", lambda content: content[:-9]), "results.csv", "cut off")
+            yield Case(f"{verb}: a line missing", verb, results(lambda text: [*text[:2], *text[3:]]), "results.csv", "rows")
+
+
+TABLES = ("results.csv", "registrations.csv", "keyframes.csv")
+
+
+def resumed(sysid, sound, work):
+    """What a kill leaves is found again, to the same files."""
+    commands = verbs(sysid, None)
+    for name, damage in (("last line cut off", rewritten("run/results.csv", lambda content: content[:-9])),
+                         ("last line missing", results(lambda text: text[:-1])),
+                         ("keyframes without a result", both(results(lambda text: text[:-1]),
+                                                             rewritten("run/keyframes.csv", lambda c: c[:-9])))):
+        folder = work / "killed"
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(sound, folder)
+        damage(folder)
+        done = program.call(*commands["resume"](folder), "--quiet")
+        yield done.returncode in (0, 3), f"resume, {name}: exit code {done.returncode}: {done.stderr}"
+        for table in TABLES:
+            yield ((folder / "run" / table).read_bytes() == (sound / "run" / table).read_bytes(),
+                   f"resume, {name}: another {table}")
+
+
+def renamed_copies(sysid, sound, work):
+    def copy(name, change):
+        folder = work / name
+        shutil.copytree(sound / "recording", folder)
+        path = folder / "recording.json"
+        content = json.loads(path.read_text())
+        change(content, folder)
+        path.write_text(json.dumps(content))
+        return folder
+
+    def other_name(content, folder):
+        content["name"] = "another"
+
+    def other_files(content, folder):
+        other_name(content, folder)
+        for k, keyframe in enumerate(content["keyframes"]):
+            (folder / keyframe["cloud"]).rename(folder / f"{k}.ply")
+            keyframe["cloud"] = f"{k}.ply"
+        (folder / "gripper.tum").rename(folder / "arm.tum")
+        content["trajectories"]["gripper"] = "arm.tum"
+
+    def other_settings(content, folder):
+        other_name(content, folder)
+        content["nuisance"] = {"offset_m": [0.01, 0.01, 0.01]}
+        content["crop"] = {"min": [None, None, -0.01], "max": [None, None, None]}
+        content["grasps"][0]["shape"] = "point"
+
+    def other_robot_file(content, folder):
+        other_name(content, folder)
+        path = folder / "gripper.tum"
+        path.write_text("# the arm\n" + path.read_text())
+
+    for name, change in (("name", other_name), ("files", other_files), ("settings", other_settings),
+                         ("robot file", other_robot_file)):
+        both_given = [sound / "recording", copy(name.replace(" ", "_"), change)]
+        for verb, more in (("grid", AXES), ("plan", [])):
+            out = work / "twice"
+            done = program.call(sysid, verb, *both_given, "--asset", sound / "asset.json", *more, "-o", out)
+            yield done.returncode == 2, f"{verb}, a copy of other {name}: exit code {done.returncode}: {done.stderr}"
+            yield "is the same recording as" in done.stderr, f"{verb}, a copy of other {name}: {done.stderr}"
+            yield not out.exists(), f"{verb}, a copy of other {name}: leaves {out}"
+            shutil.rmtree(out, ignore_errors=True) if out.is_dir() else out.unlink(missing_ok=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sysid", required=True, help="the program flash-sysid")
+    parser.add_argument("--sim", required=True, help="the program flash-sim")
+    options = parser.parse_args()
+    done, wrong = 0, []
+    with tempfile.TemporaryDirectory() as temporary:
+        work = pathlib.Path(temporary)
+        write_sound_files(options.sysid, options.sim, work / "sound")
+        commands = verbs(options.sysid, options.sim)
+        for case in cases():
+            done += 1
+            found = complaint(case, commands, work / "sound", work)
+            wrong += [f"{case.name}: {found}"] if found else []
+        for check in (resumed, renamed_copies):
+            for holds, what in check(options.sysid, work / "sound", work):
+                done += 1
+                wrong += [] if holds else [what]
+    print("\n".join([*wrong, f"{done - len(wrong)} of {done} statements about tampered results and copies hold"]))
+    sys.exit(1 if wrong else 0)
+
+
+if __name__ == "__main__":
+    main()
