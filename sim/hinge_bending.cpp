@@ -8,14 +8,7 @@
 namespace flash::sim {
 namespace {
 
-using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-Matrix3d cross_matrix(const Vector3d& a) {
-  Matrix3d A;
-  A << 0, -a.z(), a.y(), a.z(), 0, -a.x(), -a.y(), a.x(), 0;
-  return A;
-}
 
 // Normals (twice the area long) of the triangles (0, 1, 2) and (1, 0, 3).
 Vector3d left_normal(const HingePositions& x) { return (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)); }
@@ -45,34 +38,24 @@ HingePositions angle_gradient(const HingePositions& x) {
   return g;
 }
 
-Matrix12 angle_hessian(const HingePositions& x) {
-  Matrix12 H = Matrix12::Zero();
-  for (int opposite : {2, 3}) {
-    const Vector3d normal = opposite == 2 ? left_normal(x) : right_normal(x);
-    const Part p = part(x, opposite, normal);
-    // dq = (I - 2 m m^T/|m|^2)/|m|^2 dm; the right normal is the left one of (1, 0, 3).
-    const Matrix3d dq_dm = (Matrix3d::Identity() - 2 * normal * normal.transpose() / normal.squaredNorm()) /
-                           normal.squaredNorm();
-    const double turn = opposite == 2 ? 1.0 : -1.0;  // m = turn * (x1 - x0) x (c - x0)
-    const Matrix3d dm[3] = {turn * cross_matrix(p.to_c1), -turn * cross_matrix(p.to_c0),
-                            turn * cross_matrix(p.e)};
-    const Vector3d direction = p.e / p.length;
-    // Derivatives of the scalars (c - x1).e/|e|, (c - x0).e/|e| and |e| by x0, x1, c.
-    const Vector3d normal1 = (p.to_c1 - p.to_c1.dot(direction) * direction) / p.length;
-    const Vector3d normal0 = (p.to_c0 - p.to_c0.dot(direction) * direction) / p.length;
-    const Vector3d ds1[3] = {-normal1, normal1 - direction, direction};
-    const Vector3d ds0[3] = {-normal0 - direction, normal0, direction};
-    const Vector3d dlength[3] = {-direction, direction, Vector3d::Zero()};
-    const int block[3] = {0, 1, opposite};
-    for (int j = 0; j < 3; ++j) {
-      const Matrix3d dq = dq_dm * dm[j];
-      const int column = 3 * block[j];
-      H.block<3, 3>(0, column) -= p.to_c1.dot(direction) * dq + p.q * ds1[j].transpose();
-      H.block<3, 3>(3, column) += p.to_c0.dot(direction) * dq + p.q * ds0[j].transpose();
-      H.block<3, 3>(3 * opposite, column) -= p.length * dq + p.q * dlength[j].transpose();
-    }
-  }
-  return 0.5 * (H + H.transpose());
+/// How far a triangle of `area` takes part, and its derivative by the area [1/m^2].
+struct Presence {
+  double share = 1, slope = 0;
+};
+Presence presence_of(double area, double rest_area) {
+  const double full = collapsed_share * rest_area, u = area / full;
+  if (u >= 1) return {};
+  return {u * u * u * (10 - 15 * u + 6 * u * u), 30 * u * u * (1 - u) * (1 - u) / full};
+}
+
+/// Adds `factor` times the gradient of the area of the triangle (first, second, third).
+void add_area_gradient(const HingePositions& x, std::array<int, 3> triangle, double factor,
+                       HingePositions& gradient) {
+  const auto [a, b, c] = triangle;
+  const Vector3d normal = (x.col(b) - x.col(a)).cross(x.col(c) - x.col(a)).normalized();
+  gradient.col(a) += 0.5 * factor * normal.cross(x.col(c) - x.col(b));
+  gradient.col(b) += 0.5 * factor * normal.cross(x.col(a) - x.col(c));
+  gradient.col(c) += 0.5 * factor * normal.cross(x.col(b) - x.col(a));
 }
 
 double deviation(const Hinge& hinge, const HingePositions& x) {
@@ -85,11 +68,13 @@ std::vector<Hinge> sheet_hinges(const Sheet& sheet) {
   std::vector<Hinge> hinges;
   for (const Edge& e : sheet_edges(sheet)) {
     if (e.right < 0) continue;
-    Hinge hinge{{e.a, e.b, e.opposite_left, e.opposite_right}, 0.0, 0.0};
+    Hinge hinge{{e.a, e.b, e.opposite_left, e.opposite_right},
+                0.0,
+                0.0,
+                {sheet.triangles[e.left].area, sheet.triangles[e.right].area}};
     HingePositions x;
     for (int i = 0; i < 4; ++i) x.col(i) = sheet.rest.vertices.row(hinge.vertices[i]);
-    hinge.weight =
-        (x.col(1) - x.col(0)).squaredNorm() / (sheet.triangles[e.left].area + sheet.triangles[e.right].area);
+    hinge.weight = (x.col(1) - x.col(0)).squaredNorm() / (hinge.rest_areas[0] + hinge.rest_areas[1]);
     hinge.rest_angle = hinge_angle(x);
     hinges.push_back(hinge);
   }
@@ -102,29 +87,31 @@ double hinge_angle(const HingePositions& x) {
 }
 
 double hinge_energy(const Hinge& hinge, const HingePositions& x) {
-  const double angle = deviation(hinge, x);
-  return 0.5 * hinge.weight * angle * angle;
-}
-
-HingePositions hinge_gradient(const Hinge& hinge, const HingePositions& x) {
-  return hinge.weight * deviation(hinge, x) * angle_gradient(x);
-}
-
-Matrix12 hinge_hessian(const Hinge& hinge, const HingePositions& x) {
-  const HingePositions g = angle_gradient(x);
-  const Eigen::Map<const Eigen::Matrix<double, 12, 1>> flat(g.data());
-  return hinge.weight * (flat * flat.transpose() + deviation(hinge, x) * angle_hessian(x));
+  double energy;
+  HingePositions gradient;
+  hinge_response(hinge, x, energy, gradient, nullptr);
+  return energy;
 }
 
 void hinge_response(const Hinge& hinge, const HingePositions& x, double& energy, HingePositions& gradient,
                     Matrix12* hessian) {
+  const Presence left = presence_of(0.5 * left_normal(x).norm(), hinge.rest_areas[0]),
+                 right = presence_of(0.5 * right_normal(x).norm(), hinge.rest_areas[1]);
+  const double weight = left.share * right.share * hinge.weight;
+  energy = 0;
+  gradient.setZero();
+  if (hessian) hessian->setZero();
+  if (weight == 0) return;
   const double angle = deviation(hinge, x);
   const HingePositions g = angle_gradient(x);
-  energy = 0.5 * hinge.weight * angle * angle;
-  gradient = hinge.weight * angle * g;
+  energy = 0.5 * weight * angle * angle;
+  gradient = weight * angle * g;
+  const double energy_of_angle = 0.5 * hinge.weight * angle * angle;
+  if (left.slope > 0) add_area_gradient(x, {0, 1, 2}, energy_of_angle * left.slope * right.share, gradient);
+  if (right.slope > 0) add_area_gradient(x, {1, 0, 3}, energy_of_angle * left.share * right.slope, gradient);
   if (hessian) {
     const Eigen::Map<const Eigen::Matrix<double, 12, 1>> flat(g.data());
-    hessian->noalias() = hinge.weight * flat * flat.transpose();
+    hessian->noalias() = weight * flat * flat.transpose();
   }
 }
 

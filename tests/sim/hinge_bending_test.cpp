@@ -32,42 +32,87 @@ TEST(HingeBending, AngleIsTheFold) {
 }
 
 TEST(HingeBending, EnergyGoesTheShortWayRound) {
-  const Hinge hinge{{0, 1, 2, 3}, 2.0, 3.0};
+  const Hinge hinge{{0, 1, 2, 3}, 2.0, 3.0, {0.5, 0.5}};
   EXPECT_NEAR(hinge_energy(hinge, folded(-3.0)), std::pow(2 * M_PI - 6.0, 2), 1e-12);
 }
 
-TEST(HingeBending, GradientAndHessianAreDerivatives) {
+HingePositions gradient_of(const Hinge& hinge, const HingePositions& x) {
+  double energy;
+  HingePositions gradient;
+  hinge_response(hinge, x, energy, gradient, nullptr);
+  return gradient;
+}
+
+/// Central differences over `step`.
+HingePositions energy_slopes(const Hinge& hinge, const HingePositions& x, double step) {
+  HingePositions slopes;
+  for (int i = 0; i < 12; ++i) {
+    HingePositions forward = x, backward = x;
+    forward.data()[i] += step;
+    backward.data()[i] -= step;
+    slopes.data()[i] = (hinge_energy(hinge, forward) - hinge_energy(hinge, backward)) / (2 * step);
+  }
+  return slopes;
+}
+
+TEST(HingeBending, GradientIsTheDerivative) {
   std::mt19937 rng(1);
   for (int trial = 0; trial < 50; ++trial) {
-    const Hinge hinge{{0, 1, 2, 3}, 1.7, 0.3};
-    const HingePositions x = random_hinge(rng), g = hinge_gradient(hinge, x);
-    const Matrix12 H = hinge_hessian(hinge, x);
+    const Hinge hinge{{0, 1, 2, 3}, 1.7, 0.3, {0.4, 0.45}};
+    const HingePositions x = random_hinge(rng), g = gradient_of(hinge, x);
     EXPECT_LT(g.rowwise().sum().norm(), 1e-13 * g.norm());
-    for (int i = 0; i < 12; ++i) {
-      const double step = 1e-5;
-      HingePositions forward = x, backward = x;
-      forward.data()[i] += step;
-      backward.data()[i] -= step;
-      const double slope = (hinge_energy(hinge, forward) - hinge_energy(hinge, backward)) / (2 * step);
-      EXPECT_NEAR(g.data()[i], slope, 1e-7);  // step^2 times third derivatives of some hundreds
-      const HingePositions column =
-          (hinge_gradient(hinge, forward) - hinge_gradient(hinge, backward)) / (2 * step);
-      EXPECT_LT((H.col(i) - Eigen::Map<const Eigen::Matrix<double, 12, 1>>(column.data())).norm(),
-                1e-6 * H.norm());
-    }
+    // step^2 times third derivatives of some hundreds
+    EXPECT_LT((g - energy_slopes(hinge, x, 1e-5)).cwiseAbs().maxCoeff(), 1e-7);
   }
+}
+
+TEST(HingeBending, ACollapsedTriangleLosesItsPartSmoothly) {
+  std::mt19937 rng(3);
+  const Hinge hinge{{0, 1, 2, 3}, 1.7, 0.3, {0.4, 0.45}};
+  double largest = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    HingePositions x = random_hinge(rng);
+    const double share = std::pow(10, -1.0 - 0.02 * trial);  // of its height: 0.1 to 1e-5
+    x.col(3) = 0.5 * (x.col(0) + x.col(1)) + share * (x.col(3) - 0.5 * (x.col(0) + x.col(1)));
+    const HingePositions g = gradient_of(hinge, x);
+    // The height is the length over which the energy changes.
+    const HingePositions slopes = energy_slopes(hinge, x, 1e-4 * share);
+    EXPECT_LT((g - slopes).norm(), 1e-5 * (g.norm() + slopes.norm()) + 1e-12 / share) << share;
+    largest = std::max(largest, g.norm());
+  }
+  // The angle's own gradient is 1 over the height: 1e5 in the end.
+  EXPECT_LT(largest, 1.7 * 4 * M_PI / collapsed_share);
+}
+
+TEST(HingeBending, ATriangleOfATenthOfItsAreaBendsWhole) {
+  std::mt19937 rng(4);
+  const HingePositions x = random_hinge(rng);
+  const double left = 0.5 * (x.col(1) - x.col(0)).cross(x.col(2) - x.col(0)).norm(),
+               right = 0.5 * (x.col(0) - x.col(1)).cross(x.col(3) - x.col(1)).norm();
+  const Hinge rest{{0, 1, 2, 3}, 1.7, 0.3, {left, right}},
+      shrunk{{0, 1, 2, 3}, 1.7, 0.3, {9.99 * left, 9.99 * right}};
+  EXPECT_EQ(hinge_energy(rest, x), hinge_energy(shrunk, x));
+  EXPECT_EQ(gradient_of(rest, x), gradient_of(shrunk, x));
 }
 
 TEST(HingeBending, GaussNewtonIsTheHessianAtTheRestAngle) {
   std::mt19937 rng(2);
   const HingePositions x = random_hinge(rng);
-  const Hinge hinge{{0, 1, 2, 3}, 1.7, hinge_angle(x)};
+  const Hinge hinge{{0, 1, 2, 3}, 1.7, hinge_angle(x), {0.4, 0.45}};
   double energy;
   HingePositions gradient;
   Matrix12 hessian;
   hinge_response(hinge, x, energy, gradient, &hessian);
   EXPECT_EQ(energy, 0.0);
-  EXPECT_LT((hessian - hinge_hessian(hinge, x)).norm(), 1e-12 * hessian.norm());
+  const double step = 1e-5;
+  for (int i = 0; i < 12; ++i) {
+    HingePositions forward = x, backward = x;
+    forward.data()[i] += step;
+    backward.data()[i] -= step;
+    const HingePositions column = (gradient_of(hinge, forward) - gradient_of(hinge, backward)) / (2 * step);
+    EXPECT_LT((hessian.col(i) - Eigen::Map<const Eigen::Matrix<double, 12, 1>>(column.data())).norm(),
+              1e-6 * hessian.norm());
+  }
 }
 
 TEST(HingeBending, CurvedRestShapeIsAtRest) {
