@@ -30,7 +30,7 @@ function(flash_install)
                                 ${PROJECT_BINARY_DIR}/flashConfig.cmake INSTALL_DESTINATION ${destination})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/flashConfigVersion.cmake COMPATIBILITY SameMinorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/flashConfig.cmake ${PROJECT_BINARY_DIR}/flashConfigVersion.cmake
-                ${PROJECT_SOURCE_DIR}/cmake/FindMETIS.cmake DESTINATION ${destination})
+          DESTINATION ${destination})
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/docs/licences.md
           DESTINATION ${CMAKE_INSTALL_DOCDIR})
 endfunction()

@@ -1,10 +1,8 @@
 #include "sim/block_cholesky.h"
 
-#include <metis.h>
-
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCore>
 #include <algorithm>
-#include <mutex>
-#include <numeric>
 
 #include "sim/dense_front.h"
 
@@ -31,31 +29,17 @@ struct Placement {
 
 int front_size(const Supernode& node) { return node.column_count + static_cast<int>(node.rows.size()); }
 
-std::vector<int> nested_dissection(const BlockPattern& pattern) {
-  std::vector<std::vector<idx_t>> neighbours(pattern.size);
-  for (const auto& [row, column] : pattern.pairs) {
-    neighbours[row].push_back(column);
-    neighbours[column].push_back(row);
-  }
-  std::vector<idx_t> starts = {0}, adjacency;
-  for (const auto& list : neighbours) {
-    adjacency.insert(adjacency.end(), list.begin(), list.end());
-    starts.push_back(static_cast<idx_t>(adjacency.size()));
-  }
-  idx_t size = pattern.size;
-  std::vector<idx_t> order(pattern.size), position(pattern.size);
-  if (adjacency.empty()) {
-    std::iota(order.begin(), order.end(), 0);
-  } else {
-    idx_t options[METIS_NOPTIONS];
-    METIS_SetDefaultOptions(options);
-    options[METIS_OPTION_SEED] = 1;
-    // METIS seeds and draws from the C library's one generator: two threads would disturb each other's order.
-    static std::mutex generator;
-    const std::lock_guard lock(generator);
-    METIS_NodeND(&size, starts.data(), adjacency.data(), nullptr, options, order.data(), position.data());
-  }
-  return {order.begin(), order.end()};
+/// Approximate minimum degree (Amestoy, Davis, Duff 1996) on the vertex graph: vertices by elimination.
+std::vector<int> minimum_degree(const BlockPattern& pattern) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (const auto& [row, column] : pattern.pairs)
+    entries.emplace_back(std::max(row, column), std::min(row, column), 1.0);
+  for (int i = 0; i < pattern.size; ++i) entries.emplace_back(i, i, 1.0);
+  Eigen::SparseMatrix<double> graph(pattern.size, pattern.size);
+  graph.setFromTriplets(entries.begin(), entries.end());
+  Eigen::AMDOrdering<int>::PermutationType order;
+  Eigen::AMDOrdering<int>()(graph.selfadjointView<Eigen::Lower>(), order);
+  return {order.indices().begin(), order.indices().end()};
 }
 
 /// Elimination tree of the pattern under `position` (Liu 1990, with path compression).
@@ -133,7 +117,7 @@ struct SymbolicFactor {
 
 std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern) {
   const int size = pattern.size;
-  std::vector<int> order = nested_dissection(pattern);
+  std::vector<int> order = minimum_degree(pattern);
   std::vector<int> position(size);
   for (int i = 0; i < size; ++i) position[order[i]] = i;
   const std::vector<int> post = postorder(elimination_tree(size, earlier_neighbours(pattern, position)));

@@ -19,7 +19,7 @@ template <typename Scalar>
 using BlockValues = std::vector<Scalar>;
 
 /// Ordering, elimination tree and supernodes of a pattern: computed once a mesh, shared by all environments
-/// and threads. Nested dissection by METIS on the vertex graph (three unknowns a vertex stay together).
+/// and threads. Approximate minimum degree on the vertex graph (three unknowns a vertex stay together).
 struct SymbolicFactor;
 std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern);
 
