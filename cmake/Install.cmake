@@ -22,7 +22,7 @@ endfunction()
 function(flash_install)
   foreach(module data sim sysid)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${module} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/flash
-            FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE PATTERN "segment*" EXCLUDE)
+            FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE PATTERN "segment*" EXCLUDE PATTERN kernels EXCLUDE)
   endforeach()
   set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/flash)
   install(EXPORT flashTargets NAMESPACE flash:: DESTINATION ${destination})

@@ -3,7 +3,8 @@
 #include <utility>
 #include <vector>
 
-#include "sim/dense_front.h"
+#include "sim/aligned_storage.h"
+#include "sim/instruction_level.h"
 
 namespace flash::sim {
 
@@ -34,7 +35,7 @@ long factor_entries(const SymbolicFactor& symbolic);
 template <typename Scalar>
 class BlockCholesky {
  public:
-  explicit BlockCholesky(std::shared_ptr<const SymbolicFactor> symbolic);
+  BlockCholesky(std::shared_ptr<const SymbolicFactor> symbolic, const Kernels& kernels);
 
   /// L L^T = values. Returns false where a pivot is not positive; the factor is then unusable.
   bool factorize(const BlockValues<double>& values);
@@ -47,12 +48,11 @@ class BlockCholesky {
 
  private:
   std::shared_ptr<const SymbolicFactor> symbolic_;
-  VectorStorage<Scalar> factor_;  ///< per supernode: column-major [L11; L21], rows padded to whole vectors
-  std::vector<long> offsets_;     ///< of each supernode in factor_
-  VectorStorage<Scalar> stack_;   ///< update matrices waiting for their parent
-  std::vector<long> update_offsets_;  ///< of each supernode's update in stack_
-  VectorStorage<Scalar> inverses_;    ///< of the diagonal 3 x 3 blocks, 6 numbers a vertex
-  mutable VectorStorage<Scalar> front_, permuted_;
+  const Kernels* kernels_;
+  AlignedStorage<Scalar> factor_;    ///< per front: column-major [L11; L21], rows padded to whole vectors
+  AlignedStorage<Scalar> stack_;     ///< update matrices waiting for their parent
+  AlignedStorage<Scalar> inverses_;  ///< of the diagonal 3 x 3 blocks, 6 numbers a vertex
+  mutable AlignedStorage<Scalar> front_, permuted_;
 };
 
 extern template class BlockCholesky<double>;

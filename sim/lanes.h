@@ -3,57 +3,51 @@
 #include <cstring>
 
 #include "sim/host_device.h"
+#include "sim/level_namespace.h"
 
 namespace flash::sim {
+inline namespace FLASH_LEVEL {
 
-inline constexpr int lane_count = 8;
+/// Of a vector register.
+#if defined(__AVX512F__)
+inline constexpr int vector_bytes = 64;
+#elif defined(__AVX2__)
+inline constexpr int vector_bytes = 32;
+#else
+inline constexpr int vector_bytes = 16;
+#endif
 
-/// Eight numbers that go through one formula together. A formula written for a type `Real` takes a double or
-/// Lanes; what it needs beside + - * / and comparisons follows here for both.
-typedef double Lanes __attribute__((vector_size(lane_count * sizeof(double))));
+/// Numbers that one register takes.
+template <typename Scalar>
+inline constexpr int lanes_of = vector_bytes / static_cast<int>(sizeof(Scalar));
+
+inline constexpr int lane_count = lanes_of<double>;
+
+/// A register of numbers that go through one formula together. A formula written for a type `Real` takes a
+/// double or Lanes; what it needs beside + - * / and comparisons follows here for both.
+typedef double Lanes __attribute__((vector_size(vector_bytes)));
 
 inline Lanes load_lanes(const double* numbers) {
   Lanes lanes;
-  std::memcpy(&lanes, numbers, sizeof(lanes));
+  memcpy(&lanes, numbers, sizeof(lanes));
   return lanes;
 }
-inline void store_lanes(const Lanes& lanes, double* numbers) { std::memcpy(numbers, &lanes, sizeof(lanes)); }
+inline void store_lanes(const Lanes& lanes, double* numbers) { memcpy(numbers, &lanes, sizeof(lanes)); }
 
-/// In a fixed order: the same numbers have the same sum.
-inline double sum_of(const Lanes& lanes) {
-  const double low = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
-  return low + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]));
-}
-
-/// Four numbers: those of a vertex, and one more.
-template <typename Scalar>
-struct FourOf {
-  typedef Scalar type __attribute__((vector_size(4 * sizeof(Scalar))));
-};
-
-template <typename Scalar>
-typename FourOf<Scalar>::type load_four(const Scalar* numbers) {
-  typename FourOf<Scalar>::type four;
-  std::memcpy(&four, numbers, sizeof(four));
-  return four;
-}
-template <typename Scalar>
-void store_four(const typename FourOf<Scalar>::type& four, Scalar* numbers) {
-  std::memcpy(numbers, &four, sizeof(four));
-}
-
-FLASH_HOST_DEVICE inline double square_root(double x) { return std::sqrt(x); }
-FLASH_HOST_DEVICE inline double logarithm(double x) { return std::log(x); }
+// The C library's functions: those of the C++ library are inline for some types.
+FLASH_HOST_DEVICE inline float square_root(float x) { return ::sqrtf(x); }
+FLASH_HOST_DEVICE inline double square_root(double x) { return ::sqrt(x); }
+FLASH_HOST_DEVICE inline double logarithm(double x) { return ::log(x); }
 FLASH_HOST_DEVICE inline double select(bool condition, double yes, double no) { return condition ? yes : no; }
 
 inline Lanes square_root(const Lanes& x) {
   Lanes y;
-  for (int lane = 0; lane < lane_count; ++lane) y[lane] = std::sqrt(x[lane]);
+  for (int lane = 0; lane < lane_count; ++lane) y[lane] = ::sqrt(x[lane]);
   return y;
 }
 inline Lanes logarithm(const Lanes& x) {
   Lanes y;
-  for (int lane = 0; lane < lane_count; ++lane) y[lane] = std::log(x[lane]);
+  for (int lane = 0; lane < lane_count; ++lane) y[lane] = ::log(x[lane]);
   return y;
 }
 template <typename Condition>
@@ -75,4 +69,5 @@ FLASH_HOST_DEVICE inline Real with_sign(const Real& size, const Real& x) {
   return select(x < 0.0, Real(-size), size);
 }
 
+}  // namespace FLASH_LEVEL
 }  // namespace flash::sim

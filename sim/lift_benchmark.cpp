@@ -103,7 +103,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   data::RectangleMesh rectangle;
   rectangle.width = rectangle.height = side;
   rectangle.cells_x = rectangle.cells_y = cells;
-  const auto plan = make_sheet_plan(make_sheet(data::rectangle(rectangle)));
+  const auto plan = make_sheet_plan(make_sheet(data::rectangle(rectangle)), benchmark.level);
   const SolverSettings settings = [&] {
     SolverSettings chosen;
     chosen.time_step = benchmark.time_step;
@@ -164,8 +164,8 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
         values[9L * i + 4 * c] +=
             material.areal_density * plan->sheet.vertex_area[i] / (benchmark.time_step * benchmark.time_step);
   };
-  BlockCholesky<float> factor(plan->symbolic);
-  SheetProduct<float> product;
+  BlockCholesky<float> factor(plan->symbolic, *plan->kernels);
+  SheetProduct<float> product(*plan->kernels);
   const auto add = [&](const char* name, double calls, const std::function<void()>& phase) {
     result.phases.push_back({name, calls, milliseconds_of(phase)});
   };

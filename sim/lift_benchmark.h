@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "sim/instruction_level.h"
+
 namespace flash::sim {
 
 /// Corner lift of a square towel of 0.4 m by many materials at once: E t and D spread over their ranges,
@@ -12,6 +14,7 @@ struct LiftBenchmark {
   int environments = 64;
   int steps = 250;
   int threads = 1;
+  InstructionLevel level = highest_instruction_level();              ///< of the kernels
   double time_step = 0.01;                                           ///< [s]
   double tolerance = 1e-3;                                           ///< on |r| / |M g|
   double membrane_stiffness_min = 10, membrane_stiffness_max = 300;  ///< E t [N/m]

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <string>
 
+#include "data/error.h"
 #include "sim/membrane_response.h"
 
 namespace flash::sim {
@@ -16,8 +17,9 @@ SingularFrame<double> frame_of(const Matrix32& F) { return singular_frame(column
 
 PrincipalResponse<double> principal(data::Constitutive constitutive, const SingularFrame<double>& frame,
                                     const SheetLame& lame) {
-  return with_membrane_law(constitutive, lame, [&](auto law, const SheetLame& own) {
-    return decltype(law)::at(frame.s1, frame.s2, own.mu, own.lambda);
+  const Membrane membrane = membrane_of(constitutive, lame);
+  return with_membrane_law(membrane.law, [&](auto law) {
+    return decltype(law)::at(frame.s1, frame.s2, membrane.lame.mu, membrane.lame.lambda);
   });
 }
 
@@ -52,6 +54,22 @@ SheetLame sheet_lame(double membrane_stiffness, double poissons_ratio) {
                             std::to_string(poissons_ratio) + ", expected within (-1, 1)");
   return {membrane_stiffness / (2 * (1 + poissons_ratio)),
           membrane_stiffness * poissons_ratio / (1 - poissons_ratio * poissons_ratio)};
+}
+
+Membrane membrane_of(data::Constitutive constitutive, const SheetLame& lame) {
+  switch (constitutive) {
+    case data::Constitutive::tri_arap:
+      return {MembraneLaw::corotated, {lame.mu, 0.0}};
+    case data::Constitutive::tri_corotated:
+      return {MembraneLaw::corotated, lame};
+    case data::Constitutive::tri_stvk:
+      return {MembraneLaw::saint_venant_kirchhoff, lame};
+    case data::Constitutive::tri_neohookean:
+      return {MembraneLaw::neo_hookean, lame};
+    default:
+      throw data::InputError(
+          "constitutive: a sheet needs one of TRI_ARAP, TRI_COROTATED, TRI_STVK, TRI_NEOHOOKEAN");
+  }
 }
 
 double membrane_energy_density(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame) {

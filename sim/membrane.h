@@ -2,17 +2,12 @@
 #include <Eigen/Core>
 
 #include "data/material.h"
+#include "sim/membrane_law.h"
 
 namespace flash::sim {
 
 using Matrix32 = Eigen::Matrix<double, 3, 2>;
 using Matrix66 = Eigen::Matrix<double, 6, 6>;
-
-/// Plane-stress Lame parameters of a thin sheet, force per length.
-struct SheetLame {
-  double mu;      ///< shear modulus times thickness [N/m]
-  double lambda;  ///< first parameter, plane stress, times thickness [N/m]
-};
 
 /// mu = E t / (2 (1 + nu)), lambda = E t nu / (1 - nu^2), from E t [N/m].
 /// Throws data::InputError unless E t > 0 and -1 < nu < 1.
@@ -25,6 +20,13 @@ SheetLame sheet_lame(double membrane_stiffness, double poissons_ratio);
 //   tri_neohookean  mu/2 (s1^2 + s2^2 - 2) - mu ln J + lambda/2 ln(J)^2,  J = s1 s2 (infinite at J = 0)
 // All are per rest area [N/m]; a derivative by F is taken by vec(F) = (first column, second column).
 // The functions throw data::InputError on a tet_* model.
+
+/// A law with the parameters that it takes.
+struct Membrane {
+  MembraneLaw law;
+  SheetLame lame;
+};
+Membrane membrane_of(data::Constitutive constitutive, const SheetLame& lame);
 
 /// Energy per rest area [N/m].
 double membrane_energy_density(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);

@@ -1,14 +1,14 @@
 #pragma once
-#include <limits>
+#include <cmath>
 
-#include "data/error.h"
 #include "sim/host_device.h"
 #include "sim/lanes.h"
-#include "sim/membrane.h"
+#include "sim/membrane_law.h"
 
 namespace flash::sim {
+inline namespace FLASH_LEVEL {
 
-// The formulas of sim/membrane.h, for one triangle (Real = double) or eight (Real = Lanes).
+// The formulas of sim/membrane.h, for one triangle (Real = double) or several (Real = Lanes).
 
 template <typename Real>
 struct Vector3 {
@@ -80,9 +80,8 @@ FLASH_HOST_DEVICE inline SingularFrame<Real> singular_frame(const Vector3<Real>&
   return r;
 }
 
-/// The energy and its derivatives by the singular values. flip = (p1 - p2)/(s1 - s2) and twist = (p1 +
-/// p2)/(s1
-/// + s2) are written so that nothing cancels at s1 = s2; bend_i = p_i / s_i.
+/// The energy and its derivatives by the singular values. flip = (p1 - p2)/(s1 - s2) and
+/// twist = (p1 + p2)/(s1 + s2) are written so that nothing cancels at s1 = s2; bend_i = p_i / s_i.
 template <typename Real>
 struct PrincipalResponse {
   Real energy;
@@ -137,7 +136,7 @@ struct NeoHookean {
   template <typename Real>
   FLASH_HOST_DEVICE static PrincipalResponse<Real> at(const Real& s1, const Real& s2, double mu,
                                                       double lambda) {
-    const Real zero{}, least = zero + 1e-150, infinite = zero + std::numeric_limits<double>::infinity();
+    const Real zero{}, least = zero + 1e-150, infinite = zero + HUGE_VAL;
     const Real area = larger_of(Real(s1 * s2), least), log_area = logarithm(area);
     const Real i1 = 1.0 / larger_of(s1, least), i2 = 1.0 / larger_of(s2, least);
     const Real pressure = lambda * log_area - mu;
@@ -222,22 +221,13 @@ FLASH_HOST_DEVICE inline HessianBlocks<Real> hessian_of(const SingularFrame<Real
   return H;
 }
 
-/// Calls work(law, lame) with the law's formulas and the parameters it takes.
+/// Calls work(law) with the law's formulas.
 template <typename Work>
-auto with_membrane_law(data::Constitutive constitutive, const SheetLame& lame, const Work& work) {
-  switch (constitutive) {
-    case data::Constitutive::tri_arap:
-      return work(Corotated{}, SheetLame{lame.mu, 0.0});
-    case data::Constitutive::tri_corotated:
-      return work(Corotated{}, lame);
-    case data::Constitutive::tri_stvk:
-      return work(SaintVenantKirchhoff{}, lame);
-    case data::Constitutive::tri_neohookean:
-      return work(NeoHookean{}, lame);
-    default:
-      throw data::InputError(
-          "constitutive: a sheet needs one of TRI_ARAP, TRI_COROTATED, TRI_STVK, TRI_NEOHOOKEAN");
-  }
+auto with_membrane_law(MembraneLaw law, const Work& work) {
+  if (law == MembraneLaw::saint_venant_kirchhoff) return work(SaintVenantKirchhoff{});
+  if (law == MembraneLaw::neo_hookean) return work(NeoHookean{});
+  return work(Corotated{});
 }
 
+}  // namespace FLASH_LEVEL
 }  // namespace flash::sim

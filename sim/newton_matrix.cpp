@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sim/kernels.h"
+
 namespace flash::sim {
 namespace {
 
@@ -47,7 +49,10 @@ void precondition(const BlockCholesky<float>& factor, const Vector<double>& resi
 }  // namespace
 
 NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
-    : plan_(std::move(plan)), factor_(plan_->symbolic) {}
+    : plan_(std::move(plan)),
+      factor_(plan_->symbolic, *plan_->kernels),
+      single_product_(*plan_->kernels),
+      double_product_(*plan_->kernels) {}
 
 void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse, const BendingOperator& bending,
                           double rigidity, double least_eigenvalue) {
@@ -149,6 +154,7 @@ int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product,
                                       const Points& gradient, double tolerance, Points& direction,
                                       Points& force) {
   const std::vector<int>& position = elimination_position(*plan_->symbolic);
+  const LinearKernels<Scalar>& kernels = linear<Scalar>(*plan_->kernels);
   const long size = gradient.size();
   Vector<Scalar> residual(size), x = Vector<Scalar>::Zero(size), change = Vector<Scalar>::Zero(size),
                                  preconditioned(size), search(size), image(size);
@@ -169,30 +175,33 @@ int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product,
     change += image;
   }
   restrict_to_free(restrictions, residual);
-  Scalar norm = residual.norm(), previous = 0;
+  const auto norm_of = [&](const Vector<Scalar>& v) {
+    return std::sqrt(kernels.dot(size, v.data(), v.data()));
+  };
+  Scalar norm = norm_of(residual), previous = 0;
   const Scalar target = std::max(Scalar(0.1) * norm, static_cast<Scalar>(tolerance));
   int iteration = 0;
   while (norm > target && iteration < 20) {
     ++iteration;
     precondition(factor_, residual, single, preconditioned);
     restrict_to_free(restrictions, preconditioned);
-    const Scalar along = residual.dot(preconditioned);
+    const Scalar along = kernels.dot(size, residual.data(), preconditioned.data());
     if (iteration == 1)
       search = preconditioned;
     else
-      search = preconditioned + along / previous * search;
+      kernels.scale_and_add(size, along / previous, preconditioned.data(), search.data());
     previous = along;
     product.multiply(search.data(), image.data());
-    const Scalar curvature = search.dot(image);
+    const Scalar curvature = kernels.dot(size, search.data(), image.data());
     // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
     if (curvature <= 0 && iteration > 1) break;
     const Scalar step = curvature > 0 ? along / curvature : Scalar(1);
-    x += step * search;
-    change += step * image;
+    kernels.add_scaled(size, step, search.data(), x.data());
+    kernels.add_scaled(size, step, image.data(), change.data());
     if (curvature <= 0) break;
     restrict_to_free(restrictions, image);
-    residual -= step * image;
-    norm = residual.norm();
+    kernels.add_scaled(size, -step, image.data(), residual.data());
+    norm = norm_of(residual);
   }
   direction.resize(gradient.rows(), 3);
   for (int i = 0; i < direction.rows(); ++i) {

@@ -1,14 +1,10 @@
 #include "sim/row_groups.h"
 
-#ifdef __AVX512F__
-#include <immintrin.h>
-#endif
-
 #include <algorithm>
 #include <cmath>
 #include <type_traits>
 
-#include "sim/lanes.h"
+#include "sim/kernels.h"
 
 namespace flash::sim {
 namespace {
@@ -46,37 +42,6 @@ std::vector<Group> group_rows(const Matrix& matrix) {
   }
   return groups;
 }
-
-/// sums += what the group's columns `first` to `end` contribute: four numbers for each of four rows.
-template <typename Scalar>
-void add_columns(const int* columns, const Scalar* values, int first, int end, const Scalar* x,
-                 Scalar* sums) {
-  using Four = typename FourOf<Scalar>::type;
-  Four rows[4] = {};
-  for (int k = first; k < end; ++k) {
-    const Four vertex = load_four(x + 4L * columns[k]);
-    for (int row = 0; row < 4; ++row) rows[row] += values[4L * k + row] * vertex;
-  }
-  for (int row = 0; row < 4; ++row) store_four(rows[row], sums + 4 * row);
-}
-
-#ifdef __AVX512F__
-/// The same in one vector for all four rows: two loads and a permutation for sixteen multiply-adds.
-void add_columns(const int* columns, const float* values, int first, int end, const float* x, float* sums) {
-  const __m512i row_of_lane = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
-  __m512 partial[4] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
-  const auto add = [&](int k, __m512& sum) {
-    const __m512 entries = _mm512_castps128_ps512(_mm_loadu_ps(values + 4L * k));
-    sum = _mm512_fmadd_ps(_mm512_permutexvar_ps(row_of_lane, entries),
-                          _mm512_broadcast_f32x4(_mm_loadu_ps(x + 4L * columns[k])), sum);
-  };
-  int k = first;
-  for (; k + 3 < end; k += 4)
-    for (int part = 0; part < 4; ++part) add(k + part, partial[part]);
-  for (; k < end; ++k) add(k, partial[0]);
-  _mm512_storeu_ps(sums, (partial[0] + partial[1]) + (partial[2] + partial[3]));
-}
-#endif
 
 }  // namespace
 
@@ -116,24 +81,19 @@ RowGroups row_groups(const Matrix& matrix, const std::vector<int>& position) {
 }
 
 template <typename Scalar>
-void add_product(const RowGroups& matrix, Scalar scale, const Scalar* x, Scalar* y) {
+void add_product(const Kernels& kernels, const RowGroups& matrix, Scalar scale, const Scalar* x, Scalar* y) {
+  if (matrix.empty()) return;
+  const FourRows groups = {static_cast<int>(matrix.rows.size()), matrix.rows.front().data(),
+                           matrix.starts.data(), matrix.columns.data()};
   const Scalar* values;
   if constexpr (std::is_same_v<Scalar, float>)
     values = matrix.single_values.data();
   else
     values = matrix.values.data();
-  for (size_t g = 0; g < matrix.rows.size(); ++g) {
-    Scalar sums[16];
-    add_columns(matrix.columns.data(), values, matrix.starts[g], matrix.starts[g + 1], x, sums);
-    for (int member = 0; member < 4; ++member) {
-      const int row = matrix.rows[g][member];
-      if (row < 0) break;
-      for (int c = 0; c < 3; ++c) y[3L * row + c] += scale * sums[4 * member + c];
-    }
-  }
+  linear<Scalar>(kernels).add_rows(groups, values, scale, x, y);
 }
 
-template void add_product(const RowGroups&, float, const float*, float*);
-template void add_product(const RowGroups&, double, const double*, double*);
+template void add_product(const Kernels&, const RowGroups&, float, const float*, float*);
+template void add_product(const Kernels&, const RowGroups&, double, const double*, double*);
 
 }  // namespace flash::sim

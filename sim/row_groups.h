@@ -3,6 +3,8 @@
 #include <array>
 #include <vector>
 
+#include "sim/instruction_level.h"
+
 namespace flash::sim {
 
 /// A sparse matrix over vertices that acts on each coordinate alike. Its rows go four at a time over the
@@ -24,9 +26,9 @@ RowGroups row_groups(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix,
 
 /// y += scale * S x. x: four numbers a vertex, the last any; y: three.
 template <typename Scalar>
-void add_product(const RowGroups& matrix, Scalar scale, const Scalar* x, Scalar* y);
+void add_product(const Kernels& kernels, const RowGroups& matrix, Scalar scale, const Scalar* x, Scalar* y);
 
-extern template void add_product(const RowGroups&, float, const float*, float*);
-extern template void add_product(const RowGroups&, double, const double*, double*);
+extern template void add_product(const Kernels&, const RowGroups&, float, const float*, float*);
+extern template void add_product(const Kernels&, const RowGroups&, double, const double*, double*);
 
 }  // namespace flash::sim

@@ -48,6 +48,7 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
                                                              double poissons_ratio) {
   auto bending = std::make_shared<BendingOperator>();
   bending->model = model;
+  bending->kernels = plan.kernels;
   if (model == data::BendingModel::hinge) return bending;
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
@@ -68,9 +69,11 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
 
 }  // namespace
 
-std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet) {
+std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, InstructionLevel level) {
   auto plan = std::make_shared<SheetPlan>();
   plan->sheet = sheet;
+  plan->level = level;
+  plan->kernels = &kernels_of(level);
   plan->hinges = sheet_hinges(sheet);
   plan->pattern.size = static_cast<int>(sheet.rest.vertices.rows());
   PairIndex index;

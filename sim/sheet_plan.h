@@ -9,8 +9,10 @@
 #include "data/material.h"
 #include "sim/block_cholesky.h"
 #include "sim/hinge_bending.h"
+#include "sim/instruction_level.h"
 #include "sim/sheet.h"
 #include "sim/sheet_product.h"
+#include "sim/triangle_group.h"
 
 namespace flash::sim {
 
@@ -20,21 +22,10 @@ struct BlockSlot {
   bool transpose;  ///< the stored block is that of (column, row)
 };
 
-inline constexpr int triangle_group_size = 8;
-
-/// Eight triangles that go through the membrane's formulas together. In each triangle the vertices ascend, so
-/// that its blocks (1, 0), (2, 0) and (2, 1) are stored as they are.
-struct alignas(64) TriangleGroup {
-  double gradients[4][triangle_group_size];  ///< w of F = (x1 - x0) w1^T + (x2 - x0) w2^T: w1, then w2 [1/m]
-  double area[triangle_group_size];          ///< [m^2]
-  std::array<int, triangle_group_size> vertices[3];
-  std::array<int, triangle_group_size> slots[3];  ///< of blocks (1, 0), (2, 0), (2, 1) in a BlockPattern
-  int count = 0;                                  ///< triangles; the lanes behind them repeat the last
-};
-
 /// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
 struct BendingOperator {
   data::BendingModel model;
+  const Kernels* kernels;           ///< as in the plan
   RowGroups stiffness;              ///< empty for the hinge model
   RowGroups elimination_stiffness;  ///< the same in elimination order
   std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
@@ -46,9 +37,12 @@ struct BendingOperators {
   std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
 };
 
-/// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone.
+/// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone, and
+/// the kernels that work on it.
 struct SheetPlan {
   Sheet sheet;
+  InstructionLevel level;
+  const Kernels* kernels;  ///< of that level
   std::vector<Hinge> hinges;
   BlockPattern pattern;   ///< neighbours over an edge, then those across a hinge
   size_t edge_count = 0;  ///< of the pattern's pairs, those over an edge
@@ -60,7 +54,8 @@ struct SheetPlan {
   std::shared_ptr<BendingOperators> bending = std::make_shared<BendingOperators>();
 };
 
-std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet);
+std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet,
+                                                 InstructionLevel level = highest_instruction_level());
 
 /// Made once for a sheet, model and, where it matters, Poisson's ratio, and kept with the plan; threads may
 /// ask at once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.

@@ -1,6 +1,6 @@
 #include "sim/sheet_product.h"
 
-#include "sim/lanes.h"
+#include "sim/kernels.h"
 
 namespace flash::sim {
 
@@ -40,38 +40,16 @@ void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValu
   scale_ = static_cast<Scalar>(scale);
   blocks_.resize(12 * pattern.sources.size());
   padded_.resize(4 * (pattern.starts.size() - 1));
-  for (size_t k = 0; k < pattern.sources.size(); ++k) {
-    const double* from = values.data() + 9L * pattern.sources[k];
-    Scalar* to = blocks_.data() + 12 * k;
-    if (pattern.turned[k]) {
-      for (int c = 0; c < 3; ++c)
-        for (int r = 0; r < 3; ++r) to[4 * c + r] = static_cast<Scalar>(from[3 * r + c]);
-    } else {
-      for (int c = 0; c < 3; ++c)
-        for (int r = 0; r < 3; ++r) to[4 * c + r] = static_cast<Scalar>(from[3 * c + r]);
-    }
-  }
+  linear<Scalar>(*kernels_).copy_blocks(static_cast<int>(pattern.sources.size()), pattern.sources.data(),
+                                        pattern.turned.data(), values.data(), blocks_.data());
 }
 
 template <typename Scalar>
 void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
-  using Four = typename FourOf<Scalar>::type;
-  const size_t size = pattern_->starts.size() - 1;
-  for (size_t i = 0; i < size; ++i)
-    for (int c = 0; c < 3; ++c) padded_[4 * i + c] = x[3 * i + c];
-  for (size_t i = 0; i < size; ++i) {
-    Four sum{}, even{}, odd{};
-    for (int k = pattern_->starts[i]; k < pattern_->starts[i + 1]; ++k) {
-      const Scalar* block = blocks_.data() + 12L * k;
-      const Scalar* from = padded_.data() + 4L * pattern_->columns[k];
-      sum += load_four(block) * from[0];
-      even += load_four(block + 4) * from[1];
-      odd += load_four(block + 8) * from[2];
-    }
-    sum += even + odd;
-    for (int c = 0; c < 3; ++c) y[3 * i + c] = sum[c];
-  }
-  add_product(*scalar_part_, scale_, padded_.data(), y);
+  const BlockRows rows = {static_cast<int>(pattern_->starts.size()) - 1, pattern_->starts.data(),
+                          pattern_->columns.data()};
+  linear<Scalar>(*kernels_).multiply_blocks(rows, blocks_.data(), x, padded_.data(), y);
+  add_product(*kernels_, *scalar_part_, scale_, padded_.data(), y);
 }
 
 template class SheetProduct<float>;

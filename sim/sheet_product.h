@@ -12,7 +12,7 @@ struct ProductPattern {
   std::vector<int> starts;   ///< of each row in the lists below, and their end
   std::vector<int> columns;  ///< elimination position of the column's vertex
   std::vector<int> sources;  ///< block of the BlockPattern
-  std::vector<bool> turned;  ///< whether the source is the transpose
+  std::vector<char> turned;  ///< whether the source is the transpose
 };
 
 /// Of the diagonal and the first `pair_count` pairs.
@@ -24,17 +24,20 @@ ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
 template <typename Scalar>
 class SheetProduct {
  public:
+  explicit SheetProduct(const Kernels& kernels) : kernels_(&kernels) {}
+
   /// The scalar part may be empty; the arguments but `values` have to outlive the product.
   void assign(const ProductPattern& pattern, const BlockValues<double>& values, const RowGroups& scalar_part,
               double scale);
   void multiply(const Scalar* x, Scalar* y);
 
  private:
+  const Kernels* kernels_;
   const ProductPattern* pattern_ = nullptr;
   const RowGroups* scalar_part_ = nullptr;
   Scalar scale_ = 0;
-  std::vector<Scalar> blocks_;  ///< 12 numbers each
-  std::vector<Scalar> padded_;  ///< x, four numbers a vertex
+  AlignedStorage<Scalar> blocks_;  ///< 12 numbers each
+  AlignedStorage<Scalar> padded_;  ///< x, four numbers a vertex
 };
 
 extern template class SheetProduct<float>;

@@ -44,7 +44,7 @@ std::vector<int> shuffled(int size, unsigned seed) {
 
 // Against the sparse product row by row, to the rounding of a row's sum.
 template <typename Scalar>
-void expect_same_product(const Matrix& matrix, unsigned seed) {
+void expect_same_product(const Kernels& kernels, const Matrix& matrix, unsigned seed) {
   const int size = static_cast<int>(matrix.rows());
   const std::vector<int> position = shuffled(size, seed);
   const Eigen::MatrixX3d x = Eigen::MatrixX3d::Random(size, 3), y = Eigen::MatrixX3d::Random(size, 3);
@@ -55,7 +55,8 @@ void expect_same_product(const Matrix& matrix, unsigned seed) {
     for (int c = 0; c < 3; ++c) padded[4 * position[i] + c] = static_cast<Scalar>(x(i, c));
     result.row(position[i]) = y.row(i).cast<Scalar>();
   }
-  add_product(row_groups(matrix, position), static_cast<Scalar>(scale), padded.data(), result.data());
+  add_product(kernels, row_groups(matrix, position), static_cast<Scalar>(scale), padded.data(),
+              result.data());
   const Eigen::MatrixX3d expected = y + scale * (matrix * x);
   const Eigen::MatrixX3d magnitude = y.cwiseAbs() + matrix.cwiseAbs() * x.cwiseAbs();
   for (int i = 0; i < size; ++i) {
@@ -68,13 +69,17 @@ void expect_same_product(const Matrix& matrix, unsigned seed) {
 }
 
 TEST(RowGroups, ProductIsThatOfTheSparseMatrix) {
-  for (const int size : {1, 2, 3, 4, 5, 17, 64}) {
-    SCOPED_TRACE(size);
-    expect_same_product<float>(random_matrix(size, 10 + size), size);
-    expect_same_product<double>(random_matrix(size, 10 + size), size);
+  for (const InstructionLevel level : instruction_levels()) {
+    SCOPED_TRACE(to_string(level));
+    const Kernels& kernels = kernels_of(level);
+    for (const int size : {1, 2, 3, 4, 5, 17, 64}) {
+      SCOPED_TRACE(size);
+      expect_same_product<float>(kernels, random_matrix(size, 10 + size), size);
+      expect_same_product<double>(kernels, random_matrix(size, 10 + size), size);
+    }
+    expect_same_product<float>(kernels, plate(), 3);
+    expect_same_product<double>(kernels, plate(), 3);
   }
-  expect_same_product<float>(plate(), 3);
-  expect_same_product<double>(plate(), 3);
 }
 
 TEST(RowGroups, EachRowStandsOnce) {

@@ -1,22 +1,11 @@
 #pragma once
-#include <cmath>
-#include <cstring>
-#include <new>
-#include <vector>
+#include "sim/lanes.h"
 
 namespace flash::sim {
+inline namespace FLASH_LEVEL {
 
-// Dense kernels of the multifrontal factorization. Column-major, leading dimensions a multiple of `lanes`, so
-// that a column is whole vectors; what the padding rows hold is never read as a matrix entry.
-
-#ifdef __AVX512F__
-inline constexpr int vector_bytes = 64;
-#else
-inline constexpr int vector_bytes = 32;
-#endif
-
-template <typename Scalar>
-inline constexpr int lanes = vector_bytes / static_cast<int>(sizeof(Scalar));
+// Dense kernels of the multifrontal factorization. Column-major, leading dimensions a multiple of
+// `front_padding`, so that a column is whole vectors; what the padding rows hold is never read as an entry.
 
 template <typename Scalar>
 struct VectorOf {
@@ -25,33 +14,11 @@ struct VectorOf {
 
 template <typename Scalar>
 Scalar sum_of_lanes(typename VectorOf<Scalar>::type vector) {
-  Scalar halves[lanes<Scalar>];
-  std::memcpy(halves, &vector, sizeof(vector));
-  for (int width = lanes<Scalar> / 2; width > 0; width /= 2)
+  Scalar halves[lanes_of<Scalar>];
+  memcpy(halves, &vector, sizeof(vector));
+  for (int width = lanes_of<Scalar> / 2; width > 0; width /= 2)
     for (int lane = 0; lane < width; ++lane) halves[lane] += halves[lane + width];
   return halves[0];
-}
-
-/// Storage that starts on a whole vector.
-template <typename Scalar>
-struct VectorAllocator {
-  using value_type = Scalar;
-  VectorAllocator() = default;
-  template <typename Other>
-  VectorAllocator(const VectorAllocator<Other>&) {}
-  Scalar* allocate(size_t count) {
-    return static_cast<Scalar*>(::operator new(count * sizeof(Scalar), std::align_val_t(vector_bytes)));
-  }
-  void deallocate(Scalar* data, size_t) { ::operator delete(data, std::align_val_t(vector_bytes)); }
-  bool operator==(const VectorAllocator&) const { return true; }
-};
-
-template <typename Scalar>
-using VectorStorage = std::vector<Scalar, VectorAllocator<Scalar>>;
-
-template <typename Scalar>
-constexpr int padded(int rows) {
-  return (rows + lanes<Scalar> - 1) / lanes<Scalar> * lanes<Scalar>;
 }
 
 /// C(i, j) -= sum_k A(i, k) B(j, k) for `Width` columns j and whole vectors of rows [first_row, end_row): 2 x
@@ -60,7 +27,7 @@ template <int Width, typename Scalar>
 void subtract_product(Scalar* c, int ldc, const Scalar* a, const Scalar* b, int lda, int depth, int first_row,
                       int end_row) {
   using Vector = typename VectorOf<Scalar>::type;
-  constexpr int step = lanes<Scalar>;
+  constexpr int step = lanes_of<Scalar>;
   int row = first_row;
   for (; row + 2 * step <= end_row; row += 2 * step) {
     Vector low[Width], high[Width];
@@ -102,7 +69,7 @@ template <typename Scalar>
 bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
   for (int panel = 0; panel < columns;) {
     const int width = columns - panel >= 6 ? 6 : 3;
-    const int first = panel / lanes<Scalar> * lanes<Scalar>;
+    const int first = panel / lanes_of<Scalar> * lanes_of<Scalar>;
     Scalar* target = front + static_cast<long>(panel) * padded_rows;
     if (width == 6)
       subtract_product<6>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
@@ -112,7 +79,7 @@ bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
       Scalar* column = front + static_cast<long>(j) * padded_rows;
       const Scalar pivot = column[j];
       if (!(pivot > 0)) return false;
-      const Scalar scale = 1 / std::sqrt(pivot);
+      const Scalar scale = 1 / square_root(pivot);
       for (int i = j; i < padded_rows; ++i) column[i] *= scale;
       for (int k = j + 1; k < panel + width; ++k) {
         Scalar* later = front + static_cast<long>(k) * padded_rows;
@@ -126,14 +93,14 @@ bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
 }
 
 /// update -= L21 L21^T on the lower triangle; L21 starts `columns` rows down the front. `rows` a multiple
-/// of 3. Reads up to `lanes` entries past the front's last column.
+/// of 3. Reads up to a vector past the front's last column.
 template <typename Scalar>
 void subtract_outer_product(Scalar* update, int padded_update_rows, int rows, const Scalar* front,
                             int padded_rows, int columns) {
   const Scalar* below = front + columns;
   for (int j = 0; j < rows;) {
     const int width = rows - j >= 6 ? 6 : 3;
-    const int first = j / lanes<Scalar> * lanes<Scalar>;
+    const int first = j / lanes_of<Scalar> * lanes_of<Scalar>;
     Scalar* target = update + static_cast<long>(j) * padded_update_rows;
     if (width == 6)
       subtract_product<6>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
@@ -160,8 +127,7 @@ void extract_diagonal(Scalar* front, int padded_rows, int columns, Scalar* inver
     inverses[3] = (l0[j + 1] * l1[j + 2] * d1 - l0[j + 2]) * d0 * d2;
     inverses[4] = -l1[j + 2] * d1 * d2;
     inverses[5] = d2;
-    for (Scalar* column : {l0, l1, l2})
-      for (int i = 0; i < j + 3; ++i) column[i] = 0;
+    for (int i = 0; i < j + 3; ++i) l0[i] = l1[i] = l2[i] = 0;
   }
 }
 
@@ -181,7 +147,7 @@ void solve_forward(const Scalar* front, int padded_rows, int columns, const Scal
     x[j] = x0;
     x[j + 1] = x1;
     x[j + 2] = x2;
-    for (int i = (j + 3) / lanes<Scalar> * lanes<Scalar>; i < padded_rows; i += lanes<Scalar>) {
+    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
       Vector& target = *reinterpret_cast<Vector*>(x + i);
       target -= *reinterpret_cast<const Vector*>(l0 + i) * x0 +
                 *reinterpret_cast<const Vector*>(l1 + i) * x1 + *reinterpret_cast<const Vector*>(l2 + i) * x2;
@@ -199,7 +165,7 @@ void solve_backward(const Scalar* front, int padded_rows, int columns, const Sca
     const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
     const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
     Vector sum0{}, sum1{}, sum2{};
-    for (int i = (j + 3) / lanes<Scalar> * lanes<Scalar>; i < padded_rows; i += lanes<Scalar>) {
+    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
       const Vector below = *reinterpret_cast<const Vector*>(x + i);
       sum0 += *reinterpret_cast<const Vector*>(l0 + i) * below;
       sum1 += *reinterpret_cast<const Vector*>(l1 + i) * below;
@@ -213,4 +179,5 @@ void solve_backward(const Scalar* front, int padded_rows, int columns, const Sca
   }
 }
 
+}  // namespace FLASH_LEVEL
 }  // namespace flash::sim
