@@ -32,7 +32,7 @@ constexpr int width = surface_width;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int most_levels = 11;  // 8^11 packets are more than an int counts
 
-const SurfaceKernels& surface_kernels_of(sim::InstructionLevel level) {
+const SurfaceKernels& surface_kernels_of([[maybe_unused]] sim::InstructionLevel level) {
 #ifdef __x86_64__
   return level == sim::InstructionLevel::v4   ? v4::surface_kernels
          : level == sim::InstructionLevel::v3 ? v3::surface_kernels
