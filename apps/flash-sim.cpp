@@ -2,10 +2,13 @@
 
 #include "apps/command_line.h"
 #include "apps/sim_verbs.h"
+#include "sim/cpu/instruction_level.h"
 
 int main(int argc, char** argv) {
   CLI::App app("Simulates sheets by implicit Euler with contact, friction and grasps.", "flash-sim");
-  app.set_version_flag("--version", FLASH_VERSION);
+  app.set_version_flag("--version", [] {
+    return std::string(FLASH_VERSION) + ", kernels for " + to_string(flash::sim::highest_instruction_level());
+  });
   app.set_config("--config", "", "Read options from a TOML file; the command line counts more");
   app.require_subcommand(1);
   app.footer(

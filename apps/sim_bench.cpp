@@ -6,45 +6,45 @@
 #include <thread>
 
 #include "apps/command_line.h"
+#include "apps/lift_benchmark.h"
 #include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
-#include "sim/lift_benchmark.h"
 
 namespace flash {
 namespace {
 
 struct BenchOptions {
   sim::LiftBenchmark benchmark;
+  std::string level = sim::to_string(sim::highest_instruction_level());
   bool json = false;
 };
 
 int bench(BenchOptions options) {
   sim::LiftBenchmark& benchmark = options.benchmark;
   if (benchmark.threads == 0) benchmark.threads = int(std::max(1u, std::thread::hardware_concurrency()));
+  for (const sim::InstructionLevel level : sim::instruction_levels())
+    if (sim::to_string(level) == options.level) benchmark.level = level;
   const sim::LiftBenchmarkResult result = sim::run_lift_benchmark(benchmark, stop_on_signals());
   double accounted = 0;
   for (const sim::BenchmarkPhase& phase : result.phases)
     accounted += phase.calls_per_step * phase.milliseconds_per_call;
   if (options.json) {
-    nlohmann::ordered_json json = {{"schema", "flash-sim-bench/1"},
-                                   {"vertices", result.vertices},
-                                   {"environments", benchmark.environments},
-                                   {"steps", benchmark.steps},
-                                   {"threads", benchmark.threads},
-                                   {"wall_seconds", result.wall_seconds},
-                                   {"step_ms", result.step_milliseconds},
-                                   {"iterations", result.iterations},
-                                   {"converged_share", result.converged_share},
-                                   {"residual_max", result.residual_max},
-                                   {"phases", nlohmann::ordered_json::array()}};
+    nlohmann::ordered_json json = {
+        {"schema", "flash-sim-bench/1"},          {"vertices", result.vertices},
+        {"environments", benchmark.environments}, {"steps", benchmark.steps},
+        {"threads", benchmark.threads},           {"level", sim::to_string(benchmark.level)},
+        {"wall_seconds", result.wall_seconds},    {"step_ms", result.step_milliseconds},
+        {"iterations", result.iterations},        {"converged_share", result.converged_share},
+        {"residual_max", result.residual_max},    {"phases", nlohmann::ordered_json::array()}};
     for (const sim::BenchmarkPhase& phase : result.phases)
       json["phases"].push_back(
           {{"name", phase.name}, {"calls", phase.calls_per_step}, {"call_ms", phase.milliseconds_per_call}});
     std::cout << json.dump(2) << '\n';
     return exit_done;
   }
-  std::printf("%d vertices, %d environments, %d steps, %d threads: %.1f s\n", result.vertices,
-              benchmark.environments, benchmark.steps, benchmark.threads, result.wall_seconds);
+  std::printf("%d vertices, %d environments, %d steps, %d threads, kernels for %s: %.1f s\n", result.vertices,
+              benchmark.environments, benchmark.steps, benchmark.threads, sim::to_string(benchmark.level),
+              result.wall_seconds);
   std::printf("converged %.2f %% of the steps, worst residual %.2g, %.2f Newton iterations a step\n",
               100 * result.converged_share, result.residual_max, result.iterations);
   std::printf("%-21s %9s %10s %10s\n", "time a step, 1 thread", "calls", "ms a call", "ms");
@@ -84,6 +84,11 @@ void add_bench_verb(CLI::App& app, Action& action) {
   positive("--young-max", benchmark.membrane_stiffness_max, "E t to [N/m]");
   positive("--bending-min", benchmark.bending_rigidity_min, "D from [N m]");
   positive("--bending-max", benchmark.bending_rigidity_max, "D to [N m]");
+  std::vector<std::string> levels;
+  for (const sim::InstructionLevel level : sim::instruction_levels()) levels.push_back(sim::to_string(level));
+  verb.add_option("--level", options->level, "Instructions of the kernels, of those that this machine has")
+      ->check(CLI::IsMember(levels))
+      ->capture_default_str();
   verb.add_flag("--json", options->json, "Print the result as JSON");
   verb.callback([&action, options] { action = [options] { return bench(*options); }; });
 }

@@ -16,13 +16,13 @@
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
+#include "apps/scene_run.h"
 #include "apps/sim_verbs.h"
 #include "data/error.h"
 #include "data/message_line.h"
 #include "data/scene.h"
 #include "data/text.h"
 #include "data/writable.h"
-#include "sim/scene_run.h"
 
 namespace flash {
 namespace {

@@ -10,7 +10,7 @@
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
-#include "sim/sheet.h"
+#include "sim/scene/sheet.h"
 #include "sysid/report/export_asset.h"
 #include "sysid/report/search_folder.h"
 

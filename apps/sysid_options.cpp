@@ -18,7 +18,7 @@
 #include "data/message_line.h"
 #include "data/text.h"
 #include "data/writable.h"
-#include "sim/sheet.h"
+#include "sim/scene/sheet.h"
 #include "sysid/report/recording_names.h"
 #include "sysid/report/summarize.h"
 

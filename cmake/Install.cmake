@@ -5,7 +5,7 @@ include(CMakePackageConfigHelpers)
 function(flash_library module)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES")
   if(NOT arg_SOURCES)
-    file(GLOB arg_SOURCES CONFIGURE_DEPENDS *.cpp cpu/*.cpp)
+    file(GLOB arg_SOURCES CONFIGURE_DEPENDS *.cpp)
   endif()
   set(target flash_${module})
   add_library(${target} ${arg_SOURCES})
@@ -18,12 +18,12 @@ function(flash_library module)
   install(TARGETS ${target} EXPORT flashTargets)
 endfunction()
 
-# Headers by their path from the root, so that `#include "sim/solver.h"` reads the same inside and outside; those of
+# Headers by their path from the root, so that `#include "sim/newton/solver.h"` reads the same inside and outside; those of
 # calib and sysid, of which a part is installed, in their own CMakeLists.txt.
 function(flash_install)
   foreach(module data sim)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${module} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/flash
-            FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE)
+            FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE PATTERN kernels EXCLUDE)
   endforeach()
   set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/flash)
   set(has_calib OFF)
@@ -35,7 +35,7 @@ function(flash_install)
                                 ${PROJECT_BINARY_DIR}/flashConfig.cmake INSTALL_DESTINATION ${destination})
   write_basic_package_version_file(${PROJECT_BINARY_DIR}/flashConfigVersion.cmake COMPATIBILITY SameMinorVersion)
   install(FILES ${PROJECT_BINARY_DIR}/flashConfig.cmake ${PROJECT_BINARY_DIR}/flashConfigVersion.cmake
-                ${PROJECT_SOURCE_DIR}/cmake/FindMETIS.cmake DESTINATION ${destination})
+          DESTINATION ${destination})
   install(FILES ${PROJECT_SOURCE_DIR}/LICENSE ${PROJECT_SOURCE_DIR}/docs/licences.md
           DESTINATION ${CMAKE_INSTALL_DOCDIR})
 endfunction()

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "sim/environment.h"
-#include "sim/sheet_plan.h"
-#include "sim/solver.h"
+#include "sim/newton/solver.h"
+#include "sim/plan/sheet_plan.h"
+#include "sim/scene/environment.h"
 
 namespace flash::sim {
 

@@ -8,7 +8,7 @@
 #include "data/material.h"
 #include "data/mesh.h"
 #include "data/recording.h"
-#include "sim/solver.h"
+#include "sim/newton/solver.h"
 
 namespace flash::sysid {
 

@@ -3,7 +3,7 @@
 
 #include "data/recording.h"
 #include "data/trajectory.h"
-#include "sim/grasp.h"
+#include "sim/scene/grasp.h"
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {

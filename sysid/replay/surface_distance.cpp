@@ -2,19 +2,50 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
 namespace flash::sysid {
+
+// Compiled from sysid/replay/kernels for each level.
+#ifdef __x86_64__
+namespace v2 {
+extern const SurfaceKernels surface_kernels;
+}
+namespace v3 {
+extern const SurfaceKernels surface_kernels;
+}
+namespace v4 {
+extern const SurfaceKernels surface_kernels;
+}
+#else
+namespace generic {
+extern const SurfaceKernels surface_kernels;
+}
+#endif
+
 namespace {
 
+constexpr int width = surface_width;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr int most_levels = 11;  // 8^11 packets are more than an int counts
+
+const SurfaceKernels& surface_kernels_of([[maybe_unused]] sim::InstructionLevel level) {
+#ifdef __x86_64__
+  return level == sim::InstructionLevel::v4   ? v4::surface_kernels
+         : level == sim::InstructionLevel::v3 ? v3::surface_kernels
+                                              : v2::surface_kernels;
+#else
+  return generic::surface_kernels;
+#endif
+}
 
 /// Orders triangles so that every aligned run of 8, 64, 512, ... is compact: halves along the longest axis,
 /// cut at multiples of the largest power of eight below the count.
 void order_in_space(const data::Points& centroids, std::vector<int>::iterator first,
-                    std::vector<int>::iterator last, int width) {
+                    std::vector<int>::iterator last) {
   const std::ptrdiff_t count = last - first;
   if (count <= width) return;
   std::ptrdiff_t unit = width;
@@ -30,31 +61,15 @@ void order_in_space(const data::Points& centroids, std::vector<int>::iterator fi
   const auto middle = first + unit * ((units + 1) / 2);
   std::nth_element(first, middle, last,
                    [&](int i, int j) { return centroids(i, axis) < centroids(j, axis); });
-  order_in_space(centroids, first, middle, width);
-  order_in_space(centroids, middle, last, width);
+  order_in_space(centroids, first, middle);
+  order_in_space(centroids, middle, last);
 }
 
 }  // namespace
 
-/// Corner a, edges e = b - a and f = c - a, unit normal and the constants of the projections on edges and
-/// plane.
-struct SurfaceDistance::Packet {
-  double a[3][width], e[3][width], f[3][width], n[3][width];
-  double inverse_ee[width], inverse_ff[width], inverse_gg[width];  // g = c - b
-  double ee[width], ef[width], ff[width];
-  double inverse_determinant[width];  // NaN for a triangle without area: then only its edges count
-};
-
-struct SurfaceDistance::Node {
-  double low[3][width], high[3][width];
-};
-
-SurfaceDistance::~SurfaceDistance() = default;
-SurfaceDistance::SurfaceDistance(SurfaceDistance&&) noexcept = default;
-SurfaceDistance::SurfaceDistance(const SurfaceDistance&) = default;
-
-SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::Points& layout)
-    : triangles_(triangles) {
+SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::Points& layout,
+                                 sim::InstructionLevel level)
+    : kernels_(&surface_kernels_of(level)), triangles_(triangles) {
   const int count = static_cast<int>(triangles.rows());
   data::Points centroids(count, 3);
   for (int i = 0; i < count; ++i) {
@@ -63,7 +78,7 @@ SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::P
   }
   order_.resize(count);
   std::iota(order_.begin(), order_.end(), 0);
-  order_in_space(centroids, order_.begin(), order_.end(), width);
+  order_in_space(centroids, order_.begin(), order_.end());
   slot_of_.resize(count);
   for (int slot = 0; slot < count; ++slot) slot_of_[order_[slot]] = slot;
 
@@ -80,7 +95,7 @@ SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::P
 void SurfaceDistance::move(const data::Points& positions) {
   positions_ = positions;
   for (auto& level : levels_) {
-    for (Node& node : level) {
+    for (BoxNode& node : level) {
       std::fill(&node.low[0][0], &node.low[0][0] + 3 * width, kInfinity);
       std::fill(&node.high[0][0], &node.high[0][0] + 3 * width, -kInfinity);
     }
@@ -93,7 +108,7 @@ void SurfaceDistance::move(const data::Points& positions) {
                           c = positions.row(triangles_(triangle, 2));
     const Eigen::Vector3d e = b - a, f = c - a, n = e.cross(f);
     const auto inverse = [](double x) { return x > 0 ? 1 / x : 0.0; };
-    Packet& packet = packets_[slot / width];
+    TrianglePacket& packet = packets_[slot / width];
     const int lane = static_cast<int>(slot % width);
     const double area2 = n.squaredNorm();
     for (int k = 0; k < 3; ++k) {
@@ -110,7 +125,7 @@ void SurfaceDistance::move(const data::Points& positions) {
     packet.inverse_gg[lane] = inverse((c - b).squaredNorm());
     packet.inverse_determinant[lane] = area2 > 0 ? 1 / area2 : std::numeric_limits<double>::quiet_NaN();
 
-    Node& node = levels_[0][slot / (width * width)];
+    BoxNode& node = levels_[0][slot / (width * width)];
     const int child = static_cast<int>(slot / width % width);
     for (int k = 0; k < 3; ++k) {
       node.low[k][child] = std::min({node.low[k][child], a[k], b[k], c[k]});
@@ -119,8 +134,8 @@ void SurfaceDistance::move(const data::Points& positions) {
   }
   for (std::size_t level = 1; level < levels_.size(); ++level) {
     for (std::size_t i = 0; i < levels_[level - 1].size(); ++i) {
-      const Node& below = levels_[level - 1][i];
-      Node& node = levels_[level][i / width];
+      const BoxNode& below = levels_[level - 1][i];
+      BoxNode& node = levels_[level][i / width];
       for (int k = 0; k < 3; ++k) {
         node.low[k][i % width] = *std::min_element(below.low[k], below.low[k] + width);
         node.high[k][i % width] = *std::max_element(below.high[k], below.high[k] + width);
@@ -129,79 +144,15 @@ void SurfaceDistance::move(const data::Points& positions) {
   }
 }
 
-void SurfaceDistance::search_packet(int index, const Eigen::Vector3d& query, double& best, int& slot) const {
-  const Packet& t = packets_[index];
-  double distance2[width];
-  const double px = query.x(), py = query.y(), pz = query.z();
-  for (int i = 0; i < width; ++i) {
-    const double vx = px - t.a[0][i], vy = py - t.a[1][i], vz = pz - t.a[2][i];
-    const double ve = vx * t.e[0][i] + vy * t.e[1][i] + vz * t.e[2][i];
-    const double vf = vx * t.f[0][i] + vy * t.f[1][i] + vz * t.f[2][i];
-    const double vn = vx * t.n[0][i] + vy * t.n[1][i] + vz * t.n[2][i];
-    const double ee = t.ee[i], ef = t.ef[i], ff = t.ff[i];
-    const auto clamped = [](double x) {
-      x = x < 0 ? 0 : x;
-      return x > 1 ? 1 : x;
-    };
-    const auto squared_length = [&](double s, double r) {  // of v - s e - r f
-      const double x = vx - s * t.e[0][i] - r * t.f[0][i], y = vy - s * t.e[1][i] - r * t.f[1][i],
-                   z = vz - s * t.e[2][i] - r * t.f[2][i];
-      return x * x + y * y + z * z;
-    };
-    const double on_e = squared_length(clamped(ve * t.inverse_ee[i]), 0);
-    const double on_f = squared_length(0, clamped(vf * t.inverse_ff[i]));
-    // Along g = f - e from b: (v - e) . g = vf - ve - ef + ee.
-    const double s = clamped((vf - ve - ef + ee) * t.inverse_gg[i]);
-    const double on_g = squared_length(1 - s, s);
-    double d = on_e < on_f ? on_e : on_f;
-    d = on_g < d ? on_g : d;
-    const double weight_b = (ff * ve - ef * vf) * t.inverse_determinant[i];
-    const double weight_c = (ee * vf - ef * ve) * t.inverse_determinant[i];
-    const bool inside = (weight_b >= 0) & (weight_c >= 0) & (weight_b + weight_c <= 1);
-    distance2[i] = inside ? vn * vn : d;
-  }
-  for (int i = 0; i < width; ++i) {
-    if (distance2[i] < best) {
-      best = distance2[i];
-      slot = index * width + i;
-    }
-  }
-}
-
-void SurfaceDistance::search(std::size_t level, int index, const Eigen::Vector3d& query, double& best,
-                             int& slot) const {
-  const Node& node = levels_[level][index];
-  double distance2[width];
-  for (int i = 0; i < width; ++i) {
-    double sum = 0;
-    for (int k = 0; k < 3; ++k) {
-      const double below = node.low[k][i] - query[k], above = query[k] - node.high[k][i];
-      double outside = below > above ? below : above;
-      outside = outside < 0 ? 0 : outside;
-      sum += outside * outside;
-    }
-    distance2[i] = sum;
-  }
-  for (;;) {
-    int nearest = 0;
-    for (int i = 1; i < width; ++i) {
-      if (distance2[i] < distance2[nearest]) nearest = i;
-    }
-    if (!(distance2[nearest] < best)) return;
-    distance2[nearest] = kInfinity;
-    if (level == 0) {
-      search_packet(index * width + nearest, query, best, slot);
-    } else {
-      search(level - 1, index * width + nearest, query, best, slot);
-    }
-  }
-}
-
 SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& query, int hint) const {
   double best = kInfinity;
   int slot = 0;
-  if (hint >= 0) search_packet(slot_of_[hint] / width, query, best, slot);
-  search(levels_.size() - 1, 0, query, best, slot);
+  std::array<const BoxNode*, most_levels> levels;
+  std::transform(levels_.begin(), levels_.end(), levels.begin(),
+                 [](const auto& level) { return level.data(); });
+  const SurfaceTree tree = {packets_.data(), levels.data()};
+  if (hint >= 0) kernels_->search_packet(tree, slot_of_[hint] / width, query.data(), best, slot);
+  kernels_->search(tree, static_cast<int>(levels_.size()) - 1, 0, query.data(), best, slot);
   const int triangle = order_[slot] >= 0 ? order_[slot] : order_[slot_of_.size() - 1];
   SurfacePoint result =
       nearest_on_triangle(query, positions_.row(triangles_(triangle, 0)),

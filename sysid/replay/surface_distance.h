@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "data/mesh.h"
+#include "sim/cpu/instruction_level.h"
+#include "sysid/replay/surface_tree.h"
 
 namespace flash::sysid {
 
@@ -25,7 +27,8 @@ SurfacePoint nearest_on_triangle(const Eigen::Vector3d& query, const Eigen::Vect
 class SurfaceDistance {
  public:
   /// `layout`: positions that neighbourhood is judged by, usually the rest shape; also the first surface.
-  SurfaceDistance(const data::Triangles& triangles, const data::Points& layout);
+  SurfaceDistance(const data::Triangles& triangles, const data::Points& layout,
+                  sim::InstructionLevel level = sim::highest_instruction_level());
 
   /// Moves the surface, O(triangles).
   void move(const data::Points& positions);
@@ -34,24 +37,13 @@ class SurfaceDistance {
   SurfacePoint nearest(const Eigen::Vector3d& query, int hint = -1) const;
 
  private:
-  static constexpr int width = 8;
-  struct Packet;  // eight triangles, coordinate by coordinate
-  struct Node;    // eight boxes, coordinate by coordinate
-
-  void search(std::size_t level, int node, const Eigen::Vector3d& query, double& best, int& slot) const;
-  void search_packet(int packet, const Eigen::Vector3d& query, double& best, int& slot) const;
-
+  const SurfaceKernels* kernels_;
   data::Triangles triangles_;
   data::Points positions_;
   std::vector<int> order_;    // slot -> triangle, -1 past the end of the last packet
   std::vector<int> slot_of_;  // triangle -> slot
-  std::vector<Packet> packets_;
-  std::vector<std::vector<Node>> levels_;  // levels_[0] bounds packets, the last level has one node
-
- public:
-  ~SurfaceDistance();
-  SurfaceDistance(SurfaceDistance&&) noexcept;
-  SurfaceDistance(const SurfaceDistance&);
+  std::vector<TrianglePacket> packets_;
+  std::vector<std::vector<BoxNode>> levels_;  // levels_[0] bounds packets, the last level has one node
 };
 
 }  // namespace flash::sysid

@@ -7,7 +7,7 @@
 
 #include "data/error.h"
 #include "data/json_reader.h"
-#include "sim/sheet.h"
+#include "sim/scene/sheet.h"
 
 namespace flash::sysid {
 namespace {

@@ -2,48 +2,10 @@
 // to touch at least once.
 #include <benchmark/benchmark.h>
 
-#include <cmath>
-
-#include "data/procedural_mesh.h"
-#include "sim/elastic_energy.h"
+#include "tests/bench/towel.h"
 
 namespace flash::sim {
 namespace {
-
-struct Towel {
-  std::shared_ptr<const SheetPlan> plan;
-  data::SheetMaterial material;
-  data::Points positions;
-  BlockValues<double> values;
-
-  explicit Towel(int vertices) {
-    data::RectangleMesh rectangle;
-    rectangle.width = rectangle.height = 0.4;
-    rectangle.cells_x = rectangle.cells_y = static_cast<int>(std::lround(std::sqrt(vertices))) - 1;
-    plan = make_sheet_plan(make_sheet(data::rectangle(rectangle)));
-    material.areal_density = 0.2;
-    material.bending_rigidity = 3e-5;
-    positions = plan->sheet.rest.vertices;
-    for (int i = 0; i < positions.rows(); ++i)
-      positions(i, 2) = 0.02 * std::sin(15 * positions(i, 0)) * std::cos(11 * positions(i, 1));
-    assemble(Curvature::positive);
-  }
-
-  const BendingOperator& bending() const {
-    return bending_operator(*plan, material.bending_model, material.poissons_ratio);
-  }
-
-  void assemble(Curvature curvature) {
-    const double time_step = 0.01;
-    values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, bending(), material, positions, 1.0, curvature, values);
-    add_bending_stand_in(bending(), material.bending_rigidity, values);
-    for (int i = 0; i < plan->pattern.size; ++i)
-      for (int c = 0; c < 3; ++c)
-        values[9L * i + 4 * c] +=
-            material.areal_density * plan->sheet.vertex_area[i] / (time_step * time_step);
-  }
-};
 
 void energy_and_forces(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
@@ -62,14 +24,14 @@ void matrix(benchmark::State& state) {
 
 void factorization(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
-  BlockCholesky<float> factor(towel.plan->symbolic);
+  BlockCholesky<float> factor(towel.plan->symbolic, *towel.plan->kernels);
   for (auto _ : state)
     if (!factor.factorize(towel.values)) state.SkipWithError("not positive definite");
 }
 
 void triangular_solves(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
-  BlockCholesky<float> factor(towel.plan->symbolic);
+  BlockCholesky<float> factor(towel.plan->symbolic, *towel.plan->kernels);
   if (!factor.factorize(towel.values)) state.SkipWithError("not positive definite");
   Eigen::VectorXf x = Eigen::VectorXf::Ones(towel.positions.size());
   for (auto _ : state) {
@@ -81,7 +43,7 @@ void triangular_solves(benchmark::State& state) {
 
 void matrix_product(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
-  SheetProduct<float> product;
+  SheetProduct<float> product(*towel.plan->kernels);
   product.assign(towel.plan->triangle_product, towel.values, towel.bending().elimination_stiffness,
                  towel.material.bending_rigidity);
   Eigen::VectorXf x = Eigen::VectorXf::Ones(towel.positions.size()), y = x;

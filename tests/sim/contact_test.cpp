@@ -3,9 +3,9 @@
 #include <array>
 #include <cmath>
 
-#include "sheet_scene.h"
-#include "sim/contact_geometry.h"
-#include "sim/contact_law.h"
+#include "sim/law/contact_law.h"
+#include "sim/step/contact_geometry.h"
+#include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
 namespace {

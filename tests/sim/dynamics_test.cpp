@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "sheet_scene.h"
 #include "sim/batch.h"
+#include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
 namespace {

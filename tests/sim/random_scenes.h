@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "sim/solver.h"
+#include "sim/newton/solver.h"
 
 namespace flash::sim {
 

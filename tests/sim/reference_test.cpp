@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "sim/elastic_energy.h"
-#include "sim/solver.h"
+#include "sim/newton/solver.h"
+#include "sim/step/elastic_energy.h"
 #include "tests/sim/reference_scene.h"
 
 namespace flash::sim {

@@ -1,6 +1,6 @@
 #pragma once
 #include "data/procedural_mesh.h"
-#include "sim/solver.h"
+#include "sim/newton/solver.h"
 
 namespace flash::sim {
 

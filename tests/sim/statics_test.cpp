@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "sheet_scene.h"
+#include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
 namespace {

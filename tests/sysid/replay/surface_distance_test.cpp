@@ -35,22 +35,25 @@ double brute_force(const Eigen::Vector3d& query, const data::TriangleMesh& mesh)
 }
 
 TEST(SurfaceDistance, IsThatOfABruteForceOnAMovingSheetNearAndFar) {
-  for (const int cells : {1, 2, 7, 20}) {
-    data::TriangleMesh mesh = flat_sheet(cells);
-    SurfaceDistance surface(mesh.triangles, mesh.vertices);
-    std::mt19937 random(7);
-    std::uniform_real_distribution<double> uniform(-0.3, 0.7);
-    for (const double t : {0.0, 0.8, 2.5}) {
-      mesh.vertices = moving_sheet(flat_sheet(cells).vertices, t);
-      surface.move(mesh.vertices);
-      for (int i = 0; i < 200; ++i) {
-        Eigen::Vector3d query(uniform(random), uniform(random), uniform(random));
-        if (i % 2) query = mesh.vertices.row(i % mesh.vertices.rows()).transpose() + 0.01 * query;
-        const SurfacePoint nearest = surface.nearest(query);
-        // Rounding of coordinates of order one.
-        EXPECT_NEAR(nearest.distance, brute_force(query, mesh), 1e-12);
-        EXPECT_EQ(surface.nearest(query, i % static_cast<int>(mesh.triangles.rows())).distance,
-                  nearest.distance);
+  for (const sim::InstructionLevel level : sim::instruction_levels()) {
+    SCOPED_TRACE(to_string(level));
+    for (const int cells : {1, 2, 7, 20}) {
+      data::TriangleMesh mesh = flat_sheet(cells);
+      SurfaceDistance surface(mesh.triangles, mesh.vertices, level);
+      std::mt19937 random(7);
+      std::uniform_real_distribution<double> uniform(-0.3, 0.7);
+      for (const double t : {0.0, 0.8, 2.5}) {
+        mesh.vertices = moving_sheet(flat_sheet(cells).vertices, t);
+        surface.move(mesh.vertices);
+        for (int i = 0; i < 200; ++i) {
+          Eigen::Vector3d query(uniform(random), uniform(random), uniform(random));
+          if (i % 2) query = mesh.vertices.row(i % mesh.vertices.rows()).transpose() + 0.01 * query;
+          const SurfacePoint nearest = surface.nearest(query);
+          // Rounding of coordinates of order one.
+          EXPECT_NEAR(nearest.distance, brute_force(query, mesh), 1e-12);
+          EXPECT_EQ(surface.nearest(query, i % static_cast<int>(mesh.triangles.rows())).distance,
+                    nearest.distance);
+        }
       }
     }
   }

@@ -1,0 +1,189 @@
+#include "apps/lift_benchmark.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+
+#include "data/error.h"
+#include "data/memory_limit.h"
+#include "data/parallel.h"
+#include "data/procedural_mesh.h"
+#include "data/text.h"
+#include "sim/newton/solver.h"
+#include "sim/step/elastic_energy.h"
+
+namespace flash::sim {
+namespace {
+
+constexpr double side = 0.4;  // [m]
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+// Radical inverse: with i / n the points of a Hammersley set, which spreads any number of materials evenly.
+double radical_inverse(int i) {
+  double value = 0;
+  for (double digit = 0.5; i > 0; i /= 2, digit *= 0.5) value += digit * (i % 2);
+  return value;
+}
+
+double between(double low, double high, double share) { return low * std::pow(high / low, share); }
+
+// Up by 0.35 m and inwards by 0.1 m in 3 s, without jerks.
+data::Trajectory lift_of(const Eigen::Vector3d& corner) {
+  data::Trajectory trajectory;
+  for (int k = 0; k <= 300; ++k) {
+    const double t = k / 300.0, s = t * t * t * (10 - 15 * t + 6 * t * t);
+    trajectory.times.push_back(3.0 * t);
+    trajectory.poses.push_back(
+        Eigen::Isometry3d(Eigen::Translation3d(corner + s * Eigen::Vector3d(-0.1, -0.1, 0.35))));
+  }
+  return trajectory;
+}
+
+Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet, int index) {
+  Environment environment;
+  data::SheetMaterial& material = environment.material;
+  material.membrane_stiffness = between(benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max,
+                                        (index + 0.5) / benchmark.environments);
+  material.bending_rigidity =
+      between(benchmark.bending_rigidity_min, benchmark.bending_rigidity_max, radical_inverse(index));
+  material.poissons_ratio = benchmark.poissons_ratio;
+  material.areal_density = benchmark.areal_density;
+  material.friction = benchmark.friction;
+  environment.obstacles.push_back({Plane{}, -1.0});
+  environment.state.positions = sheet.rest.vertices;
+  environment.state.velocities = data::Points::Zero(sheet.rest.vertices.rows(), 3);
+  Grasp grasp;
+  for (int i = 0; i < int(sheet.rest.vertices.rows()); ++i)
+    if (sheet.rest.vertices.row(i).head<2>().minCoeff() > side - 0.02) grasp.vertices.push_back(i);
+  grasp.gripper = lift_of(Eigen::Vector3d(side, side, 0));
+  environment.grasps.push_back(grasp);
+  return environment;
+}
+
+double milliseconds_of(const std::function<void()>& work) {
+  work();
+  int count = 0;
+  const auto start = std::chrono::steady_clock::now();
+  do {
+    work();
+    ++count;
+  } while (seconds_since(start) < 0.1);
+  return 1e3 * seconds_since(start) / count;
+}
+
+void check(const LiftBenchmark& benchmark) {
+  const auto increasing = [](const char* option, double low, double high) {
+    if (!(low <= high))
+      throw data::InputError(std::string("--") + option + "-max: found " + data::format_short(high) +
+                             ", expected at least the " + data::format_short(low) + " of --" + option +
+                             "-min");
+  };
+  increasing("young", benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max);
+  increasing("bending", benchmark.bending_rigidity_min, benchmark.bending_rigidity_max);
+  const int at_once = std::min(benchmark.threads, benchmark.environments);
+  const double needed = solver_bytes_per_vertex * benchmark.vertices * at_once;
+  const double limit = data::memory_limit();
+  if (limit > 0 && needed > limit)
+    throw data::InputError("--vertices: " + data::format_count(static_cast<std::size_t>(benchmark.vertices)) +
+                           " on " + std::to_string(at_once) + " threads take about " +
+                           data::format_count(static_cast<std::size_t>(needed / 1e6)) +
+                           " MB of memory, expected at most the " +
+                           data::format_count(static_cast<std::size_t>(limit / 1e6)) + " MB that there are");
+}
+
+}  // namespace
+
+LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std::atomic<bool>& stop) {
+  check(benchmark);
+  const int cells = std::max(1, int(std::lround(std::sqrt(double(benchmark.vertices)))) - 1);
+  data::RectangleMesh rectangle;
+  rectangle.width = rectangle.height = side;
+  rectangle.cells_x = rectangle.cells_y = cells;
+  const auto plan = make_sheet_plan(make_sheet(data::rectangle(rectangle)), benchmark.level);
+  const SolverSettings settings = [&] {
+    SolverSettings chosen;
+    chosen.time_step = benchmark.time_step;
+    chosen.tolerance = benchmark.tolerance;
+    return chosen;
+  }();
+
+  struct Counts {
+    long iterations = 0, solves = 0, factorizations = 0, converged = 0;
+    double residual_max = 0;
+    data::Points middle;  // positions halfway
+  };
+  std::vector<Counts> counts(benchmark.environments);
+  const auto start = std::chrono::steady_clock::now();
+  const auto count = static_cast<std::size_t>(benchmark.environments);
+  data::for_each_in_parallel(count, benchmark.threads, [&](std::size_t e) {
+    Environment environment = lift_environment(benchmark, plan->sheet, static_cast<int>(e));
+    Solver solver(plan, settings);
+    for (int k = 0; k < benchmark.steps; ++k) {
+      if (stop) throw data::Stopped();
+      const StepReport report = solver.step(environment);
+      counts[e].iterations += report.iterations;
+      counts[e].solves += report.solves;
+      counts[e].factorizations += report.factorizations;
+      counts[e].converged += report.converged;
+      counts[e].residual_max = worst(counts[e].residual_max, report.residual);
+      if (k == benchmark.steps / 2) counts[e].middle = environment.state.positions;
+    }
+  });
+  LiftBenchmarkResult result;
+  result.wall_seconds = seconds_since(start);
+  result.vertices = plan->pattern.size;
+  const double total = double(benchmark.environments) * benchmark.steps;
+  double solves = 0, factorizations = 0, converged = 0;
+  for (const Counts& c : counts) {
+    result.iterations += double(c.iterations) / total;
+    solves += double(c.solves) / total;
+    factorizations += double(c.factorizations) / total;
+    converged += double(c.converged);
+    result.residual_max = std::max(result.residual_max, c.residual_max);
+  }
+  result.converged_share = converged / total;
+  result.step_milliseconds =
+      1e3 * result.wall_seconds * std::min(benchmark.threads, benchmark.environments) / total;
+  if (total < 1) return result;
+
+  const data::SheetMaterial material =
+      lift_environment(benchmark, plan->sheet, benchmark.environments / 2).material;
+  const BendingOperator& bending = bending_operator(*plan, material.bending_model, material.poissons_ratio);
+  const data::Points& x = counts[benchmark.environments / 2].middle;
+  data::Points y = data::Points::Zero(x.rows(), 3);
+  BlockValues<double> values;
+  const auto assemble = [&](Curvature curvature) {
+    values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
+    add_elastic_hessian(*plan, bending, material, x, 1.0, curvature, values);
+    for (int i = 0; i < plan->pattern.size; ++i)
+      for (int c = 0; c < 3; ++c)
+        values[9L * i + 4 * c] +=
+            material.areal_density * plan->sheet.vertex_area[i] / (benchmark.time_step * benchmark.time_step);
+  };
+  BlockCholesky<float> factor(plan->symbolic, *plan->kernels);
+  SheetProduct<float> product(*plan->kernels);
+  const auto add = [&](const char* name, double calls, const std::function<void()>& phase) {
+    result.phases.push_back({name, calls, milliseconds_of(phase)});
+  };
+  add("energy and forces", result.iterations + 1,
+      [&] { add_elastic_gradient(*plan, bending, material, x, y); });
+  add("matrix", result.iterations, [&] {
+    assemble(Curvature::exact);
+    product.assign(plan->triangle_product, values, bending.elimination_stiffness, material.bending_rigidity);
+  });
+  add("factorization", factorizations, [&] {
+    assemble(Curvature::positive);
+    add_bending_stand_in(bending, material.bending_rigidity, values);
+    factor.factorize(values);
+  });
+  Eigen::VectorXf from = Eigen::VectorXf::Ones(y.size()), to = from;
+  add("triangular solves", solves, [&] { factor.solve_in_order(to.data()); });
+  add("matrix products", solves, [&] { product.multiply(from.data(), to.data()); });
+  return result;
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,49 @@
+#pragma once
+#include <atomic>
+#include <string>
+#include <vector>
+
+#include "sim/cpu/instruction_level.h"
+
+namespace flash::sim {
+
+/// Corner lift of a square towel of 0.4 m by many materials at once: E t and D spread over their ranges,
+/// evenly in the logarithm.
+struct LiftBenchmark {
+  int vertices = 1000;  ///< about; the mesh has the next square number
+  int environments = 64;
+  int steps = 250;
+  int threads = 1;
+  InstructionLevel level = highest_instruction_level();              ///< of the kernels
+  double time_step = 0.01;                                           ///< [s]
+  double tolerance = 1e-3;                                           ///< on |r| / |M g|
+  double membrane_stiffness_min = 10, membrane_stiffness_max = 300;  ///< E t [N/m]
+  double bending_rigidity_min = 1e-5, bending_rigidity_max = 1e-4;   ///< D [N m]
+  double poissons_ratio = 0.3;
+  double areal_density = 0.2;  ///< [kg/m^2]
+  double friction = 0.3;
+};
+
+/// One part of a step: how often it ran, and how long one run takes by itself on the towel in mid-air.
+struct BenchmarkPhase {
+  std::string name;
+  double calls_per_step;
+  double milliseconds_per_call;
+};
+
+struct LiftBenchmarkResult {
+  int vertices = 0;
+  double wall_seconds = 0;
+  double step_milliseconds = 0;  ///< wall time a step and environment, times the threads at work
+  double converged_share = 0;    ///< of environment-steps
+  double residual_max = 0;
+  double iterations = 0;  ///< Newton's, a step
+  std::vector<BenchmarkPhase>
+      phases;  ///< their sum leaves contact, line search and the rest of step_milliseconds
+};
+
+/// Throws data::InputError where a range ends below its start, or where the solvers at work need more memory
+/// than there is; data::Stopped within a step after `stop` is set.
+LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std::atomic<bool>& stop);
+
+}  // namespace flash::sim

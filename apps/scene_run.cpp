@@ -1,0 +1,316 @@
+#include "apps/scene_run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <future>
+#include <map>
+#include <memory>
+#include <set>
+#include <utility>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/memory_limit.h"
+#include "data/mesh_io.h"
+#include "data/text.h"
+#include "sim/newton/solver.h"
+#include "sim/oracle/projective.h"
+#include "sim/scene/scene.h"
+
+namespace flash::sim {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Advances an environment by one step.
+using Stepper = std::function<StepReport(Environment&)>;
+
+Stepper make_stepper(const data::SceneSolver& solver, double time_step, const SceneBody& body) {
+  if (solver.integrator == "newton") {
+    SolverSettings settings;
+    settings.time_step = time_step;
+    settings.max_iterations = solver.max_iterations;
+    settings.tolerance = solver.tolerance;
+    settings.exit_speed = solver.exit_speed;
+    return
+        [newton = std::make_shared<Solver>(body.sheet, settings)](Environment& e) { return newton->step(e); };
+  }
+  ProjectiveSettings settings;
+  settings.time_step = time_step;
+  settings.iterations = solver.max_iterations;
+  settings.tolerance = solver.tolerance;
+  settings.metric = solver.constraint_solver.starts_with("Lite")        ? ContactMetric::inertia
+                    : solver.constraint_solver.starts_with("NonSmooth") ? ContactMetric::full
+                                                                        : ContactMetric::automatic;
+  settings.constraints.iterations = solver.constraint_iterations;
+  settings.constraints.tolerance = solver.constraint_tolerance;
+  settings.constraints.max_force = solver.max_force;
+  settings.constraints.linear.solver = dual_solver_from_name(solver.constraint_linear_solver);
+  return [projective = std::make_shared<ProjectiveSolver>(body.sheet, settings)](Environment& e) {
+    return projective->step(e);
+  };
+}
+
+data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
+  data::TriangleMesh mesh;
+  Eigen::Index vertices = 0, triangles = 0;
+  for (const SceneBody& body : bodies) {
+    const data::Points& x = body.environment.state.positions;
+    const data::Triangles& t = body.sheet.rest.triangles;
+    mesh.vertices.conservativeResize(vertices + x.rows(), 3);
+    mesh.triangles.conservativeResize(triangles + t.rows(), 3);
+    mesh.vertices.bottomRows(x.rows()) = x;
+    mesh.triangles.bottomRows(t.rows()) = t.array() + int(vertices);
+    vertices += x.rows();
+    triangles += t.rows();
+  }
+  return mesh;
+}
+
+/// Without the last digits that adding up steps leaves.
+std::string time_text(double seconds) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.12g", seconds);
+  return text;
+}
+
+std::size_t vertices_of(const std::vector<SceneBody>& bodies) {
+  std::size_t vertices = 0;
+  for (const SceneBody& body : bodies) vertices += static_cast<std::size_t>(body.sheet.rest.vertices.rows());
+  return vertices;
+}
+
+void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies) {
+  const std::size_t vertices = vertices_of(bodies);
+  const double needed = solver_bytes_per_vertex * static_cast<double>(vertices), limit = data::memory_limit();
+  if (limit > 0 && needed > limit)
+    throw data::input_error(scene.source, "objects",
+                            data::format_count(vertices) + " vertices take about " +
+                                data::format_count(static_cast<std::size_t>(needed / 1e6)) +
+                                " MB of memory, expected at most the " +
+                                data::format_count(static_cast<std::size_t>(limit / 1e6)) +
+                                " MB that there are; a coarser mesh is needed");
+}
+
+std::string log_row(int step, double time, const std::vector<StepReport>& reports) {
+  StepReport largest, sum;
+  bool converged = true;
+  for (const StepReport& r : reports) {
+    largest.residual = worst(largest.residual, r.residual);
+    largest.penetration_max = worst(largest.penetration_max, r.penetration_max);
+    largest.substeps = std::max(largest.substeps, r.substeps);
+    largest.complementarity = worst(largest.complementarity, r.complementarity);
+    sum.iterations += r.iterations;
+    sum.kinetic += r.kinetic;
+    sum.membrane += r.membrane;
+    sum.bending += r.bending;
+    sum.potential += r.potential;
+    converged = converged && r.converged;
+  }
+  std::string row = std::to_string(step) + "," + time_text(time);
+  row += "," + data::format_number(largest.residual) + "," + std::to_string(sum.iterations);
+  for (double value : {largest.penetration_max, largest.complementarity, sum.kinetic,
+                       sum.membrane + sum.bending, sum.potential})
+    row += "," + data::format_number(value);
+  row += converged ? ",1" : ",0";
+  return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "," +
+         std::to_string(largest.substeps) + "\n";
+}
+
+std::string force_rows(double time, const std::vector<SceneBody>& bodies,
+                       const std::vector<StepReport>& reports) {
+  std::map<std::string, Vector3d> forces;
+  const auto add = [&](const std::string& body, const Vector3d& force) {
+    forces.try_emplace(body, Vector3d::Zero()).first->second += force;
+  };
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    for (std::size_t k = 0; k < reports[b].grasp_forces.size(); ++k)
+      add(bodies[b].grasp_names[k], reports[b].grasp_forces[k]);
+    for (std::size_t k = 0; k < reports[b].obstacle_forces.size(); ++k)
+      add(bodies[b].obstacle_names[k], reports[b].obstacle_forces[k]);
+    for (const Load& support : reports[b].fixed_forces)
+      for (int axis = 0; axis < 3; ++axis) {
+        const std::string& name = bodies[b].support_names.at(support.vertex)[axis];
+        if (!name.empty()) add(name, support.force[axis] * Vector3d::Unit(axis));
+      }
+  }
+  std::string rows;
+  for (const auto& [body, force] : forces) {
+    rows += time_text(time) + "," + body;
+    for (double component : force) rows += "," + data::format_number(component);
+    rows += "\n";
+  }
+  return rows;
+}
+
+/// The deepest vertex of a kind that a run has seen.
+struct Deepest {
+  Penetration penetration;
+  std::size_t body = 0;
+  double time = 0;  ///< at the end of its step [s]
+
+  void see(const Penetration& seen, std::size_t in_body, double at) {
+    if (seen.depth > penetration.depth) *this = {seen, in_body, at};
+  }
+  std::string place(const std::vector<SceneBody>& bodies) const {
+    const SceneBody& in = bodies[body];
+    return in.name + ": vertex " + std::to_string(penetration.vertex) + " is " +
+           data::format_short(1e3 * penetration.depth) + " mm inside " +
+           in.obstacle_names[static_cast<std::size_t>(penetration.obstacle)] + " at " +
+           data::format_short(time) + " s";
+  }
+};
+
+constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
+
+/// Who holds a vertex: an end effector, or a support.
+std::string holder_of(const SceneBody& body, int vertex) {
+  const auto& grasps = body.environment.grasps;
+  for (std::size_t k = 0; k < grasps.size(); ++k)
+    if (body.environment.state.grasp_offsets.size() > k &&
+        body.environment.state.grasp_offsets[k].rows() > 0 &&
+        std::count(grasps[k].vertices.begin(), grasps[k].vertices.end(), vertex) > 0)
+      return body.grasp_names[k];
+  return "a support";
+}
+
+std::set<int> frames_to_write(const data::Scene& scene, int steps) {
+  std::set<int> frames;
+  if (scene.keyframe_times.empty())
+    for (int k = 0; k <= steps; ++k) frames.insert(k);
+  for (double t : scene.keyframe_times) {
+    const long k = std::lround(t / scene.time_step);
+    if (k >= 0 && k <= steps) frames.insert(int(k));
+  }
+  return frames;
+}
+
+/// Takes away all velocity; returns the largest there was [m/s].
+double stop_motion(std::vector<SceneBody>& bodies) {
+  double fastest = 0;
+  for (SceneBody& body : bodies) {
+    data::Points& velocities = body.environment.state.velocities;
+    fastest = std::max(fastest, velocities.rowwise().norm().maxCoeff());
+    velocities.setZero();
+  }
+  return fastest;
+}
+
+}  // namespace
+
+SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std::string& output_dir) {
+  const auto start = std::chrono::steady_clock::now();
+  namespace fs = std::filesystem;
+  SceneSummary summary;
+  summary.notices = scene.notices;
+  std::vector<SceneBody> bodies = scene_bodies(scene, summary.notices);
+  check_memory(scene, bodies);
+  if (scene.steps_by_default && run.steps < 0)
+    summary.notices.push_back(scene.source + ": names no length: " + std::to_string(scene.steps) +
+                              " steps are run, the default");
+  if (run.notice)
+    for (const std::string& notice : summary.notices) run.notice(notice);
+
+  const auto begins = [&](const std::string& what) {
+    if (run.phase) run.phase(what);
+  };
+  const std::string size = data::format_count(vertices_of(bodies)) + " vertices";
+  begins("setting up " + size);
+  std::vector<Stepper> steppers;
+  for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
+
+  const int steps = run.steps >= 0 ? run.steps : scene.steps;
+  const std::set<int> frames = frames_to_write(scene, steps);
+  const auto write_frame = [&](int step, const data::TriangleMesh& mesh) {
+    char name[32];
+    std::snprintf(name, sizeof name, "%06d.ply", step);
+    data::save_triangle_mesh(mesh, (fs::path(output_dir) / "frames" / name).string());
+    ++summary.frames;
+  };
+  std::string log =
+      "step,t,residual,iterations,penetration_max_m,complementarity,kinetic_J,elastic_J,potential_J,"
+      "converged,membrane_J,bending_J,substeps\n";
+  std::string forces = "t,body,fx,fy,fz\n";
+  const auto write_tables = [&] {
+    data::write_atomically((fs::path(output_dir) / "log.csv").string(), log);
+    data::write_atomically((fs::path(output_dir) / "forces.csv").string(), forces);
+  };
+
+  std::vector<StepReport> reports(bodies.size());
+  Deepest held, started;
+  std::string holder;
+  const data::TriangleMesh at_start = merged(bodies);
+  const auto begin_writing = [&] {
+    fs::remove_all(fs::path(output_dir) / "frames");
+    if (frames.count(0)) write_frame(0, at_start);
+  };
+  try {
+    if (steps == 0) begin_writing();
+    if (run.progress && !run.progress(0, steps)) summary.interrupted = steps > 0;
+    bool done = false;
+    begins("solving the first step of " + size);
+    for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
+      bool arrived = true;
+      for (SceneBody& body : bodies) {
+        close_pending_grasps(body);
+        arrived = move_supports(body, body.environment.state.time + scene.time_step) && arrived;
+      }
+      std::vector<std::future<void>> pending;
+      const auto advance = [&](std::size_t b) { reports[b] = steppers[b](bodies[b].environment); };
+      for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (run.threads > 1 && b + 1 < bodies.size())
+          pending.push_back(std::async(std::launch::async, advance, b));
+        else
+          advance(b);
+      for (std::future<void>& other : pending) other.get();
+      if (step == 1) begin_writing();  // what the first step refuses leaves nothing behind
+
+      const double time = bodies.empty() ? step * scene.time_step : bodies.front().environment.state.time;
+      log += log_row(step, time, reports);
+      forces += force_rows(time, bodies, reports);
+      bool converged = true, halved = false;
+      for (std::size_t b = 0; b < reports.size(); ++b) {
+        const StepReport& report = reports[b];
+        converged = converged && report.converged;
+        halved = halved || report.substeps > 1;
+        started.see(report.start_penetration, b, time - scene.time_step);
+        if (report.held_penetration.depth > held.penetration.depth)
+          holder = holder_of(bodies[b], report.held_penetration.vertex);
+        held.see(report.held_penetration, b, time);
+        summary.residual_max = worst(summary.residual_max, report.residual);
+        summary.penetration_max = worst(summary.penetration_max, report.penetration_max);
+        summary.iterations += report.iterations;
+      }
+      summary.unconverged_steps += !converged;
+      summary.halved_steps += halved;
+      summary.steps = step;
+      if (scene.rest_motion) {
+        summary.last_motion = scene.time_step * stop_motion(bodies);
+        done = summary.at_rest = arrived && summary.last_motion <= *scene.rest_motion;
+      }
+      if (frames.count(step) || (scene.rest_motion && (done || step == steps)))
+        write_frame(step, merged(bodies));
+      if (run.progress && !run.progress(step, steps)) summary.interrupted = step < steps;
+    }
+  } catch (...) {
+    if (summary.steps > 0) write_tables();
+    throw;
+  }
+  write_tables();
+  summary.held_penetration_max = held.penetration.depth;
+  summary.start_penetration_max = started.penetration.depth;
+  if (held.penetration.depth > told_depth)
+    summary.warnings.push_back(held.place(bodies) + ", where " + holder +
+                               " holds it: is the height of the obstacle right, or the path?");
+  if (started.penetration.depth > told_depth)
+    summary.warnings.push_back(started.place(bodies) + ", where a step starts: the obstacle lets it out at " +
+                               data::format_short(scene.solver.exit_speed) +
+                               " m/s; start outside, and leave room where obstacles close");
+  summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return summary;
+}
+
+}  // namespace flash::sim

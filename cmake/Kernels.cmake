@@ -1,0 +1,27 @@
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
+  set(FLASH_LEVELS v2 v3 v4)
+else()
+  set(FLASH_LEVELS generic)
+endif()
+
+# flash_kernels(<target> <sources>...): adds the sources once for each instruction level, in a namespace FLASH_LEVEL of
+# its own; the program chooses at run time (sim/cpu/instruction_level.h). They share no inline code with other sources.
+function(flash_kernels target)
+  foreach(level IN LISTS FLASH_LEVELS)
+    set(objects ${target}_${level})
+    add_library(${objects} OBJECT ${ARGN})
+    set_target_properties(${objects} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    target_include_directories(${objects} PRIVATE ${PROJECT_SOURCE_DIR})
+    target_link_libraries(${objects} PRIVATE flash_options)
+    target_compile_definitions(${objects} PRIVATE FLASH_LEVEL=${level})
+    # Multiply-adds are fused wherever the level has them; square roots set no errno, so that they vectorize.
+    target_compile_options(${objects} PRIVATE -ffp-contract=fast -fno-math-errno -Wno-psabi)
+    if(NOT level STREQUAL generic)
+      target_compile_options(${objects} PRIVATE -march=x86-64-${level})
+    endif()
+    if(level STREQUAL v4)
+      target_compile_options(${objects} PRIVATE -mprefer-vector-width=512)
+    endif()
+    target_sources(${target} PRIVATE $<TARGET_OBJECTS:${objects}>)
+  endforeach()
+endfunction()

@@ -1,0 +1,86 @@
+#include "sim/cpu/instruction_level.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+#include "sim/cpu/kernels.h"
+
+namespace flash::sim {
+
+const char* to_string(InstructionLevel level) {
+  switch (level) {
+    case InstructionLevel::v2:
+      return "x86-64-v2";
+    case InstructionLevel::v3:
+      return "x86-64-v3";
+    case InstructionLevel::v4:
+      return "x86-64-v4";
+    default:
+      return "generic";
+  }
+}
+
+#ifdef __x86_64__
+
+// Compiled from sim/kernels for each of them.
+namespace v2 {
+extern const Kernels kernels;
+}
+namespace v3 {
+extern const Kernels kernels;
+}
+namespace v4 {
+extern const Kernels kernels;
+}
+
+namespace {
+
+const Kernels& compiled_for(InstructionLevel level) {
+  return level == InstructionLevel::v4   ? v4::kernels
+         : level == InstructionLevel::v3 ? v3::kernels
+                                         : v2::kernels;
+}
+
+}  // namespace
+
+std::vector<InstructionLevel> instruction_levels() {
+  std::vector<InstructionLevel> levels = {InstructionLevel::v2};
+  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("fma") || !__builtin_cpu_supports("bmi") ||
+      !__builtin_cpu_supports("bmi2"))
+    return levels;
+  levels.push_back(InstructionLevel::v3);
+  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+      __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
+      __builtin_cpu_supports("avx512vl"))
+    levels.push_back(InstructionLevel::v4);
+  return levels;
+}
+
+#else
+
+namespace generic {
+extern const Kernels kernels;
+}
+
+namespace {
+
+const Kernels& compiled_for(InstructionLevel) { return generic::kernels; }
+
+}  // namespace
+
+std::vector<InstructionLevel> instruction_levels() { return {InstructionLevel::generic}; }
+
+#endif
+
+InstructionLevel highest_instruction_level() { return instruction_levels().back(); }
+
+const Kernels& kernels_of(InstructionLevel level) {
+  const std::vector<InstructionLevel> levels = instruction_levels();
+  if (std::find(levels.begin(), levels.end(), level) == levels.end())
+    throw std::invalid_argument("this machine does not have the instructions of " +
+                                std::string(to_string(level)));
+  return compiled_for(level);
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,103 @@
+#pragma once
+#include "sim/cpu/triangle_group.h"
+#include "sim/law/membrane_law.h"
+
+namespace flash::sim {
+
+// What the kernels in sim/kernels read and write: plain arrays alone, since code that they shared with other
+// sources could be compiled for more than the machine has. Vertices are in elimination order.
+
+/// Rows of a front, of its update matrix alike, are padded to a multiple of this: whole vectors at every
+/// level.
+inline constexpr int front_padding = 16;
+
+/// A supernode: vertices eliminated together, and those below them that they touch.
+struct Front {
+  int first_column, column_count;  ///< own vertices
+  int first_row, row_count;        ///< below them: in FrontTree::rows and rows_in_parent
+  int first_child, child_count;    ///< in FrontTree::children
+  int first_block, block_count;    ///< matrix blocks that enter it, in FrontTree::blocks
+  int padded_rows;                 ///< of its columns, 3 a vertex, whole vectors
+  int padded_update_rows;          ///< of its update matrix
+  long columns_at;                 ///< its columns [L11; L21] in the factor
+  long built_at, update_at;        ///< its update matrix on the stack: where it is made, and where it waits
+};
+
+/// A block of the matrix in a front.
+struct FrontBlock {
+  int row, column;  ///< in vertices of the front
+  int transposed;
+  int source;  ///< block of the BlockPattern
+};
+
+/// The elimination tree in the order of elimination.
+struct FrontTree {
+  int front_count;
+  const Front* fronts;
+  const int* rows;            ///< vertices, ascending in each front
+  const int* rows_in_parent;  ///< their places in the parent's front
+  const int* children;
+  const FrontBlock* blocks;
+};
+
+/// Rows of 3 x 3 blocks.
+struct BlockRows {
+  int size;
+  const int* starts;   ///< of each row in `columns`, and their end
+  const int* columns;  ///< vertices
+};
+
+/// Rows four at a time, as in RowGroups.
+struct FourRows {
+  int size;
+  const int* rows;     ///< four a group, -1 where there are fewer
+  const int* starts;   ///< of each group in `columns`, and their end
+  const int* columns;  ///< vertices
+};
+
+template <typename Scalar>
+struct LinearKernels {
+  /// Cholesky factorization of the matrix blocks `values`: columns of the fronts, and the inverses of the
+  /// diagonal 3 x 3 blocks of L, 6 numbers a vertex. Returns false at a pivot that is not positive.
+  bool (*factorize)(const FrontTree& tree, const double* values, Scalar* factor, Scalar* stack,
+                    Scalar* inverses);
+  /// x <- (L L^T)^-1 x, three numbers a vertex. `front`: memory for the largest front.
+  void (*solve)(const FrontTree& tree, const Scalar* factor, const Scalar* inverses, Scalar* front,
+                Scalar* x);
+  /// Three columns of four numbers for each block, from blocks of nine, transposed where `turned`.
+  void (*copy_blocks)(int count, const int* sources, const char* turned, const double* from, Scalar* to);
+  /// y = B x of such blocks, and `padded` = x with four numbers a vertex.
+  void (*multiply_blocks)(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* padded,
+                          Scalar* y);
+  /// y += scale S x, S scalar: four values a column. x: four numbers a vertex, y: three.
+  void (*add_rows)(const FourRows& groups, const Scalar* values, Scalar scale, const Scalar* x, Scalar* y);
+  Scalar (*dot)(long size, const Scalar* x, const Scalar* y);
+  /// y += a x.
+  void (*add_scaled)(long size, Scalar a, const Scalar* x, Scalar* y);
+  /// y = x + b y.
+  void (*scale_and_add)(long size, Scalar b, const Scalar* x, Scalar* y);
+};
+
+/// The loops that take the time of a step, compiled for one InstructionLevel.
+struct Kernels {
+  LinearKernels<float> single_precision;
+  LinearKernels<double> double_precision;
+
+  /// Energy of the triangles [J]; adds its gradient. Three numbers a vertex.
+  double (*add_membrane_gradient)(MembraneLaw law, const SheetLame& lame, const TriangleGroup* groups,
+                                  long count, const double* positions, double* gradient);
+  /// Adds `scale` times its Hessian to blocks of nine numbers; `positive`: without negative eigenvalues.
+  void (*add_membrane_hessian)(MembraneLaw law, const SheetLame& lame, const TriangleGroup* groups,
+                               long count, const double* positions, double scale, bool positive,
+                               double* values);
+};
+
+template <typename Scalar>
+const LinearKernels<Scalar>& linear(const Kernels& kernels) {
+  if constexpr (sizeof(Scalar) == sizeof(float))
+    return kernels.single_precision;
+  else
+    return kernels.double_precision;
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,183 @@
+#pragma once
+#include "sim/law/lanes.h"
+
+namespace flash::sim {
+inline namespace FLASH_LEVEL {
+
+// Dense kernels of the multifrontal factorization. Column-major, leading dimensions a multiple of
+// `front_padding`, so that a column is whole vectors; what the padding rows hold is never read as an entry.
+
+template <typename Scalar>
+struct VectorOf {
+  typedef Scalar type __attribute__((vector_size(vector_bytes), aligned(sizeof(Scalar))));
+};
+
+template <typename Scalar>
+Scalar sum_of_lanes(typename VectorOf<Scalar>::type vector) {
+  Scalar halves[lanes_of<Scalar>];
+  memcpy(halves, &vector, sizeof(vector));
+  for (int width = lanes_of<Scalar> / 2; width > 0; width /= 2)
+    for (int lane = 0; lane < width; ++lane) halves[lane] += halves[lane + width];
+  return halves[0];
+}
+
+/// C(i, j) -= sum_k A(i, k) B(j, k) for `Width` columns j and whole vectors of rows [first_row, end_row): 2 x
+/// Width register tiles, 2 loads and Width broadcasts for 2 Width multiply-adds.
+template <int Width, typename Scalar>
+void subtract_product(Scalar* c, int ldc, const Scalar* a, const Scalar* b, int lda, int depth, int first_row,
+                      int end_row) {
+  using Vector = typename VectorOf<Scalar>::type;
+  constexpr int step = lanes_of<Scalar>;
+  int row = first_row;
+  for (; row + 2 * step <= end_row; row += 2 * step) {
+    Vector low[Width], high[Width];
+    for (int j = 0; j < Width; ++j) low[j] = high[j] = Vector{};
+    for (int k = 0; k < depth; ++k) {
+      const Scalar* column = a + static_cast<long>(k) * lda + row;
+      const Vector a_low = *reinterpret_cast<const Vector*>(column);
+      const Vector a_high = *reinterpret_cast<const Vector*>(column + step);
+      const Scalar* factors = b + static_cast<long>(k) * lda;
+#pragma GCC unroll 6
+      for (int j = 0; j < Width; ++j) {
+        low[j] += a_low * factors[j];
+        high[j] += a_high * factors[j];
+      }
+    }
+    for (int j = 0; j < Width; ++j) {
+      Scalar* target = c + static_cast<long>(j) * ldc + row;
+      *reinterpret_cast<Vector*>(target) -= low[j];
+      *reinterpret_cast<Vector*>(target + step) -= high[j];
+    }
+  }
+  for (; row < end_row; row += step) {
+    Vector sum[Width];
+    for (int j = 0; j < Width; ++j) sum[j] = Vector{};
+    for (int k = 0; k < depth; ++k) {
+      const Vector a_row = *reinterpret_cast<const Vector*>(a + static_cast<long>(k) * lda + row);
+      const Scalar* factors = b + static_cast<long>(k) * lda;
+#pragma GCC unroll 6
+      for (int j = 0; j < Width; ++j) sum[j] += a_row * factors[j];
+    }
+    for (int j = 0; j < Width; ++j)
+      *reinterpret_cast<Vector*>(c + static_cast<long>(j) * ldc + row) -= sum[j];
+  }
+}
+
+/// Cholesky of the leading `columns` (a multiple of 3) of a front of `padded_rows` rows: on return the lower
+/// trapezoid holds [L11; L21]. Returns false at a pivot that is not positive.
+template <typename Scalar>
+bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
+  for (int panel = 0; panel < columns;) {
+    const int width = columns - panel >= 6 ? 6 : 3;
+    const int first = panel / lanes_of<Scalar> * lanes_of<Scalar>;
+    Scalar* target = front + static_cast<long>(panel) * padded_rows;
+    if (width == 6)
+      subtract_product<6>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
+    else
+      subtract_product<3>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
+    for (int j = panel; j < panel + width; ++j) {
+      Scalar* column = front + static_cast<long>(j) * padded_rows;
+      const Scalar pivot = column[j];
+      if (!(pivot > 0)) return false;
+      const Scalar scale = 1 / square_root(pivot);
+      for (int i = j; i < padded_rows; ++i) column[i] *= scale;
+      for (int k = j + 1; k < panel + width; ++k) {
+        Scalar* later = front + static_cast<long>(k) * padded_rows;
+        const Scalar factor = column[k];
+        for (int i = k; i < padded_rows; ++i) later[i] -= factor * column[i];
+      }
+    }
+    panel += width;
+  }
+  return true;
+}
+
+/// update -= L21 L21^T on the lower triangle; L21 starts `columns` rows down the front. `rows` a multiple
+/// of 3. Reads up to a vector past the front's last column.
+template <typename Scalar>
+void subtract_outer_product(Scalar* update, int padded_update_rows, int rows, const Scalar* front,
+                            int padded_rows, int columns) {
+  const Scalar* below = front + columns;
+  for (int j = 0; j < rows;) {
+    const int width = rows - j >= 6 ? 6 : 3;
+    const int first = j / lanes_of<Scalar> * lanes_of<Scalar>;
+    Scalar* target = update + static_cast<long>(j) * padded_update_rows;
+    if (width == 6)
+      subtract_product<6>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
+                          padded_update_rows);
+    else
+      subtract_product<3>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
+                          padded_update_rows);
+    j += width;
+  }
+}
+
+/// Takes the diagonal 3 x 3 blocks out of a factorized front: their inverses (6 numbers each, lower triangle
+/// row by row) go to `inverses`, and every entry on or above them becomes zero. Solves then run over whole
+/// aligned vectors.
+template <typename Scalar>
+void extract_diagonal(Scalar* front, int padded_rows, int columns, Scalar* inverses) {
+  for (int j = 0; j < columns; j += 3, inverses += 6) {
+    Scalar* l0 = front + static_cast<long>(j) * padded_rows;
+    Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
+    const Scalar d0 = 1 / l0[j], d1 = 1 / l1[j + 1], d2 = 1 / l2[j + 2];
+    inverses[0] = d0;
+    inverses[1] = -l0[j + 1] * d0 * d1;
+    inverses[2] = d1;
+    inverses[3] = (l0[j + 1] * l1[j + 2] * d1 - l0[j + 2]) * d0 * d2;
+    inverses[4] = -l1[j + 2] * d1 * d2;
+    inverses[5] = d2;
+    for (int i = 0; i < j + 3; ++i) l0[i] = l1[i] = l2[i] = 0;
+  }
+}
+
+// One right-hand side through a front, in place: x holds the front's own entries, then those below, then
+// zeros up to `padded_rows`. Three columns at a time.
+
+/// x <- [L11^-1 x_own; x_below - L21 L11^-1 x_own].
+template <typename Scalar>
+void solve_forward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
+  using Vector = typename VectorOf<Scalar>::type;
+  for (int j = 0; j < columns; j += 3, inverses += 6) {
+    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
+    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
+    const Scalar x0 = inverses[0] * x[j];
+    const Scalar x1 = inverses[1] * x[j] + inverses[2] * x[j + 1];
+    const Scalar x2 = inverses[3] * x[j] + inverses[4] * x[j + 1] + inverses[5] * x[j + 2];
+    x[j] = x0;
+    x[j + 1] = x1;
+    x[j + 2] = x2;
+    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
+      Vector& target = *reinterpret_cast<Vector*>(x + i);
+      target -= *reinterpret_cast<const Vector*>(l0 + i) * x0 +
+                *reinterpret_cast<const Vector*>(l1 + i) * x1 + *reinterpret_cast<const Vector*>(l2 + i) * x2;
+    }
+  }
+}
+
+/// x_own <- L11^-T (x_own - L21^T x_below).
+template <typename Scalar>
+void solve_backward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
+  using Vector = typename VectorOf<Scalar>::type;
+  inverses += 2 * columns;
+  for (int j = columns - 3; j >= 0; j -= 3) {
+    inverses -= 6;
+    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
+    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
+    Vector sum0{}, sum1{}, sum2{};
+    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
+      const Vector below = *reinterpret_cast<const Vector*>(x + i);
+      sum0 += *reinterpret_cast<const Vector*>(l0 + i) * below;
+      sum1 += *reinterpret_cast<const Vector*>(l1 + i) * below;
+      sum2 += *reinterpret_cast<const Vector*>(l2 + i) * below;
+    }
+    const Scalar x0 = x[j] - sum_of_lanes<Scalar>(sum0), x1 = x[j + 1] - sum_of_lanes<Scalar>(sum1),
+                 x2 = x[j + 2] - sum_of_lanes<Scalar>(sum2);
+    x[j] = inverses[0] * x0 + inverses[1] * x1 + inverses[3] * x2;
+    x[j + 1] = inverses[2] * x1 + inverses[4] * x2;
+    x[j + 2] = inverses[5] * x2;
+  }
+}
+
+}  // namespace FLASH_LEVEL
+}  // namespace flash::sim

@@ -1,0 +1,133 @@
+#pragma once
+#ifdef __AVX512F__
+#include <immintrin.h>
+#endif
+
+#include "sim/cpu/kernels.h"
+#include "sim/law/lanes.h"
+
+namespace flash::sim {
+inline namespace FLASH_LEVEL {
+
+/// Four numbers: those of a vertex, and one more.
+template <typename Scalar>
+struct FourOf {
+  typedef Scalar type __attribute__((vector_size(4 * sizeof(Scalar))));
+};
+
+template <typename Scalar>
+typename FourOf<Scalar>::type load_four(const Scalar* numbers) {
+  typename FourOf<Scalar>::type four;
+  memcpy(&four, numbers, sizeof(four));
+  return four;
+}
+template <typename Scalar>
+void store_four(const typename FourOf<Scalar>::type& four, Scalar* numbers) {
+  memcpy(numbers, &four, sizeof(four));
+}
+
+template <typename Scalar>
+void copy_blocks(int count, const int* sources, const char* turned, const double* from, Scalar* to) {
+  for (int k = 0; k < count; ++k, to += 12) {
+    const double* block = from + 9L * sources[k];
+    if (turned[k]) {
+      for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) to[4 * c + r] = static_cast<Scalar>(block[3 * r + c]);
+    } else {
+      for (int c = 0; c < 3; ++c)
+        for (int r = 0; r < 3; ++r) to[4 * c + r] = static_cast<Scalar>(block[3 * c + r]);
+    }
+  }
+}
+
+template <typename Scalar>
+void multiply_blocks(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* padded,
+                     Scalar* y) {
+  using Four = typename FourOf<Scalar>::type;
+  for (int i = 0; i < rows.size; ++i)
+    for (int c = 0; c < 3; ++c) padded[4L * i + c] = x[3L * i + c];
+  for (int i = 0; i < rows.size; ++i) {
+    Four sum{}, even{}, odd{};
+    for (int k = rows.starts[i]; k < rows.starts[i + 1]; ++k) {
+      const Scalar *block = blocks + 12L * k, *from = padded + 4L * rows.columns[k];
+      sum += load_four(block) * from[0];
+      even += load_four(block + 4) * from[1];
+      odd += load_four(block + 8) * from[2];
+    }
+    sum += even + odd;
+    for (int c = 0; c < 3; ++c) y[3L * i + c] = sum[c];
+  }
+}
+
+/// What a group's columns `first` to `end` contribute: four numbers for each of four rows.
+template <typename Scalar>
+void sum_columns(const int* columns, const Scalar* values, int first, int end, const Scalar* x,
+                 Scalar* sums) {
+  using Four = typename FourOf<Scalar>::type;
+  Four rows[4] = {};
+  for (int k = first; k < end; ++k) {
+    const Four vertex = load_four(x + 4L * columns[k]);
+    for (int row = 0; row < 4; ++row) rows[row] += values[4L * k + row] * vertex;
+  }
+  for (int row = 0; row < 4; ++row) store_four(rows[row], sums + 4 * row);
+}
+
+#ifdef __AVX512F__
+/// In one vector for all four rows: two loads and a permutation for sixteen multiply-adds.
+template <>
+inline void sum_columns(const int* columns, const float* values, int first, int end, const float* x,
+                        float* sums) {
+  const __m512i row_of_lane = _mm512_setr_epi32(0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3);
+  __m512 partial[4] = {_mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps(), _mm512_setzero_ps()};
+  const auto add = [&](int k, __m512& sum) {
+    const __m512 entries = _mm512_castps128_ps512(_mm_loadu_ps(values + 4L * k));
+    sum = _mm512_fmadd_ps(_mm512_permutexvar_ps(row_of_lane, entries),
+                          _mm512_broadcast_f32x4(_mm_loadu_ps(x + 4L * columns[k])), sum);
+  };
+  int k = first;
+  for (; k + 3 < end; k += 4)
+    for (int part = 0; part < 4; ++part) add(k + part, partial[part]);
+  for (; k < end; ++k) add(k, partial[0]);
+  _mm512_storeu_ps(sums, (partial[0] + partial[1]) + (partial[2] + partial[3]));
+}
+#endif
+
+template <typename Scalar>
+void add_rows(const FourRows& groups, const Scalar* values, Scalar scale, const Scalar* x, Scalar* y) {
+  for (int g = 0; g < groups.size; ++g) {
+    Scalar sums[16];
+    sum_columns(groups.columns, values, groups.starts[g], groups.starts[g + 1], x, sums);
+    for (int member = 0; member < 4; ++member) {
+      const int row = groups.rows[4L * g + member];
+      if (row < 0) break;
+      for (int c = 0; c < 3; ++c) y[3L * row + c] += scale * sums[4 * member + c];
+    }
+  }
+}
+
+/// Sixteen sums, whatever the vector: the same order at every level.
+template <typename Scalar>
+Scalar dot(long size, const Scalar* x, const Scalar* y) {
+  constexpr int width = 16;
+  Scalar sums[width] = {};
+  long i = 0;
+  for (; i + width <= size; i += width)
+    for (int k = 0; k < width; ++k) sums[k] += x[i + k] * y[i + k];
+  for (int k = 0; i < size; ++i, ++k) sums[k] += x[i] * y[i];
+  for (int half = width / 2; half > 0; half /= 2)
+    for (int k = 0; k < half; ++k) sums[k] += sums[k + half];
+  return sums[0];
+}
+
+template <typename Scalar>
+void add_scaled(long size, Scalar a, const Scalar* x, Scalar* y) {
+  for (long i = 0; i < size; ++i) y[i] += a * x[i];
+}
+
+template <typename Scalar>
+void scale_and_add(long size, Scalar b, const Scalar* x, Scalar* y) {
+  for (long i = 0; i < size; ++i) y[i] = x[i] + b * y[i];
+}
+
+}  // namespace FLASH_LEVEL
+}  // namespace flash::sim

@@ -1,0 +1,34 @@
+#pragma once
+#include <Eigen/SparseCore>
+#include <array>
+#include <vector>
+
+#include "sim/cpu/instruction_level.h"
+
+namespace flash::sim {
+
+/// A sparse matrix over vertices that acts on each coordinate alike. Its rows go four at a time over the
+/// columns that any of them has (block compressed rows, blocks of 4 x 1): rows next to each other share most
+/// of their columns, and a vertex that was loaded serves four rows.
+struct RowGroups {
+  std::vector<std::array<int, 4>> rows;  ///< of each group; -1 where there are fewer
+  std::vector<int> starts;               ///< of each group in `columns`, and their end
+  std::vector<int> columns;
+  std::vector<double> values;  ///< four a column, one for each row of the group
+  std::vector<float> single_values;
+
+  bool empty() const { return rows.empty(); }
+};
+
+/// `position`: the number of each vertex in the result.
+RowGroups row_groups(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix,
+                     const std::vector<int>& position);
+
+/// y += scale * S x. x: four numbers a vertex, the last any; y: three.
+template <typename Scalar>
+void add_product(const Kernels& kernels, const RowGroups& matrix, Scalar scale, const Scalar* x, Scalar* y);
+
+extern template void add_product(const Kernels&, const RowGroups&, float, const float*, float*);
+extern template void add_product(const Kernels&, const RowGroups&, double, const double*, double*);
+
+}  // namespace flash::sim

@@ -1,0 +1,58 @@
+#include "sim/cpu/sheet_product.h"
+
+#include "sim/cpu/kernels.h"
+
+namespace flash::sim {
+
+ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
+                               const std::vector<int>& position) {
+  struct Entry {
+    int column, source;
+    bool turned;
+  };
+  std::vector<std::vector<Entry>> rows(pattern.size);
+  for (int vertex = 0; vertex < pattern.size; ++vertex)
+    rows[position[vertex]].push_back({position[vertex], vertex, false});
+  for (size_t k = 0; k < pair_count; ++k) {
+    const int row = position[pattern.pairs[k].first], column = position[pattern.pairs[k].second];
+    const int source = pattern.size + static_cast<int>(k);
+    rows[row].push_back({column, source, false});
+    rows[column].push_back({row, source, true});
+  }
+  ProductPattern product;
+  product.starts.push_back(0);
+  for (const auto& row : rows) {
+    for (const Entry& entry : row) {
+      product.columns.push_back(entry.column);
+      product.sources.push_back(entry.source);
+      product.turned.push_back(entry.turned);
+    }
+    product.starts.push_back(static_cast<int>(product.columns.size()));
+  }
+  return product;
+}
+
+template <typename Scalar>
+void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValues<double>& values,
+                                  const RowGroups& scalar_part, double scale) {
+  pattern_ = &pattern;
+  scalar_part_ = &scalar_part;
+  scale_ = static_cast<Scalar>(scale);
+  blocks_.resize(12 * pattern.sources.size());
+  padded_.resize(4 * (pattern.starts.size() - 1));
+  linear<Scalar>(*kernels_).copy_blocks(static_cast<int>(pattern.sources.size()), pattern.sources.data(),
+                                        pattern.turned.data(), values.data(), blocks_.data());
+}
+
+template <typename Scalar>
+void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
+  const BlockRows rows = {static_cast<int>(pattern_->starts.size()) - 1, pattern_->starts.data(),
+                          pattern_->columns.data()};
+  linear<Scalar>(*kernels_).multiply_blocks(rows, blocks_.data(), x, padded_.data(), y);
+  add_product(*kernels_, *scalar_part_, scale_, padded_.data(), y);
+}
+
+template class SheetProduct<float>;
+template class SheetProduct<double>;
+
+}  // namespace flash::sim

@@ -1,0 +1,46 @@
+#pragma once
+#include <vector>
+
+#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/row_groups.h"
+
+namespace flash::sim {
+
+/// Where the blocks of a BlockPattern stand in the rows of a product: both triangles of the matrix, vertices
+/// in elimination order.
+struct ProductPattern {
+  std::vector<int> starts;   ///< of each row in the lists below, and their end
+  std::vector<int> columns;  ///< elimination position of the column's vertex
+  std::vector<int> sources;  ///< block of the BlockPattern
+  std::vector<char> turned;  ///< whether the source is the transpose
+};
+
+/// Of the diagonal and the first `pair_count` pairs.
+ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
+                               const std::vector<int>& elimination_position);
+
+/// y = (B + s S) x over the vertices of a sheet in elimination order, three numbers a vertex: B of 3 x 3
+/// blocks, S scalar. A block is three columns of four numbers, so that a column is one vector multiply-add.
+template <typename Scalar>
+class SheetProduct {
+ public:
+  explicit SheetProduct(const Kernels& kernels) : kernels_(&kernels) {}
+
+  /// The scalar part may be empty; the arguments but `values` have to outlive the product.
+  void assign(const ProductPattern& pattern, const BlockValues<double>& values, const RowGroups& scalar_part,
+              double scale);
+  void multiply(const Scalar* x, Scalar* y);
+
+ private:
+  const Kernels* kernels_;
+  const ProductPattern* pattern_ = nullptr;
+  const RowGroups* scalar_part_ = nullptr;
+  Scalar scale_ = 0;
+  AlignedStorage<Scalar> blocks_;  ///< 12 numbers each
+  AlignedStorage<Scalar> padded_;  ///< x, four numbers a vertex
+};
+
+extern template class SheetProduct<float>;
+extern template class SheetProduct<double>;
+
+}  // namespace flash::sim

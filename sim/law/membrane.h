@@ -1,0 +1,55 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "data/material.h"
+#include "sim/law/membrane_law.h"
+
+namespace flash::sim {
+
+using Matrix32 = Eigen::Matrix<double, 3, 2>;
+using Matrix66 = Eigen::Matrix<double, 6, 6>;
+
+/// mu = E t / (2 (1 + nu)), lambda = E t nu / (1 - nu^2), from E t [N/m].
+/// Throws data::InputError unless E t > 0 and -1 < nu < 1.
+SheetLame sheet_lame(double membrane_stiffness, double poissons_ratio);
+
+// Membranes are isotropic: with s1 >= s2 >= 0 the singular values of the 3 x 2 deformation gradient F,
+//   tri_arap        mu (e1^2 + e2^2),  e_i = s_i - 1
+//   tri_corotated   mu (e1^2 + e2^2) + lambda/2 (e1 + e2)^2
+//   tri_stvk        mu |S|^2 + lambda/2 tr(S)^2,  S = (F^T F - I)/2
+//   tri_neohookean  mu/2 (s1^2 + s2^2 - 2) - mu ln J + lambda/2 ln(J)^2,  J = s1 s2 (infinite at J = 0)
+// All are per rest area [N/m]; a derivative by F is taken by vec(F) = (first column, second column).
+// The functions throw data::InputError on a tet_* model.
+
+/// A law with the parameters that it takes.
+struct Membrane {
+  MembraneLaw law;
+  SheetLame lame;
+};
+Membrane membrane_of(data::Constitutive constitutive, const SheetLame& lame);
+
+/// Energy per rest area [N/m].
+double membrane_energy_density(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
+
+/// First Piola-Kirchhoff stress P = dPsi/dF [N/m].
+Matrix32 membrane_stress(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
+
+/// Exact d vec(P) / d vec(F) [N/m]. Undefined where s2 = 0, except for tri_stvk.
+Matrix66 membrane_hessian(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
+
+/// The same with negative eigenvalues set to zero: positive semi-definite at every F, s2 = 0 included. The
+/// eigenvectors of an isotropic energy are known from the singular vectors of F (Smith, de Goes, Kim 2019,
+/// "Analytic eigensystems for isotropic distortion energies", sec. 4): a 2 x 2 scaling block, twist, flip,
+/// and one rotation out of the plane for each singular value.
+Matrix66 membrane_hessian_projected(data::Constitutive constitutive, const Matrix32& F,
+                                    const SheetLame& lame);
+
+/// `positive`: negative eigenvalues set to zero.
+enum class Curvature { exact, positive };
+
+/// Energy, stress and (unless null) the Hessian from one singular value decomposition.
+void membrane_response(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame,
+                       double& energy, Matrix32& stress, Matrix66* response_hessian,
+                       Curvature curvature = Curvature::positive);
+
+}  // namespace flash::sim

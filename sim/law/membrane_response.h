@@ -1,0 +1,233 @@
+#pragma once
+#include <cmath>
+
+#include "sim/law/host_device.h"
+#include "sim/law/lanes.h"
+#include "sim/law/membrane_law.h"
+
+namespace flash::sim {
+inline namespace FLASH_LEVEL {
+
+// The formulas of sim/law/membrane.h, for one triangle (Real = double) or several (Real = Lanes).
+
+template <typename Real>
+struct Vector3 {
+  Real x, y, z;
+};
+
+template <typename Real>
+FLASH_HOST_DEVICE inline Vector3<Real> operator+(const Vector3<Real>& a, const Vector3<Real>& b) {
+  return {a.x + b.x, a.y + b.y, a.z + b.z};
+}
+template <typename Real>
+FLASH_HOST_DEVICE inline Vector3<Real> operator-(const Vector3<Real>& a, const Vector3<Real>& b) {
+  return {a.x - b.x, a.y - b.y, a.z - b.z};
+}
+template <typename Real>
+FLASH_HOST_DEVICE inline Vector3<Real> operator*(const Real& a, const Vector3<Real>& b) {
+  return {a * b.x, a * b.y, a * b.z};
+}
+template <typename Real>
+FLASH_HOST_DEVICE inline Real dot(const Vector3<Real>& a, const Vector3<Real>& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+template <typename Real>
+FLASH_HOST_DEVICE inline Vector3<Real> cross(const Vector3<Real>& a, const Vector3<Real>& b) {
+  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+template <typename Real>
+FLASH_HOST_DEVICE inline Vector3<Real> select(const auto& condition, const Vector3<Real>& yes,
+                                              const Vector3<Real>& no) {
+  return {select(condition, yes.x, no.x), select(condition, yes.y, no.y), select(condition, yes.z, no.z)};
+}
+
+/// Deformation gradient (f1, f2) = s1 u1 v1^T + s2 u2 v2^T with s1 >= s2 >= 0, v1 = (c, s), v2 = (-s, c) and
+/// n = u1 x u2.
+template <typename Real>
+struct SingularFrame {
+  Real s1, s2, c, s;
+  Vector3<Real> u1, u2, n;
+};
+
+/// The angle of v1 comes from the 2 x 2 matrix F^T F by half-angle formulas, s2 from the area |f1 x f2| = s1
+/// s2, which keeps its relative accuracy where s2 is small. Where F is of rank one any normal serves (the
+/// basis of Duff et al. 2017, "Building an orthonormal basis, revisited").
+template <typename Real>
+FLASH_HOST_DEVICE inline SingularFrame<Real> singular_frame(const Vector3<Real>& f1,
+                                                            const Vector3<Real>& f2) {
+  const Real zero{}, one = zero + 1.0, least = zero + 1e-150;
+  const Real a = dot(f1, f1), b = dot(f1, f2), d = dot(f2, f2);
+  const Real mean = 0.5 * (a + d), half = 0.5 * (a - d), radius = square_root(half * half + b * b);
+  const Vector3<Real> normal = cross(f1, f2);
+  const Real area = square_root(dot(normal, normal));
+  SingularFrame<Real> r;
+  r.s1 = square_root(mean + radius);
+  const Real inverse_s1 = 1.0 / larger_of(r.s1, least);
+  r.s2 = area * inverse_s1;
+  const Real inverse_radius = 1.0 / larger_of(radius, least);
+  const Real cos2 = select(radius > least, half * inverse_radius, one);
+  const Real large = square_root(0.5 * (1.0 + magnitude(cos2))), small = 0.5 * b * inverse_radius / large;
+  r.c = select(cos2 >= 0.0, large, magnitude(small));
+  r.s = select(cos2 >= 0.0, small, with_sign(large, b));
+  r.u1 = inverse_s1 * (r.c * f1 + r.s * f2);
+  r.u1 = select(r.s1 > least, r.u1, {one, zero, zero});
+  const Vector3<Real>& u = r.u1;
+  const Real sign = with_sign(one, u.z), k = -1.0 / (sign + u.z);
+  const Vector3<Real> any = {1.0 + sign * u.x * u.x * k, sign * u.x * u.y * k, -sign * u.x};
+  const auto has_area = area > 1e-12 * r.s1 * r.s1;
+  r.n = select(has_area, Vector3<Real>((1.0 / larger_of(area, least)) * normal), cross(u, any));
+  r.u2 = cross(r.n, u);
+  return r;
+}
+
+/// The energy and its derivatives by the singular values. flip = (p1 - p2)/(s1 - s2) and
+/// twist = (p1 + p2)/(s1 + s2) are written so that nothing cancels at s1 = s2; bend_i = p_i / s_i.
+template <typename Real>
+struct PrincipalResponse {
+  Real energy;
+  Real p1, p2;
+  Real p11, p12, p22;
+  Real twist, flip;
+  Real bend1, bend2;
+};
+
+/// With lambda = 0 the ARAP sheet.
+struct Corotated {
+  template <typename Real>
+  FLASH_HOST_DEVICE static PrincipalResponse<Real> at(const Real& s1, const Real& s2, double mu,
+                                                      double lambda) {
+    const Real zero{}, least = zero + 1e-150, e1 = s1 - 1.0, e2 = s2 - 1.0, sum = e1 + e2;
+    PrincipalResponse<Real> r;
+    r.energy = mu * (e1 * e1 + e2 * e2) + 0.5 * lambda * sum * sum;
+    r.p1 = 2 * mu * e1 + lambda * sum;
+    r.p2 = 2 * mu * e2 + lambda * sum;
+    r.p11 = r.p22 = zero + (2 * mu + lambda);
+    r.p12 = zero + lambda;
+    r.twist = 2 * (mu + lambda) * sum / larger_of(Real(s1 + s2), least);
+    r.flip = zero + 2 * mu;
+    r.bend1 = r.p1 / larger_of(s1, least);
+    r.bend2 = r.p2 / larger_of(s2, least);
+    return r;
+  }
+};
+
+struct SaintVenantKirchhoff {
+  template <typename Real>
+  FLASH_HOST_DEVICE static PrincipalResponse<Real> at(const Real& s1, const Real& s2, double mu,
+                                                      double lambda) {
+    const Real c1 = s1 * s1 - 1.0, c2 = s2 * s2 - 1.0, trace = 0.5 * lambda * (c1 + c2);
+    PrincipalResponse<Real> r;
+    r.energy = 0.25 * mu * (c1 * c1 + c2 * c2) + 0.125 * lambda * (c1 + c2) * (c1 + c2);
+    r.bend1 = mu * c1 + trace;
+    r.bend2 = mu * c2 + trace;
+    r.p1 = s1 * r.bend1;
+    r.p2 = s2 * r.bend2;
+    r.p11 = r.bend1 + (2 * mu + lambda) * s1 * s1;
+    r.p22 = r.bend2 + (2 * mu + lambda) * s2 * s2;
+    r.p12 = lambda * s1 * s2;
+    const Real squares = s1 * s1 + s2 * s2 - 1.0;
+    r.twist = mu * (squares - s1 * s2) + trace;
+    r.flip = mu * (squares + s1 * s2) + trace;
+    return r;
+  }
+};
+
+struct NeoHookean {
+  template <typename Real>
+  FLASH_HOST_DEVICE static PrincipalResponse<Real> at(const Real& s1, const Real& s2, double mu,
+                                                      double lambda) {
+    const Real zero{}, least = zero + 1e-150, infinite = zero + HUGE_VAL;
+    const Real area = larger_of(Real(s1 * s2), least), log_area = logarithm(area);
+    const Real i1 = 1.0 / larger_of(s1, least), i2 = 1.0 / larger_of(s2, least);
+    const Real pressure = lambda * log_area - mu;
+    PrincipalResponse<Real> r;
+    r.energy = select(s1 * s2 > 0.0,
+                      Real(0.5 * mu * (s1 * s1 + s2 * s2 - 2.0) + (0.5 * lambda * log_area - mu) * log_area),
+                      infinite);
+    r.p1 = mu * s1 + pressure * i1;
+    r.p2 = mu * s2 + pressure * i2;
+    r.bend1 = mu + pressure * i1 * i1;
+    r.bend2 = mu + pressure * i2 * i2;
+    r.p11 = mu + (lambda - pressure) * i1 * i1;
+    r.p22 = mu + (lambda - pressure) * i2 * i2;
+    r.p12 = lambda / area;
+    r.twist = mu + pressure / area;
+    r.flip = mu - pressure / area;
+    return r;
+  }
+};
+
+/// Sets negative eigenvalues of the Hessian to zero.
+template <typename Real>
+FLASH_HOST_DEVICE inline void clamp(PrincipalResponse<Real>& r) {
+  const Real zero{}, least = zero + 1e-150;
+  const Real mean = 0.5 * (r.p11 + r.p22), half = 0.5 * (r.p11 - r.p22);
+  const Real radius = square_root(half * half + r.p12 * r.p12);
+  // One eigenvalue at most stays: A+ = l1 (A - l2 I) / (l1 - l2).
+  const Real l1 = mean + radius, l2 = mean - radius;
+  const Real scale = select(l1 > 0.0, Real(l1 / larger_of(Real(l1 - l2), least)), zero);
+  const auto negative = l2 < 0.0;
+  r.p11 = select(negative, Real(scale * (r.p11 - l2)), r.p11);
+  r.p22 = select(negative, Real(scale * (r.p22 - l2)), r.p22);
+  r.p12 = select(negative, Real(scale * r.p12), r.p12);
+  r.twist = larger_of(r.twist, zero);
+  r.flip = larger_of(r.flip, zero);
+  r.bend1 = larger_of(r.bend1, zero);
+  r.bend2 = larger_of(r.bend2, zero);
+}
+
+/// The two columns of the stress P.
+template <typename Real>
+struct StressColumns {
+  Vector3<Real> p1, p2;
+};
+
+template <typename Real>
+FLASH_HOST_DEVICE inline StressColumns<Real> stress_of(const SingularFrame<Real>& f,
+                                                       const PrincipalResponse<Real>& r) {
+  const Vector3<Real> t1 = r.p1 * f.u1, t2 = r.p2 * f.u2;
+  return {f.c * t1 - f.s * t2, f.s * t1 + f.c * t2};
+}
+
+/// d p_i / d f_j as columns; h01 = d p1 / d f2.
+template <typename Real>
+struct HessianBlocks {
+  Vector3<Real> h00[3], h01[3], h11[3];
+};
+
+/// H = sum_ij (v_i v_j^T) x B_ij with B_11 = p11 u1 u1^T + m u2 u2^T + bend1 n n^T, B_22 alike and B_12 = p12
+/// u1 u2^T + k u2 u1^T, where m = (flip + twist)/2 and k = (flip - twist)/2.
+template <typename Real>
+FLASH_HOST_DEVICE inline HessianBlocks<Real> hessian_of(const SingularFrame<Real>& f,
+                                                        const PrincipalResponse<Real>& r) {
+  const Real m = 0.5 * (r.flip + r.twist), k = 0.5 * (r.flip - r.twist);
+  const Real cc = f.c * f.c, ss = f.s * f.s, cs = f.c * f.s, sum = r.p12 + k;
+  // Each block as u1 a u1^T + u1 b u2^T + u2 c u1^T + u2 d u2^T + n e n^T.
+  const Real a00 = cc * r.p11 + ss * m, d00 = cc * m + ss * r.p22, e00 = cc * r.bend1 + ss * r.bend2;
+  const Real a11 = ss * r.p11 + cc * m, d11 = ss * m + cc * r.p22, e11 = ss * r.bend1 + cc * r.bend2;
+  const Real b11 = cs * sum, b00 = -b11;
+  const Real a01 = cs * (r.p11 - m), d01 = cs * (m - r.p22), e01 = cs * (r.bend1 - r.bend2);
+  const Real b01 = cc * r.p12 - ss * k, c01 = cc * k - ss * r.p12;
+  const Real x[3] = {f.u1.x, f.u1.y, f.u1.z}, y[3] = {f.u2.x, f.u2.y, f.u2.z}, z[3] = {f.n.x, f.n.y, f.n.z};
+  const auto column = [&](int j, const Real& a, const Real& b, const Real& c, const Real& d, const Real& e) {
+    return Real(a * x[j] + b * y[j]) * f.u1 + Real(c * x[j] + d * y[j]) * f.u2 + Real(e * z[j]) * f.n;
+  };
+  HessianBlocks<Real> H;
+  for (int j = 0; j < 3; ++j) {
+    H.h00[j] = column(j, a00, b00, b00, d00, e00);
+    H.h01[j] = column(j, a01, b01, c01, d01, e01);
+    H.h11[j] = column(j, a11, b11, b11, d11, e11);
+  }
+  return H;
+}
+
+/// Calls work(law) with the law's formulas.
+template <typename Work>
+auto with_membrane_law(MembraneLaw law, const Work& work) {
+  if (law == MembraneLaw::saint_venant_kirchhoff) return work(SaintVenantKirchhoff{});
+  if (law == MembraneLaw::neo_hookean) return work(NeoHookean{});
+  return work(Corotated{});
+}
+
+}  // namespace FLASH_LEVEL
+}  // namespace flash::sim

@@ -1,0 +1,144 @@
+#include "sim/newton/active_set.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace flash::sim {
+
+using data::Points;
+using Eigen::Map;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+Map<Matrix3d> block(BlockValues<double>& values, size_t k) { return Map<Matrix3d>(values.data() + 9 * k); }
+
+}  // namespace
+
+void add_slip_stiffness(const ContactSet& contacts, BlockValues<double>& values) {
+  for (const VertexConstraint& c : contacts.constraints)
+    if (c.hold == Hold::slip) block(values, c.vertex) += c.free * c.slip_stiffness * c.free;
+}
+
+void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& values) {
+  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k)
+    for (const Touch& touch : contacts.touches_of(k))
+      if (touch.holds)
+        block(values, contacts.constraints[k].vertex) -=
+            touch.normal_force * touch.curved * touch.curved.transpose();
+}
+
+void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, BlockValues<double>& values) {
+  for (const VertexConstraint& c : contacts.constraints) {
+    if (c.hold == Hold::free) continue;
+    auto own = block(values, c.vertex);
+    own = c.free * own * c.free + own.trace() / 3 * (Matrix3d::Identity() - c.free);
+  }
+  for (size_t k = 0; k < pattern.pairs.size(); ++k) {
+    const auto [row, column] = pattern.pairs[k];
+    if (contacts.place[row] < 0 && contacts.place[column] < 0) continue;
+    auto between = block(values, pattern.size + k);
+    for (const bool left : {true, false}) {
+      const VertexConstraint* c = contacts.find(left ? row : column);
+      if (c == nullptr || c->hold == Hold::free) continue;
+      if (c->hold == Hold::stick)
+        between.setZero();
+      else if (left)
+        between = c->free * between;
+      else
+        between = between * c->free;
+    }
+  }
+}
+
+namespace {
+
+/// Frees a vertex from the touches that would have to pull. Returns whether from any.
+bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touches) {
+  const auto holds = [](const Touch& touch) { return touch.holds; };
+  const auto held = std::count_if(touches.begin(), touches.end(), holds);
+  for (Touch& touch : touches) touch.let_go = touch.let_go || touch.holds;
+  share_force(touches, force, holds);
+  for (Touch& touch : touches) touch.let_go = touch.let_go && !touch.holds;
+  const auto still_held = std::count_if(touches.begin(), touches.end(), holds);
+  if (still_held == held) return false;
+  c.hold = still_held > 0 ? Hold::slip : Hold::free;
+  c.free = along_surfaces(touches);
+  c.correction -= c.free * c.correction;
+  return true;
+}
+
+/// Holds a vertex on the touches up to `reach` away that `step` drives it into. Returns whether on any.
+bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Touch> touches) {
+  bool any = false;
+  for (Touch& touch : touches) {
+    if (touch.holds || touch.let_go || touch.gap > reach || touch.gap + touch.normal.dot(step) >= -1e-12)
+      continue;
+    // Within the surfaces that hold already, up to the edge.
+    const Vector3d inward = c.free * touch.normal;
+    if (inward.squaredNorm() < 1e-6) continue;
+    c.correction += (-touch.gap - touch.normal.dot(c.correction)) / inward.squaredNorm() * inward;
+    touch.holds = true;
+    c.hold = Hold::slip;
+    c.free = along_surfaces(touches);
+    any = true;
+  }
+  return any;
+}
+
+/// The same for a vertex that nothing holds so far.
+bool hold_free(const LinearizedAt& iterate, const Vector3d& step, double reach, int i, ContactSet& contacts) {
+  const double clearance = contacts.clearance[i];
+  if (clearance > reach || clearance > step.norm()) return false;
+  const size_t first = contacts.touches.size();
+  add_touches(iterate.step, iterate.positions, i, contacts.touches);
+  VertexConstraint constraint{.vertex = i};
+  if (!hold(step, reach, constraint, std::span(contacts.touches).subspan(first))) {
+    contacts.touches.resize(first);
+    return false;
+  }
+  contacts.place[i] = static_cast<int>(contacts.constraints.size());
+  contacts.constraints.push_back(constraint);
+  return true;
+}
+
+bool hold_free_vertices(const LinearizedAt& iterate, const Points& direction, double reach,
+                        ContactSet& contacts) {
+  bool any = false;
+  for (int i = 0; i < direction.rows(); ++i)
+    if (contacts.place[i] < 0) any = hold_free(iterate, direction.row(i), reach, i, contacts) || any;
+  return any;
+}
+
+}  // namespace
+
+bool exchange_contacts(const LinearizedAt& iterate, const Points& direction, const Points& force,
+                       Points& gradient, ContactSet& contacts) {
+  constexpr double any_reach = std::numeric_limits<double>::infinity();
+  bool any = false;
+  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
+    VertexConstraint& c = contacts.constraints[k];
+    const std::span<Touch> touches = contacts.touches_of(k);
+    const int i = c.vertex;
+    if (c.hold != Hold::free && release(force.row(i), c, touches)) {
+      gradient.row(i) = c.hold == Hold::free ? iterate.force.row(i) : iterate.residual.row(i);
+      any = true;
+    } else if (c.hold != Hold::stick && hold(direction.row(i), any_reach, c, touches)) {
+      any = true;
+    }
+  }
+  return hold_free_vertices(iterate, direction, any_reach, contacts) || any;
+}
+
+bool hold_touching(const LinearizedAt& iterate, const Points& direction, ContactSet& contacts) {
+  bool any = false;
+  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
+    VertexConstraint& c = contacts.constraints[k];
+    if (c.hold == Hold::free || c.hold == Hold::slip)
+      any = hold(direction.row(c.vertex), touching_gap, c, contacts.touches_of(k)) || any;
+  }
+  return hold_free_vertices(iterate, direction, touching_gap, contacts) || any;
+}
+
+}  // namespace flash::sim

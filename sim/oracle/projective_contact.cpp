@@ -1,0 +1,111 @@
+#include "sim/oracle/projective_contact.h"
+
+#include <cmath>
+
+#include "sim/step/contact_geometry.h"
+
+namespace flash::sim {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+/// A direction along held axes only has no compliance of its own: the system stays regular with that of the
+/// vertex.
+double regular(double compliance, double inverse_mass) {
+  return compliance > 1e-9 * inverse_mass ? compliance : inverse_mass;
+}
+
+/// Displacement of a vertex since the start of the step against the surface [m].
+Vector3d moved_against(const Environment& environment, const Gap& gap, const data::Points& positions,
+                       Index vertex) {
+  return (positions.row(vertex) - environment.state.positions.row(vertex)).transpose() - gap.surface_moved;
+}
+
+}  // namespace
+
+std::vector<VertexContact> find_contacts(const Environment& environment, double time, double time_step,
+                                         const data::Points& positions, const Eigen::VectorXd& reach,
+                                         const std::vector<Vector3d>& free_axes, double tangent_angle) {
+  std::vector<VertexContact> contacts;
+  for (Index i = 0; i < positions.rows(); ++i) {
+    if (free_axes[i].isZero()) continue;
+    for (std::size_t k = 0; k < environment.obstacles.size(); ++k) {
+      const Obstacle& obstacle = environment.obstacles[k];
+      const Gap gap = gap_to(obstacle, positions.row(i), time, time_step);
+      if (!(gap.distance < reach[i]) || gap.normal.cwiseProduct(free_axes[i]).norm() < 1e-6) continue;
+      VertexContact contact{static_cast<int>(i), static_cast<int>(k), {}, {}, 0};
+      const Vector3d first = gap.normal.unitOrthogonal(), second = gap.normal.cross(first);
+      contact.directions.row(0) = gap.normal;
+      contact.directions.row(1) = std::cos(tangent_angle) * first + std::sin(tangent_angle) * second;
+      contact.directions.row(2) = std::cos(tangent_angle) * second - std::sin(tangent_angle) * first;
+      contact.gap = contact.directions * moved_against(environment, gap, positions, i);
+      contact.gap[0] = gap.distance;
+      contact.friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
+      contacts.push_back(contact);
+    }
+  }
+  return contacts;
+}
+
+data::Points contact_forces(const std::vector<VertexContact>& contacts, const Eigen::VectorXd& multiplier,
+                            Index vertices) {
+  data::Points force = data::Points::Zero(vertices, 3);
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    force.row(contacts[k].vertex) += multiplier.segment<3>(3 * k).transpose() * contacts[k].directions;
+  return force;
+}
+
+Eigen::VectorXd along_contacts(const std::vector<VertexContact>& contacts, const data::Points& u) {
+  Eigen::VectorXd along(3 * contacts.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k)
+    along.segment<3>(3 * k) = contacts[k].directions * u.row(contacts[k].vertex).transpose();
+  return along;
+}
+
+double contact_potential(const Environment& environment, double time, double time_step,
+                         const std::vector<VertexContact>& contacts, const Eigen::VectorXd& multiplier,
+                         const data::Points& positions) {
+  double potential = 0;
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const double normal = multiplier[3 * k];
+    if (normal == 0) continue;
+    const VertexContact& contact = contacts[k];
+    const Gap gap =
+        gap_to(environment.obstacles[contact.obstacle], positions.row(contact.vertex), time, time_step);
+    const Vector3d moved = moved_against(environment, gap, positions, contact.vertex);
+    const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
+    potential += normal * (contact.friction * slip - gap.distance);
+  }
+  return potential;
+}
+
+Eigen::MatrixXd full_metric(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system) {
+  const Index n = static_cast<Index>(contacts.size());
+  Eigen::MatrixXd W(3 * n, 3 * n);
+  for (Index j = 0; j < n; ++j)
+    for (Index i = j; i < n; ++i) {
+      const Vector3d inverse = system.inverse(contacts[i].vertex, contacts[j].vertex);
+      const Matrix3d block =
+          contacts[i].directions * inverse.asDiagonal() * contacts[j].directions.transpose();
+      W.block<3, 3>(3 * i, 3 * j) = block;
+      W.block<3, 3>(3 * j, 3 * i) = block.transpose();
+    }
+  for (Index i = 0; i < 3 * n; ++i) W(i, i) = regular(W(i, i), 1 / system.mass()[contacts[i / 3].vertex]);
+  return W;
+}
+
+Eigen::VectorXd full_metric_diagonal(const std::vector<VertexContact>& contacts,
+                                     const ProjectiveSystem& system) {
+  Eigen::VectorXd diagonal(3 * contacts.size());
+  for (std::size_t k = 0; k < contacts.size(); ++k) {
+    const Vector3d inverse = system.inverse(contacts[k].vertex, contacts[k].vertex);
+    for (int a = 0; a < 3; ++a)
+      diagonal[3 * k + a] =
+          regular(contacts[k].directions.row(a).cwiseAbs2() * inverse, 1 / system.mass()[contacts[k].vertex]);
+  }
+  return diagonal;
+}
+
+}  // namespace flash::sim

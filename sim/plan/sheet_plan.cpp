@@ -1,0 +1,113 @@
+#include "sim/plan/sheet_plan.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "sim/plan/isometric_bending.h"
+#include "sim/plan/morley.h"
+
+namespace flash::sim {
+
+namespace {
+
+using PairIndex = std::map<std::pair<int, int>, int>;
+
+int pair_index(PairIndex& index, BlockPattern& pattern, int i, int j) {
+  const std::pair<int, int> key = std::minmax(i, j);
+  const auto [entry, fresh] = index.try_emplace(key, static_cast<int>(pattern.pairs.size()));
+  if (fresh) pattern.pairs.push_back({key.second, key.first});
+  return entry->second;
+}
+
+/// The triangles from `first` on, up to eight. slot(row, column) is the place of a block, row > column.
+template <typename Slot>
+TriangleGroup group_of(const std::vector<RestTriangle>& triangles, size_t first, const Slot& slot) {
+  TriangleGroup group;
+  group.count = static_cast<int>(std::min<size_t>(triangle_group_size, triangles.size() - first));
+  for (int lane = 0; lane < triangle_group_size; ++lane) {
+    const RestTriangle& triangle = triangles[first + std::min(lane, group.count - 1)];
+    Eigen::Matrix<double, 3, 2> gradients;
+    gradients.bottomRows<2>() = triangle.inverse_edges;
+    gradients.row(0) = -gradients.row(1) - gradients.row(2);
+    std::array<int, 3> order = {0, 1, 2};
+    std::sort(order.begin(), order.end(),
+              [&](int a, int b) { return triangle.vertices[a] < triangle.vertices[b]; });
+    for (int k = 0; k < 4; ++k) group.gradients[k][lane] = gradients(order[1 + k / 2], k % 2);
+    group.area[lane] = triangle.area;
+    for (int k = 0; k < 3; ++k) group.vertices[k][lane] = triangle.vertices[order[k]];
+    constexpr std::pair<int, int> blocks[3] = {{1, 0}, {2, 0}, {2, 1}};
+    for (int k = 0; k < 3; ++k)
+      group.slots[k][lane] =
+          slot(group.vertices[blocks[k].first][lane], group.vertices[blocks[k].second][lane]);
+  }
+  return group;
+}
+
+std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, data::BendingModel model,
+                                                             double poissons_ratio) {
+  auto bending = std::make_shared<BendingOperator>();
+  bending->model = model;
+  bending->kernels = plan.kernels;
+  if (model == data::BendingModel::hinge) return bending;
+  const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
+      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio, 1e-6)
+                                         : isometric;
+  std::vector<int> as_numbered(plan.pattern.size);
+  std::iota(as_numbered.begin(), as_numbered.end(), 0);
+  bending->stiffness = row_groups(stiffness, as_numbered);
+  bending->elimination_stiffness = row_groups(stiffness, elimination_position(*plan.symbolic));
+  // Against the plate the isometric stiffness has its eigenvalues between 0.5 and 4.6 (regular meshes, nu =
+  // 0.3): scaled, they lie around 1, where those of the membrane and the mass are.
+  const double scale = model == data::BendingModel::plate ? 0.6 : 1.0;
+  for (int i = 0; i < plan.pattern.size; ++i) bending->stand_in.push_back(scale * isometric.coeff(i, i));
+  for (const auto& [row, column] : plan.pattern.pairs)
+    bending->stand_in.push_back(scale * isometric.coeff(row, column));
+  return bending;
+}
+
+}  // namespace
+
+std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, InstructionLevel level) {
+  auto plan = std::make_shared<SheetPlan>();
+  plan->sheet = sheet;
+  plan->level = level;
+  plan->kernels = &kernels_of(level);
+  plan->hinges = sheet_hinges(sheet);
+  plan->pattern.size = static_cast<int>(sheet.rest.vertices.rows());
+  PairIndex index;
+  const auto slot = [&](int row, int column) {
+    return BlockSlot{plan->pattern.size + pair_index(index, plan->pattern, row, column), row < column};
+  };
+  for (size_t first = 0; first < sheet.triangles.size(); first += triangle_group_size)
+    plan->triangle_groups.push_back(
+        group_of(sheet.triangles, first, [&](int row, int column) { return slot(row, column).block; }));
+  plan->edge_count = plan->pattern.pairs.size();
+  for (const Hinge& hinge : plan->hinges) {
+    const auto& v = hinge.vertices;
+    plan->hinge_slots.push_back({slot(v[1], v[0]), slot(v[2], v[0]), slot(v[2], v[1]), slot(v[3], v[0]),
+                                 slot(v[3], v[1]), slot(v[3], v[2])});
+  }
+  plan->symbolic = analyze(plan->pattern);
+  const std::vector<int>& position = elimination_position(*plan->symbolic);
+  plan->triangle_product = product_pattern(plan->pattern, plan->edge_count, position);
+  plan->full_product = product_pattern(plan->pattern, plan->pattern.pairs.size(), position);
+  return plan;
+}
+
+const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
+                                        double poissons_ratio) {
+  const double key = model == data::BendingModel::plate ? poissons_ratio : 0.0;
+  const std::lock_guard lock(plan.bending->mutex);
+  auto& entry = plan.bending->made[{model, key}];
+  if (!entry) entry = make_bending_operator(plan, model, poissons_ratio);
+  return *entry;
+}
+
+std::size_t count_bending_operators(const SheetPlan& plan) {
+  const std::lock_guard lock(plan.bending->mutex);
+  return plan.bending->made.size();
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,68 @@
+#pragma once
+#include <array>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "data/material.h"
+#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/instruction_level.h"
+#include "sim/cpu/sheet_product.h"
+#include "sim/cpu/triangle_group.h"
+#include "sim/plan/hinge_bending.h"
+#include "sim/scene/sheet.h"
+
+namespace flash::sim {
+
+/// A 3 x 3 block of the system matrix between two vertices; stored once, for row > column.
+struct BlockSlot {
+  int block;       ///< index among the blocks of a BlockPattern, the diagonal ones first
+  bool transpose;  ///< the stored block is that of (column, row)
+};
+
+/// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
+struct BendingOperator {
+  data::BendingModel model;
+  const Kernels* kernels;           ///< as in the plan
+  RowGroups stiffness;              ///< empty for the hinge model
+  RowGroups elimination_stiffness;  ///< the same in elimination order
+  std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
+};
+
+/// Those made so far, for all environments of a sheet.
+struct BendingOperators {
+  std::mutex mutex;
+  std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
+};
+
+/// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone, and
+/// the kernels that work on it.
+struct SheetPlan {
+  Sheet sheet;
+  InstructionLevel level;
+  const Kernels* kernels;  ///< of that level
+  std::vector<Hinge> hinges;
+  BlockPattern pattern;   ///< neighbours over an edge, then those across a hinge
+  size_t edge_count = 0;  ///< of the pattern's pairs, those over an edge
+  std::shared_ptr<const SymbolicFactor> symbolic;
+  ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
+  std::vector<TriangleGroup> triangle_groups;
+  std::vector<std::array<BlockSlot, 6>>
+      hinge_slots;  ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
+  std::shared_ptr<BendingOperators> bending = std::make_shared<BendingOperators>();
+};
+
+std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet,
+                                                 InstructionLevel level = highest_instruction_level());
+
+/// Made once for a sheet, model and, where it matters, Poisson's ratio, and kept with the plan; threads may
+/// ask at once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.
+const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
+                                        double poissons_ratio);
+
+/// Bending operators that were made for a plan so far.
+std::size_t count_bending_operators(const SheetPlan& plan);
+
+}  // namespace flash::sim

@@ -1,0 +1,201 @@
+#include "sim/step/contact_geometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace flash::sim {
+
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+Gap gap_of(const Plane& plane, const ObstacleMotion&, const Vector3d& point) {
+  return {plane.normal.dot(point - plane.point), plane.normal, Vector3d::Zero(), Vector3d::Zero()};
+}
+
+/// From the axis to the point, across the axis.
+Vector3d radial_of(const Cylinder& cylinder, const Vector3d& point) {
+  const Vector3d radial = point - cylinder.point;
+  return radial - cylinder.axis * cylinder.axis.dot(radial);
+}
+
+Gap gap_of(const Cylinder& cylinder, const ObstacleMotion&, const Vector3d& point) {
+  const Vector3d radial = radial_of(cylinder, point);
+  const double length = radial.norm();
+  if (length == 0)
+    return {-cylinder.radius, cylinder.axis.unitOrthogonal(), Vector3d::Zero(), Vector3d::Zero()};
+  const Vector3d normal = radial / length;
+  return {length - cylinder.radius, normal, Vector3d::Zero(),
+          cylinder.axis.cross(normal) / std::sqrt(length)};
+}
+
+/// How far the material of a box at `point` has moved in the step.
+Vector3d moved_by(const ObstacleMotion& motion, const Vector3d& point, const Vector3d& local) {
+  return motion.moves ? Vector3d(point - motion.start * local) : Vector3d::Zero();
+}
+
+/// Against the face of a box across `axis`, on the side of `sign`.
+Gap gap_to_face(const Box& box, const ObstacleMotion& motion, const Vector3d& point, const Vector3d& local,
+                int axis, double sign) {
+  return {sign * local[axis] - box.half_extents[axis], sign * motion.end.linear().col(axis),
+          moved_by(motion, point, local), Vector3d::Zero()};
+}
+
+Gap gap_of(const Box& box, const ObstacleMotion& motion, const Vector3d& point) {
+  const Vector3d local = motion.end.inverse(Eigen::Isometry) * point;
+  const Vector3d excess = local.cwiseAbs() - box.half_extents;
+  if (excess.maxCoeff() <= 0) {
+    int axis;
+    excess.maxCoeff(&axis);
+    return gap_to_face(box, motion, point, local, axis, std::copysign(1.0, local[axis]));
+  }
+  const Vector3d outside = excess.cwiseMax(0.0).cwiseProduct(local.cwiseSign());
+  const double distance = outside.norm();
+  return {distance, motion.end.linear() * (outside / distance), moved_by(motion, point, local),
+          Vector3d::Zero()};
+}
+
+/// How deep a vertex may stay that starts `depth` inside.
+double still_sunk(double depth, double time_step, double exit_speed) {
+  return std::max(0.0, depth - exit_speed * time_step);
+}
+
+Gap gap_after_way(const Plane& plane, const ObstacleMotion& motion, const Vector3d& start,
+                  const Vector3d& point, double time_step, double exit_speed) {
+  Gap gap = gap_of(plane, motion, point);
+  gap.sunk = still_sunk(-plane.normal.dot(start - plane.point), time_step, exit_speed);
+  gap.distance += gap.sunk;
+  return gap;
+}
+
+Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const Vector3d& start,
+                  const Vector3d& point, double time_step, double exit_speed) {
+  Gap gap = gap_of(cylinder, motion, point);
+  const Vector3d from = radial_of(cylinder, start), to = radial_of(cylinder, point), way = to - from;
+  // Where the way enters the circle: |from + s way| = radius, the first of two; at once where it starts
+  // inside.
+  const double a = way.squaredNorm(), b = from.dot(way),
+               c = from.squaredNorm() - cylinder.radius * cylinder.radius;
+  double entry = 0;
+  if (c > 0) {
+    const double root = b * b - a * c;
+    if (root > 0 && b < 0) entry = (-b - std::sqrt(root)) / a;
+    if (!(root > 0 && b < 0) || entry > 1) return gap;
+  }
+  const Vector3d entered = from + entry * way;
+  if (entered.norm() > 0 && entered.dot(to) <= 0) {
+    gap.normal = entered.normalized();
+    gap.distance = gap.normal.dot(to) - cylinder.radius;
+    gap.curved.setZero();
+  }
+  gap.sunk = still_sunk(cylinder.radius - from.norm(), time_step, exit_speed);
+  gap.distance += gap.sunk;
+  return gap;
+}
+
+/// The faces through which a way from `from` to `to` in the frame of a box enters and leaves it.
+struct Passage {
+  bool enters = false;
+  int entry_axis = 0, exit_axis = 0;
+  double entry_sign = 1;
+};
+
+Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to) {
+  Passage passage;
+  const Vector3d excess = from.cwiseAbs() - box.half_extents;
+  double enters = -std::numeric_limits<double>::infinity(), leaves = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    const double way = to[axis] - from[axis];
+    if (way == 0) {
+      if (excess[axis] > 0) return passage;
+      continue;
+    }
+    const double sign = way > 0 ? -1 : 1;  // of the face that it meets first
+    const double in = (sign * box.half_extents[axis] - from[axis]) / way,
+                 out = (-sign * box.half_extents[axis] - from[axis]) / way;
+    if (in > enters) {
+      enters = in;
+      passage.entry_axis = axis;
+      passage.entry_sign = sign;
+    }
+    if (out < leaves) {
+      leaves = out;
+      passage.exit_axis = axis;
+    }
+  }
+  if (excess.maxCoeff() <= 0) {
+    // Starts inside, or on a face: that is where it came in.
+    excess.maxCoeff(&passage.entry_axis);
+    passage.entry_sign = std::copysign(1.0, from[passage.entry_axis]);
+    enters = 0;
+  }
+  passage.enters = enters >= 0 && enters <= 1 && enters < leaves;
+  return passage;
+}
+
+Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const Vector3d& start, const Vector3d& point,
+                  double time_step, double exit_speed) {
+  const Vector3d from = motion.start.inverse(Eigen::Isometry) * start,
+                 to = motion.end.inverse(Eigen::Isometry) * point;
+  const Passage passage = passage_through(box, from, to);
+  if (!passage.enters) return gap_of(box, motion, point);
+  const bool ends_inside = ((to.cwiseAbs() - box.half_extents).array() <= 0).all();
+  const bool behind = passage.exit_axis == passage.entry_axis &&
+                      passage.entry_sign * to[passage.entry_axis] < -box.half_extents[passage.entry_axis];
+  if (!ends_inside && !behind) return gap_of(box, motion, point);
+  Gap gap = gap_to_face(box, motion, point, to, passage.entry_axis, passage.entry_sign);
+  gap.sunk = still_sunk(box.half_extents[passage.entry_axis] - passage.entry_sign * from[passage.entry_axis],
+                        time_step, exit_speed);
+  gap.distance += gap.sunk;
+  return gap;
+}
+
+ObstacleMotion motion_of(const Obstacle& obstacle, double start, double end) {
+  ObstacleMotion motion;
+  const Box* box = std::get_if<Box>(&obstacle.shape);
+  if (box == nullptr) return motion;
+  motion.moves = !box->trajectory.times.empty();
+  motion.start = motion.moves ? data::pose_at(box->trajectory, start) : box->pose;
+  motion.end = motion.moves ? data::pose_at(box->trajectory, end) : box->pose;
+  return motion;
+}
+
+}  // namespace
+
+std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, double start, double end) {
+  std::vector<ObstacleMotion> motions;
+  for (const Obstacle& obstacle : environment.obstacles) motions.push_back(motion_of(obstacle, start, end));
+  return motions;
+}
+
+Gap gap_to(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& point) {
+  return std::visit([&](const auto& shape) { return gap_of(shape, motion, point); }, obstacle.shape);
+}
+
+Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double time_step) {
+  return gap_to(obstacle, motion_of(obstacle, time - time_step, time), point);
+}
+
+Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& start,
+              const Vector3d& point, double time_step, double exit_speed) {
+  return std::visit(
+      [&](const auto& shape) { return gap_after_way(shape, motion, start, point, time_step, exit_speed); },
+      obstacle.shape);
+}
+
+void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
+                   const data::Points& points, double time_step, double exit_speed,
+                   std::vector<double>& distances) {
+  std::visit(
+      [&](const auto& shape) {
+        for (Eigen::Index i = 0; i < points.rows(); ++i)
+          distances[i] = std::min(
+              distances[i],
+              gap_after_way(shape, motion, starts.row(i), points.row(i), time_step, exit_speed).distance);
+      },
+      obstacle.shape);
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,55 @@
+#pragma once
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "sim/scene/environment.h"
+
+namespace flash::sim {
+
+/// Where a point stands against an obstacle.
+struct Gap {
+  double distance;                ///< to the surface, negative inside [m]
+  Eigen::Vector3d normal;         ///< unit, out of the obstacle
+  Eigen::Vector3d surface_moved;  ///< by the obstacle's material at the contact, over the step [m]
+  Eigen::Vector3d curved;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
+  double sunk = 0;         ///< how far the surface that `distance` is to lies below the obstacle's own [m]
+};
+
+/// A vertex below the surface of an obstacle.
+struct Penetration {
+  double depth = 0;  ///< [m]; 0: there is none
+  int vertex = -1, obstacle = -1;
+};
+
+/// Where an obstacle stands at the start and at the end of a step.
+struct ObstacleMotion {
+  Eigen::Isometry3d start = Eigen::Isometry3d::Identity(), end = Eigen::Isometry3d::Identity();
+  bool moves = false;
+};
+std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, double start, double end);
+
+/// Signed distance of `point` [m] to the obstacle where it stands at the end of the step. Exact outside;
+/// inside a box the nearest face decides.
+Gap gap_to(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& point);
+
+/// The same at `time` [s], the end of a step of `time_step`.
+Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, double time_step);
+
+/// How a vertex that comes from `start` [m] at the start of the step stands at `point` at its end. The way
+/// between them is straight, seen from the obstacle:
+/// - a point in a box, or behind it, stands against the face through which its way entered; one behind the
+///   axis of a cylinder against the tangent plane where its way entered. So nothing passes through, however
+///   thin. A way that leaves a box by a face beside rounds its edge and is let go.
+/// - a vertex that starts inside stands against a surface below the obstacle's own (`sunk`), so that it comes
+///   out at `exit_speed` [m/s] at most.
+Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
+              const Eigen::Vector3d& point, double time_step, double exit_speed);
+
+/// Lowers distances[i] to that of gap_after for every vertex, where it is smaller: rows of `starts` and
+/// `points`.
+void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
+                   const data::Points& points, double time_step, double exit_speed,
+                   std::vector<double>& distances);
+
+}  // namespace flash::sim

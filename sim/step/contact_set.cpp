@@ -1,0 +1,262 @@
+#include "sim/step/contact_set.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace flash::sim {
+
+using data::Points;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double smoothing =
+    1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
+
+double friction_of(const Environment& environment, const Touch& touch) {
+  const Obstacle& obstacle = environment.obstacles[touch.obstacle];
+  return obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
+}
+
+/// Length of a slip as friction takes it, smooth where it starts [m].
+double smooth_length(double length) { return std::sqrt(length * length + smoothing * smoothing); }
+
+Vector3d way_of(const ContactStep& step, const Points& positions, int i) {
+  return (positions.row(i) - step.environment.state.positions.row(i)).transpose();
+}
+
+/// Fills in the slip of a vertex that moved by `way` against each touching surface. Returns the longest [m].
+double find_slips(const Vector3d& way, std::span<Touch> touches) {
+  double longest = 0;
+  for (Touch& touch : touches) {
+    if (!touch.touches()) continue;
+    const Vector3d moved = way - touch.surface_moved;
+    const Vector3d slip = moved - touch.normal * touch.normal.dot(moved);
+    const double length = slip.norm();
+    longest = std::max(longest, length);
+    touch.slip = smooth_length(length);
+    touch.slip_direction = slip / touch.slip;
+  }
+  return longest;
+}
+
+/// Normal forces of the touches of a vertex that needs `needed` [N]. Each of several that it slips on rubs.
+void find_normal_forces(const Environment& environment, const Vector3d& needed, bool slipped,
+                        std::span<Touch> touches) {
+  const auto eligible = [](const Touch& touch) { return touch.touches(); };
+  if (!slipped || std::count_if(touches.begin(), touches.end(), eligible) < 2)
+    return share_force(touches, needed, eligible);
+  std::vector<double> friction;
+  for (const Touch& touch : touches) friction.push_back(friction_of(environment, touch));
+  share_force_rubbing(touches, friction, needed, eligible);
+}
+
+/// The constraint of a vertex that touches surfaces; it is free where none of them has to push.
+VertexConstraint constraint_of(const ContactStep& step, const Points& positions, const Vector3d& needed,
+                               int i, std::span<Touch> touches) {
+  VertexConstraint constraint;
+  constraint.vertex = i;
+  const bool slipped = find_slips(way_of(step, positions, i), touches) > resting_slip;
+  find_normal_forces(step.environment, needed, slipped, touches);
+  int held = 0;
+  for (const Touch& touch : touches) {
+    if (!touch.holds) continue;
+    constraint.friction_bound += friction_of(step.environment, touch) * touch.normal_force;
+    constraint.slip_direction = touch.slip_direction;
+    ++held;
+  }
+  if (held == 0) return constraint;
+
+  const double bound = constraint.friction_bound;
+  const Matrix3d along = along_surfaces(touches);
+  const Vector3d needed_tangential = along * needed;
+  if (!slipped && needed_tangential.norm() <= bound) {
+    constraint.hold = Hold::stick;
+    constraint.free.setZero();
+    constraint.reaction = needed;
+    for (Touch& touch : touches)
+      if (touch.holds && bound > 0)
+        touch.friction =
+            friction_of(step.environment, touch) * touch.normal_force / bound * needed_tangential;
+    return constraint;
+  }
+  constraint.hold = Hold::slip;
+  constraint.free = along;
+  if (!slipped) {
+    constraint.slip_direction = -needed_tangential / needed_tangential.norm();
+  } else if (held > 1) {
+    const Vector3d slip = slip_of(step, positions, i, touches);
+    constraint.slip_direction = slip / smooth_length(slip.norm());
+  }
+  for (Touch& touch : touches) {
+    if (!touch.holds) continue;
+    const double own_bound = friction_of(step.environment, touch) * touch.normal_force;
+    const Vector3d& direction = slipped ? touch.slip_direction : constraint.slip_direction;
+    touch.friction = -own_bound * direction;
+    constraint.reaction += touch.normal_force * touch.normal + touch.friction;
+    if (slipped)
+      constraint.slip_stiffness += own_bound / touch.slip *
+                                   (Matrix3d::Identity() - touch.normal * touch.normal.transpose() -
+                                    direction * direction.transpose());
+  }
+  return constraint;
+}
+
+}  // namespace
+
+ContactStep::ContactStep(const Environment& environment_in, double time_step_in, double exit_speed_in)
+    : environment(environment_in),
+      time(environment_in.state.time + time_step_in),
+      time_step(time_step_in),
+      exit_speed(exit_speed_in),
+      motions(obstacle_motions(environment_in, environment_in.state.time, time)) {}
+
+ContactSet begin_step(const ContactStep& step, Points& positions) {
+  const Environment& environment = step.environment;
+  ContactSet contacts;
+  contacts.obstacles = environment.obstacles.size();
+  contacts.place.assign(positions.rows(), -1);
+  const auto hold = [&](int vertex) -> VertexConstraint& {
+    if (contacts.place[vertex] < 0) {
+      contacts.place[vertex] = static_cast<int>(contacts.constraints.size());
+      contacts.constraints.push_back({.vertex = vertex, .hold = Hold::fixed});
+    }
+    return contacts.constraints[contacts.place[vertex]];
+  };
+  for (const FixedVertex& support : environment.fixed) {
+    VertexConstraint& constraint = hold(support.vertex);
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!support.axes[axis]) continue;
+      constraint.free(axis, axis) = 0;
+      positions(support.vertex, axis) = support.position[axis];
+    }
+  }
+  for (size_t k = 0; k < environment.grasps.size(); ++k) {
+    const Grasp& grasp = environment.grasps[k];
+    const Points& offsets = environment.state.grasp_offsets[k];
+    if (offsets.rows() == 0) continue;
+    const Eigen::Isometry3d pose = data::pose_at(grasp.gripper, step.time);
+    const double closed =
+        grasp.closing_time > 0 ? std::clamp((step.time - grasp.from) / grasp.closing_time, 0.0, 1.0) : 1.0;
+    const double blend = closed * closed * (3 - 2 * closed);
+    for (size_t v = 0; v < grasp.vertices.size(); ++v) {
+      Vector3d offset = offsets.row(v);
+      if (grasp.targets.rows() > 0) offset += blend * (grasp.targets.row(v).transpose() - offset);
+      VertexConstraint& constraint = hold(grasp.vertices[v]);
+      constraint.grasp = static_cast<int>(k);
+      constraint.free.setZero();
+      positions.row(grasp.vertices[v]) = pose * offset;
+    }
+  }
+  contacts.fixed = contacts.constraints.size();
+  return contacts;
+}
+
+void find_clearance(const ContactStep& step, const Points& positions, std::vector<double>& clearance) {
+  clearance.assign(positions.rows(), std::numeric_limits<double>::infinity());
+  for (size_t k = 0; k < step.motions.size(); ++k)
+    lower_to_gaps(step.environment.obstacles[k], step.motions[k], step.environment.state.positions, positions,
+                  step.time_step, step.exit_speed, clearance);
+}
+
+void add_touches(const ContactStep& step, const Points& positions, int i, std::vector<Touch>& touches) {
+  for (int k = 0; k < static_cast<int>(step.environment.obstacles.size()); ++k) {
+    const Gap gap = step.gap(k, positions, i);
+    touches.push_back({.obstacle = k,
+                       .gap = gap.distance,
+                       .sunk = gap.sunk,
+                       .normal = gap.normal,
+                       .curved = gap.curved,
+                       .surface_moved = gap.surface_moved});
+  }
+}
+
+void update_contacts(const ContactStep& step, const Points& positions, const Points& force,
+                     ContactSet& contacts) {
+  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k)
+    contacts.place[contacts.constraints[k].vertex] = -1;
+  contacts.constraints.resize(contacts.fixed);
+  contacts.touches.clear();
+  for (VertexConstraint& constraint : contacts.constraints) {
+    const Vector3d needed = force.row(constraint.vertex);
+    constraint.reaction = needed - constraint.free * needed;
+  }
+  find_clearance(step, positions, contacts.clearance);
+  for (int i = 0; i < positions.rows(); ++i) {
+    if (contacts.place[i] >= 0 || contacts.clearance[i] > touching_gap) continue;
+    const size_t first = contacts.touches.size();
+    add_touches(step, positions, i, contacts.touches);
+    VertexConstraint constraint =
+        constraint_of(step, positions, force.row(i), i, std::span(contacts.touches).subspan(first));
+    if (constraint.hold == Hold::free) {
+      contacts.touches.resize(first);
+      continue;
+    }
+    contacts.place[i] = static_cast<int>(contacts.constraints.size());
+    contacts.constraints.push_back(constraint);
+  }
+}
+
+std::vector<Matrix3d> friction_couplings(const ContactStep& step, const ContactSet& contacts) {
+  std::vector<Matrix3d> couplings;
+  for (size_t k = 0; k < contacts.constraints.size(); ++k) {
+    Matrix3d normals = Matrix3d::Zero(), rubs = Matrix3d::Zero(), gram = Matrix3d::Identity();
+    int count = 0;
+    if (contacts.constraints[k].hold == Hold::slip) {
+      for (const Touch& touch : contacts.touches_of(k)) {
+        if (!touch.holds) continue;
+        normals.col(count) = touch.normal;
+        rubs.col(count++) = friction_of(step.environment, touch) * touch.slip_direction;
+      }
+    }
+    gram.topLeftCorner(count, count) =
+        normals.leftCols(count).transpose() * (normals.leftCols(count) - rubs.leftCols(count));
+    couplings.push_back(rubs * gram.inverse() * normals.transpose());
+  }
+  return couplings;
+}
+
+double friction_potential(const ContactStep& step, const ContactSet& contacts, const Points& positions) {
+  double potential = 0;
+  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
+    const VertexConstraint& constraint = contacts.constraints[k];
+    if (constraint.friction_bound == 0) continue;
+    for (const Touch& touch : contacts.touches_of(k)) {
+      if (!touch.holds) continue;
+      const Gap gap = step.gap(touch.obstacle, positions, constraint.vertex);
+      const Vector3d moved = way_of(step, positions, constraint.vertex) - gap.surface_moved;
+      const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
+      potential += friction_of(step.environment, touch) * touch.normal_force *
+                   (constraint.slip_stiffness.isZero(0) ? slip : smooth_length(slip));
+    }
+  }
+  return potential;
+}
+
+Vector3d slip_of(const ContactStep& step, const Points& positions, int vertex,
+                 std::span<const Touch> touches) {
+  Vector3d surfaces_moved = Vector3d::Zero();
+  double weights = 0;
+  std::array<Vector3d, 3> normals;
+  size_t count = 0;
+  for (const Touch& touch : touches) {
+    if (!touch.holds) continue;
+    const Gap gap = step.gap(touch.obstacle, positions, vertex);
+    const double weight = friction_of(step.environment, touch) * touch.normal_force + 1e-300;
+    surfaces_moved += weight * gap.surface_moved;
+    weights += weight;
+    normals[count++] = gap.normal;
+  }
+  const Vector3d against = way_of(step, positions, vertex) - surfaces_moved / weights;
+  if (count == 1) return against - normals[0] * normals[0].dot(against);
+  if (count > 2) return Vector3d::Zero();
+  const Vector3d edge = normals[0].cross(normals[1]).normalized();
+  return edge * edge.dot(against);
+}
+
+}  // namespace flash::sim

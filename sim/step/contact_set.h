@@ -1,0 +1,110 @@
+#pragma once
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "sim/law/contact_law.h"
+#include "sim/scene/environment.h"
+#include "sim/step/contact_geometry.h"
+
+namespace flash::sim {
+
+/// Slip up to which a vertex has not moved: rounding of a position [m].
+inline constexpr double resting_slip = 1e-13;
+
+/// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
+struct ContactStep {
+  ContactStep(const Environment& environment, double time_step, double exit_speed);
+
+  const Environment& environment;
+  double time, time_step;  ///< [s]
+  double exit_speed;       ///< of vertices that start inside an obstacle, at most [m/s]
+  std::vector<ObstacleMotion> motions;
+
+  /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
+  Gap gap(int obstacle, const data::Points& positions, int i) const {
+    return gap_after(environment.obstacles[obstacle], motions[obstacle],
+                     environment.state.positions.row(i).transpose(), positions.row(i).transpose(), time_step,
+                     exit_speed);
+  }
+};
+
+/// What a vertex may do at the current iterate of a step.
+enum class Hold {
+  free,
+  fixed,  ///< some axes held, by a support or a gripper
+  slip,   ///< on a surface, the friction force on the rim of its cone
+  stick,  ///< on a surface, at rest against it
+};
+
+/// What holds a vertex at the current iterate of a step.
+struct VertexConstraint {
+  int vertex = -1;
+  Hold hold = Hold::free;
+  int grasp = -1;                                        ///< which grasp holds it
+  Eigen::Vector3d correction = Eigen::Vector3d::Zero();  ///< displacement that a held direction must make [m]
+  Eigen::Matrix3d free = Eigen::Matrix3d::Identity();    ///< projector on the directions it may move in
+  Eigen::Vector3d reaction = Eigen::Vector3d::Zero();    ///< force on the vertex, always admissible [N]
+  Eigen::Vector3d slip_direction =
+      Eigen::Vector3d::Zero();  ///< of the slip that is free to go on, over its length
+  double friction_bound = 0.0;  ///< sum of mu lambda_n [N]
+  /// How the friction force turns with the slip: the sum of mu lambda_n / |slip| across it [N/m].
+  Eigen::Matrix3d slip_stiffness = Eigen::Matrix3d::Zero();
+};
+
+/// The vertices that something holds. Those that nothing holds are not in the list: of them there is only
+/// how far they are from the obstacles.
+struct ContactSet {
+  std::vector<VertexConstraint> constraints;
+  std::size_t fixed = 0;          ///< so many of them, the first, are held by supports and grippers
+  std::size_t obstacles = 0;      ///< touches of each of the others
+  std::vector<Touch> touches;     ///< against every obstacle, in the order of the constraints
+  std::vector<int> place;         ///< of each vertex in `constraints`; -1: nothing holds it
+  std::vector<double> clearance;  ///< of each vertex: to the nearest obstacle [m]
+
+  const VertexConstraint* find(int vertex) const {
+    return place[vertex] < 0 ? nullptr : &constraints[place[vertex]];
+  }
+  /// Of constraint k against every obstacle; empty where a support or a gripper holds it.
+  std::span<Touch> touches_of(std::size_t k) {
+    return k < fixed ? std::span<Touch>() : std::span(touches).subspan((k - fixed) * obstacles, obstacles);
+  }
+  std::span<const Touch> touches_of(std::size_t k) const {
+    return k < fixed ? std::span<const Touch>()
+                     : std::span(touches).subspan((k - fixed) * obstacles, obstacles);
+  }
+};
+
+/// Vertices that the environment's supports and grasps hold at the end of the step; moves them to where they
+/// have to be.
+ContactSet begin_step(const ContactStep& step, data::Points& positions);
+
+/// Sets `clearance` to the smallest gap of each vertex, infinity without obstacles [m].
+void find_clearance(const ContactStep& step, const data::Points& positions, std::vector<double>& clearance);
+
+/// Appends to `touches` vertex i against every obstacle.
+void add_touches(const ContactStep& step, const data::Points& positions, int i, std::vector<Touch>& touches);
+
+/// Decides from the iterate alone what holds each vertex. `force` is what it needs from outside to obey its
+/// equation of motion [N]. A vertex on a surface is held while it needs a push. It sticks where it has not
+/// slipped in this step and needs a friction force inside the cone; else the force is on the rim, against the
+/// slip. Of several surfaces each rubs against its own slip, which enters the normal forces of the others;
+/// the vertex moves along the edge of two alone, and between three not at all.
+void update_contacts(const ContactStep& step, const data::Points& positions, const data::Points& force,
+                     ContactSet& contacts);
+
+/// How the friction forces of slipping vertices change with the force on them, a constraint each: the sum of
+/// mu_k d_k l_k^T, where d_k is the direction of slip and l_k . f the normal force of surface k under the
+/// force f. Zero for all others.
+std::vector<Eigen::Matrix3d> friction_couplings(const ContactStep& step, const ContactSet& contacts);
+
+/// sum mu lambda_n |slip| of the held vertices at frozen normal forces: the potential of friction over the
+/// step [J].
+double friction_potential(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
+
+/// Displacement of a held vertex since the start of the step along the surfaces that hold it, against them:
+/// against their mean by mu lambda_n where there are several [m].
+Eigen::Vector3d slip_of(const ContactStep& step, const data::Points& positions, int vertex,
+                        std::span<const Touch> touches);
+
+}  // namespace flash::sim

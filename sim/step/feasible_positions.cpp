@@ -1,0 +1,91 @@
+#include "sim/step/feasible_positions.h"
+
+#include <algorithm>
+
+namespace flash::sim {
+
+using data::Points;
+using Eigen::Vector3d;
+
+namespace {
+
+/// Whether the vertex is to land on the surface that it held at the iterate: where the step is long enough to
+/// bring it down.
+bool lands(const Touch& touch, double distance) {
+  return touch.holds && distance > 0 && (touch.touches() || distance <= 0.01 * touch.gap);
+}
+
+bool stays(const ContactStep& step, std::span<const Touch> touches, const Points& positions, int i) {
+  for (size_t k = 0; k < step.motions.size(); ++k) {
+    const double distance = step.gap(static_cast<int>(k), positions, i).distance;
+    if (!(distance >= 0) || (!touches.empty() && lands(touches[k], distance))) return false;
+  }
+  return true;
+}
+
+/// Moves vertex i by the shortest way out of all obstacles, and onto those where it is to land. Exact for
+/// planes at once; round surfaces and faces that change take a few rounds.
+void project_vertex(const ContactStep& step, std::span<const Touch> touches, Points& positions, int i) {
+  if (stays(step, touches, positions, i)) return;
+  const size_t count = step.motions.size();
+  std::vector<Vector3d> normals(count);
+  std::vector<double> depths(count);
+  for (int round = 0; round < 40; ++round) {
+    double moved = 0;
+    for (size_t k = 0; k < count; ++k) {
+      const Gap gap = step.gap(static_cast<int>(k), positions, i);
+      normals[k] = gap.normal;
+      depths[k] = -gap.distance;
+      if (touches.empty() || !lands(touches[k], gap.distance)) continue;
+      positions.row(i) -= gap.distance * gap.normal.transpose();
+      moved = std::max(moved, gap.distance);
+      depths[k] = 0;
+    }
+    if (moved == 0 && std::all_of(depths.begin(), depths.end(), [](double depth) { return depth <= 0; }))
+      return;
+    Vector3d way = Vector3d::Zero();
+    if (count == 1) {
+      way = std::max(0.0, depths[0]) * normals[0];
+    } else {
+      const std::vector<double> x = complementary(normals, normals, depths);
+      for (size_t k = 0; k < count; ++k) way += x[k] * normals[k];
+    }
+    positions.row(i) += way.transpose();
+    if (std::max(moved, way.norm()) <= resting_slip) return;
+  }
+}
+
+/// Takes back a slip against `direction`.
+void stop_turned_slip(const ContactStep& step, std::span<const Touch> touches, const Vector3d& direction,
+                      Points& positions, int i) {
+  Vector3d slip = slip_of(step, positions, i, touches);
+  if (slip.dot(direction) >= 0) return;
+  // On a round surface the way back along it leaves it: back on it, and again.
+  for (int round = 0; round < 10 && slip.norm() > resting_slip; ++round) {
+    positions.row(i) -= slip.transpose();
+    project_vertex(step, touches, positions, i);
+    slip = slip_of(step, positions, i, touches);
+  }
+}
+
+}  // namespace
+
+void project_to_feasible(const ContactStep& step, const ContactSet& contacts, Points& positions) {
+  std::vector<double> clearance;
+  find_clearance(step, positions, clearance);
+  for (int i = 0; i < positions.rows(); ++i) {
+    const int k = contacts.place[i];
+    if (k < 0) {
+      if (!(clearance[i] >= 0)) project_vertex(step, {}, positions, i);
+      continue;
+    }
+    const VertexConstraint& constraint = contacts.constraints[k];
+    if (constraint.hold == Hold::fixed) continue;
+    const std::span<const Touch> touches = contacts.touches_of(k);
+    project_vertex(step, touches, positions, i);
+    if (constraint.hold == Hold::slip)
+      stop_turned_slip(step, touches, constraint.slip_direction, positions, i);
+  }
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,62 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "sim/plan/sheet_plan.h"
+#include "sim/scene/environment.h"
+#include "sim/step/elastic_energy.h"
+
+namespace flash::sim {
+
+/// What one implicit Euler step of length h from `environment.state` minimizes, contact and grasps apart:
+///
+///   |x - s|^2_M / (2 h^2) + E(x) - f.x + a / (2 h) |x - x_0|^2_M + b / h E_0(x),   s = x_0 + h v_0 + h^2 g
+///
+/// with the elastic energy E, loads f, `air_drag` a and `stiffness_damping` b. E_0 is the elastic energy of
+/// what changed since the start of the step: of strains, of the angles of hinges, and of a quadratic bending
+/// model's positions less what the sheet turned by as a whole. Its forces are b K v for small motions,
+/// without a torque on a sheet that turns rigidly, stressed or not (Kelvin-Voigt). The arguments of the
+/// constructor have to outlive the potential.
+class IncrementalPotential {
+ public:
+  IncrementalPotential(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment,
+                       double time_step);
+
+  /// Mass of each vertex [kg].
+  const Eigen::VectorXd& mass() const { return mass_; }
+
+  /// Potential [J] at `positions`; `force` becomes its gradient: what every vertex needs from outside [N].
+  /// `elastic`: the energy of the sheet alone.
+  double evaluate(const data::Points& positions, data::Points& force, ElasticEnergy& elastic) const;
+
+  /// Potential at the start of the step, where the energy of the sheet is `elastic` [J].
+  double at_start(const ElasticEnergy& elastic) const;
+
+  /// Hessian of the potential, without the stiffness of a quadratic bending model.
+  /// `sparse`: over edges alone, which is all where no hinges bend.
+  void assemble(const data::Points& positions, Curvature curvature, bool sparse,
+                BlockValues<double>& values) const;
+
+  /// What the stiffness of a quadratic bending model enters the Hessian with: D (1 + b / h) [N m].
+  double effective_rigidity() const;
+
+ private:
+  /// Moduli of the membrane times b / h.
+  SheetLame damping_lame() const;
+
+  /// Adds the gradient of b / h E_0 to `force` and returns its value [J].
+  double add_damping(const data::Points& positions, data::Points& force) const;
+
+  const SheetPlan& plan_;
+  const BendingOperator& bending_;
+  const Environment& environment_;
+  double h_;
+  double damping_share_;  ///< b / h
+  Eigen::VectorXd mass_;
+  data::Points target_, loads_;
+  // With damping: strains and angles at the start of the step.
+  std::vector<Eigen::Matrix2d> start_metrics_;
+  std::vector<Hinge> start_hinges_;
+};
+
+}  // namespace flash::sim

@@ -1,0 +1,104 @@
+#include "sim/step/contact_geometry.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace flash::sim {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+Isometry3d random_pose() {
+  return Isometry3d(Eigen::Translation3d(Vector3d::Random()) *
+                    Eigen::AngleAxisd(3 * Vector3d::Random().x(), Vector3d::Random().normalized()));
+}
+
+TEST(ContactGeometry, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
+  int through = 0;
+  for (int sample = 0; sample < 20000; ++sample) {
+    const Box box{.half_extents = 0.02 * Vector3d::Ones() + 0.3 * Vector3d::Random().cwiseAbs()};
+    ObstacleMotion motion{random_pose(), random_pose(), true};
+    const Vector3d from = 0.8 * Vector3d::Random(), to = 0.8 * Vector3d::Random();
+    if ((from.cwiseAbs() - box.half_extents).maxCoeff() < 0) continue;
+    // Brute force: the faces through which the straight way, seen from the box, goes in and out.
+    int in = -1, out = -1;
+    bool by_an_edge = false;
+    double in_sign = 0;
+    constexpr int parts = 4000;
+    for (int k = 1; k <= parts; ++k) {
+      const auto excess = [&](int part) {
+        const Vector3d at = from + double(part) / parts * (to - from);
+        return Vector3d(at.cwiseAbs() - box.half_extents);
+      };
+      const Vector3d before = excess(k - 1), now = excess(k);
+      // By an edge: which face is for chance to say.
+      by_an_edge = by_an_edge || (before.maxCoeff() * now.maxCoeff() <= 0 &&
+                                  ((before.array() > 0) != (now.array() > 0)).count() > 1);
+      if (before.maxCoeff() > 0 && now.maxCoeff() <= 0) {
+        before.maxCoeff(&in);
+        in_sign = std::copysign(1.0, (from + double(k) / parts * (to - from))[in]);
+      }
+      if (before.maxCoeff() <= 0 && now.maxCoeff() > 0) now.maxCoeff(&out);
+    }
+    if (by_an_edge) continue;
+    const Gap gap = gap_after({box}, motion, motion.start * from, motion.end * to, 0.01, 1);
+    const bool ends_inside = (to.cwiseAbs() - box.half_extents).maxCoeff() <= 0;
+    if (in < 0 || (!ends_inside && out != in)) {
+      // Never in, or out by a face beside: the distance of the point alone.
+      if (in < 0) {
+        EXPECT_GE(gap.distance, 0) << sample;
+      }
+      continue;
+    }
+    ++through;
+    EXPECT_NEAR(gap.distance, in_sign * to[in] - box.half_extents[in], 1e-9) << sample;
+    EXPECT_LT(gap.distance, 0) << sample;
+    EXPECT_NEAR((gap.normal - in_sign * motion.end.linear().col(in)).norm(), 0, 1e-9) << sample;
+  }
+  EXPECT_GT(through, 500);
+}
+
+TEST(ContactGeometry, NoWayPassesThroughACylinder) {
+  int through = 0;
+  for (int sample = 0; sample < 20000; ++sample) {
+    const Cylinder cylinder{Vector3d::Zero(), Vector3d::UnitY(), 0.3};
+    const Vector3d from = Vector3d::Random(), to = Vector3d::Random();
+    const auto across = [](const Vector3d& x) { return Vector3d(x.x(), 0, x.z()); };
+    if (across(from).norm() < 0.3) continue;
+    double nearest = 1;
+    for (int k = 0; k <= 1000; ++k)
+      nearest = std::min(nearest, across(from + k / 1000.0 * (to - from)).norm());
+    const Gap gap = gap_after({cylinder}, {}, from, to, 0.01, 1);
+    if (nearest > 0.301) {
+      EXPECT_GT(gap.distance, 0) << sample;
+    }
+    // A way this deep leaves more than a quarter of the round from where it came in.
+    if (nearest > 0.3 / std::sqrt(2.0) || across(to).norm() < 0.3) continue;
+    ++through;
+    EXPECT_LT(gap.distance, 0) << sample;
+    EXPECT_GE(across(to - gap.distance * gap.normal).norm(), 0.3 - 1e-9) << sample;
+    EXPECT_GT(gap.normal.dot(from), 0) << sample;
+  }
+  EXPECT_GT(through, 1000);
+}
+
+TEST(ContactGeometry, WhatStartsInsideMayStayThereForItsWayOut) {
+  Box box{.half_extents = {0.1, 0.1, 0.05}};
+  const Obstacle obstacles[] = {
+      {Plane{Vector3d(0, 0, 0.05)}}, {box}, {Cylinder{Vector3d::Zero(), Vector3d::UnitY(), 0.05}}};
+  const double time_step = 0.01, speed = 1;
+  for (const Obstacle& obstacle : obstacles) {
+    const Vector3d start(0, 0, 0.02);  // 30 mm deep, 10 mm a step
+    const Gap gap = gap_after(obstacle, {}, start, start, time_step, speed);
+    EXPECT_NEAR(gap.sunk, 0.02, 1e-12);
+    EXPECT_NEAR(gap.distance, -0.01, 1e-12);
+    EXPECT_NEAR((gap.normal - Vector3d::UnitZ()).norm(), 0, 1e-12);
+    EXPECT_NEAR(gap_after(obstacle, {}, Vector3d(0, 0, 0.045), start, time_step, speed).sunk, 0, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace flash::sim
