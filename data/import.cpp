@@ -342,6 +342,11 @@ Recording import_recording(const ImportOptions& options) {
   else
     guesses.push_back("table height " + format_short(table_height) +
                       " m, from the gripper's start and the crop (--table-height)");
+  constexpr double kKnown = 5e-3;  // what a table's height is known to [m]
+  if (gripper.z() < table_height - kKnown)
+    notices.push_back("import: warning: --table-height: found " + format_short(table_height) +
+                      " m, expected at most the height at which the gripper starts, " +
+                      format_short(gripper.z()) + " m: does it grasp below the table?");
   recording.has_table = true;
   recording.table_point.z() = table_height;
 

@@ -230,14 +230,18 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
     falls += mass[i] * environment.gravity.dot(way);
     unbalanced += std::abs(end.residual.row(i).dot(way));
   }
-  for (const VertexConstraint& c : end.contacts.constraints) {
+  for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
+    const VertexConstraint& c = end.contacts.constraints[k];
     const Vector3d way = moved.row(c.vertex);
-    const double work = c.reaction.dot(way);
     if (c.hold == Hold::fixed) {
-      report.work += work;
+      report.work += c.reaction.dot(way);
       start_is_feasible = start_is_feasible && ((Eigen::Matrix3d::Identity() - c.free) * way).isZero(0);
-    } else {
-      report.work += std::max(0.0, work);
+    }
+    for (const Touch& touch : end.contacts.touches_of(k)) {
+      if (!touch.holds) continue;
+      const Vector3d force = touch.normal_force * touch.normal + touch.friction;
+      // What starts inside is pushed out, also by an obstacle that stands still.
+      report.work += touch.sunk > 0 ? std::max(0.0, force.dot(way)) : force.dot(touch.surface_moved);
     }
   }
   for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));

@@ -1,13 +1,14 @@
 #include "data/import.h"
 
 #include <gtest/gtest.h>
-#include "data/extrinsics.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "data/atomic_file.h"
 #include "data/depth_image.h"
+#include "data/extrinsics.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
 #include "tests/data/temporary_folder.h"
@@ -186,6 +187,19 @@ TEST_F(ImportFiles, TheMiddleOfThePatchCanBeAtTheTool) {
   const std::vector<int> held = select_vertices(recording, recording.grasps[0]);
   for (const int vertex : held) middle += recording.start.row(vertex) / static_cast<double>(held.size());
   EXPECT_TRUE(middle.isApprox(Eigen::RowVector3d(0.5, 0.1, 0.05), 1e-9)) << middle;
+}
+
+TEST_F(ImportFiles, ATableAboveTheGripperIsDoubted) {
+  const auto doubts = [&](double table_height) {
+    options_.table_height = table_height;
+    options_.out = folder_ / (table_height < 0.055 ? "known" : "doubted");
+    const std::vector<std::string> notices = import_recording(options_).notices;
+    return std::count_if(notices.begin(), notices.end(), [](const std::string& notice) {
+      return notice.find("warning: --table-height: found") != std::string::npos;
+    });
+  };
+  EXPECT_EQ(doubts(0.05), 0);
+  EXPECT_EQ(doubts(0.06), 1);
 }
 
 TEST_F(ImportFiles, SenselessOptionsAreRefusedByTheirNames) {
