@@ -7,16 +7,16 @@
 
 #include "data/error.h"
 #include "data/memory_limit.h"
-#include "data/parallel.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
-#include "sim/newton/solver.h"
+#include "sim/batch.h"
 #include "sim/step/elastic_energy.h"
 
 namespace flash::sim {
 namespace {
 
 constexpr double side = 0.4;  // [m]
+constexpr int environments_at_once = 1024;
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -104,35 +104,35 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   rectangle.width = rectangle.height = side;
   rectangle.cells_x = rectangle.cells_y = cells;
   const auto plan = make_sheet_plan(make_sheet(data::rectangle(rectangle)), benchmark.level);
-  const SolverSettings settings = [&] {
-    SolverSettings chosen;
-    chosen.time_step = benchmark.time_step;
-    chosen.tolerance = benchmark.tolerance;
-    return chosen;
-  }();
+  BatchSettings settings;
+  settings.solver.time_step = benchmark.time_step;
+  settings.solver.tolerance = benchmark.tolerance;
+  settings.solver.stop = &stop;
+  settings.steps = benchmark.steps;
+  settings.kept_steps = {benchmark.steps / 2};
+  settings.threads = benchmark.threads;
 
   struct Counts {
     long iterations = 0, solves = 0, factorizations = 0, converged = 0;
     double residual_max = 0;
-    data::Points middle;  // positions halfway
   };
   std::vector<Counts> counts(benchmark.environments);
+  const std::size_t middle = counts.size() / 2;
+  data::Points x;  // of the environment in the middle, halfway
   const auto start = std::chrono::steady_clock::now();
-  const auto count = static_cast<std::size_t>(benchmark.environments);
-  data::for_each_in_parallel(count, benchmark.threads, [&](std::size_t e) {
-    Environment environment = lift_environment(benchmark, plan->sheet, static_cast<int>(e));
-    Solver solver(plan, settings);
-    for (int k = 0; k < benchmark.steps; ++k) {
-      if (stop) throw data::Stopped();
-      const StepReport report = solver.step(environment);
-      counts[e].iterations += report.iterations;
-      counts[e].solves += report.solves;
-      counts[e].factorizations += report.factorizations;
-      counts[e].converged += report.converged;
-      counts[e].residual_max = worst(counts[e].residual_max, report.residual);
-      if (k == benchmark.steps / 2) counts[e].middle = environment.state.positions;
-    }
-  });
+  replay_in_batches(
+      plan, counts.size(), environments_at_once, settings,
+      [&](std::size_t i) { return lift_environment(benchmark, plan->sheet, static_cast<int>(i)); },
+      [&](std::size_t i, const Batch& batch, int e) {
+        for (const StepStats& step : batch.stats(e)) {
+          counts[i].iterations += step.iterations;
+          counts[i].solves += step.solves;
+          counts[i].factorizations += step.factorizations;
+          counts[i].converged += step.converged;
+          counts[i].residual_max = worst(counts[i].residual_max, step.residual);
+        }
+        if (i == middle) x = batch.kept_positions(e, 0);
+      });
   LiftBenchmarkResult result;
   result.wall_seconds = seconds_since(start);
   result.vertices = plan->pattern.size;
@@ -143,7 +143,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     solves += double(c.solves) / total;
     factorizations += double(c.factorizations) / total;
     converged += double(c.converged);
-    result.residual_max = std::max(result.residual_max, c.residual_max);
+    result.residual_max = worst(result.residual_max, c.residual_max);
   }
   result.converged_share = converged / total;
   result.step_milliseconds =
@@ -153,7 +153,6 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   const data::SheetMaterial material =
       lift_environment(benchmark, plan->sheet, benchmark.environments / 2).material;
   const BendingOperator& bending = bending_operator(*plan, material.bending_model, material.poissons_ratio);
-  const data::Points& x = counts[benchmark.environments / 2].middle;
   data::Points y = data::Points::Zero(x.rows(), 3);
   BlockValues<double> values;
   const auto assemble = [&](Curvature curvature) {

@@ -135,17 +135,36 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
   return passage;
 }
 
+/// Takes a way in the plane of a face, to within rounding, out of the box where the face looks up, into it
+/// where it looks down and the way begins at another face or outside.
+void decide_grazing(const Box& box, const Vector3d& down, Vector3d& from, Vector3d& to) {
+  constexpr double grazing = 1e-9;  // [m]
+  const Vector3d excess = from.cwiseAbs() - box.half_extents;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double side = std::copysign(1.0, from[axis]);
+    const auto grazes = [&](double x) { return std::abs(side * x - box.half_extents[axis]) <= grazing; };
+    if (std::abs(down[axis]) < 0.5 || !grazes(from[axis]) || !grazes(to[axis])) continue;
+    const bool looks_down = side * down[axis] > 0;
+    const bool beside = excess[(axis + 1) % 3] >= -grazing || excess[(axis + 2) % 3] >= -grazing;
+    if (looks_down && !beside) continue;
+    const double decided = side * (box.half_extents[axis] + (looks_down ? -2 : 2) * grazing);
+    from[axis] = to[axis] = decided;
+  }
+}
+
 Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const Vector3d& start, const Vector3d& point,
                   double time_step, double exit_speed) {
-  const Vector3d from = motion.start.inverse(Eigen::Isometry) * start,
-                 to = motion.end.inverse(Eigen::Isometry) * point;
+  Vector3d from = motion.start.inverse(Eigen::Isometry) * start;
+  const Vector3d local = motion.end.inverse(Eigen::Isometry) * point;
+  Vector3d to = local;
+  decide_grazing(box, motion.end.linear().transpose() * motion.down, from, to);
   const Passage passage = passage_through(box, from, to);
   if (!passage.enters) return gap_of(box, motion, point);
   const bool ends_inside = ((to.cwiseAbs() - box.half_extents).array() <= 0).all();
   const bool behind = passage.exit_axis == passage.entry_axis &&
                       passage.entry_sign * to[passage.entry_axis] < -box.half_extents[passage.entry_axis];
   if (!ends_inside && !behind) return gap_of(box, motion, point);
-  Gap gap = gap_to_face(box, motion, point, to, passage.entry_axis, passage.entry_sign);
+  Gap gap = gap_to_face(box, motion, point, local, passage.entry_axis, passage.entry_sign);
   gap.sunk = still_sunk(box.half_extents[passage.entry_axis] - passage.entry_sign * from[passage.entry_axis],
                         time_step, exit_speed);
   gap.distance += gap.sunk;
@@ -166,7 +185,11 @@ ObstacleMotion motion_of(const Obstacle& obstacle, double start, double end) {
 
 std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, double start, double end) {
   std::vector<ObstacleMotion> motions;
-  for (const Obstacle& obstacle : environment.obstacles) motions.push_back(motion_of(obstacle, start, end));
+  const double gravity = environment.gravity.norm();
+  for (const Obstacle& obstacle : environment.obstacles) {
+    motions.push_back(motion_of(obstacle, start, end));
+    if (gravity > 0) motions.back().down = environment.gravity / gravity;
+  }
   return motions;
 }
 

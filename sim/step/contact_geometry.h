@@ -26,6 +26,7 @@ struct Penetration {
 struct ObstacleMotion {
   Eigen::Isometry3d start = Eigen::Isometry3d::Identity(), end = Eigen::Isometry3d::Identity();
   bool moves = false;
+  Eigen::Vector3d down = Eigen::Vector3d::Zero();  ///< unit, the way of gravity; zero without
 };
 std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, double start, double end);
 
@@ -41,6 +42,9 @@ Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, 
 /// - a point in a box, or behind it, stands against the face through which its way entered; one behind the
 ///   axis of a cylinder against the tangent plane where its way entered. So nothing passes through, however
 ///   thin. A way that leaves a box by a face beside rounds its edge and is let go.
+/// - a way in the plane of a face, to within rounding, belongs to that face where it looks up, so that a
+///   sheet slides over boxes that stand flush; a face that looks down carries nothing, and what is pushed
+///   against a box that stands on a table meets its side.
 /// - a vertex that starts inside stands against a surface below the obstacle's own (`sunk`), so that it comes
 ///   out at `exit_speed` [m/s] at most.
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,

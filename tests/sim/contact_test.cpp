@@ -159,6 +159,50 @@ TEST(Contact, AMovingBoxCarriesTheSheet) {
   EXPECT_NEAR(carried, 0.5 * 0.5 * 0.5, 1e-9);  // it sticks: 50 steps of a slip below 1e-13
 }
 
+/// A sheet on a table and a box that stands on it, exactly, and moves towards it along x.
+Environment pushed_by_a_box(const Sheet& sheet, double height) {
+  Environment environment = environment_of(sheet);
+  environment.obstacles.push_back({Plane{}});
+  Box box{.half_extents = {0.02, 0.1, 0.5 * height}};
+  for (int k = 0; k <= 100; ++k) {
+    box.trajectory.times.push_back(0.01 * k);
+    box.trajectory.poses.push_back(
+        Eigen::Isometry3d(Eigen::Translation3d(-0.05 + 0.002 * k, 0.03, 0.5 * height)));
+  }
+  environment.obstacles.push_back({box});
+  return environment;
+}
+
+TEST(Contact, ABoxThatStandsOnATablePushesASheetAlongIt) {
+  const Sheet sheet = small_sheet(6, 0.06);
+  for (const double height : {0.05, 0.04, 0.06, 0.1}) {
+    Environment environment = pushed_by_a_box(sheet, height);
+    environment.material.friction = 0.3;
+    Solver solver(sheet, {});
+    for (int n = 0; n < 100; ++n) EXPECT_TRUE(solver.step(environment).converged) << n;
+    // The face of the box has come from -0.03 to 0.17.
+    EXPECT_NEAR(environment.state.positions.col(0).minCoeff(), 0.17, 1e-9) << height;
+  }
+}
+
+TEST(Contact, ASheetSlidesOverBoxesThatStandFlush) {
+  const Sheet sheet = small_sheet(6, 0.06);
+  for (const double height : {0.05, 0.04, 0.06, 0.1}) {
+    Environment environment = environment_of(sheet);
+    environment.material.friction = 0.0;
+    for (const double x : {0.0, 0.2}) {
+      Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+      pose.translation() = Vector3d(x, 0, -0.5 * height);
+      environment.obstacles.push_back({Box{.half_extents = {0.1, 0.1, 0.5 * height}, .pose = pose}});
+    }
+    environment.state.velocities.col(0).setConstant(0.2);
+    Solver solver(sheet, {.tolerance = 1e-6});
+    for (int n = 0; n < 100; ++n) solver.step(environment);
+    EXPECT_NEAR(environment.state.positions(0, 0) - sheet.rest.vertices(0, 0), 0.2, 1e-6) << height;
+    EXPECT_LT(environment.state.positions.col(2).cwiseAbs().maxCoeff(), 1e-9) << height;
+  }
+}
+
 TEST(Contact, AVertexOnRollersIsSeenBelowATable) {
   const Sheet sheet = small_sheet(4, 0.04);
   Environment environment = environment_of(sheet);
