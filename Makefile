@@ -10,7 +10,7 @@ SEED ?= 10001
 SCENES ?= 1000
 
 PYTHON ?= /usr/bin/python3
-REFERENCE ?= ../shared/reference
+REFERENCE ?= tests/reference
 
 sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'

@@ -69,7 +69,8 @@ def solved(name, *arguments):
 def main(words=None):
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sim", required=True, help="the program flash-sim")
-    parser.add_argument("--scenes", required=True, type=pathlib.Path, help="folder of the reference scenes")
+    parser.add_argument("--scenes", type=pathlib.Path, default=pathlib.Path(__file__).parent / "scenes",
+                        help="folder of the reference scenes")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder of the results")
     parser.add_argument("--jobs", type=int, default=1, help="scenes at once")
     parser.add_argument("--judge", action="store_true", help="fail where a quantity is farther off than allowed")

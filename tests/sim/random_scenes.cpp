@@ -6,6 +6,7 @@
 #include <random>
 
 #include "data/procedural_mesh.h"
+#include "tests/sim/obstacle_depth.h"
 
 namespace flash::sim {
 namespace {
@@ -202,17 +203,6 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
       return;
     }
   }
-}
-
-/// Depth of a point in an obstacle, negative outside: from the shapes' definitions alone [m].
-double depth_in(const Obstacle& obstacle, const Vector3d& point, double time) {
-  if (const auto* plane = std::get_if<Plane>(&obstacle.shape))
-    return -plane->normal.dot(point - plane->point);
-  if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape))
-    return cylinder->radius - (point - cylinder->point).cross(cylinder->axis).norm();
-  const Box& box = std::get<Box>(obstacle.shape);
-  const Isometry3d pose = box.trajectory.times.empty() ? box.pose : data::pose_at(box.trajectory, time);
-  return (box.half_extents - (pose.inverse() * point).cwiseAbs()).minCoeff();
 }
 
 /// Whether the straight way from `from` to `to`, seen from the obstacle as it moves, goes through it: in by

@@ -1,26 +1,23 @@
 #pragma once
-#include <gtest/gtest.h>
-
-#include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "data/mesh.h"
 
-/// Reference scenes stand beside the checkout; a test that needs one skips where they are absent.
-#define FLASH_REFERENCE_SCENE(scene, name)                                               \
-  if (!std::filesystem::exists(flash::sim::reference_path(std::string(name) + ".json"))) \
-    GTEST_SKIP() << "no reference scenes in " << flash::sim::reference_path("");         \
-  const nlohmann::json scene =                                                           \
-      nlohmann::json::parse(std::ifstream(flash::sim::reference_path(std::string(name) + ".json")))
-
 namespace flash::sim {
 
 inline std::string reference_path(const std::string& file) {
-  return std::string(FLASH_SHARED_DIR) + "/reference/scenes/" + file;
+  return std::string(FLASH_REFERENCE_SCENES) + "/" + file;
+}
+
+/// The scene of that name; throws where its file is absent or broken.
+inline nlohmann::json reference_scene(const std::string& name) {
+  std::ifstream in(reference_path(name + ".json"));
+  return nlohmann::json::parse(in);
 }
 
 /// An .obj of vertices and triangles, nothing else.

@@ -216,7 +216,7 @@ TEST(Membrane, UniaxialStretchGivesBackYoungsModulusAndPoissonsRatio) {
 }
 
 void expect_reference(const std::string& name, Constitutive model) {
-  FLASH_REFERENCE_SCENE(scene, name);
+  const nlohmann::json scene = reference_scene(name);
   const Sheet sheet = make_sheet(reference_mesh(scene.at("mesh")));
   const data::Points x = reference_points(scene.at("x"));
   const nlohmann::json& material = scene.at("material");

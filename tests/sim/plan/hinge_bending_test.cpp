@@ -129,7 +129,7 @@ TEST(HingeBending, CurvedRestShapeIsAtRest) {
 }
 
 TEST(HingeBending, ReferenceScene) {
-  FLASH_REFERENCE_SCENE(scene, "unit_bending_hinge");
+  const nlohmann::json scene = reference_scene("unit_bending_hinge");
   const Sheet sheet = make_sheet(reference_mesh(scene.at("mesh")));
   const data::Points x = reference_points(scene.at("x"));
   const double D = scene.at("bending").at("D");

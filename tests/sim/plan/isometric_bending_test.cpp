@@ -34,7 +34,7 @@ TEST(IsometricBending, CylinderCostsItsRigidity) {
 }
 
 TEST(IsometricBending, ReferenceScene) {
-  FLASH_REFERENCE_SCENE(scene, "unit_bending_quadratic");
+  const nlohmann::json scene = reference_scene("unit_bending_quadratic");
   const Sheet sheet = make_sheet(reference_mesh(scene.at("mesh")));
   const data::Points x = reference_points(scene.at("x"));
   const double D = scene.at("bending").at("D");

@@ -1,0 +1,10 @@
+#pragma once
+#include "sim/scene/environment.h"
+
+namespace flash::sim {
+
+/// Depth of a point in an obstacle as it stands at `time`, negative outside: from the shapes' definitions
+/// alone [m].
+double depth_in(const Obstacle& obstacle, const Eigen::Vector3d& point, double time);
+
+}  // namespace flash::sim

@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "tests/sim/obstacle_depth.h"
+#include "tests/sim/properties/drawn_world.h"
+
+namespace flash::sim {
+namespace {
+
+using Eigen::Vector3d;
+
+struct Run {
+  Sheet sheet = draw_sheet();
+  Environment environment = draw_world(sheet);
+  int steps = 20;
+  SolverSettings settings{.time_step = draw_log(2e-3, 2e-2), .tolerance = draw_log(1e-6, 1e-3)};
+  Eigen::VectorXd mass = masses_of(sheet, environment.material);
+  Solver solver{sheet, settings};
+};
+
+std::vector<bool> held_vertices(const Environment& environment) {
+  std::vector<bool> held(static_cast<std::size_t>(environment.state.positions.rows()), false);
+  for (const Grasp& grasp : environment.grasps)
+    for (const int i : grasp.vertices) held[static_cast<std::size_t>(i)] = true;
+  for (const FixedVertex& fixed : environment.fixed) held[static_cast<std::size_t>(fixed.vertex)] = true;
+  return held;
+}
+
+// No vertex is deeper in an obstacle than the step reported, and none that nothing holds is in one at all.
+RC_GTEST_PROP(Properties, NoVertexIsBelowASurfaceUnreported, ()) {
+  Run run;
+  const std::vector<bool> held = held_vertices(run.environment);
+  bool touched = false;
+  for (int step = 0; step < run.steps; ++step) {
+    const StepReport report = run.solver.step(run.environment);
+    for (const Vector3d& force : report.obstacle_forces) touched = touched || force.norm() > 0;
+    for (const Obstacle& obstacle : run.environment.obstacles)
+      for (std::size_t i = 0; i < held.size(); ++i) {
+        const double depth = depth_in(obstacle, run.environment.state.positions.row(static_cast<int>(i)),
+                                      run.environment.state.time);
+        RC_ASSERT(depth <= report.penetration_max + 1e-9);
+        if (!held[i] && report.converged) RC_ASSERT(depth <= 2e-9);  // the solver's on gaps, and rounding
+      }
+  }
+  RC_CLASSIFY(touched);
+}
+
+// What grippers, supports and obstacles are reported to do is what weight, loads, air and inertia ask for:
+// sum m (v1 - v0) / h = sum of all forces.
+RC_GTEST_PROP(Properties, ReportedForcesBalanceWeightAndInertia, ()) {
+  Run run;
+  Environment& environment = run.environment;
+  for (int step = 0; step < run.steps; ++step) {
+    const State before = environment.state;
+    const StepReport report = run.solver.step(environment);
+    // In a step in parts the air acts at velocities that only its parts know.
+    if (!report.converged || (report.substeps > 1 && environment.material.air_drag > 0)) continue;
+    const data::Points& v = environment.state.velocities;
+    Vector3d asked = ((run.mass.asDiagonal() * (v - before.velocities)) / run.settings.time_step +
+                      environment.material.air_drag * (run.mass.asDiagonal() * v))
+                         .colwise()
+                         .sum()
+                         .transpose();
+    asked -= run.mass.sum() * environment.gravity;
+    for (const Load& load : environment.loads) asked -= load.force;
+    Vector3d found = Vector3d::Zero();
+    double largest = 0;
+    const auto add = [&](const Vector3d& force) {
+      found += force;
+      largest += force.norm();
+    };
+    std::ranges::for_each(report.grasp_forces, add);
+    std::ranges::for_each(report.obstacle_forces, add);
+    for (const Load& support : report.fixed_forces) add(support.force);
+    RC_ASSERT((asked - found).norm() <= unbalanced_sum(environment, run.mass, report) + 1e-12 * largest);
+  }
+}
+
+// A plane pushes, and drags no harder than friction lets it: the cone is convex, so that the sum of its
+// vertices' forces lies in it too.
+RC_GTEST_PROP(Properties, ForcesOfPlanesAreInTheConeOfFriction, ()) {
+  Run run;
+  for (int step = 0; step < run.steps; ++step) {
+    const StepReport report = run.solver.step(run.environment);
+    if (!report.converged) continue;
+    for (std::size_t k = 0; k < run.environment.obstacles.size(); ++k) {
+      const Obstacle& obstacle = run.environment.obstacles[k];
+      const auto* plane = std::get_if<Plane>(&obstacle.shape);
+      if (plane == nullptr) continue;
+      const double friction = obstacle.friction < 0 ? run.environment.material.friction : obstacle.friction;
+      const double normal = report.obstacle_forces[k].dot(plane->normal);
+      const double along = (report.obstacle_forces[k] - normal * plane->normal).norm();
+      const double unbalanced = unbalanced_sum(run.environment, run.mass, report);
+      RC_ASSERT(normal >= -unbalanced);
+      RC_ASSERT(along <= friction * normal + (1 + friction) * unbalanced);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace flash::sim
