@@ -21,7 +21,7 @@
 #include "sysid/infer/fit/fit.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/parameter_label.h"
-#include "sysid/report/summary.h"
+#include "sysid/report/search_folder.h"
 
 namespace flash {
 namespace {
@@ -147,7 +147,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   stop_on_signals();
   choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
-  const sysid::Summary found = sysid::load_summary((fs::path(options.start) / "summary.json").string());
+  const sysid::Summary found = sysid::load_search_folder(options.start).summary;
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.asset : options.asset, recordings.front());
   sysid::FitSettings settings = fit_settings(options, found);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <string_view>
 #include <type_traits>
 
 #include "data/atomic_file.h"
@@ -13,7 +14,8 @@
 namespace flash::sysid {
 namespace {
 
-constexpr const char* kMagic = "flash-rollout/2\n";
+constexpr std::string_view kMagic = "flash-rollout/3\n";
+constexpr std::size_t kDigest = 64;  // hexadecimal digits of a SHA-256
 
 /// Numbers as the bytes they are.
 class Bytes {
@@ -42,44 +44,49 @@ class Bytes {
 
 class BytesReader {
  public:
-  BytesReader(std::string text, std::string path) : text_(std::move(text)), path_(std::move(path)) {
-    if (text_.rfind(kMagic, 0) != 0) fail();
-    place_ = std::strlen(kMagic);
-  }
+  BytesReader(std::string_view text, const std::string& path) : text_(text), path_(path) {}
   template <class Number>
   Number take() {
     Number number;
     take_bytes(&number, sizeof number);
     return number;
   }
-  template <class Matrix>
-  Matrix take_matrix() {
+  /// Of three columns.
+  data::Points take_points(Eigen::Index expected, const char* what) {
     const auto rows = take<std::int64_t>(), columns = take<std::int64_t>();
-    const auto left = static_cast<std::int64_t>((text_.size() - place_) / sizeof(double));
-    if (rows < 0 || columns != 3 || rows > left / columns) fail();
-    Matrix matrix(rows, columns);
+    if (rows != expected || columns != 3)
+      fail(what, std::to_string(rows) + " x " + std::to_string(columns), std::to_string(expected) + " x 3");
+    if ((text_.size() - place_) / (3 * sizeof(double)) < static_cast<std::size_t>(rows)) end_is_missing();
+    data::Points matrix(rows, columns);
     take_bytes(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double));
     return matrix;
   }
   void expect_end() const {
-    if (place_ != text_.size()) fail();
+    if (place_ != text_.size())
+      fail("length", std::to_string(text_.size()) + " bytes", std::to_string(place_));
+  }
+  [[noreturn]] void fail(const char* what, const std::string& found, const std::string& expected) const {
+    throw data::InputError(path_ + ": " + what + ": found " + found + ", expected " + expected +
+                           "; remove the file, and its motion is simulated again");
   }
 
  private:
-  [[noreturn]] void fail() const {
-    throw data::InputError(path_ + ": not a motion of flash-sysid, or cut off; remove it");
+  [[noreturn]] void end_is_missing() const {
+    fail("length", std::to_string(text_.size()) + " bytes", "more");
   }
   void take_bytes(void* to, std::size_t size) {
-    if (text_.size() - place_ < size) fail();
+    if (text_.size() - place_ < size) end_is_missing();
     std::memcpy(to, text_.data() + place_, size);
     place_ += size;
   }
-  std::string text_, path_;
+  std::string_view text_;
+  const std::string& path_;
   std::size_t place_ = 0;
 };
 
 std::string key_of(const Replay& replay, const sim::Environment& world, const std::vector<int>& kept) {
   Bytes bytes;
+  bytes.add_text(std::string(kMagic));  // a file of another format has another name
   bytes.add_text(FLASH_VERSION);
   bytes.add_matrix(replay.recording.mesh.vertices);
   bytes.add_matrix(replay.recording.mesh.triangles);
@@ -111,7 +118,8 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
   return data::sha256(bytes.text());
 }
 
-void save(const ReplayResult& result, const std::vector<int>& kept, const std::string& path) {
+void save(const ReplayResult& result, const std::vector<int>& kept, const std::string& key,
+          const std::string& path) {
   Bytes bytes;
   for (const double value : {result.motion.start, result.motion.step, result.residual_max,
                              result.penetration_max, result.unconverged_share})
@@ -123,11 +131,21 @@ void save(const ReplayResult& result, const std::vector<int>& kept, const std::s
   for (Eigen::Index i = 0; i < forces.rows(); ++i)
     forces.row(i) = result.motion.forces[static_cast<std::size_t>(i)].transpose();
   bytes.add_matrix(forces);
-  data::write_atomically(path, kMagic + bytes.text());
+  data::write_atomically(path, std::string(kMagic) + key + data::sha256(bytes.text()) + bytes.text());
 }
 
-ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std::string& path) {
-  BytesReader bytes(data::read_file(path), path);
+ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std::string& key,
+                  const std::string& path) {
+  const std::string text = data::read_file(path);
+  const std::string_view whole = text;
+  const std::size_t header = kMagic.size() + 2 * kDigest;
+  BytesReader bytes(whole.substr(std::min(header, whole.size())), path);
+  if (!whole.starts_with(kMagic) || whole.size() < header)
+    bytes.fail("header", "another", "that of a motion of flash-sysid, \"flash-rollout/3\"");
+  if (whole.substr(kMagic.size(), kDigest) != key) bytes.fail("key", "that of another motion", key);
+  const std::string_view kept_sum = whole.substr(kMagic.size() + kDigest, kDigest);
+  if (const std::string sum = data::sha256(whole.substr(header)); sum != kept_sum)
+    bytes.fail("SHA-256 of its numbers", sum, "the " + std::string(kept_sum) + " it was written with");
   ReplayResult result;
   for (double* value : {&result.motion.start, &result.motion.step, &result.residual_max,
                         &result.penetration_max, &result.unconverged_share})
@@ -135,9 +153,10 @@ ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std:
   result.converged = bytes.take<char>() != 0;
   result.finite = bytes.take<char>() != 0;
   result.motion.positions.assign(static_cast<std::size_t>(replay.steps) + 1, data::Points(0, 3));
+  const Eigen::Index vertices = replay.recording.mesh.vertices.rows();
   for (const int step : kept)
-    result.motion.positions[static_cast<std::size_t>(step)] = bytes.take_matrix<data::Points>();
-  const auto forces = bytes.take_matrix<data::Points>();
+    result.motion.positions[static_cast<std::size_t>(step)] = bytes.take_points(vertices, "vertices");
+  const data::Points forces = bytes.take_points(replay.steps, "forces");
   for (Eigen::Index i = 0; i < forces.rows(); ++i)
     result.motion.forces.emplace_back(forces.row(i).transpose());
   bytes.expect_end();
@@ -153,23 +172,24 @@ MotionStore::MotionStore(const std::string& folder) : folder_(folder) {
 void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
                       const std::function<void(std::size_t, ReplayResult)>& finished) const {
   const std::vector<int> kept = scored_steps(replay);
-  const auto path_of = [&](const ReplayCandidate& candidate) {
-    const std::string key = key_of(replay, make_environment(replay, candidate), kept);
+  const auto path_of = [&](const std::string& key) {
     return (std::filesystem::path(folder_) / (key + ".rollout")).string();
   };
   std::vector<std::size_t> missing;
   std::vector<ReplayCandidate> simulated;
+  std::vector<std::string> keys;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const std::string path = path_of(candidates[i]);
-    if (std::filesystem::exists(path)) {
-      finished(i, load(replay, kept, path));
+    const std::string key = key_of(replay, make_environment(replay, candidates[i]), kept);
+    if (std::filesystem::exists(path_of(key))) {
+      finished(i, load(replay, kept, key, path_of(key)));
     } else {
+      keys.push_back(key);
       missing.push_back(i);
       simulated.push_back(candidates[i]);
     }
   }
   sysid::run(replay, simulated, kept, [&](std::size_t k, ReplayResult result) {
-    save(result, kept, path_of(simulated[k]));
+    save(result, kept, keys[k], path_of(keys[k]));
     finished(missing[k], std::move(result));
   });
 }

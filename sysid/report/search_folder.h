@@ -1,7 +1,7 @@
 #pragma once
 #include <string>
 
-#include "sysid/emulate/results_store.h"
+#include "sysid/emulate/results_reader.h"
 #include "sysid/report/summary.h"
 
 namespace flash::sysid {

@@ -16,20 +16,25 @@ READERS = ("export", "report", "resume")
 AXES = ["--bending", "5e-5,1e-4,2e-4", "--no-solver-check", "--no-horizon", "--quiet"]  # as write_sound_files
 
 
-def results(change):
-    """Changes the list of whole lines of results.csv; the first is the header, the next are ids 0, 1 and 2."""
+def table(name, change):
+    """Changes the list of whole lines of a table; the first is the header."""
     def apply(content):
         return b"".join(line + b"\n" for line in change(content.split(b"\n")[:-1]))
-    return rewritten("run/results.csv", apply)
+    return rewritten(f"run/{name}.csv", apply)
 
 
-def field(name, value, line=2):
+def results(change):
+    """Of results.csv; the lines after the header are ids 0, 1 and 2."""
+    return table("results", change)
+
+
+def field(name, value, line=2, file="results"):
     """Another value in the column `name` of a line."""
     def change(text):
         words = text[line].split(b",")
         words[text[0].split(b",").index(name.encode())] = value.encode()
         return [*text[:line], b",".join(words), *text[line + 1:]]
-    return results(change)
+    return table(file, change)
 
 
 def both(*damages):
@@ -69,6 +74,40 @@ def table_cases(verb):
         yield Case(f"{verb}: {name} \"{value}\"", verb, field(name, value), "results.csv:3", name)
 
 
+def score_cases(verb):
+    """registrations.csv, a line a candidate, and keyframes.csv, as many lines for each."""
+    registrations, keyframes = "registrations", "keyframes"
+
+    def without(line):
+        return lambda text: [*text[:line], *text[line + 1:]]
+
+    def twice(line):
+        return lambda text: [*text[:line + 1], *text[line:]]
+
+    yield Case(f"{verb}: a registration missing", verb, table(registrations, without(2)), "registrations.csv:3", "id")
+    yield Case(f"{verb}: a registration twice", verb, table(registrations, twice(2)), "registrations.csv:4", "id")
+    yield Case(f"{verb}: a registration more", verb, table(registrations, twice(3)), "registrations.csv:5", "id")
+    yield Case(f"{verb}: a keyframe missing", verb, table(keyframes, without(1)), "registrations.csv:2", "score_m")
+    yield Case(f"{verb}: a keyframe of a later candidate missing", verb, table(keyframes, lambda text: without(len(text) - 2)(text)),
+               "keyframes.csv", ": t: found")
+    yield Case(f"{verb}: a keyframe more", verb, table(keyframes, lambda text: twice(len(text) - 1)(text)), "keyframes.csv", "no more")
+    yield Case(f"{verb}: a keyframe without points", verb, table(keyframes, lambda text: [*text[:-1], text[-1].rsplit(b",", 2)[0] + b",0,1"]),
+               "keyframes.csv", "points", "found \"0\"")
+    yield Case(f"{verb}: another score of a keyframe", verb, field("score_m", "0.5", 1, keyframes), "registrations.csv:2", "score_m")
+    yield Case(f"{verb}: another score of a registration", verb, field("score_m", "0", 2, registrations), "registrations.csv:3",
+               "score_m", "the mean of its keyframes.csv")
+    yield Case(f"{verb}: another recording", verb, field("recording", "b", 2, registrations), "registrations.csv:3", "recording")
+    yield Case(f"{verb}: a residual that has not converged", verb, field("residual_max", "99999999999999999999"),
+               "results.csv:3", "residual_max", "tolerance of 0.001")
+    if verb == "resume":
+        return
+    for name in (registrations, keyframes):
+        yield Case(f"{verb}: {name}.csv without lines", verb, table(name, lambda text: text[:1]), f"{name}.csv",
+                   "candidate 0")
+        yield Case(f"{verb}: {name}.csv without its last line", verb, table(name, lambda text: text[:-1]), f"{name}.csv",
+                   "candidate 2", "--resume")
+
+
 def summary_cases(verb):
     file, bending = "run/summary.json", "parameters.bending."
     decided = both(edited(file, bending + "identifiable", "yes"), edited(file, bending + "interval95", [6e-5, 1.5e-4]),
@@ -85,14 +124,23 @@ def summary_cases(verb):
                    last)
 
 
-def cases():
+def fit_cases():
+    for name in ("registrations", "keyframes"):
+        yield Case(f"fit: {name}.csv without its last line", "fit", table(name, lambda text: text[:-1]), f"{name}.csv",
+                   "candidate 2", "--resume")
+
+
+def cases(fits):
+    yield from fit_cases() if fits else ()
     for verb in READERS:
         yield from table_cases(verb)
+        yield from score_cases(verb)
         if verb != "resume":  # which writes the summary
             yield from summary_cases(verb)
             yield Case(f"{verb}: the last line cut off", verb,
                        rewritten("run/results.csv", lambda content: content[:-9]), "results.csv", "cut off")
-            yield Case(f"{verb}: a line missing", verb, results(lambda text: [*text[:2], *text[3:]]), "results.csv", "rows")
+            yield Case(f"{verb}: a line missing", verb, results(lambda text: [*text[:2], *text[3:]]), "registrations.csv:3", "id",
+                       "results.csv")
 
 
 TABLES = ("results.csv", "registrations.csv", "keyframes.csv")
@@ -104,16 +152,20 @@ def resumed(sysid, sound, work):
     for name, damage in (("last line cut off", rewritten("run/results.csv", lambda content: content[:-9])),
                          ("last line missing", results(lambda text: text[:-1])),
                          ("keyframes without a result", both(results(lambda text: text[:-1]),
-                                                             rewritten("run/keyframes.csv", lambda c: c[:-9])))):
+                                                             rewritten("run/keyframes.csv", lambda c: c[:-9]))),
+                         ("keyframes.csv without its last line", table("keyframes", lambda text: text[:-1])),
+                         ("keyframes.csv without half of its lines", table("keyframes", lambda text: text[:len(text) // 2])),
+                         ("registrations.csv without its last line", table("registrations", lambda text: text[:-1])),
+                         ("keyframes.csv without lines", table("keyframes", lambda text: text[:1]))):
         folder = work / "killed"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(sound, folder)
         damage(folder)
         done = program.call(*commands["resume"](folder), "--quiet")
         yield done.returncode in (0, 3), f"resume, {name}: exit code {done.returncode}: {done.stderr}"
-        for table in TABLES:
-            yield ((folder / "run" / table).read_bytes() == (sound / "run" / table).read_bytes(),
-                   f"resume, {name}: another {table}")
+        for file in TABLES:
+            yield ((folder / "run" / file).read_bytes() == (sound / "run" / file).read_bytes(),
+                   f"resume, {name}: another {file}")
 
 
 def renamed_copies(sysid, sound, work):
@@ -169,8 +221,9 @@ def main():
     with tempfile.TemporaryDirectory() as temporary:
         work = pathlib.Path(temporary)
         write_sound_files(options.sysid, options.sim, work / "sound")
-        commands = verbs(options.sysid, options.sim)
-        for case in cases():
+        commands = verbs(options.sysid, options.sim) | {
+            "fit": lambda f: [options.sysid, "fit", f / "recording", "--start", f / "run", "-o", f / "fitted"]}
+        for case in cases("fit" in program.call(options.sysid, "--help").stdout):
             done += 1
             found = complaint(case, commands, work / "sound", work)
             wrong += [f"{case.name}: {found}"] if found else []

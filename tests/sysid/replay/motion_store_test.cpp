@@ -4,7 +4,9 @@
 
 #include <filesystem>
 
+#include "data/atomic_file.h"
 #include "data/procedural_mesh.h"
+#include "data/sha256.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 #include "sysid/emulate/grid_search.h"
@@ -74,16 +76,48 @@ TEST(MotionStore, AnotherMotionIsAnotherFileAndAnotherNoiseIsNot) {
   EXPECT_EQ(files_in(folder / "rollouts"), 2);
 }
 
-TEST(MotionStore, ACutFileIsNamed) {
+TEST(MotionStore, AFileThatIsNotAsItWasWrittenIsNamed) {
   const data::TemporaryFolder folder;
   const Replay replay = recorded(folder, "corner_lift", 1);
   const MotionStore store(folder / "rollouts");
-  const ReplayCandidate candidate{towel(), {}};
+  ReplayCandidate candidate{towel(), {}};
   store.run(replay, candidate);
-  const auto file = std::filesystem::directory_iterator(folder / "rollouts")->path();
-  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
-  EXPECT_NE(data::input_error_of([&] { store.run(replay, candidate); }).find(file.filename().string()),
-            std::string::npos);
+  const std::string file = std::filesystem::directory_iterator(folder / "rollouts")->path();
+  const std::string whole = data::read_file(file);
+  const auto message_of = [&](const std::string& content) {
+    data::write_atomically(file, content);
+    const std::string message = data::input_error_of([&] { store.run(replay, candidate); });
+    return message.starts_with(file + ": ") ? message.substr(file.size() + 2) : message;
+  };
+  const std::size_t header = whole.find('\n') + 1 + 2 * 64;
+  EXPECT_EQ(message_of("").find("header: "), 0u);
+  EXPECT_EQ(message_of("flash-rollout/2\n" + whole.substr(header)).find("header: "), 0u);
+  EXPECT_EQ(message_of(whole.substr(0, header - 1)).find("header: "), 0u);
+  EXPECT_EQ(message_of(whole.substr(0, whole.size() / 2)).find("SHA-256"), 0u);
+  EXPECT_EQ(message_of(whole + '0').find("SHA-256"), 0u);
+  std::string flipped = whole;
+  flipped[whole.size() / 2] = static_cast<char>(flipped[whole.size() / 2] ^ 1);
+  EXPECT_EQ(message_of(flipped).find("SHA-256"), 0u);
+
+  // Sound in itself, but of no vertices, or too short.
+  const auto sealed = [&](const std::string& numbers) {
+    return whole.substr(0, header - 64) + data::sha256(numbers) + numbers;
+  };
+  const std::size_t rows = header + 5 * sizeof(double) + 2;  // start, step, three figures; two flags
+  std::string none = whole.substr(header);
+  none.replace(rows - header, sizeof(std::int64_t), sizeof(std::int64_t), '\0');
+  EXPECT_EQ(message_of(sealed(none)).find("vertices: found 0 x 3, expected 49 x 3"), 0u);
+  EXPECT_EQ(message_of(sealed(whole.substr(header, 100))).find("length: "), 0u);
+  EXPECT_EQ(message_of(sealed(whole.substr(header) + '0')).find("length: "), 0u);
+
+  // Another motion under this name.
+  std::filesystem::remove(file);
+  candidate.material.friction += 0.1;
+  store.run(replay, candidate);
+  const std::string other = data::read_file(std::filesystem::directory_iterator(folder / "rollouts")->path());
+  candidate.material.friction = towel().friction;
+  EXPECT_EQ(message_of(other).find("key: "), 0u);
+  EXPECT_EQ(message_of(whole), "");
 }
 
 TEST(Sensitivity, ExplainsTheMotionOfAnotherParameterByThatParameter) {

@@ -1,0 +1,26 @@
+#pragma once
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sysid/emulate/parameter_grid.h"
+
+namespace flash::sysid {
+
+/// What decides the results of a search, by name; see sysid/emulate/fingerprint.h.
+using Fingerprint = std::map<std::string, std::string>;
+
+/// grid.json of a search: what its folder holds the results of.
+struct GridFile {
+  std::vector<Axis> axes;
+  std::vector<std::string> recordings;     ///< names
+  std::optional<Fingerprint> fingerprint;  ///< of inputs and settings; earlier programs wrote none
+};
+
+void save_grid_file(const GridFile& grid, const std::string& path);
+
+/// Throws data::InputError naming the file and what it lacks.
+GridFile load_grid_file(const std::string& path);
+
+}  // namespace flash::sysid
