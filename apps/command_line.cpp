@@ -167,6 +167,9 @@ std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int a
   for (int i = 2; i < argc && dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr; ++i) {
     const std::string word(argv[i], std::strcspn(argv[i], "="));
     if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
+    if (word == "--config" && app.get_config_ptr() != nullptr)
+      return "--config: found after the verb, expected before it, as " + app.get_name() + " --config FILE " +
+             argv[1];
     const std::string nearest = data::nearest_name(word, known);
     return word + ": unknown option" +
            (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)");

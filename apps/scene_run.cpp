@@ -177,6 +177,14 @@ std::string holder_of(const SceneBody& body, int vertex) {
   return "a support";
 }
 
+/// The bound is one vertex's along its way out: what neighbours do to each other goes beyond it.
+std::string speed_text(double fastest, double exit_speed) {
+  constexpr double kFar = 3;
+  if (fastest <= kFar * exit_speed) return "";
+  return " along each vertex's own way out, but the sheet reached " + data::format_short(fastest) +
+         " m/s, as where neighbours leave through different faces";
+}
+
 std::set<int> frames_to_write(const data::Scene& scene, int steps) {
   std::set<int> frames;
   if (scene.keyframe_times.empty())
@@ -241,6 +249,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
 
   std::vector<StepReport> reports(bodies.size());
   Deepest held, started;
+  double fastest_out = 0;  // of sheets in steps that start inside an obstacle [m/s]
   std::string holder;
   const data::TriangleMesh at_start = merged(bodies);
   const auto begin_writing = [&] {
@@ -277,6 +286,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         converged = converged && report.converged;
         halved = halved || report.substeps > 1;
         started.see(report.start_penetration, b, time - scene.time_step);
+        if (report.start_penetration.depth > told_depth)
+          fastest_out =
+              std::max(fastest_out, bodies[b].environment.state.velocities.rowwise().norm().maxCoeff());
         if (report.held_penetration.depth > held.penetration.depth)
           holder = holder_of(bodies[b], report.held_penetration.vertex);
         held.see(report.held_penetration, b, time);
@@ -307,8 +319,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
                                " holds it: is the height of the obstacle right, or the path?");
   if (started.penetration.depth > told_depth)
     summary.warnings.push_back(started.place(bodies) + ", where a step starts: the obstacle lets it out at " +
-                               data::format_short(scene.solver.exit_speed) +
-                               " m/s; start outside, and leave room where obstacles close");
+                               data::format_short(scene.solver.exit_speed) + " m/s" +
+                               speed_text(fastest_out, scene.solver.exit_speed) +
+                               "; start outside, and leave room where obstacles close");
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }

@@ -13,6 +13,7 @@
 #include "data/error.h"
 #include "data/message_line.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
 #include "sysid/infer/answer.h"
@@ -65,6 +66,24 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
   sysid::check_axes(all, base.material.constitutive);
   return settings;
+}
+
+void check_options(const GridOptions& options) {
+  if (options.resume && options.common.force)
+    throw data::InputError(
+        "--resume: found --force beside it, which removes the results, expected one of the two");
+  for (const std::string& name : options.map)
+    if (std::none_of(options.axes.begin(), options.axes.end(),
+                     [&](const auto& axis) { return axis.first == name; }))
+      throw data::InputError("--map: found " + name + ", expected a parameter that is searched");
+  if (options.map.size() == 2 && options.map[0] == options.map[1])
+    throw data::InputError("--map: found " + options.map[0] + " twice, expected two parameters");
+  if (options.rollouts.empty()) return;
+  try {
+    data::check_folder_writable(options.rollouts);
+  } catch (const data::InputError& error) {
+    throw data::InputError(std::string("--rollouts: ") + error.what() + ", expected a folder");
+  }
 }
 
 std::string value_text(const sysid::ParameterFinding& finding, const std::string& unit) {
@@ -178,6 +197,7 @@ int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
 
 int run_grid(const CLI::App& verb, const GridOptions& options) {
   stop_on_signals();
+  check_options(options);
   const auto begin = std::chrono::steady_clock::now();
   const std::string device = choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
@@ -197,6 +217,8 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   const sysid::MemoryEstimate memory = sysid::estimate_memory(replays, settings, !options.no_solver_check);
   sysid::check_job(replays, sysid::count_candidates(settings.axes), memory);
   end_after_signal();
+  if (options.resume && !fs::exists(fs::path(options.out) / "grid.json"))
+    say(options.common, options.out + ": holds no search yet, --resume begins one");
   sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
                             sysid::fingerprint(replays, settings),
                             options.resume         ? sysid::Existing::resume

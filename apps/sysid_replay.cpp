@@ -154,6 +154,8 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
       throw data::InputError("--frames: " + std::to_string(k) + " is not a keyframe; expected 0 to " +
                              std::to_string(overlay.frames.size() - 1));
   end_after_signal();
+  // What a replay that was killed left; no other folder is searched for it.
+  if (fs::exists(fs::path(options.out) / "000_mesh.ply")) data::remove_leftovers(options.out);
   sysid::save_overlay(overlay, options.out);
   if (options.every_step)
     for (std::size_t k = 0; k < motion.motion.positions.size(); ++k) {

@@ -287,7 +287,8 @@ void read_pair_friction(const JsonObject& file, Scene& scene) {
 }
 
 void read_duration(const JsonObject& file, Scene& scene) {
-  if (file.has("steps") && file.has("duration")) throw file.error("steps", "either steps or duration");
+  if (file.has("steps") && file.has("duration"))
+    throw input_error(file.source(), "steps", "found duration beside it, expected one of the two");
   scene.steps_by_default = !file.has("steps") && !file.has("duration");
   if (file.has("steps")) {
     const double steps = file.number("steps");

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <set>
+#include <utility>
 
 #include "data/asset.h"
 #include "data/text.h"
@@ -184,16 +185,17 @@ Fingerprint fingerprint(const std::vector<Replay>& replays, const GridSettings& 
 }
 
 std::string difference(const Fingerprint& was, const Fingerprint& is) {
-  std::set<std::string> names;
+  // Settings first: how a recording is cut into steps follows from them.
+  std::set<std::pair<bool, std::string>> names;
   for (const auto* print : {&was, &is})
-    for (const auto& [name, value] : *print) names.insert(name);
+    for (const auto& [name, value] : *print) names.emplace(name.starts_with("recording "), name);
   const auto value_of = [](const Fingerprint& print, const std::string& name) {
     const auto found = print.find(name);
     return found == print.end() ? std::string("absent") : found->second;
   };
   std::string first;
   int more = 0;
-  for (const std::string& name : names) {
+  for (const auto& [of_recording, name] : names) {
     const std::string old_value = value_of(was, name), new_value = value_of(is, name);
     if (old_value == new_value) continue;
     if (first.empty())

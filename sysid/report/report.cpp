@@ -169,6 +169,8 @@ Json overlays_of(const std::vector<Overlay>& overlays, int max_cloud_points) {
 }
 
 Json map_axes(const Summary& summary, const std::array<std::string, 2>& names) {
+  if (!names[0].empty() && names[0] == names[1])
+    throw data::InputError("--map: found " + names[0] + " twice, expected two parameters");
   Json axes = Json::array();
   for (const std::string& name : names) {
     if (name.empty()) continue;

@@ -32,7 +32,7 @@ def write_inputs(folder):
     for name, content in (("short", scene(0.05, steps=2)), ("default", scene(0.05)), ("long", scene(0.004, steps=100000)),
                           ("nothing_grasped", scene(0.05, end_effectors=far)), ("curved", scene("curved", steps=2)),
                           ("before_start", scene(0.05, keyframes=[-1])), ("too_many", scene(0.05, steps=2 ** 32)),
-                          ("too_long", scene(0.05, duration=1e9))):
+                          ("too_long", scene(0.05, duration=1e9)), ("two_lengths", scene(0.05, steps=2, duration=0.02))):
         (folder / f"{name}.json").write_text(json.dumps(content))
     (folder / "twice.json").write_text('{"schema": "flash-scene/1", "timestep": 0.01, "timestep": 0.02}')
     (folder / "loop").symlink_to("loop")
@@ -66,6 +66,14 @@ def refusals(sim, sysid, calib):
         ([*run, "curved.json", "-o", "out"], ["flat"]),
         ([*run, "before_start.json", "-o", "out"], ["before_start.json", "keyframes", "times from 0"]),
         ([*run, "too_many.json", "-o", "out"], ["steps", "found 4294967296", "0 to 1,000,000"]),
+        ([*run, "two_lengths.json", "-o", "out"], ["two_lengths.json", "steps", "found duration beside it"]),
+        ([sim, "run", "short.json", "--config", "c.toml", "-o", "out"], ["--config", "before", "flash-sim --config FILE run"]),
+        ([*grid, "--bending", "1e-4", "--config", "c.toml"], ["--config", "before", "flash-sysid --config FILE grid"]),
+        ([*grid, "--bending", "1e-4", "--rollouts", "short.json"], ["--rollouts: short.json", "expected a folder"]),
+        ([*grid, "--bending", "1e-4", "--rollouts", long], ["--rollouts: " + long, "too long", "expected a folder"]),
+        ([*grid, "--bending", "1e-4", "--map", "bending,bending"], ["--map", "found bending twice"]),
+        ([*grid, "--bending", "1e-4", "--map", "bending,young"], ["--map", "found young", "searched"]),
+        ([*grid, "--bending", "1e-4", "--resume", "--force"], ["--resume", "--force"]),
         ([*run, "too_long.json", "-o", "out"], ["duration", "at most 1,000,000 steps"]),
         ([*run, "twice.json", "-o", "out"], ["timestep", "given twice"]),
         ([*run, "short.json", "--steps", "4294967296", "-o", "out"], ["--steps", "from 0 to 1,000,000"]),
@@ -200,6 +208,29 @@ def check_defaults(options, folder):
     yield "Up to 1 % of the steps" in done.stdout, "--help does not say what is tolerated"
 
 
+def check_resume(options, folder):
+    """A folder without a search is said to be one; of what was changed, a setting is named before what follows from it."""
+    grid = [options.sysid, "grid", folder / "recording", "--asset", folder / "asset.json", "--bending", "1e-4,2e-4",
+            "--no-solver-check", "--no-horizon", "--resume", "-o", folder / "begun"]
+    done = program.call(*grid)
+    yield done.returncode in (0, 3) and done.stderr.count("holds no search yet") == 1, f"--resume of nothing: {done.stderr}"
+    done = program.call(*grid)
+    yield done.returncode in (0, 3) and "holds no search" not in done.stderr, f"--resume: {done.stderr}"
+    done = program.call(*grid, "--time-step", "0.005")
+    yield (done.returncode == REFUSED and "results: time_step_s was 0.01 and is 0.005" in done.stderr,
+           f"--resume --time-step: exit code {done.returncode}: {done.stderr}")
+
+
+def check_killed_replay(options, folder):
+    """What a replay that was killed leaves beside its pictures is gone after the next."""
+    replay = [options.sysid, "replay", folder / "recording", "--asset", folder / "asset.json", "--quiet", "-o", folder / "replayed"]
+    program.must(*replay)
+    (folder / "replayed" / "002.png.12345-6.tmp").write_bytes(b"half")
+    program.must(*replay, "--force")
+    left = [path.name for path in (folder / "replayed").iterdir() if path.suffix == ".tmp"]
+    yield not left, f"replay --force keeps {left}"
+
+
 def check_fit(options, folder):
     """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
     recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
@@ -226,7 +257,8 @@ def main():
         folder = pathlib.Path(temporary)
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
-        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults,
+        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume,
+                      check_killed_replay,
                       *([check_fit] if options.calib else [])):
             for holds, complaint in check(options, folder):
                 done += 1
