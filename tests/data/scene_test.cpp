@@ -144,7 +144,7 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
             "objects: found {}, expected at least one object");
   EXPECT_EQ(changed(kPublished, "/planecollisions/table", {{"point", {0, 0, 0}}}),
             "planecollisions.table.normal: missing, expected a direction, out of the solid");
-  EXPECT_EQ(changed(kFlash, "/steps", 5), "steps: found 5, expected either steps or duration");
+  EXPECT_EQ(changed(kFlash, "/steps", 5), "steps: found duration beside it, expected one of the two");
   EXPECT_EQ(changed(kFlash, "/obstacles/rail/shape", "sphere"),
             "obstacles.rail.shape: found \"sphere\", expected one of plane, box, cylinder");
   EXPECT_EQ(changed(kFlash, "/obstacles/rail/radius", -1),
