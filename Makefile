@@ -17,7 +17,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate reference fuzz configure-test format check-format check-includes tidy install clean
-.PHONY: bench random-scenes packages-build packages-test packages-bench packages-check
+.PHONY: bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -59,6 +59,10 @@ validate: reference configure-test  ## Calibrate and fit what is in $(DATA), ren
 random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
 	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --list
+
+deep-starts: configure-test  ## Simulate SCENES random sheets that start across obstacles; say how fast they come out
+	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --list
 
 reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py
 	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \

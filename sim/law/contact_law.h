@@ -11,12 +11,12 @@ inline constexpr double touching_gap = 1e-10;
 /// A vertex against an obstacle.
 struct Touch {
   int obstacle = -1;
-  bool holds = false;       ///< the vertex stays on it
-  bool let_go = false;      ///< in the linear problem of this iterate, which would have had to pull
-  double gap = 0.0;         ///< [m]
-  double sunk = 0.0;        ///< as in Gap [m]
-  double normal_force = 0;  ///< lambda_n of an obstacle that holds [N]
-  double slip = 0.0;        ///< length of the slip against it in this step, as friction takes it [m]
+  bool holds = false;          ///< the vertex stays on it
+  bool let_go = false;         ///< in the linear problem of this iterate, which would have had to pull
+  double gap = 0.0;            ///< [m]
+  bool starts_inside = false;  ///< as in Gap
+  double normal_force = 0;     ///< lambda_n of an obstacle that holds [N]
+  double slip = 0.0;           ///< length of the slip against it in this step, as friction takes it [m]
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   Eigen::Vector3d curved = Eigen::Vector3d::Zero();          ///< as in Gap
   Eigen::Vector3d surface_moved = Eigen::Vector3d::Zero();   ///< as in Gap [m]

@@ -11,6 +11,7 @@
 #include "sim/step/feasible_positions.h"
 #include "sim/step/incremental_potential.h"
 #include "sim/step/penetration.h"
+#include "sim/step/way_out.h"
 
 namespace flash::sim {
 
@@ -61,11 +62,11 @@ struct StepProblem {
   double gravity;      ///< [m/s^2]; 9.81 without
   double force_scale;  ///< |M g| [N]
 
-  StepProblem(const SheetPlan& plan, const Environment& environment, double time_step, double exit_speed)
+  StepProblem(const SheetPlan& plan, const Environment& environment, double time_step, const Exit& exit)
       : bending(
             bending_operator(plan, environment.material.bending_model, environment.material.poissons_ratio)),
         potential(plan, bending, environment, time_step),
-        contacts(environment, time_step, exit_speed),
+        contacts(environment, time_step, exit),
         gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81),
         force_scale(potential.mass().norm() * gravity) {}
 
@@ -197,7 +198,11 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
     if (c != nullptr && c->hold == Hold::fixed) continue;
     for (size_t k = 0; k < environment.obstacles.size(); ++k) {
       const Gap gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
-      report.penetration_max = std::max(report.penetration_max, gap.sunk - gap.distance);
+      const double depth =
+          gap.starts_inside
+              ? -gap_to(environment.obstacles[k], problem.contacts.motions[k], end.positions.row(i)).distance
+              : -gap.distance;
+      report.penetration_max = std::max(report.penetration_max, depth);
       // Where it is let out slowly it may stay below the surface.
       report.complementarity = std::max(report.complementarity, -gap.distance);
     }
@@ -241,7 +246,7 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
       if (!touch.holds) continue;
       const Vector3d force = touch.normal_force * touch.normal + touch.friction;
       // What starts inside is pushed out, also by an obstacle that stands still.
-      report.work += touch.sunk > 0 ? std::max(0.0, force.dot(way)) : force.dot(touch.surface_moved);
+      report.work += touch.starts_inside ? std::max(0.0, force.dot(way)) : force.dot(touch.surface_moved);
     }
   }
   for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));
@@ -276,12 +281,36 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const Solver::
   return add_elastic_gradient(*w.plan, problem.bending, environment.material, start, force);
 }
 
-/// One step of `h` as a whole; environment.state advances in any case. Returns whether it is as good as
-/// halves would be: solved, or to all that rounding allows.
-bool try_step(Environment& environment, double h, Solver::Workspace& w, StepReport& report) {
-  const StepProblem problem(*w.plan, environment, h, w.settings.exit_speed);
+/// Whether letting the sheet out of obstacles has not torn it: edges at vertices that started inside are not
+/// strained by more than what a sheet that is let go turns into the exit speed, v sqrt(rho / (E t)), nor by
+/// more than they were at the start.
+bool let_out_gently(const StepProblem& problem, const SheetPlan& plan,
+                    const std::vector<std::vector<int>>& inside, const Points& end, double exit_speed) {
+  const data::SheetMaterial& material = problem.contacts.environment.material;
+  const Points& start = problem.contacts.environment.state.positions;
+  const Points& rest = plan.sheet.rest.vertices;
+  const double limit = exit_speed * std::sqrt(material.areal_density / material.membrane_stiffness);
+  std::vector<bool> let_out(static_cast<size_t>(start.rows()), false);
+  for (const std::vector<int>& vertices : inside)
+    for (const int i : vertices) let_out[i] = true;
+  for (size_t k = 0; k < plan.edge_count; ++k) {
+    const auto [i, j] = plan.pattern.pairs[k];
+    if (!let_out[i] && !let_out[j]) continue;
+    const auto strain = [&](const Points& x) {
+      return std::abs((x.row(i) - x.row(j)).norm() / (rest.row(i) - rest.row(j)).norm() - 1);
+    };
+    const double strain_at_end = strain(end);
+    if (!(strain_at_end <= limit || strain_at_end <= strain(start))) return false;
+  }
+  return true;
+}
+
+/// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
+/// solved, or to all that rounding allows.
+bool solve_step(const StepProblem& problem, Solver::Workspace& w, StepReport& report) {
+  const State& start = problem.contacts.environment.state;
   const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
-  w.now.positions = environment.state.positions + h * environment.state.velocities;
+  w.now.positions = start.positions + problem.contacts.time_step * start.velocities;
   w.now.contacts = begin_step(problem.contacts, w.now.positions);
   project_to_feasible(problem.contacts, w.now.contacts, w.now.positions);
   problem.evaluate(w.now);
@@ -292,6 +321,46 @@ bool try_step(Environment& environment, double h, Solver::Workspace& w, StepRepo
   const bool energy_is_sound = account_for_energy(problem, elastic_at_start, w.now, report);
   const bool sound = report.complementarity <= gap_tolerance && energy_is_sound;
   report.converged = sound && problem.balanced(w.now, w.settings.tolerance);
+  return sound && problem.balanced(w.now, std::max(w.settings.tolerance, rounding_tolerance));
+}
+
+/// Adds the work of an attempt that was given up.
+void add_work(const StepReport& given_up, StepReport& report) {
+  report.iterations += given_up.iterations;
+  report.solves += given_up.solves;
+  report.factorizations += given_up.factorizations;
+}
+
+/// What to try for a sheet that starts inside obstacles, the fastest first: each vertex on its own side, then
+/// all on one. At last it stays where it is.
+std::vector<Exit> exits_of(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
+  const Vector3d way = common_way_out(step.environment, step.motions, inside);
+  std::vector<Exit> exits;
+  for (const double share : {1.0, 0.125}) {
+    exits.push_back({share * step.exit.speed});
+    if (!way.isZero(0)) exits.push_back({share * step.exit.speed, way});
+  }
+  exits.push_back({0});
+  return exits;
+}
+
+/// One step of `h` as a whole; environment.state advances in any case. A sheet that starts inside obstacles
+/// takes the first exit that does not tear it. Returns whether the step is solved.
+bool try_step(Environment& environment, double h, Solver::Workspace& w, StepReport& report) {
+  const double exit_speed = w.settings.exit_speed;
+  const StepProblem problem(*w.plan, environment, h, {exit_speed});
+  bool solved = solve_step(problem, w, report);
+  if (report.start_penetration.depth > 0) {
+    const auto inside = vertices_inside(environment, problem.contacts.motions);
+    const std::vector<Exit> exits = exits_of(problem.contacts, inside);
+    for (size_t k = 1; k < exits.size(); ++k) {
+      if (solved && let_out_gently(problem, *w.plan, inside, w.now.positions, exit_speed)) break;
+      const StepReport given_up = std::exchange(report, {});
+      w.refactor = true;
+      solved = solve_step(StepProblem(*w.plan, environment, h, exits[k]), w, report);
+      add_work(given_up, report);
+    }
+  }
   environment.state.time += h;
   if (!w.now.positions.allFinite()) {
     // Better a sheet that stands still, and says so, than none.
@@ -302,7 +371,7 @@ bool try_step(Environment& environment, double h, Solver::Workspace& w, StepRepo
   }
   environment.state.velocities = (w.now.positions - environment.state.positions) / h;
   environment.state.positions = w.now.positions;
-  return sound && problem.balanced(w.now, std::max(w.settings.tolerance, rounding_tolerance));
+  return solved;
 }
 
 const Penetration& deeper(const Penetration& a, const Penetration& b) { return a.depth >= b.depth ? a : b; }
@@ -340,8 +409,6 @@ StepReport advance(Environment& environment, double h, int halvings, Solver::Wor
   w.refactor = true;
   const bool stopped = w.settings.stop != nullptr && *w.settings.stop;
   if (halvings <= 0 || stopped) return report;
-  const int spent_iterations = report.iterations, spent_solves = report.solves,
-            spent_factorizations = report.factorizations;
   const State whole = std::exchange(environment.state, start);
   // Supports go half the way in each half.
   std::vector<Vector3d> targets;
@@ -353,9 +420,7 @@ StepReport advance(Environment& environment, double h, int halvings, Solver::Wor
   for (size_t k = 0; k < targets.size(); ++k) environment.fixed[k].position = targets[k];
   StepReport parts = joined(first, advance(environment, 0.5 * h, first.converged ? halvings - 1 : 0, w));
   environment.state.time = whole.time;
-  parts.iterations += spent_iterations;
-  parts.solves += spent_solves;
-  parts.factorizations += spent_factorizations;
+  add_work(report, parts);
   return parts;
 }
 

@@ -57,21 +57,34 @@ Gap gap_of(const Box& box, const ObstacleMotion& motion, const Vector3d& point) 
           Vector3d::Zero()};
 }
 
-/// How deep a vertex may stay that starts `depth` inside.
-double still_sunk(double depth, double time_step, double exit_speed) {
-  return std::max(0.0, depth - exit_speed * time_step);
-}
-
-Gap gap_after_way(const Plane& plane, const ObstacleMotion& motion, const Vector3d& start,
-                  const Vector3d& point, double time_step, double exit_speed) {
-  Gap gap = gap_of(plane, motion, point);
-  gap.sunk = still_sunk(-plane.normal.dot(start - plane.point), time_step, exit_speed);
+/// Lowers the surface of a vertex that starts `depth` inside.
+Gap let_out(Gap gap, double depth, double time_step, const Exit& exit) {
+  gap.starts_inside = depth > inside_depth;
+  gap.sunk = std::max(0.0, depth - exit.speed * time_step);
   gap.distance += gap.sunk;
   return gap;
 }
 
+/// The unit normal of a cylinder's side that faces `way`; zero where none does.
+Vector3d side_facing(const Cylinder& cylinder, const Vector3d& way) {
+  const Vector3d across = way - cylinder.axis * cylinder.axis.dot(way);
+  const double length = across.norm();
+  return length > 0.1 ? Vector3d(across / length) : Vector3d::Zero();
+}
+
+/// The face of a box that faces `way`, given in the frame of the box.
+void face_facing(const Vector3d& way, int& axis, double& sign) {
+  way.cwiseAbs().maxCoeff(&axis);
+  sign = std::copysign(1.0, way[axis]);
+}
+
+Gap gap_after_way(const Plane& plane, const ObstacleMotion& motion, const Vector3d& start,
+                  const Vector3d& point, double time_step, const Exit& exit) {
+  return let_out(gap_of(plane, motion, point), -plane.normal.dot(start - plane.point), time_step, exit);
+}
+
 Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const Vector3d& start,
-                  const Vector3d& point, double time_step, double exit_speed) {
+                  const Vector3d& point, double time_step, const Exit& exit) {
   Gap gap = gap_of(cylinder, motion, point);
   const Vector3d from = radial_of(cylinder, start), to = radial_of(cylinder, point), way = to - from;
   // Where the way enters the circle: |from + s way| = radius, the first of two; at once where it starts
@@ -84,15 +97,21 @@ Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const 
     if (root > 0 && b < 0) entry = (-b - std::sqrt(root)) / a;
     if (!(root > 0 && b < 0) || entry > 1) return gap;
   }
+  const Vector3d side = side_facing(cylinder, exit.way);
+  if (cylinder.radius - from.norm() > inside_depth && !side.isZero(0)) {
+    if (to.norm() >= cylinder.radius) return gap;
+    gap.normal = side;
+    gap.distance = side.dot(to) - cylinder.radius;
+    gap.curved.setZero();
+    return let_out(gap, cylinder.radius - side.dot(from), time_step, exit);
+  }
   const Vector3d entered = from + entry * way;
   if (entered.norm() > 0 && entered.dot(to) <= 0) {
     gap.normal = entered.normalized();
     gap.distance = gap.normal.dot(to) - cylinder.radius;
     gap.curved.setZero();
   }
-  gap.sunk = still_sunk(cylinder.radius - from.norm(), time_step, exit_speed);
-  gap.distance += gap.sunk;
-  return gap;
+  return let_out(gap, cylinder.radius - from.norm(), time_step, exit);
 }
 
 /// The faces through which a way from `from` to `to` in the frame of a box enters and leaves it.
@@ -102,7 +121,8 @@ struct Passage {
   double entry_sign = 1;
 };
 
-Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to) {
+/// What starts inside came in by the nearest face, or by the one that faces `way_out` where that is not zero.
+Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to, const Vector3d& way_out) {
   Passage passage;
   const Vector3d excess = from.cwiseAbs() - box.half_extents;
   double enters = -std::numeric_limits<double>::infinity(), leaves = std::numeric_limits<double>::infinity();
@@ -129,6 +149,8 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
     // Starts inside, or on a face: that is where it came in.
     excess.maxCoeff(&passage.entry_axis);
     passage.entry_sign = std::copysign(1.0, from[passage.entry_axis]);
+    if (!way_out.isZero(0) && excess.maxCoeff() < -inside_depth)
+      face_facing(way_out, passage.entry_axis, passage.entry_sign);
     enters = 0;
   }
   passage.enters = enters >= 0 && enters <= 1 && enters < leaves;
@@ -153,22 +175,20 @@ void decide_grazing(const Box& box, const Vector3d& down, Vector3d& from, Vector
 }
 
 Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const Vector3d& start, const Vector3d& point,
-                  double time_step, double exit_speed) {
+                  double time_step, const Exit& exit) {
   Vector3d from = motion.start.inverse(Eigen::Isometry) * start;
   const Vector3d local = motion.end.inverse(Eigen::Isometry) * point;
   Vector3d to = local;
   decide_grazing(box, motion.end.linear().transpose() * motion.down, from, to);
-  const Passage passage = passage_through(box, from, to);
+  const Passage passage = passage_through(box, from, to, motion.end.linear().transpose() * exit.way);
   if (!passage.enters) return gap_of(box, motion, point);
   const bool ends_inside = ((to.cwiseAbs() - box.half_extents).array() <= 0).all();
   const bool behind = passage.exit_axis == passage.entry_axis &&
                       passage.entry_sign * to[passage.entry_axis] < -box.half_extents[passage.entry_axis];
   if (!ends_inside && !behind) return gap_of(box, motion, point);
-  Gap gap = gap_to_face(box, motion, point, local, passage.entry_axis, passage.entry_sign);
-  gap.sunk = still_sunk(box.half_extents[passage.entry_axis] - passage.entry_sign * from[passage.entry_axis],
-                        time_step, exit_speed);
-  gap.distance += gap.sunk;
-  return gap;
+  const Gap gap = gap_to_face(box, motion, point, local, passage.entry_axis, passage.entry_sign);
+  const double depth = box.half_extents[passage.entry_axis] - passage.entry_sign * from[passage.entry_axis];
+  return let_out(gap, depth, time_step, exit);
 }
 
 ObstacleMotion motion_of(const Obstacle& obstacle, double start, double end) {
@@ -202,21 +222,37 @@ Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double 
 }
 
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& start,
-              const Vector3d& point, double time_step, double exit_speed) {
+              const Vector3d& point, double time_step, const Exit& exit) {
   return std::visit(
-      [&](const auto& shape) { return gap_after_way(shape, motion, start, point, time_step, exit_speed); },
+      [&](const auto& shape) { return gap_after_way(shape, motion, start, point, time_step, exit); },
       obstacle.shape);
 }
 
+double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& start,
+                   const Vector3d& way) {
+  constexpr double never = std::numeric_limits<double>::infinity();
+  if (const auto* plane = std::get_if<Plane>(&obstacle.shape))
+    return way.dot(plane->normal) > 0.1 ? -plane->normal.dot(start - plane->point) : never;
+  if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
+    const Vector3d side = side_facing(*cylinder, way);
+    return side.isZero(0) ? never : cylinder->radius - side.dot(start - cylinder->point);
+  }
+  const Box& box = std::get<Box>(obstacle.shape);
+  int axis;
+  double sign;
+  face_facing(motion.start.linear().transpose() * way, axis, sign);
+  return box.half_extents[axis] - sign * (motion.start.inverse(Eigen::Isometry) * start)[axis];
+}
+
 void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
-                   const data::Points& points, double time_step, double exit_speed,
+                   const data::Points& points, double time_step, const Exit& exit,
                    std::vector<double>& distances) {
   std::visit(
       [&](const auto& shape) {
         for (Eigen::Index i = 0; i < points.rows(); ++i)
-          distances[i] = std::min(
-              distances[i],
-              gap_after_way(shape, motion, starts.row(i), points.row(i), time_step, exit_speed).distance);
+          distances[i] =
+              std::min(distances[i],
+                       gap_after_way(shape, motion, starts.row(i), points.row(i), time_step, exit).distance);
       },
       obstacle.shape);
 }

@@ -7,13 +7,17 @@
 
 namespace flash::sim {
 
+/// Depth from which a vertex counts as inside an obstacle at the start of a step, above rounding [m].
+inline constexpr double inside_depth = 1e-9;
+
 /// Where a point stands against an obstacle.
 struct Gap {
   double distance;                ///< to the surface, negative inside [m]
   Eigen::Vector3d normal;         ///< unit, out of the obstacle
   Eigen::Vector3d surface_moved;  ///< by the obstacle's material at the contact, over the step [m]
   Eigen::Vector3d curved;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
-  double sunk = 0;         ///< how far the surface that `distance` is to lies below the obstacle's own [m]
+  bool starts_inside = false;  ///< the vertex, at the start of the step
+  double sunk = 0;  ///< how far the surface that `distance` is to lies below the obstacle's own [m]
 };
 
 /// A vertex below the surface of an obstacle.
@@ -28,6 +32,14 @@ struct ObstacleMotion {
   bool moves = false;
   Eigen::Vector3d down = Eigen::Vector3d::Zero();  ///< unit, the way of gravity; zero without
 };
+
+/// How vertices that start a step inside an obstacle come out of it.
+struct Exit {
+  double speed;  ///< at most [m/s]; 0: they may stay, no deeper
+  /// Unit: out on the side of each obstacle that faces it. Zero: each vertex on the side nearest to it.
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+};
+
 std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, double start, double end);
 
 /// Signed distance of `point` [m] to the obstacle where it stands at the end of the step. Exact outside;
@@ -46,14 +58,19 @@ Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, 
 ///   sheet slides over boxes that stand flush; a face that looks down carries nothing, and what is pushed
 ///   against a box that stands on a table meets its side.
 /// - a vertex that starts inside stands against a surface below the obstacle's own (`sunk`), so that it comes
-///   out at `exit_speed` [m/s] at most.
+///   out as `exit` says.
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
-              const Eigen::Vector3d& point, double time_step, double exit_speed);
+              const Eigen::Vector3d& point, double time_step, const Exit& exit);
+
+/// How far a vertex at `start` is from coming out of the obstacle on the side that faces `way`, at the start
+/// of the step; infinity where there is no such side [m].
+double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
+                   const Eigen::Vector3d& way);
 
 /// Lowers distances[i] to that of gap_after for every vertex, where it is smaller: rows of `starts` and
 /// `points`.
 void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
-                   const data::Points& points, double time_step, double exit_speed,
+                   const data::Points& points, double time_step, const Exit& exit,
                    std::vector<double>& distances);
 
 }  // namespace flash::sim

@@ -109,11 +109,11 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
 
 }  // namespace
 
-ContactStep::ContactStep(const Environment& environment_in, double time_step_in, double exit_speed_in)
+ContactStep::ContactStep(const Environment& environment_in, double time_step_in, const Exit& exit_in)
     : environment(environment_in),
       time(environment_in.state.time + time_step_in),
       time_step(time_step_in),
-      exit_speed(exit_speed_in),
+      exit(exit_in),
       motions(obstacle_motions(environment_in, environment_in.state.time, time)) {}
 
 ContactSet begin_step(const ContactStep& step, Points& positions) {
@@ -161,7 +161,7 @@ void find_clearance(const ContactStep& step, const Points& positions, std::vecto
   clearance.assign(positions.rows(), std::numeric_limits<double>::infinity());
   for (size_t k = 0; k < step.motions.size(); ++k)
     lower_to_gaps(step.environment.obstacles[k], step.motions[k], step.environment.state.positions, positions,
-                  step.time_step, step.exit_speed, clearance);
+                  step.time_step, step.exit, clearance);
 }
 
 void add_touches(const ContactStep& step, const Points& positions, int i, std::vector<Touch>& touches) {
@@ -169,7 +169,7 @@ void add_touches(const ContactStep& step, const Points& positions, int i, std::v
     const Gap gap = step.gap(k, positions, i);
     touches.push_back({.obstacle = k,
                        .gap = gap.distance,
-                       .sunk = gap.sunk,
+                       .starts_inside = gap.starts_inside,
                        .normal = gap.normal,
                        .curved = gap.curved,
                        .surface_moved = gap.surface_moved});

@@ -14,18 +14,18 @@ inline constexpr double resting_slip = 1e-13;
 
 /// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
 struct ContactStep {
-  ContactStep(const Environment& environment, double time_step, double exit_speed);
+  ContactStep(const Environment& environment, double time_step, const Exit& exit);
 
   const Environment& environment;
   double time, time_step;  ///< [s]
-  double exit_speed;       ///< of vertices that start inside an obstacle, at most [m/s]
+  Exit exit;               ///< of vertices that start inside an obstacle
   std::vector<ObstacleMotion> motions;
 
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
   Gap gap(int obstacle, const data::Points& positions, int i) const {
     return gap_after(environment.obstacles[obstacle], motions[obstacle],
                      environment.state.positions.row(i).transpose(), positions.row(i).transpose(), time_step,
-                     exit_speed);
+                     exit);
   }
 };
 

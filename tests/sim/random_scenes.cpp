@@ -271,6 +271,37 @@ RandomScene random_scene(unsigned long seed) {
   return scene;
 }
 
+RandomScene random_deep_start(unsigned long seed) {
+  Lot lot(seed);
+  RandomScene scene;
+  scene.kind = SceneKind::deep;
+  double side = 0;
+  scene.mesh = draw_mesh(lot, side);
+  scene.sheet = make_sheet(data::parse_mesh_spec(scene.mesh));
+  scene.settings.time_step = lot.log_uniform(0.001, 0.03);
+  scene.steps = static_cast<int>(0.4 / scene.settings.time_step);
+  Environment& environment = scene.environment;
+  environment.material = draw_material(lot);
+  environment.state.positions = scene.sheet.rest.vertices;
+  environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
+  if (lot.chance(0.5)) environment.gravity.setZero();
+  const Vector3d middle = environment.state.positions.colwise().mean();
+  const Isometry3d turned = lot.chance(0.5) ? tumbled(lot) : Isometry3d::Identity();
+  move(environment, turned * Eigen::Translation3d(-middle));
+  for (int k = lot.below(2); k >= 0; --k) {
+    const Vector3d aside = lot.uniform(0, 0.5) * side * lot.direction();
+    if (lot.chance(0.4)) {
+      environment.obstacles.push_back({Cylinder{aside, lot.direction(), lot.log_uniform(0.01, 0.3)}});
+      continue;
+    }
+    Box box{.half_extents = {lot.log_uniform(0.003, 0.3), lot.log_uniform(0.003, 0.3),
+                             lot.log_uniform(0.003, 0.3)}};
+    box.pose = Eigen::Translation3d(aside) * (lot.chance(0.5) ? tumbled(lot) : Isometry3d::Identity());
+    environment.obstacles.push_back({box});
+  }
+  return scene;
+}
+
 SceneFindings observe(RandomScene scene) {
   Environment& environment = scene.environment;
   const double h = scene.settings.time_step;
@@ -304,6 +335,8 @@ SceneFindings observe(RandomScene scene) {
     found.finite = found.finite && after.positions.allFinite() && after.velocities.allFinite() &&
                    std::isfinite(report.residual);
     if (!found.finite) return found;
+    found.shot_speed = std::max(found.shot_speed, after.velocities.rowwise().norm().maxCoeff() -
+                                                      after.time * environment.gravity.norm());
     found.halved += report.substeps > 1;
     if (!report.converged) {
       ++found.unconverged;
@@ -358,6 +391,12 @@ SceneFindings observe(RandomScene scene) {
     }
     energy = now;
   }
+  for (std::size_t i = 0; i < held.size(); ++i)
+    found.inside += !held[i] && std::any_of(environment.obstacles.begin(), environment.obstacles.end(),
+                                            [&](const Obstacle& obstacle) {
+                                              return depth_in(obstacle, environment.state.positions.row(i),
+                                                              environment.state.time) > 1e-6;
+                                            });
   return found;
 }
 

@@ -9,39 +9,46 @@
 #include "tests/sim/random_scenes.h"
 
 // What an observer finds in many random scenes, by kind and in all. Arguments: first seed, number of scenes,
-// and
-// --list to name those with something to say.
+// then --list to name those with something to say, --deep for sheets that start across obstacles.
 int main(int argc, char** argv) {
   using namespace flash;
   const unsigned long first = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const std::size_t count = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1000;
-  const bool list = argc > 3 && std::string(argv[3]) == "--list";
+  bool list = false, deep = false;
+  for (int k = 3; k < argc; ++k) {
+    list = list || std::string(argv[k]) == "--list";
+    deep = deep || std::string(argv[k]) == "--deep";
+  }
 
   std::vector<sim::RandomScene> scenes(count);
   std::vector<sim::SceneFindings> findings(count);
   data::for_each_in_parallel(count, 0, [&](std::size_t k) {
-    scenes[k] = sim::random_scene(first + k);
+    scenes[k] = deep ? sim::random_deep_start(first + k) : sim::random_scene(first + k);
     findings[k] = sim::observe(scenes[k]);
   });
 
   struct Sum {
     int scenes = 0, unsolved_scenes = 0, steps = 0, unsolved = 0, halved = 0;
     int infinite = 0, gains = 0, crossed = 0, unseen = 0;
-    double exit_speed = 0, free_depth = 0;
+    int left_inside = 0;
+    double exit_speed = 0, shot_speed = 0, free_depth = 0;
   };
   std::map<std::string, Sum> sums;
   for (std::size_t k = 0; k < count; ++k) {
     const sim::SceneFindings& found = findings[k];
     const auto& material = scenes[k].environment.material;
     const bool gains = found.energy_gain_share > 1e-2, unseen = found.unseen_depth > 1e-4;
-    if (list && (found.unconverged > 0 || !found.finite || gains || found.crossed > 0 || unseen))
+    if (list && (found.unconverged > 0 || !found.finite || gains || found.crossed > 0 || unseen || deep))
       std::printf(
           "%lu %s: h %.4f s, E t %.3g N/m, D %.3g N m, friction %.2f, membrane law %d, bending model %d: "
-          "%d steps not converged (residual %.2g), energy gain %.2g, %d crossed, unseen %.2g m%s\n",
+          "%d steps not converged (residual %.2g), energy gain %.2g, %d crossed, unseen %.2g m, %d inside, "
+          "shot "
+          "%.1f m/s%s\n",
           first + k, to_string(scenes[k].kind), scenes[k].settings.time_step, material.membrane_stiffness,
           material.bending_rigidity, material.friction, static_cast<int>(material.constitutive),
           static_cast<int>(material.bending_model), found.unconverged, found.residual_max,
-          found.energy_gain_share, found.crossed, found.unseen_depth, found.finite ? "" : ", not finite");
+          found.energy_gain_share, found.crossed, found.unseen_depth, found.inside, found.shot_speed,
+          found.finite ? "" : ", not finite");
     for (const std::string& key : {std::string(to_string(scenes[k].kind)), std::string("~ all")}) {
       Sum& sum = sums[key];
       ++sum.scenes;
@@ -54,14 +61,16 @@ int main(int argc, char** argv) {
       sum.crossed += found.crossed > 0;
       sum.unseen += unseen;
       if (found.unconverged == 0) sum.exit_speed = std::max(sum.exit_speed, found.exit_speed);
+      sum.shot_speed = std::max(sum.shot_speed, found.shot_speed);
+      sum.left_inside += found.inside > 0;
       sum.free_depth = std::max(sum.free_depth, found.free_depth);
     }
   }
-  std::printf("%-7s %7s %9s | %6s %9s %7s | %10s %7s %8s %7s | %9s %9s\n", "kind", "scenes", "unsolved",
-              "steps", "unsolved", "halved", "not finite", "energy", "crossed", "unseen", "exit m/s",
-              "depth m");
+  std::printf("%-7s %7s %9s | %6s %9s %7s | %10s %7s %8s %7s | %6s %9s %9s %9s\n", "kind", "scenes",
+              "unsolved", "steps", "unsolved", "halved", "not finite", "energy", "crossed", "unseen",
+              "inside", "exit m/s", "shot m/s", "depth m");
   for (const auto& [key, sum] : sums)
-    std::printf("%-7s %7d %9d | %6d %9d %7d | %10d %7d %8d %7d | %9.2f %9.1g\n", key.c_str(), sum.scenes,
-                sum.unsolved_scenes, sum.steps, sum.unsolved, sum.halved, sum.infinite, sum.gains,
-                sum.crossed, sum.unseen, sum.exit_speed, sum.free_depth);
+    std::printf("%-7s %7d %9d | %6d %9d %7d | %10d %7d %8d %7d | %6d %9.2f %9.2f %9.1g\n", key.c_str(),
+                sum.scenes, sum.unsolved_scenes, sum.steps, sum.unsolved, sum.halved, sum.infinite, sum.gains,
+                sum.crossed, sum.unseen, sum.left_inside, sum.exit_speed, sum.shot_speed, sum.free_depth);
 }
