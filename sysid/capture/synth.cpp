@@ -248,6 +248,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   check_job({replay}, 1, estimate_batch({replay}, 1));
   Motion motion;
   run(replay, {{material, {}}}, scored_steps(replay), [&](std::size_t, ReplayResult result) {
+    synthetic.residual_max = result.residual_max;
     synthetic.unconverged_share = result.unconverged_share;
     motion = std::move(result.motion);
   });

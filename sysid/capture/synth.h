@@ -43,6 +43,7 @@ struct SynthRecording {
   data::Recording recording;           ///< keyframes without paths
   std::vector<data::Points> clouds;    ///< one a keyframe, base frame [m]
   std::vector<data::Points> contours;  ///< visible border of the sheet, one a keyframe [m]
+  double residual_max = 0;             ///< of the simulated steps, |r| / |M g|
   double unconverged_share = 0;        ///< of the simulated steps
 };
 
