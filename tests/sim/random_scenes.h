@@ -32,7 +32,7 @@ struct SceneFindings {
   double exit_speed = 0;    ///< fastest that a vertex leaves an obstacle it started in [m/s]
   double energy_gain = 0;   ///< largest gain of a converged step beyond the work done on the sheet [J]
   double energy_gain_share = 0;  ///< the same over the energy that was there to begin with and put in since
-  double shot_speed = 0;         ///< fastest vertex of the sheet beyond what falling gives it [m/s]
+  double shot_speed = 0;         ///< of kind `deep`: fastest vertex, beyond what falling gives it [m/s]
   int inside = 0;                ///< vertices that nothing holds in an obstacle at the end
   int crossed = 0;               ///< times that a free vertex went through an obstacle in a converged step
   bool finite = true;
