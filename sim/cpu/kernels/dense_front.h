@@ -12,15 +12,6 @@ struct VectorOf {
   typedef Scalar type __attribute__((vector_size(vector_bytes), aligned(sizeof(Scalar))));
 };
 
-template <typename Scalar>
-Scalar sum_of_lanes(typename VectorOf<Scalar>::type vector) {
-  Scalar halves[lanes_of<Scalar>];
-  memcpy(halves, &vector, sizeof(vector));
-  for (int width = lanes_of<Scalar> / 2; width > 0; width /= 2)
-    for (int lane = 0; lane < width; ++lane) halves[lane] += halves[lane + width];
-  return halves[0];
-}
-
 /// C(i, j) -= sum_k A(i, k) B(j, k) for `Width` columns j and whole vectors of rows [first_row, end_row): 2 x
 /// Width register tiles, 2 loads and Width broadcasts for 2 Width multiply-adds.
 template <int Width, typename Scalar>
@@ -109,73 +100,6 @@ void subtract_outer_product(Scalar* update, int padded_update_rows, int rows, co
       subtract_product<3>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
                           padded_update_rows);
     j += width;
-  }
-}
-
-/// Takes the diagonal 3 x 3 blocks out of a factorized front: their inverses (6 numbers each, lower triangle
-/// row by row) go to `inverses`, and every entry on or above them becomes zero. Solves then run over whole
-/// aligned vectors.
-template <typename Scalar>
-void extract_diagonal(Scalar* front, int padded_rows, int columns, Scalar* inverses) {
-  for (int j = 0; j < columns; j += 3, inverses += 6) {
-    Scalar* l0 = front + static_cast<long>(j) * padded_rows;
-    Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
-    const Scalar d0 = 1 / l0[j], d1 = 1 / l1[j + 1], d2 = 1 / l2[j + 2];
-    inverses[0] = d0;
-    inverses[1] = -l0[j + 1] * d0 * d1;
-    inverses[2] = d1;
-    inverses[3] = (l0[j + 1] * l1[j + 2] * d1 - l0[j + 2]) * d0 * d2;
-    inverses[4] = -l1[j + 2] * d1 * d2;
-    inverses[5] = d2;
-    for (int i = 0; i < j + 3; ++i) l0[i] = l1[i] = l2[i] = 0;
-  }
-}
-
-// One right-hand side through a front, in place: x holds the front's own entries, then those below, then
-// zeros up to `padded_rows`. Three columns at a time.
-
-/// x <- [L11^-1 x_own; x_below - L21 L11^-1 x_own].
-template <typename Scalar>
-void solve_forward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
-  using Vector = typename VectorOf<Scalar>::type;
-  for (int j = 0; j < columns; j += 3, inverses += 6) {
-    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
-    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
-    const Scalar x0 = inverses[0] * x[j];
-    const Scalar x1 = inverses[1] * x[j] + inverses[2] * x[j + 1];
-    const Scalar x2 = inverses[3] * x[j] + inverses[4] * x[j + 1] + inverses[5] * x[j + 2];
-    x[j] = x0;
-    x[j + 1] = x1;
-    x[j + 2] = x2;
-    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
-      Vector& target = *reinterpret_cast<Vector*>(x + i);
-      target -= *reinterpret_cast<const Vector*>(l0 + i) * x0 +
-                *reinterpret_cast<const Vector*>(l1 + i) * x1 + *reinterpret_cast<const Vector*>(l2 + i) * x2;
-    }
-  }
-}
-
-/// x_own <- L11^-T (x_own - L21^T x_below).
-template <typename Scalar>
-void solve_backward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
-  using Vector = typename VectorOf<Scalar>::type;
-  inverses += 2 * columns;
-  for (int j = columns - 3; j >= 0; j -= 3) {
-    inverses -= 6;
-    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
-    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
-    Vector sum0{}, sum1{}, sum2{};
-    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
-      const Vector below = *reinterpret_cast<const Vector*>(x + i);
-      sum0 += *reinterpret_cast<const Vector*>(l0 + i) * below;
-      sum1 += *reinterpret_cast<const Vector*>(l1 + i) * below;
-      sum2 += *reinterpret_cast<const Vector*>(l2 + i) * below;
-    }
-    const Scalar x0 = x[j] - sum_of_lanes<Scalar>(sum0), x1 = x[j + 1] - sum_of_lanes<Scalar>(sum1),
-                 x2 = x[j + 2] - sum_of_lanes<Scalar>(sum2);
-    x[j] = inverses[0] * x0 + inverses[1] * x1 + inverses[3] * x2;
-    x[j + 1] = inverses[2] * x1 + inverses[4] * x2;
-    x[j + 2] = inverses[5] * x2;
   }
 }
 
