@@ -22,14 +22,20 @@ using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
 template <typename Scalar>
 struct Restriction {
   int position;
-  Eigen::Matrix<Scalar, 3, 3> free;
+  Eigen::Matrix<Scalar, 4, 3> free;  ///< columns of four numbers, the last zero
+
+  Restriction(int position_in, const Eigen::Matrix3d& free_in) : position(position_in) {
+    free << free_in.cast<Scalar>(), Eigen::Matrix<Scalar, 1, 3>::Zero();
+  }
 };
 
 template <typename Scalar>
 void restrict_to_free(const std::vector<Restriction<Scalar>>& restrictions, Vector<Scalar>& x) {
   for (const Restriction<Scalar>& restriction : restrictions) {
-    auto own = x.template segment<3>(4L * restriction.position);
-    own = (restriction.free * own).eval();
+    auto own = x.template segment<4>(4L * restriction.position);
+    own = (restriction.free.col(0) * own[0] + restriction.free.col(1) * own[1] +
+           restriction.free.col(2) * own[2])
+              .eval();
   }
 }
 
@@ -102,8 +108,8 @@ int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product, co
     if (constraint.hold == Hold::free) continue;
     const int i = position[constraint.vertex];
     const Eigen::Matrix3d coupling = k < couplings.size() ? couplings[k] : Eigen::Matrix3d::Zero();
-    free.push_back({i, constraint.free.cast<Scalar>()});
-    coupled.push_back({i, (constraint.free + coupling).cast<Scalar>()});
+    free.emplace_back(i, constraint.free);
+    coupled.emplace_back(i, constraint.free + coupling);
     x.template segment<3>(4L * i) = constraint.correction.cast<Scalar>();
   }
   restrict_to_free(free, residual);
@@ -169,7 +175,7 @@ int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product, const Conta
   for (const VertexConstraint& constraint : contacts.constraints) {
     if (constraint.hold == Hold::free) continue;
     const int i = position[constraint.vertex];
-    restrictions.push_back({i, constraint.free.cast<Scalar>()});
+    restrictions.emplace_back(i, constraint.free);
     x.template segment<3>(4L * i) = constraint.correction.cast<Scalar>();
     corrected = corrected || !constraint.correction.isZero(0);
   }

@@ -54,6 +54,37 @@ void subtract_product(Scalar* c, int ldc, const Scalar* a, const Scalar* b, int 
   }
 }
 
+/// Cholesky of `Width` columns from row `first` on, to which nothing is left to subtract. Returns false at a
+/// pivot that is not positive.
+template <int Width, typename Scalar>
+bool eliminate_few_columns(Scalar* columns, int padded_rows, int first) {
+  using Vector = typename VectorOf<Scalar>::type;
+  Scalar lower[Width][Width], scales[Width];
+  for (int j = 0; j < Width; ++j)
+    for (int i = j; i < Width; ++i) lower[i][j] = columns[static_cast<long>(j) * padded_rows + first + i];
+  for (int j = 0; j < Width; ++j) {
+    if (!(lower[j][j] > 0)) return false;
+    scales[j] = 1 / square_root(lower[j][j]);
+    for (int i = j + 1; i < Width; ++i) lower[i][j] *= scales[j];
+    for (int k = j + 1; k < Width; ++k)
+      for (int i = k; i < Width; ++i) lower[i][k] -= lower[k][j] * lower[i][j];
+  }
+  for (int row = first / lanes_of<Scalar> * lanes_of<Scalar>; row < padded_rows; row += lanes_of<Scalar>) {
+    Vector rows[Width];
+    for (int j = 0; j < Width; ++j)
+      rows[j] = *reinterpret_cast<const Vector*>(columns + static_cast<long>(j) * padded_rows + row);
+#pragma GCC unroll 6
+    for (int j = 0; j < Width; ++j) {
+      rows[j] *= scales[j];
+#pragma GCC unroll 6
+      for (int k = j + 1; k < Width; ++k) rows[k] -= lower[k][j] * rows[j];
+    }
+    for (int j = 0; j < Width; ++j)
+      *reinterpret_cast<Vector*>(columns + static_cast<long>(j) * padded_rows + row) = rows[j];
+  }
+  return true;
+}
+
 /// Cholesky of the leading `columns` (a multiple of 3) of a front of `padded_rows` rows: on return the lower
 /// trapezoid holds [L11; L21]. Returns false at a pivot that is not positive.
 template <typename Scalar>
@@ -62,21 +93,12 @@ bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
     const int width = columns - panel >= 6 ? 6 : 3;
     const int first = panel / lanes_of<Scalar> * lanes_of<Scalar>;
     Scalar* target = front + static_cast<long>(panel) * padded_rows;
-    if (width == 6)
+    if (width == 6) {
       subtract_product<6>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
-    else
+      if (!eliminate_few_columns<6>(target, padded_rows, panel)) return false;
+    } else {
       subtract_product<3>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
-    for (int j = panel; j < panel + width; ++j) {
-      Scalar* column = front + static_cast<long>(j) * padded_rows;
-      const Scalar pivot = column[j];
-      if (!(pivot > 0)) return false;
-      const Scalar scale = 1 / square_root(pivot);
-      for (int i = j; i < padded_rows; ++i) column[i] *= scale;
-      for (int k = j + 1; k < panel + width; ++k) {
-        Scalar* later = front + static_cast<long>(k) * padded_rows;
-        const Scalar factor = column[k];
-        for (int i = k; i < padded_rows; ++i) later[i] -= factor * column[i];
-      }
+      if (!eliminate_few_columns<3>(target, padded_rows, panel)) return false;
     }
     panel += width;
   }

@@ -23,6 +23,7 @@ constexpr int inverse_stride(int width) { return width / 3 * 4; }
 template <int Width, typename Scalar>
 void eliminate_panel(Scalar* columns, int padded_rows, int first, Scalar* inverse, Stored<Scalar>* panel) {
   using Vector = typename VectorOf<Scalar>::type;
+  using Four = typename FourOf<Scalar>::type;
   constexpr int stride = inverse_stride(Width);
   Scalar lower[Width][Width], scales[Width], rows[Width][stride] = {};  // L_pp, and L_pp^-1 row by row
   const int first_vector = (first + Width) / lanes_of<Scalar> * lanes_of<Scalar>;
@@ -34,15 +35,18 @@ void eliminate_panel(Scalar* columns, int padded_rows, int first, Scalar* invers
   for (int i = 0; i < Width; ++i) {
     scales[i] = 1 / lower[i][i];
     rows[i][i] = 1;
-    for (int k = 0; k < i; ++k)
-      for (int j = 0; j < stride; ++j) rows[i][j] -= lower[i][k] * rows[k][j];
-    for (int j = 0; j < stride; ++j) rows[i][j] *= scales[i];
+    for (int j = 0; j < stride; j += 4) {
+      Four sum = load_four(rows[i] + j);
+      for (int k = 0; k < i; ++k) sum -= lower[i][k] * load_four(rows[k] + j);
+      store_four<Scalar>(scales[i] * sum, rows[i] + j);
+    }
   }
   for (int i = 0; i < Width; ++i) {
-    Scalar sums[stride] = {};
-    for (int k = i; k < Width; ++k)
-      for (int j = 0; j < stride; ++j) sums[j] += rows[k][i] * rows[k][j];
-    for (int j = 0; j < stride; ++j) inverse[i * stride + j] = sums[j];
+    for (int j = 0; j < stride; j += 4) {
+      Four sum = {};
+      for (int k = i; k < Width; ++k) sum += rows[k][i] * load_four(rows[k] + j);
+      store_four<Scalar>(sum, inverse + i * stride + j);
+    }
   }
   for (int row = first_vector; row < padded_rows; row += lanes_of<Scalar>) {
     Vector w[Width];
@@ -79,7 +83,8 @@ void solve_panel_forward(const Stored<Scalar>* panel, int padded_rows, int first
 
 /// A vector's fourths, added.
 template <typename Scalar>
-typename FourOf<Scalar>::type fold(const typename VectorOf<Scalar>::type& vector) {
+[[gnu::always_inline]] inline typename FourOf<Scalar>::type fold(
+    const typename VectorOf<Scalar>::type& vector) {
   constexpr int parts = lanes_of<Scalar> / 4;
   typename FourOf<Scalar>::type fours[parts];
   memcpy(fours, &vector, sizeof(vector));
@@ -90,7 +95,8 @@ typename FourOf<Scalar>::type fold(const typename VectorOf<Scalar>::type& vector
 
 /// Their sums over the lanes.
 template <typename Scalar>
-typename FourOf<Scalar>::type sums_of_lanes(const typename VectorOf<Scalar>::type* vectors) {
+[[gnu::always_inline]] inline typename FourOf<Scalar>::type sums_of_lanes(
+    const typename VectorOf<Scalar>::type* vectors) {
   using Four = typename FourOf<Scalar>::type;
   if constexpr (lanes_of<Scalar> < 4) {
     Four sums;

@@ -43,12 +43,18 @@ template <typename Scalar>
 void sum_columns(const int* columns, const Scalar* values, int first, int end, const Scalar* x,
                  Scalar* sums) {
   using Four = typename FourOf<Scalar>::type;
-  Four rows[4] = {};
-  for (int k = first; k < end; ++k) {
+  Four even[4] = {}, odd[4] = {};
+  const auto add = [&](int k, Four* rows) {
     const Four vertex = load_four(x + 4L * columns[k]);
     for (int row = 0; row < 4; ++row) rows[row] += values[4L * k + row] * vertex;
+  };
+  int k = first;
+  for (; k + 1 < end; k += 2) {
+    add(k, even);
+    add(k + 1, odd);
   }
-  for (int row = 0; row < 4; ++row) store_four(rows[row], sums + 4 * row);
+  if (k < end) add(k, even);
+  for (int row = 0; row < 4; ++row) store_four<Scalar>(even[row] + odd[row], sums + 4 * row);
 }
 
 #ifdef __AVX512F__
