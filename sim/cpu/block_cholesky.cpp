@@ -301,7 +301,7 @@ long factor_entries(const SymbolicFactor& symbolic) { return symbolic.entries; }
 template <typename Scalar>
 BlockCholesky<Scalar>::BlockCholesky(std::shared_ptr<const SymbolicFactor> symbolic, const Kernels& kernels)
     : symbolic_(std::move(symbolic)), kernels_(&kernels) {
-  factor_.resize(symbolic_->factor_size);
+  factor_.resize(linear<Scalar>(kernels).stored_bytes * symbolic_->factor_size);
   inverses_.resize(inverse_size * symbolic_->position.size());
   // Rows below a front's own are read by whole vectors from where they start: past the end of its last
   // column.

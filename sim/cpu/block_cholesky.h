@@ -51,7 +51,7 @@ class BlockCholesky {
  private:
   std::shared_ptr<const SymbolicFactor> symbolic_;
   const Kernels* kernels_;
-  AlignedStorage<Scalar> factor_;    ///< per front: its panels, column-major, rows padded to whole vectors
+  AlignedStorage<char> factor_;      ///< per front: its panels, column-major, rows padded to whole vectors
   AlignedStorage<Scalar> inverses_;  ///< of the panels' diagonal blocks
   AlignedStorage<Scalar> columns_;   ///< of the front that is eliminated
   AlignedStorage<Scalar> stack_;     ///< update matrices waiting for their parent

@@ -60,6 +60,7 @@ struct FourRows {
 
 template <typename Scalar>
 struct LinearKernels {
+  int stored_bytes;  ///< of a number of the factor
   /// Cholesky factorization of the matrix blocks `values`, for solves: panels of the fronts, those of
   /// single precision rounded to half, and the inverses of their diagonal blocks, `inverse_size` numbers a
   /// vertex. `front`, `stack`: memory for the columns of the largest front, and for update matrices. Returns
