@@ -179,7 +179,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     add_bending_stand_in(bending, material.bending_rigidity, values);
     factor.factorize(values);
   });
-  Eigen::VectorXf from = Eigen::VectorXf::Ones(y.size()), to = from;
+  Eigen::VectorXf from = Eigen::VectorXf::Ones(4 * y.rows()), to = from;
   add("triangular solves", solves, [&] { factor.solve_in_order(to.data()); });
   add("matrix products", solves, [&] { product.multiply(from.data(), to.data()); });
   return result;

@@ -13,12 +13,11 @@ namespace {
 /// Columns eliminated together; `rows` are the vertices below them that they touch (permuted numbering,
 /// sorted).
 struct Supernode {
-  int first_column = 0, column_count = 0;
-  std::vector<int> rows;
+  std::vector<int> columns, rows;
   long zeros = 0;  ///< blocks stored that are zero
 };
 
-int front_size(const Supernode& node) { return node.column_count + static_cast<int>(node.rows.size()); }
+long front_size(const Supernode& node) { return static_cast<long>(node.columns.size() + node.rows.size()); }
 
 /// Approximate minimum degree (Amestoy, Davis, Duff 1996) on the vertex graph: vertices by elimination.
 std::vector<int> minimum_degree(const BlockPattern& pattern) {
@@ -83,11 +82,6 @@ std::vector<std::vector<int>> earlier_neighbours(const BlockPattern& pattern,
   return lists;
 }
 
-/// Zeros that merging `child` into its parent would store, in blocks.
-long merge_zeros(const Supernode& child, const Supernode& parent) {
-  return static_cast<long>(child.column_count) * (front_size(parent) - static_cast<long>(child.rows.size()));
-}
-
 /// Rows below the diagonal of L, column by column.
 std::vector<std::vector<int>> column_structure(const std::vector<int>& parent,
                                                const std::vector<std::vector<int>>& earlier) {
@@ -108,41 +102,68 @@ std::vector<std::vector<int>> column_structure(const std::vector<int>& parent,
   return structure;
 }
 
-/// Fundamental supernodes, then merged with the parent where few zeros are stored: larger dense fronts run
-/// faster.
-std::vector<Supernode> supernodes(const std::vector<int>& parent,
-                                  const std::vector<std::vector<int>>& structure) {
-  const int size = static_cast<int>(parent.size());
+/// Columns with the same rows below them.
+std::vector<Supernode> fundamental_supernodes(const std::vector<int>& parent,
+                                              const std::vector<std::vector<int>>& structure) {
   std::vector<Supernode> nodes;
-  for (int column = 0; column < size; ++column) {
+  for (int column = 0; column < static_cast<int>(parent.size()); ++column) {
     const bool extends = !nodes.empty() && parent[column - 1] == column &&
                          structure[column - 1].size() == structure[column].size() + 1;
-    if (extends) {
-      ++nodes.back().column_count;
-      nodes.back().rows = structure[column];
-    } else {
-      nodes.push_back({column, 1, structure[column], 0});
-    }
-    while (nodes.size() >= 2) {
-      Supernode& last = nodes.back();
-      Supernode& before = nodes[nodes.size() - 2];
-      const int end = last.first_column + last.column_count;
-      const bool complete = column + 1 == size || parent[column] != column + 1 ||
-                            structure[column].size() != structure[column + 1].size() + 1;
-      if (!complete || before.rows.empty() || before.rows.front() < last.first_column ||
-          before.rows.front() >= end)
-        break;
-      const long zeros = before.zeros + last.zeros + merge_zeros(before, last);
-      const int columns = before.column_count + last.column_count;
-      const long stored = static_cast<long>(columns) * (columns + static_cast<long>(last.rows.size()));
-      if (zeros * 16 > stored) break;
-      before.column_count = columns;
-      before.zeros = zeros;
-      before.rows = last.rows;
-      nodes.pop_back();
-    }
+    if (!extends) nodes.emplace_back();
+    nodes.back().columns.push_back(column);
+    nodes.back().rows = structure[column];
   }
   return nodes;
+}
+
+/// Zeros that merging `child` into its parent would store, with those stored already, in blocks.
+long zeros_of_both(const Supernode& child, const Supernode& parent) {
+  return child.zeros + parent.zeros +
+         static_cast<long>(child.columns.size()) *
+             (front_size(parent) - static_cast<long>(child.rows.size()));
+}
+
+/// Merges supernodes with their parents where few zeros are stored, more where both are small (Ashcraft and
+/// Grimes 1989): larger dense fronts run faster. The result is in postorder, columns ascending in each.
+std::vector<Supernode> amalgamated(std::vector<Supernode> nodes) {
+  constexpr std::size_t small = 8;  ///< columns
+  constexpr double zeros_of_small = 0.3, zeros_of_large = 0.06;
+  std::vector<int> owner, parent(nodes.size(), -1);
+  for (std::size_t s = 0; s < nodes.size(); ++s)
+    owner.resize(owner.size() + nodes[s].columns.size(), static_cast<int>(s));
+  std::vector<std::vector<int>> children(nodes.size());
+  for (std::size_t s = 0; s < nodes.size(); ++s) {
+    if (nodes[s].rows.empty()) continue;
+    parent[s] = owner[nodes[s].rows.front()];
+    children[parent[s]].push_back(static_cast<int>(s));
+  }
+  std::vector<char> merged(nodes.size(), 0);
+  for (std::size_t s = 0; s < nodes.size(); ++s) {
+    Supernode& node = nodes[s];
+    std::vector<int>& candidates = children[s];
+    const auto share_of_zeros = [&](int child) {
+      const std::size_t columns = node.columns.size() + nodes[child].columns.size();
+      const double share = static_cast<double>(zeros_of_both(nodes[child], node)) /
+                           static_cast<double>(columns * (columns + node.rows.size()));
+      return share <= (columns <= small ? zeros_of_small : zeros_of_large) ? share : 1.0;
+    };
+    while (!candidates.empty()) {
+      const auto best = std::ranges::min_element(candidates, {}, share_of_zeros);
+      const int child = *best;
+      if (share_of_zeros(child) == 1.0) break;
+      candidates.erase(best);
+      node.zeros = zeros_of_both(nodes[child], node);
+      node.columns.insert(node.columns.end(), nodes[child].columns.begin(), nodes[child].columns.end());
+      candidates.insert(candidates.end(), children[child].begin(), children[child].end());
+      for (const int grandchild : children[child]) parent[grandchild] = static_cast<int>(s);
+      merged[child] = 1;
+    }
+    std::ranges::sort(node.columns);
+  }
+  std::vector<Supernode> result;
+  for (const int s : postorder(parent))
+    if (!merged[s]) result.push_back(std::move(nodes[s]));
+  return result;
 }
 
 int padded(int rows) { return (rows + front_padding - 1) / front_padding * front_padding; }
@@ -158,7 +179,8 @@ struct SymbolicFactor {
   long entries = 0;      ///< of L
   long factor_size = 0;  ///< with the padding
   long stack_size = 0;
-  int largest_front = 0;  ///< padded rows
+  long largest_columns = 0;  ///< of a front, with the padding
+  int largest_front = 0;     ///< padded rows
 
   FrontTree tree() const {
     return {static_cast<int>(fronts.size()), fronts.data(),   rows.data(),
@@ -173,10 +195,11 @@ void add_fronts(const BlockPattern& pattern, const std::vector<Supernode>& nodes
   std::vector<int> owner(pattern.size);
   const std::vector<int>& position = symbolic.position;
   for (std::size_t s = 0; s < nodes.size(); ++s)
-    for (int c = 0; c < nodes[s].column_count; ++c) owner[nodes[s].first_column + c] = static_cast<int>(s);
+    for (const int column : nodes[s].columns) owner[column] = static_cast<int>(s);
   const auto row_in = [&](const Supernode& node, int row) {
-    if (row < node.first_column + node.column_count) return row - node.first_column;
-    return node.column_count +
+    const int columns = static_cast<int>(node.columns.size());
+    if (row <= node.columns.back()) return row - node.columns.front();
+    return columns +
            static_cast<int>(std::lower_bound(node.rows.begin(), node.rows.end(), row) - node.rows.begin());
   };
   std::vector<std::vector<int>> node_children(nodes.size());
@@ -184,21 +207,21 @@ void add_fronts(const BlockPattern& pattern, const std::vector<Supernode>& nodes
   for (std::size_t s = 0; s < nodes.size(); ++s)
     if (!nodes[s].rows.empty()) node_children[owner[nodes[s].rows.front()]].push_back(static_cast<int>(s));
   for (int vertex = 0; vertex < pattern.size; ++vertex) {
-    const int s = owner[position[vertex]], place = position[vertex] - nodes[s].first_column;
+    const int s = owner[position[vertex]], place = position[vertex] - nodes[s].columns.front();
     node_blocks[s].push_back({place, place, false, vertex});
   }
   for (std::size_t k = 0; k < pattern.pairs.size(); ++k) {
     const int row = position[pattern.pairs[k].first], column = position[pattern.pairs[k].second];
     const int s = owner[std::min(row, column)];
     node_blocks[s].push_back({row_in(nodes[s], std::max(row, column)),
-                              std::min(row, column) - nodes[s].first_column, row < column,
+                              std::min(row, column) - nodes[s].columns.front(), row < column,
                               pattern.size + static_cast<int>(k)});
   }
   for (std::size_t s = 0; s < nodes.size(); ++s) {
     const Supernode& node = nodes[s];
     Front front{};
-    front.first_column = node.first_column;
-    front.column_count = node.column_count;
+    front.first_column = node.columns.front();
+    front.column_count = static_cast<int>(node.columns.size());
     front.first_row = static_cast<int>(symbolic.rows.size());
     front.row_count = static_cast<int>(node.rows.size());
     front.first_child = static_cast<int>(symbolic.children.size());
@@ -226,7 +249,9 @@ void place_fronts(SymbolicFactor& symbolic) {
     symbolic.largest_front = std::max(symbolic.largest_front, front.padded_rows);
     symbolic.entries += static_cast<long>(columns) * (columns + rows);
     front.columns_at = symbolic.factor_size;
-    symbolic.factor_size += static_cast<long>(front.padded_rows) * columns;
+    const long size = static_cast<long>(front.padded_rows) * columns;
+    symbolic.largest_columns = std::max(symbolic.largest_columns, size);
+    symbolic.factor_size += size;
     const long update_size = static_cast<long>(front.padded_update_rows) * rows;
     front.built_at = front.update_at = top;
     if (front.child_count > 0)
@@ -250,7 +275,18 @@ std::shared_ptr<const SymbolicFactor> analyze(const BlockPattern& pattern) {
 
   const auto earlier = earlier_neighbours(pattern, position);
   const std::vector<int> parent = elimination_tree(size, earlier);
-  const std::vector<Supernode> nodes = supernodes(parent, column_structure(parent, earlier));
+  std::vector<Supernode> nodes =
+      amalgamated(fundamental_supernodes(parent, column_structure(parent, earlier)));
+  // Numbers in the order of elimination, which merging has changed.
+  int next = 0;
+  for (const Supernode& node : nodes)
+    for (const int column : node.columns) renumber[column] = next++;
+  for (int& p : position) p = renumber[p];
+  for (Supernode& node : nodes) {
+    for (int& column : node.columns) column = renumber[column];
+    for (int& row : node.rows) row = renumber[row];
+    std::sort(node.rows.begin(), node.rows.end());
+  }
   auto symbolic = std::make_shared<SymbolicFactor>();
   symbolic->position = position;
   add_fronts(pattern, nodes, *symbolic);
@@ -265,19 +301,20 @@ long factor_entries(const SymbolicFactor& symbolic) { return symbolic.entries; }
 template <typename Scalar>
 BlockCholesky<Scalar>::BlockCholesky(std::shared_ptr<const SymbolicFactor> symbolic, const Kernels& kernels)
     : symbolic_(std::move(symbolic)), kernels_(&kernels) {
+  factor_.resize(linear<Scalar>(kernels).stored_bytes * symbolic_->factor_size);
+  inverses_.resize(inverse_size * symbolic_->position.size());
   // Rows below a front's own are read by whole vectors from where they start: past the end of its last
   // column.
-  factor_.resize(symbolic_->factor_size + front_padding);
+  columns_.resize(symbolic_->largest_columns + front_padding);
   stack_.resize(symbolic_->stack_size);
-  inverses_.resize(6 * symbolic_->position.size());
-  front_.resize(symbolic_->largest_front);
-  permuted_.resize(3 * symbolic_->position.size());
+  front_.resize(symbolic_->largest_front + front_padding);
+  permuted_.resize(4 * symbolic_->position.size());
 }
 
 template <typename Scalar>
 bool BlockCholesky<Scalar>::factorize(const BlockValues<double>& values) {
-  return linear<Scalar>(*kernels_).factorize(symbolic_->tree(), values.data(), factor_.data(), stack_.data(),
-                                             inverses_.data());
+  return linear<Scalar>(*kernels_).factorize(symbolic_->tree(), values.data(), columns_.data(), stack_.data(),
+                                             factor_.data(), inverses_.data());
 }
 
 template <typename Scalar>
@@ -289,10 +326,10 @@ template <typename Scalar>
 void BlockCholesky<Scalar>::solve_in_place(double* x) const {
   const std::vector<int>& position = symbolic_->position;
   for (std::size_t vertex = 0; vertex < position.size(); ++vertex)
-    for (int c = 0; c < 3; ++c) permuted_[3 * position[vertex] + c] = static_cast<Scalar>(x[3 * vertex + c]);
+    for (int c = 0; c < 3; ++c) permuted_[4 * position[vertex] + c] = static_cast<Scalar>(x[3 * vertex + c]);
   solve_in_order(permuted_.data());
   for (std::size_t vertex = 0; vertex < position.size(); ++vertex)
-    for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted_[3 * position[vertex] + c];
+    for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted_[4 * position[vertex] + c];
 }
 
 template class BlockCholesky<double>;

@@ -30,8 +30,9 @@ const std::vector<int>& elimination_position(const SymbolicFactor& symbolic);
 /// Entries of L, in scalars.
 long factor_entries(const SymbolicFactor& symbolic);
 
-/// Multifrontal Cholesky factorization, stored and computed in Scalar; in single precision a preconditioner
-/// at half the memory traffic (Duff and Reid 1983; Liu 1992) with dense fronts of 3 x 3 blocks.
+/// Multifrontal Cholesky factorization (Duff and Reid 1983; Liu 1992) with dense fronts of 3 x 3 blocks,
+/// computed in Scalar. In single precision a preconditioner: what solves read of it is rounded to
+/// half precision, and however that rounds, it stays positive definite.
 template <typename Scalar>
 class BlockCholesky {
  public:
@@ -43,15 +44,17 @@ class BlockCholesky {
   /// x <- (L L^T)^-1 x, for x of 3 * size entries, vertex by vertex.
   void solve_in_place(double* x) const;
 
-  /// The same for vertices in elimination order: no number is moved.
+  /// The same for vertices in elimination order, four numbers each, the last of them zero: no number is
+  /// moved.
   void solve_in_order(Scalar* x) const;
 
  private:
   std::shared_ptr<const SymbolicFactor> symbolic_;
   const Kernels* kernels_;
-  AlignedStorage<Scalar> factor_;    ///< per front: column-major [L11; L21], rows padded to whole vectors
+  AlignedStorage<char> factor_;      ///< per front: its panels, column-major, rows padded to whole vectors
+  AlignedStorage<Scalar> inverses_;  ///< of the panels' diagonal blocks
+  AlignedStorage<Scalar> columns_;   ///< of the front that is eliminated
   AlignedStorage<Scalar> stack_;     ///< update matrices waiting for their parent
-  AlignedStorage<Scalar> inverses_;  ///< of the diagonal 3 x 3 blocks, 6 numbers a vertex
   mutable AlignedStorage<Scalar> front_, permuted_;
 };
 

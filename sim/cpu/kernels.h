@@ -11,6 +11,9 @@ namespace flash::sim {
 /// level.
 inline constexpr int front_padding = 16;
 
+/// Numbers that the inverse of a panel takes, for each vertex: four rows of twelve.
+inline constexpr long inverse_size = 48;
+
 /// A supernode: vertices eliminated together, and those below them that they touch.
 struct Front {
   int first_column, column_count;  ///< own vertices
@@ -57,19 +60,21 @@ struct FourRows {
 
 template <typename Scalar>
 struct LinearKernels {
-  /// Cholesky factorization of the matrix blocks `values`: columns of the fronts, and the inverses of the
-  /// diagonal 3 x 3 blocks of L, 6 numbers a vertex. Returns false at a pivot that is not positive.
-  bool (*factorize)(const FrontTree& tree, const double* values, Scalar* factor, Scalar* stack,
+  int stored_bytes;  ///< of a number of the factor
+  /// Cholesky factorization of the matrix blocks `values`, for solves: panels of the fronts, those of
+  /// single precision rounded to half, and the inverses of their diagonal blocks, `inverse_size` numbers a
+  /// vertex. `front`, `stack`: memory for the columns of the largest front, and for update matrices. Returns
+  /// false at a pivot that is not positive.
+  bool (*factorize)(const FrontTree& tree, const double* values, Scalar* front, Scalar* stack, void* factor,
                     Scalar* inverses);
-  /// x <- (L L^T)^-1 x, three numbers a vertex. `front`: memory for the largest front.
-  void (*solve)(const FrontTree& tree, const Scalar* factor, const Scalar* inverses, Scalar* front,
-                Scalar* x);
+  /// x <- (L L^T)^-1 x, four numbers a vertex, the last of them zero. `front`: memory for the rows of the
+  /// largest front and `front_padding` more.
+  void (*solve)(const FrontTree& tree, const void* factor, const Scalar* inverses, Scalar* front, Scalar* x);
   /// Three columns of four numbers for each block, from blocks of nine, transposed where `turned`.
   void (*copy_blocks)(int count, const int* sources, const char* turned, const double* from, Scalar* to);
-  /// y = B x of such blocks, and `padded` = x with four numbers a vertex.
-  void (*multiply_blocks)(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* padded,
-                          Scalar* y);
-  /// y += scale S x, S scalar: four values a column. x: four numbers a vertex, y: three.
+  /// y = B x of such blocks, four numbers a vertex.
+  void (*multiply_blocks)(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* y);
+  /// y += scale S x, S scalar: four values a column. Four numbers a vertex.
   void (*add_rows)(const FourRows& groups, const Scalar* values, Scalar scale, const Scalar* x, Scalar* y);
   Scalar (*dot)(long size, const Scalar* x, const Scalar* y);
   /// y += a x.

@@ -24,7 +24,7 @@ struct RowGroups {
 RowGroups row_groups(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix,
                      const std::vector<int>& position);
 
-/// y += scale * S x. x: four numbers a vertex, the last any; y: three.
+/// y += scale * S x. Four numbers a vertex, of which the last is any.
 template <typename Scalar>
 void add_product(const Kernels& kernels, const RowGroups& matrix, Scalar scale, const Scalar* x, Scalar* y);
 

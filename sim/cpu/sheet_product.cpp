@@ -39,7 +39,6 @@ void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValu
   scalar_part_ = &scalar_part;
   scale_ = static_cast<Scalar>(scale);
   blocks_.resize(12 * pattern.sources.size());
-  padded_.resize(4 * (pattern.starts.size() - 1));
   linear<Scalar>(*kernels_).copy_blocks(static_cast<int>(pattern.sources.size()), pattern.sources.data(),
                                         pattern.turned.data(), values.data(), blocks_.data());
 }
@@ -48,8 +47,8 @@ template <typename Scalar>
 void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
   const BlockRows rows = {static_cast<int>(pattern_->starts.size()) - 1, pattern_->starts.data(),
                           pattern_->columns.data()};
-  linear<Scalar>(*kernels_).multiply_blocks(rows, blocks_.data(), x, padded_.data(), y);
-  add_product(*kernels_, *scalar_part_, scale_, padded_.data(), y);
+  linear<Scalar>(*kernels_).multiply_blocks(rows, blocks_.data(), x, y);
+  add_product(*kernels_, *scalar_part_, scale_, x, y);
 }
 
 template class SheetProduct<float>;

@@ -19,8 +19,9 @@ struct ProductPattern {
 ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
                                const std::vector<int>& elimination_position);
 
-/// y = (B + s S) x over the vertices of a sheet in elimination order, three numbers a vertex: B of 3 x 3
-/// blocks, S scalar. A block is three columns of four numbers, so that a column is one vector multiply-add.
+/// y = (B + s S) x over the vertices of a sheet in elimination order, four numbers a vertex, the last of them
+/// zero: B of 3 x 3 blocks, S scalar. A block is three columns of four numbers, so that a column is one
+/// vector multiply-add.
 template <typename Scalar>
 class SheetProduct {
  public:
@@ -37,7 +38,6 @@ class SheetProduct {
   const RowGroups* scalar_part_ = nullptr;
   Scalar scale_ = 0;
   AlignedStorage<Scalar> blocks_;  ///< 12 numbers each
-  AlignedStorage<Scalar> padded_;  ///< x, four numbers a vertex
 };
 
 extern template class SheetProduct<float>;

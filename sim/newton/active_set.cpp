@@ -24,7 +24,7 @@ void add_slip_stiffness(const ContactSet& contacts, BlockValues<double>& values)
 void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& values) {
   for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k)
     for (const Touch& touch : contacts.touches_of(k))
-      if (touch.holds)
+      if (touch.holds && !touch.curved.isZero(0))
         block(values, contacts.constraints[k].vertex) -=
             touch.normal_force * touch.curved * touch.curved.transpose();
 }

@@ -14,6 +14,7 @@ using data::Points;
 
 constexpr double neighbours = 6;  ///< of a vertex, in a regular mesh
 
+/// Vertices in elimination order, four numbers each, the last of them zero.
 template <typename Scalar>
 using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
 
@@ -21,14 +22,20 @@ using Vector = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>;
 template <typename Scalar>
 struct Restriction {
   int position;
-  Eigen::Matrix<Scalar, 3, 3> free;
+  Eigen::Matrix<Scalar, 4, 3> free;  ///< columns of four numbers, the last zero
+
+  Restriction(int position_in, const Eigen::Matrix3d& free_in) : position(position_in) {
+    free << free_in.cast<Scalar>(), Eigen::Matrix<Scalar, 1, 3>::Zero();
+  }
 };
 
 template <typename Scalar>
 void restrict_to_free(const std::vector<Restriction<Scalar>>& restrictions, Vector<Scalar>& x) {
   for (const Restriction<Scalar>& restriction : restrictions) {
-    auto own = x.template segment<3>(3L * restriction.position);
-    own = (restriction.free * own).eval();
+    auto own = x.template segment<4>(4L * restriction.position);
+    own = (restriction.free.col(0) * own[0] + restriction.free.col(1) * own[1] +
+           restriction.free.col(2) * own[2])
+              .eval();
   }
 }
 
@@ -90,20 +97,20 @@ int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product, co
                                                Points& force) {
   constexpr int most = 40;
   const std::vector<int>& position = elimination_position(*plan_->symbolic);
-  const long size = gradient.size();
-  Vector<Scalar> residual(size), x = Vector<Scalar>::Zero(size), image(size), preconditioned(size);
+  const long size = 4 * gradient.rows();
+  Vector<Scalar> residual = Vector<Scalar>::Zero(size), x = residual, image(size), preconditioned(size);
   Vector<float> single(size);
   std::vector<Restriction<Scalar>> free, coupled;
   for (int i = 0; i < gradient.rows(); ++i)
-    residual.template segment<3>(3L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
+    residual.template segment<3>(4L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
   for (size_t k = 0; k < contacts.constraints.size(); ++k) {
     const VertexConstraint& constraint = contacts.constraints[k];
     if (constraint.hold == Hold::free) continue;
     const int i = position[constraint.vertex];
     const Eigen::Matrix3d coupling = k < couplings.size() ? couplings[k] : Eigen::Matrix3d::Zero();
-    free.push_back({i, constraint.free.cast<Scalar>()});
-    coupled.push_back({i, (constraint.free + coupling).cast<Scalar>()});
-    x.template segment<3>(3L * i) = constraint.correction.cast<Scalar>();
+    free.emplace_back(i, constraint.free);
+    coupled.emplace_back(i, constraint.free + coupling);
+    x.template segment<3>(4L * i) = constraint.correction.cast<Scalar>();
   }
   restrict_to_free(free, residual);
   if (!x.isZero(0)) {
@@ -145,8 +152,8 @@ int NewtonMatrix::generalized_minimal_residual(SheetProduct<Scalar>& product, co
   product.multiply(x.data(), image.data());
   direction.resize(gradient.rows(), 3);
   for (int i = 0; i < direction.rows(); ++i) {
-    direction.row(i) = x.template segment<3>(3L * position[i]).transpose().template cast<double>();
-    force.row(i) += image.template segment<3>(3L * position[i]).transpose().template cast<double>();
+    direction.row(i) = x.template segment<3>(4L * position[i]).transpose().template cast<double>();
+    force.row(i) += image.template segment<3>(4L * position[i]).transpose().template cast<double>();
   }
   return count;
 }
@@ -157,19 +164,19 @@ int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product, const Conta
                                       Points& force) {
   const std::vector<int>& position = elimination_position(*plan_->symbolic);
   const LinearKernels<Scalar>& kernels = linear<Scalar>(*plan_->kernels);
-  const long size = gradient.size();
-  Vector<Scalar> residual(size), x = Vector<Scalar>::Zero(size), change = Vector<Scalar>::Zero(size),
-                                 preconditioned(size), search(size), image(size);
+  const long size = 4 * gradient.rows();
+  Vector<Scalar> residual = Vector<Scalar>::Zero(size), x = residual, change = residual;
+  Vector<Scalar> preconditioned(size), search(size), image(size);
   Vector<float> single(size);
   std::vector<Restriction<Scalar>> restrictions;
   bool corrected = false;
   for (int i = 0; i < gradient.rows(); ++i)
-    residual.template segment<3>(3L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
+    residual.template segment<3>(4L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
   for (const VertexConstraint& constraint : contacts.constraints) {
     if (constraint.hold == Hold::free) continue;
     const int i = position[constraint.vertex];
-    restrictions.push_back({i, constraint.free.cast<Scalar>()});
-    x.template segment<3>(3L * i) = constraint.correction.cast<Scalar>();
+    restrictions.emplace_back(i, constraint.free);
+    x.template segment<3>(4L * i) = constraint.correction.cast<Scalar>();
     corrected = corrected || !constraint.correction.isZero(0);
   }
   if (corrected) {
@@ -208,8 +215,8 @@ int NewtonMatrix::conjugate_gradients(SheetProduct<Scalar>& product, const Conta
   }
   direction.resize(gradient.rows(), 3);
   for (int i = 0; i < direction.rows(); ++i) {
-    direction.row(i) = x.template segment<3>(3L * position[i]).transpose().template cast<double>();
-    force.row(i) += change.template segment<3>(3L * position[i]).transpose().template cast<double>();
+    direction.row(i) = x.template segment<3>(4L * position[i]).transpose().template cast<double>();
+    force.row(i) += change.template segment<3>(4L * position[i]).transpose().template cast<double>();
   }
   return iteration;
 }

@@ -23,10 +23,11 @@ void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& bloc
 }
 
 /// Four numbers a vertex.
-std::vector<double> padded_vertices(const Points& x) {
-  std::vector<double> padded(4 * x.rows());
-  for (long i = 0; i < x.rows(); ++i)
-    for (int c = 0; c < 3; ++c) padded[4 * i + c] = x(i, c);
+using PaddedPoints = Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor>;
+
+PaddedPoints padded_vertices(const Points& x) {
+  PaddedPoints padded(x.rows(), 4);
+  padded << x, Eigen::VectorXd::Zero(x.rows());
   return padded;
 }
 
@@ -47,7 +48,7 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
   Points bent = Points::Zero(positions.rows(), 3);
   add_bending_product(bending, material.bending_rigidity, positions, bent);
   gradient += bent;
-  energy.bending += 0.5 * bent.cwiseProduct(positions).sum();
+  energy.bending = 0.5 * bent.cwiseProduct(positions).sum();
   return energy;
 }
 
@@ -101,8 +102,11 @@ void add_bending_stand_in(const BendingOperator& bending, double rigidity, Block
 }
 
 void add_bending_product(const BendingOperator& bending, double rigidity, const Points& x, Points& y) {
-  if (!bending.stiffness.empty())
-    add_product(*bending.kernels, bending.stiffness, rigidity, padded_vertices(x).data(), y.data());
+  if (bending.stiffness.empty()) return;
+  const PaddedPoints padded = padded_vertices(x);
+  PaddedPoints product = PaddedPoints::Zero(x.rows(), 4);
+  add_product(*bending.kernels, bending.stiffness, rigidity, padded.data(), product.data());
+  y += product.leftCols<3>();
 }
 
 }  // namespace flash::sim

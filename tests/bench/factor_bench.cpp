@@ -46,7 +46,7 @@ void flash_solve(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
   BlockCholesky<Scalar> factor(towel.plan->symbolic, *towel.plan->kernels);
   if (!factor.factorize(towel.values)) state.SkipWithError("not positive definite");
-  Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x(towel.positions.size());
+  Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x(4 * towel.positions.rows());
   for (auto _ : state) {
     x.setOnes();
     factor.solve_in_order(x.data());

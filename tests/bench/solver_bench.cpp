@@ -33,7 +33,7 @@ void triangular_solves(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
   BlockCholesky<float> factor(towel.plan->symbolic, *towel.plan->kernels);
   if (!factor.factorize(towel.values)) state.SkipWithError("not positive definite");
-  Eigen::VectorXf x = Eigen::VectorXf::Ones(towel.positions.size());
+  Eigen::VectorXf x(4 * towel.positions.rows());
   for (auto _ : state) {
     x.setOnes();
     factor.solve_in_order(x.data());
@@ -46,7 +46,7 @@ void matrix_product(benchmark::State& state) {
   SheetProduct<float> product(*towel.plan->kernels);
   product.assign(towel.plan->triangle_product, towel.values, towel.bending().elimination_stiffness,
                  towel.material.bending_rigidity);
-  Eigen::VectorXf x = Eigen::VectorXf::Ones(towel.positions.size()), y = x;
+  Eigen::VectorXf x = Eigen::VectorXf::Ones(4 * towel.positions.rows()), y = x;
   for (auto _ : state) product.multiply(x.data(), y.data());
   const size_t blocks = towel.plan->triangle_product.sources.size(),
                columns = towel.bending().elimination_stiffness.columns.size();

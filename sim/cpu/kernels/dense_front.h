@@ -12,15 +12,6 @@ struct VectorOf {
   typedef Scalar type __attribute__((vector_size(vector_bytes), aligned(sizeof(Scalar))));
 };
 
-template <typename Scalar>
-Scalar sum_of_lanes(typename VectorOf<Scalar>::type vector) {
-  Scalar halves[lanes_of<Scalar>];
-  memcpy(halves, &vector, sizeof(vector));
-  for (int width = lanes_of<Scalar> / 2; width > 0; width /= 2)
-    for (int lane = 0; lane < width; ++lane) halves[lane] += halves[lane + width];
-  return halves[0];
-}
-
 /// C(i, j) -= sum_k A(i, k) B(j, k) for `Width` columns j and whole vectors of rows [first_row, end_row): 2 x
 /// Width register tiles, 2 loads and Width broadcasts for 2 Width multiply-adds.
 template <int Width, typename Scalar>
@@ -63,6 +54,37 @@ void subtract_product(Scalar* c, int ldc, const Scalar* a, const Scalar* b, int 
   }
 }
 
+/// Cholesky of `Width` columns from row `first` on, to which nothing is left to subtract. Returns false at a
+/// pivot that is not positive.
+template <int Width, typename Scalar>
+bool eliminate_few_columns(Scalar* columns, int padded_rows, int first) {
+  using Vector = typename VectorOf<Scalar>::type;
+  Scalar lower[Width][Width], scales[Width];
+  for (int j = 0; j < Width; ++j)
+    for (int i = j; i < Width; ++i) lower[i][j] = columns[static_cast<long>(j) * padded_rows + first + i];
+  for (int j = 0; j < Width; ++j) {
+    if (!(lower[j][j] > 0)) return false;
+    scales[j] = 1 / square_root(lower[j][j]);
+    for (int i = j + 1; i < Width; ++i) lower[i][j] *= scales[j];
+    for (int k = j + 1; k < Width; ++k)
+      for (int i = k; i < Width; ++i) lower[i][k] -= lower[k][j] * lower[i][j];
+  }
+  for (int row = first / lanes_of<Scalar> * lanes_of<Scalar>; row < padded_rows; row += lanes_of<Scalar>) {
+    Vector rows[Width];
+    for (int j = 0; j < Width; ++j)
+      rows[j] = *reinterpret_cast<const Vector*>(columns + static_cast<long>(j) * padded_rows + row);
+#pragma GCC unroll 6
+    for (int j = 0; j < Width; ++j) {
+      rows[j] *= scales[j];
+#pragma GCC unroll 6
+      for (int k = j + 1; k < Width; ++k) rows[k] -= lower[k][j] * rows[j];
+    }
+    for (int j = 0; j < Width; ++j)
+      *reinterpret_cast<Vector*>(columns + static_cast<long>(j) * padded_rows + row) = rows[j];
+  }
+  return true;
+}
+
 /// Cholesky of the leading `columns` (a multiple of 3) of a front of `padded_rows` rows: on return the lower
 /// trapezoid holds [L11; L21]. Returns false at a pivot that is not positive.
 template <typename Scalar>
@@ -71,21 +93,12 @@ bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
     const int width = columns - panel >= 6 ? 6 : 3;
     const int first = panel / lanes_of<Scalar> * lanes_of<Scalar>;
     Scalar* target = front + static_cast<long>(panel) * padded_rows;
-    if (width == 6)
+    if (width == 6) {
       subtract_product<6>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
-    else
+      if (!eliminate_few_columns<6>(target, padded_rows, panel)) return false;
+    } else {
       subtract_product<3>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
-    for (int j = panel; j < panel + width; ++j) {
-      Scalar* column = front + static_cast<long>(j) * padded_rows;
-      const Scalar pivot = column[j];
-      if (!(pivot > 0)) return false;
-      const Scalar scale = 1 / square_root(pivot);
-      for (int i = j; i < padded_rows; ++i) column[i] *= scale;
-      for (int k = j + 1; k < panel + width; ++k) {
-        Scalar* later = front + static_cast<long>(k) * padded_rows;
-        const Scalar factor = column[k];
-        for (int i = k; i < padded_rows; ++i) later[i] -= factor * column[i];
-      }
+      if (!eliminate_few_columns<3>(target, padded_rows, panel)) return false;
     }
     panel += width;
   }
@@ -109,73 +122,6 @@ void subtract_outer_product(Scalar* update, int padded_update_rows, int rows, co
       subtract_product<3>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
                           padded_update_rows);
     j += width;
-  }
-}
-
-/// Takes the diagonal 3 x 3 blocks out of a factorized front: their inverses (6 numbers each, lower triangle
-/// row by row) go to `inverses`, and every entry on or above them becomes zero. Solves then run over whole
-/// aligned vectors.
-template <typename Scalar>
-void extract_diagonal(Scalar* front, int padded_rows, int columns, Scalar* inverses) {
-  for (int j = 0; j < columns; j += 3, inverses += 6) {
-    Scalar* l0 = front + static_cast<long>(j) * padded_rows;
-    Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
-    const Scalar d0 = 1 / l0[j], d1 = 1 / l1[j + 1], d2 = 1 / l2[j + 2];
-    inverses[0] = d0;
-    inverses[1] = -l0[j + 1] * d0 * d1;
-    inverses[2] = d1;
-    inverses[3] = (l0[j + 1] * l1[j + 2] * d1 - l0[j + 2]) * d0 * d2;
-    inverses[4] = -l1[j + 2] * d1 * d2;
-    inverses[5] = d2;
-    for (int i = 0; i < j + 3; ++i) l0[i] = l1[i] = l2[i] = 0;
-  }
-}
-
-// One right-hand side through a front, in place: x holds the front's own entries, then those below, then
-// zeros up to `padded_rows`. Three columns at a time.
-
-/// x <- [L11^-1 x_own; x_below - L21 L11^-1 x_own].
-template <typename Scalar>
-void solve_forward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
-  using Vector = typename VectorOf<Scalar>::type;
-  for (int j = 0; j < columns; j += 3, inverses += 6) {
-    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
-    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
-    const Scalar x0 = inverses[0] * x[j];
-    const Scalar x1 = inverses[1] * x[j] + inverses[2] * x[j + 1];
-    const Scalar x2 = inverses[3] * x[j] + inverses[4] * x[j + 1] + inverses[5] * x[j + 2];
-    x[j] = x0;
-    x[j + 1] = x1;
-    x[j + 2] = x2;
-    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
-      Vector& target = *reinterpret_cast<Vector*>(x + i);
-      target -= *reinterpret_cast<const Vector*>(l0 + i) * x0 +
-                *reinterpret_cast<const Vector*>(l1 + i) * x1 + *reinterpret_cast<const Vector*>(l2 + i) * x2;
-    }
-  }
-}
-
-/// x_own <- L11^-T (x_own - L21^T x_below).
-template <typename Scalar>
-void solve_backward(const Scalar* front, int padded_rows, int columns, const Scalar* inverses, Scalar* x) {
-  using Vector = typename VectorOf<Scalar>::type;
-  inverses += 2 * columns;
-  for (int j = columns - 3; j >= 0; j -= 3) {
-    inverses -= 6;
-    const Scalar* l0 = front + static_cast<long>(j) * padded_rows;
-    const Scalar *l1 = l0 + padded_rows, *l2 = l1 + padded_rows;
-    Vector sum0{}, sum1{}, sum2{};
-    for (int i = (j + 3) / lanes_of<Scalar> * lanes_of<Scalar>; i < padded_rows; i += lanes_of<Scalar>) {
-      const Vector below = *reinterpret_cast<const Vector*>(x + i);
-      sum0 += *reinterpret_cast<const Vector*>(l0 + i) * below;
-      sum1 += *reinterpret_cast<const Vector*>(l1 + i) * below;
-      sum2 += *reinterpret_cast<const Vector*>(l2 + i) * below;
-    }
-    const Scalar x0 = x[j] - sum_of_lanes<Scalar>(sum0), x1 = x[j + 1] - sum_of_lanes<Scalar>(sum1),
-                 x2 = x[j + 2] - sum_of_lanes<Scalar>(sum2);
-    x[j] = inverses[0] * x0 + inverses[1] * x1 + inverses[3] * x2;
-    x[j + 1] = inverses[2] * x1 + inverses[4] * x2;
-    x[j + 2] = inverses[5] * x2;
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 #include "sim/cpu/kernels.h"
-#include "sim/cpu/kernels/dense_front.h"
+#include "sim/cpu/kernels/front_panels.h"
 
 namespace flash::sim {
 inline namespace FLASH_LEVEL {
@@ -46,70 +46,96 @@ void extend_add(const FrontTree& tree, const Front& child, const Front& parent, 
 }
 
 template <typename Scalar>
-bool factorize(const FrontTree& tree, const double* values, Scalar* factor, Scalar* stack, Scalar* inverses) {
+bool factorize(const FrontTree& tree, const double* values, Scalar* columns, Scalar* stack, void* factor,
+               Scalar* inverses) {
   for (int f = 0; f < tree.front_count; ++f) {
     const Front& front = tree.fronts[f];
-    const int columns = 3 * front.column_count, rows = 3 * front.row_count;
-    Scalar *own = factor + front.columns_at, *update = stack + front.built_at;
+    const int count = 3 * front.column_count, rows = 3 * front.row_count;
+    Scalar* update = stack + front.built_at;
     const long update_size = static_cast<long>(front.padded_update_rows) * rows;
-    memset(own, 0, sizeof(Scalar) * front.padded_rows * columns);
+    memset(columns, 0, sizeof(Scalar) * front.padded_rows * count);
     if (rows > 0) memset(update, 0, sizeof(Scalar) * update_size);
-    place_blocks(tree, front, values, own);
+    place_blocks(tree, front, values, columns);
     for (int k = front.first_child; k < front.first_child + front.child_count; ++k) {
       const Front& child = tree.fronts[tree.children[k]];
-      extend_add(tree, child, front, stack + child.update_at, own, update);
+      extend_add(tree, child, front, stack + child.update_at, columns, update);
     }
-    if (!eliminate_columns(own, front.padded_rows, columns)) return false;
+    if (!eliminate_columns(columns, front.padded_rows, count)) return false;
     if (rows > 0)
-      subtract_outer_product(update, front.padded_update_rows, rows, own, front.padded_rows, columns);
-    extract_diagonal(own, front.padded_rows, columns, inverses + 6L * front.first_column);
+      subtract_outer_product(update, front.padded_update_rows, rows, columns, front.padded_rows, count);
     if (rows > 0 && front.update_at != front.built_at)
       memmove(stack + front.update_at, update, sizeof(Scalar) * update_size);
+    for (int first = 0; first < count; first += panel_width(count - first)) {
+      const long offset = static_cast<long>(first) * front.padded_rows;
+      Scalar* inverse = inverses + inverse_size * (front.first_column + first / 3);
+      Stored<Scalar>* panel = static_cast<Stored<Scalar>*>(factor) + front.columns_at + offset;
+      if (panel_width(count - first) == 12)
+        eliminate_panel<12>(columns + offset, front.padded_rows, first, inverse, panel);
+      else
+        eliminate_panel<3>(columns + offset, front.padded_rows, first, inverse, panel);
+    }
   }
   return true;
 }
 
-// Few numbers: a call of memmove would cost more than the copy.
+/// Four numbers, of which a vertex has three: one move.
 template <typename Scalar>
 void copy_vertex(const Scalar* from, Scalar* to) {
-  to[0] = from[0];
-  to[1] = from[1];
-  to[2] = from[2];
+  memcpy(to, from, 4 * sizeof(Scalar));
 }
 
-template <typename Scalar>
-void copy_vertices(const Scalar* from, int count, Scalar* to) {
-  for (int i = 0; i < count; ++i) copy_vertex(from + 3L * i, to + 3L * i);
-}
-
-/// The numbers of a front's own vertices, of those below, then zeros up to its padding.
+/// The numbers of a front's own vertices and of those below, three a vertex, then zeros for its padding.
 template <typename Scalar>
 void gather(const FrontTree& tree, const Front& front, const Scalar* x, Scalar* numbers) {
-  const int columns = 3 * front.column_count;
-  copy_vertices(x + 3L * front.first_column, front.column_count, numbers);
+  const Scalar* own = x + 4L * front.first_column;
+  for (int c = 0; c < front.column_count; ++c, numbers += 3) copy_vertex(own + 4L * c, numbers);
   const int* rows = tree.rows + front.first_row;
-  for (int r = 0; r < front.row_count; ++r) copy_vertex(x + 3L * rows[r], numbers + columns + 3L * r);
-  for (int i = columns + 3 * front.row_count; i < front.padded_rows; ++i) numbers[i] = 0;
+  for (int r = 0; r < front.row_count; ++r, numbers += 3) copy_vertex(x + 4L * rows[r], numbers);
+  memset(numbers, 0, front_padding * sizeof(Scalar));
 }
 
 template <typename Scalar>
-void solve(const FrontTree& tree, const Scalar* factor, const Scalar* inverses, Scalar* numbers, Scalar* x) {
+void solve(const FrontTree& tree, const void* factor, const Scalar* inverses, Scalar* numbers, Scalar* x) {
   for (int f = 0; f < tree.front_count; ++f) {
     const Front& front = tree.fronts[f];
     const int columns = 3 * front.column_count;
-    const int* rows = tree.rows + front.first_row;
     gather(tree, front, x, numbers);
-    solve_forward(factor + front.columns_at, front.padded_rows, columns, inverses + 6L * front.first_column,
-                  numbers);
-    copy_vertices(numbers, front.column_count, x + 3L * front.first_column);
-    for (int r = 0; r < front.row_count; ++r) copy_vertex(numbers + columns + 3L * r, x + 3L * rows[r]);
+    const Stored<Scalar>* panel = static_cast<const Stored<Scalar>*>(factor) + front.columns_at;
+    for (int first = 0; first < columns;) {
+      const int width = panel_width(columns - first);
+      if (width == 12)
+        solve_panel_forward<12, Scalar>(panel, front.padded_rows, first, numbers);
+      else
+        solve_panel_forward<3, Scalar>(panel, front.padded_rows, first, numbers);
+      panel += static_cast<long>(width) * front.padded_rows;
+      first += width;
+    }
+    for (int c = 1; c < front.column_count; ++c)
+      copy_vertex(numbers + 3L * c, x + 4L * (front.first_column + c));
+    const int* rows = tree.rows + front.first_row;
+    for (int r = 0; r < front.row_count; ++r) copy_vertex(numbers + columns + 3L * r, x + 4L * rows[r]);
   }
   for (int f = tree.front_count; f-- > 0;) {
     const Front& front = tree.fronts[f];
+    const int columns = 3 * front.column_count;
     gather(tree, front, x, numbers);
-    solve_backward(factor + front.columns_at, front.padded_rows, 3 * front.column_count,
-                   inverses + 6L * front.first_column, numbers);
-    copy_vertices(numbers, front.column_count, x + 3L * front.first_column);
+    // The narrow panels are the last.
+    for (int first = columns; first > 0;) {
+      const int width = first % 12 == 0 ? 12 : 3;
+      first -= width;
+      const Stored<Scalar>* panel = static_cast<const Stored<Scalar>*>(factor) + front.columns_at +
+                                    static_cast<long>(first) * front.padded_rows;
+      const Scalar* inverse = inverses + inverse_size * (front.first_column + first / 3);
+      if (width == 12)
+        solve_panel_backward<12, Scalar>(panel, front.padded_rows, first, inverse, numbers);
+      else
+        solve_panel_backward<3, Scalar>(panel, front.padded_rows, first, inverse, numbers);
+    }
+    for (int c = 0; c < front.column_count; ++c) {
+      Scalar* own = x + 4L * (front.first_column + c);
+      copy_vertex(numbers + 3L * c, own);
+      own[3] = 0;
+    }
   }
 }
 

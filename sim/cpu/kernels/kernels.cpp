@@ -12,8 +12,9 @@ namespace {
 
 template <typename Scalar>
 constexpr LinearKernels<Scalar> linear_kernels = {
-    factorize<Scalar>, solve<Scalar>, copy_blocks<Scalar>, multiply_blocks<Scalar>,
-    add_rows<Scalar>,  dot<Scalar>,   add_scaled<Scalar>,  scale_and_add<Scalar>};
+    sizeof(Stored<Scalar>),  factorize<Scalar>, solve<Scalar>, copy_blocks<Scalar>,
+    multiply_blocks<Scalar>, add_rows<Scalar>,  dot<Scalar>,   add_scaled<Scalar>,
+    scale_and_add<Scalar>};
 
 }  // namespace
 

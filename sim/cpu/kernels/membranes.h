@@ -1,5 +1,6 @@
 #pragma once
 #include "sim/cpu/kernels.h"
+#include "sim/cpu/kernels/four.h"
 #include "sim/law/membrane_response.h"
 
 namespace flash::sim {
@@ -49,17 +50,44 @@ inline BlockLanes transposed(const BlockLanes& a) {
   return {{{c[0].x, c[1].x, c[2].x}, {c[0].y, c[1].y, c[2].y}, {c[0].z, c[1].z, c[2].z}}};
 }
 
+/// Four lanes of four vectors become four vectors of four numbers.
+inline void transpose(FourOf<double>::type (&rows)[4]) {
+  using Four = FourOf<double>::type;
+  const Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
+             b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
+             c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
+             d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+  rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
 /// Adds lane after lane to the blocks it belongs to.
 inline void scatter(const BlockLanes& block, const int* slots, int count, double* values) {
-  alignas(64) double entries[9][lane_count];
-  for (int c = 0; c < 3; ++c) {
-    store_lanes(block.columns[c].x, entries[3 * c]);
-    store_lanes(block.columns[c].y, entries[3 * c + 1]);
-    store_lanes(block.columns[c].z, entries[3 * c + 2]);
-  }
-  for (int lane = 0; lane < count; ++lane) {
-    double* target = values + 9L * slots[lane];
-    for (int k = 0; k < 9; ++k) target[k] += entries[k][lane];
+  const Triple* c = block.columns;
+  const Lanes entries[9] = {c[0].x, c[0].y, c[0].z, c[1].x, c[1].y, c[1].z, c[2].x, c[2].y, c[2].z};
+  if constexpr (lane_count < 4) {
+    for (int lane = 0; lane < count; ++lane)
+      for (int k = 0; k < 9; ++k) values[9L * slots[lane] + k] += entries[k][lane];
+  } else {
+    alignas(64) double numbers[9][lane_count];
+    for (int k = 0; k < 9; ++k) store_lanes(entries[k], numbers[k]);
+    for (int first = 0; first < count; first += 4) {
+      FourOf<double>::type low[4], high[4];
+      for (int k = 0; k < 4; ++k) {
+        low[k] = load_four(numbers[k] + first);
+        high[k] = load_four(numbers[k + 4] + first);
+      }
+      transpose(low);
+      transpose(high);
+      for (int lane = 0; lane < 4 && first + lane < count; ++lane) {
+        double* target = values + 9L * slots[first + lane];
+        store_four<double>(load_four(target) + low[lane], target);
+        store_four<double>(load_four(target + 4) + high[lane], target + 4);
+        target[8] += numbers[8][first + lane];
+      }
+    }
   }
 }
 

@@ -4,27 +4,10 @@
 #endif
 
 #include "sim/cpu/kernels.h"
-#include "sim/law/lanes.h"
+#include "sim/cpu/kernels/four.h"
 
 namespace flash::sim {
 inline namespace FLASH_LEVEL {
-
-/// Four numbers: those of a vertex, and one more.
-template <typename Scalar>
-struct FourOf {
-  typedef Scalar type __attribute__((vector_size(4 * sizeof(Scalar))));
-};
-
-template <typename Scalar>
-typename FourOf<Scalar>::type load_four(const Scalar* numbers) {
-  typename FourOf<Scalar>::type four;
-  memcpy(&four, numbers, sizeof(four));
-  return four;
-}
-template <typename Scalar>
-void store_four(const typename FourOf<Scalar>::type& four, Scalar* numbers) {
-  memcpy(numbers, &four, sizeof(four));
-}
 
 template <typename Scalar>
 void copy_blocks(int count, const int* sources, const char* turned, const double* from, Scalar* to) {
@@ -41,21 +24,17 @@ void copy_blocks(int count, const int* sources, const char* turned, const double
 }
 
 template <typename Scalar>
-void multiply_blocks(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* padded,
-                     Scalar* y) {
+void multiply_blocks(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* y) {
   using Four = typename FourOf<Scalar>::type;
-  for (int i = 0; i < rows.size; ++i)
-    for (int c = 0; c < 3; ++c) padded[4L * i + c] = x[3L * i + c];
   for (int i = 0; i < rows.size; ++i) {
     Four sum{}, even{}, odd{};
     for (int k = rows.starts[i]; k < rows.starts[i + 1]; ++k) {
-      const Scalar *block = blocks + 12L * k, *from = padded + 4L * rows.columns[k];
+      const Scalar *block = blocks + 12L * k, *from = x + 4L * rows.columns[k];
       sum += load_four(block) * from[0];
       even += load_four(block + 4) * from[1];
       odd += load_four(block + 8) * from[2];
     }
-    sum += even + odd;
-    for (int c = 0; c < 3; ++c) y[3L * i + c] = sum[c];
+    store_four<Scalar>(sum + (even + odd), y + 4L * i);
   }
 }
 
@@ -64,12 +43,18 @@ template <typename Scalar>
 void sum_columns(const int* columns, const Scalar* values, int first, int end, const Scalar* x,
                  Scalar* sums) {
   using Four = typename FourOf<Scalar>::type;
-  Four rows[4] = {};
-  for (int k = first; k < end; ++k) {
+  Four even[4] = {}, odd[4] = {};
+  const auto add = [&](int k, Four* rows) {
     const Four vertex = load_four(x + 4L * columns[k]);
     for (int row = 0; row < 4; ++row) rows[row] += values[4L * k + row] * vertex;
+  };
+  int k = first;
+  for (; k + 1 < end; k += 2) {
+    add(k, even);
+    add(k + 1, odd);
   }
-  for (int row = 0; row < 4; ++row) store_four(rows[row], sums + 4 * row);
+  if (k < end) add(k, even);
+  for (int row = 0; row < 4; ++row) store_four<Scalar>(even[row] + odd[row], sums + 4 * row);
 }
 
 #ifdef __AVX512F__
@@ -100,7 +85,7 @@ void add_rows(const FourRows& groups, const Scalar* values, Scalar scale, const 
     for (int member = 0; member < 4; ++member) {
       const int row = groups.rows[4L * g + member];
       if (row < 0) break;
-      for (int c = 0; c < 3; ++c) y[3L * row + c] += scale * sums[4 * member + c];
+      store_four<Scalar>(load_four(y + 4L * row) + scale * load_four(sums + 4 * member), y + 4L * row);
     }
   }
 }

@@ -135,14 +135,15 @@ void expect_matrix_products(const Kernels& kernels) {
   const RowGroups none;
   SheetProduct<Scalar> product(kernels);
   product.assign(plan->full_product, values, none, 1.0);
-  Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x(3 * size), y(3 * size);
+  Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>::Zero(4 * size),
+                                           y = x;
   Eigen::VectorXd in_order(3 * size), result(3 * size);
   for (int i = 0; i < size; ++i)
     for (int c = 0; c < 3; ++c)
-      x[3 * position[i] + c] = static_cast<Scalar>(in_order[3 * i + c] = entry(random));
+      x[4 * position[i] + c] = static_cast<Scalar>(in_order[3 * i + c] = entry(random));
   product.multiply(x.data(), y.data());
   for (int i = 0; i < size; ++i)
-    for (int c = 0; c < 3; ++c) result[3 * i + c] = y[3 * position[i] + c];
+    for (int c = 0; c < 3; ++c) result[3 * i + c] = y[4 * position[i] + c];
   const Eigen::VectorXd expected = matrix * in_order, magnitude = matrix.cwiseAbs() * in_order.cwiseAbs();
   const double terms = 3.0 * 20;  // of a row: vertices have at most 20 neighbours here
   const double bound = (terms + 2) * std::numeric_limits<Scalar>::epsilon();

@@ -15,7 +15,7 @@ namespace {
 
 using Matrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 template <typename Scalar>
-using Rows = Eigen::Matrix<Scalar, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using Rows = Eigen::Matrix<Scalar, Eigen::Dynamic, 4, Eigen::RowMajor>;
 
 // Not symmetric; some rows are empty.
 Matrix random_matrix(int size, unsigned seed) {
@@ -50,10 +50,10 @@ void expect_same_product(const Kernels& kernels, const Matrix& matrix, unsigned 
   const Eigen::MatrixX3d x = Eigen::MatrixX3d::Random(size, 3), y = Eigen::MatrixX3d::Random(size, 3);
   const double scale = 0.7;
   std::vector<Scalar> padded(4 * size, std::numeric_limits<Scalar>::quiet_NaN());
-  Rows<Scalar> result(size, 3);
+  Rows<Scalar> result = Rows<Scalar>::Zero(size, 4);
   for (int i = 0; i < size; ++i) {
     for (int c = 0; c < 3; ++c) padded[4 * position[i] + c] = static_cast<Scalar>(x(i, c));
-    result.row(position[i]) = y.row(i).cast<Scalar>();
+    result.row(position[i]).template head<3>() = y.row(i).cast<Scalar>();
   }
   add_product(kernels, row_groups(matrix, position), static_cast<Scalar>(scale), padded.data(),
               result.data());
