@@ -16,8 +16,8 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate reference fuzz configure-test format check-format check-includes tidy install clean
-.PHONY: bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
+.PHONY: help demo configure build test validate reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
+.PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -73,6 +73,19 @@ fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s u
 	cmake --preset fuzz
 	cmake --build --preset fuzz -j $(JOBS)
 	scripts/fuzz build/fuzz $(FUZZ_SECONDS)
+
+sanitize: packages-build packages-test packages-check  ## Tests of data and sim, built by clang, under the address and undefined-behaviour sanitizers
+	$(call sanitized,asan-ubsan)
+
+sanitize-threads: packages-build packages-test packages-check  ## Tests of what runs on several threads, under the thread sanitizer
+	$(call sanitized,tsan)
+
+# What a preset builds and which tests it runs, CMakePresets.json says.
+define sanitized
+cmake --preset $1
+cmake --build --preset $1 -j $(JOBS)
+ctest --preset $1 -j $(JOBS)
+endef
 
 format: packages-check  ## Lay out all sources as .clang-format says
 	$(sources) | xargs -r clang-format -i

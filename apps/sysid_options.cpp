@@ -16,11 +16,11 @@
 #include "apps/option_checks.h"
 #include "data/error.h"
 #include "data/message_line.h"
+#include "data/recording_digest.h"
 #include "data/text.h"
 #include "data/writable.h"
 #include "sim/scene/sheet.h"
 #include "sysid/report/recording_names.h"
-#include "sysid/report/summarize.h"
 
 namespace flash {
 namespace {
@@ -242,7 +242,7 @@ std::vector<data::Recording> load_recordings(const std::vector<std::string>& pat
     const data::Recording& recording = recordings.back();
     names.push_back(recording.name);
     if (paths.size() == 1) break;
-    const auto [same, is_new] = known.emplace(sysid::observed_sha256(recording), recording.source);
+    const auto [same, is_new] = known.emplace(data::observed_sha256(recording), recording.source);
     if (!is_new)
       throw data::InputError(recording.source + ": is the same recording as " + same->second +
                              ", expected each once: twice would count as two trials");

@@ -117,8 +117,10 @@ TriangleMesh delaunay_rectangle(double width, double height, double cell, unsign
   const std::size_t wanted = border + static_cast<std::size_t>(nx - 1) * static_cast<std::size_t>(ny - 1);
   for (double distance = 0.9 * cell; points.size() < wanted; distance *= 0.95)
     for (int attempt = 0; attempt < 200 && points.size() < wanted; ++attempt) {
-      const Eigen::Vector2d p(uniform(generator, 0.4 * cell, width - 0.4 * cell),
-                              uniform(generator, 0.4 * cell, height - 0.4 * cell));
+      // One after the other: compilers differ in the order of two draws that are arguments of one call.
+      const double y = uniform(generator, 0.4 * cell, height - 0.4 * cell);
+      const double x = uniform(generator, 0.4 * cell, width - 0.4 * cell);
+      const Eigen::Vector2d p(x, y);
       const bool fits = std::none_of(points.begin(), points.end(), [&](const Eigen::Vector2d& q) {
         return (p - q).squaredNorm() < distance * distance;
       });

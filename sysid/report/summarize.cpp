@@ -5,9 +5,8 @@
 #include <filesystem>
 
 #include "data/asset.h"
-#include "data/atomic_file.h"
 #include "data/procedural_mesh.h"
-#include "data/sha256.h"
+#include "data/recording_digest.h"
 #include "data/text.h"
 #include "sysid/infer/modes.h"
 #include "sysid/observe/registration_parameter.h"
@@ -56,7 +55,7 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
                                      const std::map<std::string, double>& nuisance) {
   SummaryRecording recording;
   recording.name = replay.recording.name;
-  recording.sha256 = recording_sha256(replay.recording);
+  recording.sha256 = data::recording_sha256(replay.recording);
   recording.offset = score.offset;
   recording.yaw = score.yaw;
   recording.time_offset = score.time_offset;
@@ -159,18 +158,6 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
                                          : "mean";
 }
 
-void add_files(const data::RecordedKeyframe& keyframe, std::vector<std::string>& paths) {
-  for (const std::string& path :
-       {keyframe.cloud, keyframe.depth, keyframe.mask, keyframe.markers, keyframe.contour})
-    if (!path.empty()) paths.push_back(path);
-}
-
-std::string digest_of(const std::vector<std::string>& paths) {
-  std::string digests;
-  for (const std::string& path : paths) digests += data::sha256(data::read_file(path));
-  return data::sha256(digests);
-}
-
 }  // namespace
 
 Summary summarize(const GridResults& results, const GridVerdict& verdict, const std::vector<Replay>& replays,
@@ -231,29 +218,6 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
                                " mm only, which widens the intervals: search more values or narrower ranges");
   for (std::size_t r = 0; r < replays.size(); ++r) summary.recordings[r].horizon_s = answer.horizons[r];
   return summary;
-}
-
-std::string recording_sha256(const data::Recording& recording) {
-  std::vector<std::string> paths = {recording.source};
-  for (const auto& [name, path] : recording.trajectory_paths) paths.push_back(path);
-  if (!recording.mesh_spec.empty() && !data::is_mesh_spec(recording.mesh_spec))
-    paths.push_back(recording.mesh_spec);
-  if (!recording.start_mesh.empty()) paths.push_back(recording.start_mesh);
-  if (recording.camera && !recording.camera->intrinsics_path.empty())
-    paths.push_back(recording.camera->intrinsics_path);
-  for (const data::RecordedKeyframe& keyframe : recording.keyframes) add_files(keyframe, paths);
-  return digest_of(paths);
-}
-
-std::string observed_sha256(const data::Recording& recording) {
-  std::vector<std::string> paths;
-  std::string forces;
-  for (const data::RecordedKeyframe& keyframe : recording.keyframes) {
-    add_files(keyframe, paths);
-    if (keyframe.force)
-      for (const double component : *keyframe.force) forces += data::format_number(component) + " ";
-  }
-  return data::sha256(digest_of(paths) + forces);
 }
 
 }  // namespace flash::sysid

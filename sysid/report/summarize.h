@@ -21,11 +21,4 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
 Summary summarize(const GridResults& results, const GridVerdict& verdict, const std::vector<Replay>& replays,
                   const GridSettings& settings);
 
-/// SHA-256 over recording.json and every file it names, in the order they are named, each as its own digest.
-std::string recording_sha256(const data::Recording& recording);
-
-/// SHA-256 of what was observed alone: the files of the keyframes and their forces. It stays the same where
-/// the recording is named or described anew, or its trajectory is written anew.
-std::string observed_sha256(const data::Recording& recording);
-
 }  // namespace flash::sysid

@@ -14,7 +14,8 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-/// Draws that do not depend on the standard library's distributions.
+/// Draws that do not depend on the standard library's distributions. A call draws for one argument only, or
+/// for several in braces: compilers differ in the order of the others.
 class Lot {
  public:
   explicit Lot(unsigned long seed) : generator_(seed) {}
@@ -112,7 +113,10 @@ Obstacle draw_support(Lot& lot, double side) {
   return {box};
 }
 
-Isometry3d tumbled(Lot& lot) { return Isometry3d(Eigen::AngleAxisd(lot.uniform(0, 3), lot.direction())); }
+Isometry3d tumbled(Lot& lot) {
+  const Vector3d axis = lot.direction();
+  return Isometry3d(Eigen::AngleAxisd(lot.uniform(0, 3), axis));
+}
 
 /// Puts the sheet `height` above the point `above`.
 void raise_above(Environment& environment, double top, double height) {
@@ -124,8 +128,8 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
   const double seconds = scene.steps * scene.settings.time_step;
   const Obstacle table{Plane{}};
   const auto throw_at = [&](double fastest) {
-    environment.state.velocities.rowwise() +=
-        (lot.uniform(0, fastest) * Vector3d(lot.uniform(-0.3, 0.3), lot.uniform(-0.3, 0.3), -1)).transpose();
+    const double y = lot.uniform(-0.3, 0.3), x = lot.uniform(-0.3, 0.3);
+    environment.state.velocities.rowwise() += lot.uniform(0, fastest) * Vector3d(x, y, -1).transpose();
   };
   const int corner = 0;
   switch (scene.kind) {
@@ -177,7 +181,8 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
       environment.obstacles = {table,
                                {Plane{Vector3d::Zero(), Vector3d(1, 0, lean).normalized()}},
                                {Plane{Vector3d::Zero(), Vector3d(0, 1, lean).normalized()}}};
-      environment.gravity = 9.81 * Vector3d(-lot.uniform(0, 1), -lot.uniform(0, 1), -1).normalized();
+      const double y = -lot.uniform(0, 1), x = -lot.uniform(0, 1);
+      environment.gravity = 9.81 * Vector3d(x, y, -1).normalized();
       return;
     }
     case SceneKind::pusher: {
