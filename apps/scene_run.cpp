@@ -239,6 +239,15 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     data::write_atomically((fs::path(output_dir) / "forces.csv").string(), forces);
   };
 
+  // A run that is killed leaves them as they were some seconds before.
+  auto tables_written = start;
+  const auto write_tables_at_times = [&] {
+    const auto now = std::chrono::steady_clock::now();
+    if (now - tables_written < std::chrono::seconds(10)) return;
+    write_tables();
+    tables_written = now;
+  };
+
   std::vector<StepReport> reports(bodies.size());
   Deepest held, started;
   double inside_at_end = 0;  // depth at the start of the last step [m]
@@ -296,6 +305,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       }
       if (frames.count(step) || (scene.rest_motion && (done || step == steps)))
         write_frame(step, merged(bodies));
+      write_tables_at_times();
       if (run.progress && !run.progress(step, steps)) summary.interrupted = step < steps;
     }
   } catch (...) {
@@ -310,11 +320,11 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
                                " holds it: is the height of the obstacle right, or the path?");
   if (started.penetration.depth > told_depth)
     summary.warnings.push_back(started.place(bodies) + ", where a step starts: the obstacle lets it out at " +
-                               data::format_short(scene.solver.exit_speed) + " m/s at most" +
+                               data::format_short(scene.solver.exit_speed) + " m/s" +
                                (inside_at_end > told_depth
                                     ? "; at the end it is still inside, by " +
                                           data::format_short(1e3 * inside_at_end) +
-                                          " mm, as where the way out would tear the sheet"
+                                          " mm: the run is too short, or its way out would tear it"
                                     : "") +
                                "; start outside, and leave room where obstacles close");
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -294,7 +294,7 @@ bool let_out_gently(const StepProblem& problem, const SheetPlan& plan,
   for (const std::vector<int>& vertices : inside)
     for (const int i : vertices) let_out[i] = true;
   for (size_t k = 0; k < plan.edge_count; ++k) {
-    const auto [i, j] = plan.pattern.pairs[k];
+    const int i = plan.pattern.pairs[k].first, j = plan.pattern.pairs[k].second;
     if (!let_out[i] && !let_out[j]) continue;
     const auto strain = [&](const Points& x) {
       return std::abs((x.row(i) - x.row(j)).norm() / (rest.row(i) - rest.row(j)).norm() - 1);
@@ -355,6 +355,8 @@ bool try_step(Environment& environment, double h, Solver::Workspace& w, StepRepo
     const std::vector<Exit> exits = exits_of(problem.contacts, inside);
     for (size_t k = 1; k < exits.size(); ++k) {
       if (solved && let_out_gently(problem, *w.plan, inside, w.now.positions, exit_speed)) break;
+      // What cannot be solved costs the most, and does not get better by being slower.
+      if (!solved && k > 1) k = exits.size() - 1;
       const StepReport given_up = std::exchange(report, {});
       w.refactor = true;
       solved = solve_step(StepProblem(*w.plan, environment, h, exits[k]), w, report);

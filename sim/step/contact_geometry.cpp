@@ -79,12 +79,12 @@ void face_facing(const Vector3d& way, int& axis, double& sign) {
 }
 
 Gap gap_after_way(const Plane& plane, const ObstacleMotion& motion, const Vector3d& start,
-                  const Vector3d& point, double time_step, const Exit& exit) {
+                  const Vector3d& point, const Vector3d&, double time_step, const Exit& exit) {
   return let_out(gap_of(plane, motion, point), -plane.normal.dot(start - plane.point), time_step, exit);
 }
 
 Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const Vector3d& start,
-                  const Vector3d& point, double time_step, const Exit& exit) {
+                  const Vector3d& point, const Vector3d&, double time_step, const Exit& exit) {
   Gap gap = gap_of(cylinder, motion, point);
   const Vector3d from = radial_of(cylinder, start), to = radial_of(cylinder, point), way = to - from;
   // Where the way enters the circle: |from + s way| = radius, the first of two; at once where it starts
@@ -158,9 +158,11 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
 }
 
 /// Takes a way in the plane of a face, to within rounding, out of the box where the face looks up, into it
-/// where it looks down and the way begins at another face or outside.
-void decide_grazing(const Box& box, const Vector3d& down, Vector3d& from, Vector3d& to) {
+/// where it looks down and the way begins at another face or outside. Returns the axis of the face that looks
+/// up, or -1.
+int decide_grazing(const Box& box, const Vector3d& down, Vector3d& from, Vector3d& to) {
   constexpr double grazing = 1e-9;  // [m]
+  int upper = -1;
   const Vector3d excess = from.cwiseAbs() - box.half_extents;
   for (int axis = 0; axis < 3; ++axis) {
     const double side = std::copysign(1.0, from[axis]);
@@ -169,17 +171,25 @@ void decide_grazing(const Box& box, const Vector3d& down, Vector3d& from, Vector
     const bool looks_down = side * down[axis] > 0;
     const bool beside = excess[(axis + 1) % 3] >= -grazing || excess[(axis + 2) % 3] >= -grazing;
     if (looks_down && !beside) continue;
+    if (!looks_down) upper = axis;
     const double decided = side * (box.half_extents[axis] + (looks_down ? -2 : 2) * grazing);
     from[axis] = to[axis] = decided;
   }
+  return upper;
 }
 
 Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const Vector3d& start, const Vector3d& point,
-                  double time_step, const Exit& exit) {
+                  const Vector3d& slid, double time_step, const Exit& exit) {
   Vector3d from = motion.start.inverse(Eigen::Isometry) * start;
   const Vector3d local = motion.end.inverse(Eigen::Isometry) * point;
-  Vector3d to = local;
-  decide_grazing(box, motion.end.linear().transpose() * motion.down, from, to);
+  Vector3d to = motion.end.inverse(Eigen::Isometry) * slid;
+  const int upper = decide_grazing(box, motion.end.linear().transpose() * motion.down, from, to);
+  if (upper >= 0) {
+    const Gap gap = gap_to_face(box, motion, point, local, upper, std::copysign(1.0, from[upper]));
+    Vector3d above = local.cwiseAbs() - box.half_extents;
+    above[upper] = gap.distance;
+    if (above.maxCoeff() <= 0) return gap;
+  }
   const Passage passage = passage_through(box, from, to, motion.end.linear().transpose() * exit.way);
   if (!passage.enters) return gap_of(box, motion, point);
   const bool ends_inside = ((to.cwiseAbs() - box.half_extents).array() <= 0).all();
@@ -222,9 +232,9 @@ Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double 
 }
 
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& start,
-              const Vector3d& point, double time_step, const Exit& exit) {
+              const Vector3d& point, const Vector3d& slid, double time_step, const Exit& exit) {
   return std::visit(
-      [&](const auto& shape) { return gap_after_way(shape, motion, start, point, time_step, exit); },
+      [&](const auto& shape) { return gap_after_way(shape, motion, start, point, slid, time_step, exit); },
       obstacle.shape);
 }
 
@@ -250,9 +260,9 @@ void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const
   std::visit(
       [&](const auto& shape) {
         for (Eigen::Index i = 0; i < points.rows(); ++i)
-          distances[i] =
-              std::min(distances[i],
-                       gap_after_way(shape, motion, starts.row(i), points.row(i), time_step, exit).distance);
+          distances[i] = std::min(distances[i], gap_after_way(shape, motion, starts.row(i), points.row(i),
+                                                              points.row(i), time_step, exit)
+                                                    .distance);
       },
       obstacle.shape);
 }

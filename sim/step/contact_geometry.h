@@ -57,10 +57,13 @@ Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, 
 /// - a way in the plane of a face, to within rounding, belongs to that face where it looks up, so that a
 ///   sheet slides over boxes that stand flush; a face that looks down carries nothing, and what is pushed
 ///   against a box that stands on a table meets its side.
+/// - a vertex that starts on another surface slides along it: `slid` is where its way would end so, `point`
+///   where it starts on none. That way decides which face of a box it meets, so that it slides from one box
+///   to the next.
 /// - a vertex that starts inside stands against a surface below the obstacle's own (`sunk`), so that it comes
 ///   out as `exit` says.
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
-              const Eigen::Vector3d& point, double time_step, const Exit& exit);
+              const Eigen::Vector3d& point, const Eigen::Vector3d& slid, double time_step, const Exit& exit);
 
 /// How far a vertex at `start` is from coming out of the obstacle on the side that faces `way`, at the start
 /// of the step; infinity where there is no such side [m].
@@ -68,7 +71,7 @@ double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const
                    const Eigen::Vector3d& way);
 
 /// Lowers distances[i] to that of gap_after for every vertex, where it is smaller: rows of `starts` and
-/// `points`.
+/// `points`, of vertices that start on no other surface.
 void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
                    const data::Points& points, double time_step, const Exit& exit,
                    std::vector<double>& distances);

@@ -107,6 +107,28 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   return constraint;
 }
 
+std::vector<std::vector<StartSurface>> find_start_surfaces(const Environment& environment,
+                                                           const std::vector<ObstacleMotion>& motions) {
+  const std::vector<Obstacle>& obstacles = environment.obstacles;
+  const auto is_box = [](const Obstacle& obstacle) { return std::holds_alternative<Box>(obstacle.shape); };
+  if (obstacles.size() < 2 || std::none_of(obstacles.begin(), obstacles.end(), is_box)) return {};
+  const Points& starts = environment.state.positions;
+  std::vector<std::vector<StartSurface>> surfaces(static_cast<size_t>(starts.rows()));
+  for (size_t k = 0; k < obstacles.size(); ++k) {
+    if (std::holds_alternative<Cylinder>(obstacles[k].shape)) continue;
+    ObstacleMotion at_start = motions[k];
+    at_start.end = at_start.start;
+    const Eigen::Isometry3d moved = motions[k].end * motions[k].start.inverse(Eigen::Isometry);
+    for (int i = 0; i < starts.rows(); ++i) {
+      const Vector3d start = starts.row(i);
+      const Gap gap = gap_to(obstacles[k], at_start, start);
+      if (std::abs(gap.distance) <= inside_depth)
+        surfaces[i].push_back({int(k), gap.normal, gap.normal.dot(moved * start - start)});
+    }
+  }
+  return surfaces;
+}
+
 }  // namespace
 
 ContactStep::ContactStep(const Environment& environment_in, double time_step_in, const Exit& exit_in)
@@ -114,7 +136,18 @@ ContactStep::ContactStep(const Environment& environment_in, double time_step_in,
       time(environment_in.state.time + time_step_in),
       time_step(time_step_in),
       exit(exit_in),
-      motions(obstacle_motions(environment_in, environment_in.state.time, time)) {}
+      motions(obstacle_motions(environment_in, environment_in.state.time, time)),
+      start_surfaces(find_start_surfaces(environment_in, motions)) {}
+
+Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& point, int i) const {
+  Vector3d end = point;
+  for (const StartSurface& surface : start_surfaces[i]) {
+    if (surface.obstacle == obstacle) continue;
+    const double inward = surface.rises - surface.normal.dot(end - start);
+    if (inward > 0) end += inward * surface.normal;
+  }
+  return end;
+}
 
 ContactSet begin_step(const ContactStep& step, Points& positions) {
   const Environment& environment = step.environment;
@@ -159,9 +192,15 @@ ContactSet begin_step(const ContactStep& step, Points& positions) {
 
 void find_clearance(const ContactStep& step, const Points& positions, std::vector<double>& clearance) {
   clearance.assign(positions.rows(), std::numeric_limits<double>::infinity());
-  for (size_t k = 0; k < step.motions.size(); ++k)
+  for (size_t k = 0; k < step.motions.size(); ++k) {
+    if (!step.start_surfaces.empty()) {
+      for (int i = 0; i < positions.rows(); ++i)
+        clearance[i] = std::min(clearance[i], step.gap(int(k), positions, i).distance);
+      continue;
+    }
     lower_to_gaps(step.environment.obstacles[k], step.motions[k], step.environment.state.positions, positions,
                   step.time_step, step.exit, clearance);
+  }
 }
 
 void add_touches(const ContactStep& step, const Points& positions, int i, std::vector<Touch>& touches) {

@@ -12,6 +12,13 @@ namespace flash::sim {
 /// Slip up to which a vertex has not moved: rounding of a position [m].
 inline constexpr double resting_slip = 1e-13;
 
+/// A flat surface that a vertex starts a step on.
+struct StartSurface {
+  int obstacle;
+  Eigen::Vector3d normal;
+  double rises;  ///< along the normal, over the step [m]
+};
+
 /// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
 struct ContactStep {
   ContactStep(const Environment& environment, double time_step, const Exit& exit);
@@ -20,13 +27,18 @@ struct ContactStep {
   double time, time_step;  ///< [s]
   Exit exit;               ///< of vertices that start inside an obstacle
   std::vector<ObstacleMotion> motions;
+  /// Of each vertex; empty where no box stands beside another obstacle.
+  std::vector<std::vector<StartSurface>> start_surfaces;
 
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
   Gap gap(int obstacle, const data::Points& positions, int i) const {
-    return gap_after(environment.obstacles[obstacle], motions[obstacle],
-                     environment.state.positions.row(i).transpose(), positions.row(i).transpose(), time_step,
-                     exit);
+    const Eigen::Vector3d start = environment.state.positions.row(i), point = positions.row(i);
+    return gap_after(environment.obstacles[obstacle], motions[obstacle], start, point,
+                     start_surfaces.empty() ? point : slid(obstacle, start, point, i), time_step, exit);
   }
+
+  /// Where the way of vertex i would end along the surfaces of other obstacles that it starts on.
+  Eigen::Vector3d slid(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point, int i) const;
 };
 
 /// What a vertex may do at the current iterate of a step.

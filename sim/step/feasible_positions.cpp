@@ -10,15 +10,16 @@ using Eigen::Vector3d;
 namespace {
 
 /// Whether the vertex is to land on the surface that it held at the iterate: where the step is long enough to
-/// bring it down.
-bool lands(const Touch& touch, double distance) {
-  return touch.holds && distance > 0 && (touch.touches() || distance <= 0.01 * touch.gap);
+/// bring it down, and has not taken it beyond the end of that surface.
+bool lands(const Touch& touch, const Gap& gap) {
+  return touch.holds && gap.distance > 0 && (touch.touches() || gap.distance <= 0.01 * touch.gap) &&
+         gap.normal.dot(touch.normal) > 0.5;
 }
 
 bool stays(const ContactStep& step, std::span<const Touch> touches, const Points& positions, int i) {
   for (size_t k = 0; k < step.motions.size(); ++k) {
-    const double distance = step.gap(static_cast<int>(k), positions, i).distance;
-    if (!(distance >= 0) || (!touches.empty() && lands(touches[k], distance))) return false;
+    const Gap gap = step.gap(static_cast<int>(k), positions, i);
+    if (!(gap.distance >= 0) || (!touches.empty() && lands(touches[k], gap))) return false;
   }
   return true;
 }
@@ -36,7 +37,7 @@ void project_vertex(const ContactStep& step, std::span<const Touch> touches, Poi
       const Gap gap = step.gap(static_cast<int>(k), positions, i);
       normals[k] = gap.normal;
       depths[k] = -gap.distance;
-      if (touches.empty() || !lands(touches[k], gap.distance)) continue;
+      if (touches.empty() || !lands(touches[k], gap)) continue;
       positions.row(i) -= gap.distance * gap.normal.transpose();
       moved = std::max(moved, gap.distance);
       depths[k] = 0;
