@@ -1,0 +1,176 @@
+#include "sim/cuda/batch_kernels.h"
+
+#include <algorithm>
+
+#include "sim/cuda/conjugate_gradients.cuh"
+#include "sim/cuda/front_factor.cuh"
+#include "sim/cuda/launch.h"
+#include "sim/cuda/membrane.cuh"
+
+namespace flash::sim::cuda {
+namespace {
+
+__device__ const float* vector_of(const BatchNumbers& batch, int e) {
+  return batch.vectors + 3L * batch.sheet.size * e;
+}
+__device__ float* result_of(const BatchNumbers& batch, int e) {
+  return batch.results + 3L * batch.sheet.size * e;
+}
+__device__ const Point* places_of(const BatchNumbers& batch, int e) {
+  return batch.positions + static_cast<long>(batch.sheet.size) * e;
+}
+template <typename Stored>
+__device__ Stored* factor_of(const BatchNumbers& batch, int e) {
+  return static_cast<Stored*>(batch.factors) + batch.fronts.factor_size * e;
+}
+__device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
+  const long team = blockIdx.x, size = 3L * batch.sheet.size;
+  return {batch.residuals + size * team,
+          batch.images + size * team,
+          batch.searches + batch.sheet.size * team,
+          {batch.forward + 2 * size * team, batch.passed + batch.fronts.vector_size * team}};
+}
+
+// A kernel's block goes through the environments that are its own.
+#define FOR_OWN_ENVIRONMENTS(batch, e) \
+  for (int e = static_cast<int>(blockIdx.x); e < (batch).environment_count; e += static_cast<int>(gridDim.x))
+
+__global__ void __launch_bounds__(team_threads, sparse_teams)
+    evaluate_kernel(const __grid_constant__ BatchNumbers batch, float) {
+  const int triangles = batch.sheet.triangle_count;
+  FOR_OWN_ENVIRONMENTS(batch, e) {
+    const ElasticEnergies energy = elastic_gradient(
+        batch.sheet, batch.environments[e], places_of(batch, e), batch.gradients + 3L * batch.sheet.size * e,
+        batch.triangle_gradients + 9L * triangles * blockIdx.x, shared_memory<double>());
+    if (threadIdx.x == 0) batch.energies[e] = energy;
+    __syncthreads();
+  }
+}
+
+template <bool Preconditioner>
+__global__ void __launch_bounds__(team_threads, dense_teams)
+    assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
+  float* shares = batch.triangle_blocks + 54L * batch.sheet.triangle_count * blockIdx.x;
+  FOR_OWN_ENVIRONMENTS(batch, e) {
+    triangle_blocks(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares,
+                    shared_memory<float>());
+    __syncthreads();
+    if constexpr (Preconditioner)
+      assemble_blocks(batch.sheet, batch.environments[e], shares,
+                      batch.blocks + 9L * batch.sheet.block_count * e);
+    else
+      assemble_block_rows(batch.sheet, batch.environments[e], shares,
+                          batch.block_rows + batch.block_row_size * e);
+    __syncthreads();
+  }
+}
+
+template <typename Stored>
+__global__ void __launch_bounds__(team_threads, dense_teams)
+    factorize_kernel(const __grid_constant__ BatchNumbers batch, float) {
+  FOR_OWN_ENVIRONMENTS(batch, e) {
+    if (threadIdx.x == 0) batch.positive[e] = 1;
+    const bool positive = factorize(batch.fronts, batch.blocks + 9L * batch.sheet.block_count * e,
+                                    batch.updates + batch.fronts.update_size * blockIdx.x,
+                                    factor_of<Stored>(batch, e), shared_memory<float>());
+    if (!positive) batch.positive[e] = 0;
+  }
+}
+
+template <typename Stored>
+__global__ void __launch_bounds__(team_threads, sparse_teams)
+    solve_kernel(const __grid_constant__ BatchNumbers batch, float) {
+  const int size = 3 * batch.sheet.size;
+  FOR_OWN_ENVIRONMENTS(batch, e) {
+    const SolveVectors v = linear_vectors(batch).solve;
+    for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
+      v.forward[size + i] = vector_of(batch, e)[i];
+    solve(batch.fronts, factor_of<Stored>(batch, e), v, shared_memory<float>());
+    for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
+      result_of(batch, e)[i] = v.forward[size + i];
+    __syncthreads();
+  }
+}
+
+__global__ void __launch_bounds__(team_threads, sparse_teams)
+    multiply_kernel(const __grid_constant__ BatchNumbers batch, float) {
+  FOR_OWN_ENVIRONMENTS(batch, e) {
+    Four<float>* x = linear_vectors(batch).search;
+    for (int i = static_cast<int>(threadIdx.x); i < batch.sheet.size; i += team_threads) {
+      const float* from = vector_of(batch, e) + 3 * i;
+      x[i] = {from[0], from[1], from[2], 0};
+    }
+    __syncthreads();
+    multiply(batch.sheet, batch.block_rows + batch.block_row_size * e,
+             static_cast<float>(batch.environments[e].rigidity), x, result_of(batch, e));
+    __syncthreads();
+  }
+}
+
+template <typename Stored>
+__global__ void __launch_bounds__(team_threads, sparse_teams)
+    find_directions_kernel(const __grid_constant__ BatchNumbers batch, float tolerance) {
+  float* chip = shared_memory<float>();
+  FOR_OWN_ENVIRONMENTS(batch, e) {
+    const LinearProblem<Stored> problem = {
+        batch.block_rows + batch.block_row_size * e,
+        static_cast<float>(batch.environments[e].rigidity),
+        factor_of<Stored>(batch, e),
+        vector_of(batch, e),
+        batch.restrictions + static_cast<long>(batch.restrictions_each) * e,
+        batch.restriction_counts[e],
+        tolerance};
+    const int solves =
+        conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
+                            batch.changes + 3L * batch.sheet.size * e, chip, chip + team_warps);
+    if (threadIdx.x == 0) batch.solves[e] = solves;
+  }
+}
+
+/// A kernel and the on-chip memory of a team [bytes].
+struct Choice {
+  void (*kernel)(BatchNumbers, float);
+  int bytes;
+};
+
+template <typename Stored>
+Choice choice(BatchKernel kernel, const FrontTables& fronts) {
+  const int number = sizeof(float), solve_bytes = number * solve_memory(fronts.largest_columns);
+  switch (kernel) {
+    case BatchKernel::evaluate:
+      return {evaluate_kernel, team_warps * static_cast<int>(sizeof(double))};
+    case BatchKernel::assemble_matrix:
+      return {assemble_kernel<false>, 9 * team_threads * number};
+    case BatchKernel::assemble_preconditioner:
+      return {assemble_kernel<true>, 9 * team_threads * number};
+    case BatchKernel::factorize:
+      return {factorize_kernel<Stored>, number * factor_memory(fronts.shared_panel, fronts.shared_rows)};
+    case BatchKernel::multiply:
+      return {multiply_kernel, 0};
+    case BatchKernel::solve:
+      return {solve_kernel<Stored>, solve_bytes};
+    case BatchKernel::find_directions:
+      break;
+  }
+  return {find_directions_kernel<Stored>, solve_bytes + number * team_warps};
+}
+
+Choice choice(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts) {
+  return precision == FactorPrecision::half ? choice<__half>(kernel, fronts) : choice<float>(kernel, fronts);
+}
+
+}  // namespace
+
+int resident_teams(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts) {
+  const Choice chosen = choice(kernel, precision, fronts);
+  return resident_teams(chosen.kernel, chosen.bytes);
+}
+
+void run(BatchKernel kernel, FactorPrecision precision, const BatchNumbers& numbers, int teams,
+         float tolerance, cudaStream_t stream) {
+  const Choice chosen = choice(kernel, precision, numbers.fronts);
+  launch(chosen.kernel, std::min(teams, resident_teams(chosen.kernel, chosen.bytes)), chosen.bytes, stream,
+         numbers, tolerance);
+}
+
+}  // namespace flash::sim::cuda

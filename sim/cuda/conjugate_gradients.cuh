@@ -1,0 +1,122 @@
+#pragma once
+#include "sim/cuda/environment_numbers.h"
+#include "sim/cuda/front_solve.cuh"
+#include "sim/cuda/sheet_product.cuh"
+
+namespace flash::sim::cuda {
+
+// Conjugate gradients of one environment, as NewtonMatrix::solve of the CPU. A thread owns the numbers i,
+// i + team_threads, ... of each vector.
+
+/// The linear problem of an environment.
+template <typename Stored>
+struct LinearProblem {
+  const float* block_rows;
+  float rigidity;
+  const Stored* factor;
+  const float* gradient;
+  const VertexRestriction* restrictions;
+  int restriction_count;
+  float tolerance;
+};
+
+/// Memory of a team, three numbers a vertex but where said.
+struct LinearVectors {
+  float *residual, *image;
+  Four<float>* search;  ///< four
+  SolveVectors solve;
+};
+
+__device__ inline void restrict_to_free(const VertexRestriction* restrictions, int count, float* x) {
+  if (count == 0) return;
+  __syncthreads();
+  for (int k = static_cast<int>(threadIdx.x); k < count; k += team_threads) {
+    const VertexRestriction& restriction = restrictions[k];
+    float* own = x + 3 * restriction.place;
+    const float a = own[0], b = own[1], c = own[2];
+    const float* free = restriction.free;
+    for (int r = 0; r < 3; ++r) own[r] = free[r] * a + free[3 + r] * b + free[6 + r] * c;
+  }
+  __syncthreads();
+}
+
+/// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
+/// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
+/// Returns the number of solves with the factor, to all threads. `partial`, `own`: on chip, a number a warp
+/// and solve_memory.
+template <typename Stored>
+__device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
+                                   const LinearProblem<Stored>& problem, const LinearVectors& v,
+                                   float* direction, float* change, float* partial, float* own) {
+  constexpr int most = 20;
+  const int size = 3 * sheet.size, first = static_cast<int>(threadIdx.x);
+  float* search = reinterpret_cast<float*>(v.search);
+  float* preconditioned = v.solve.forward + size;
+  const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
+  const auto restricted = [&](float* x) {
+    restrict_to_free(problem.restrictions, problem.restriction_count, x);
+  };
+  for (int i = first; i < size; i += team_threads) {
+    v.residual[i] = -problem.gradient[i];
+    direction[i] = change[i] = search[slot(i)] = 0;
+  }
+  __syncthreads();
+  int moved = 0;
+  for (int k = first; k < problem.restriction_count; k += team_threads) {
+    const VertexRestriction& restriction = problem.restrictions[k];
+    for (int c = 0; c < 3; ++c) {
+      moved += restriction.correction[c] != 0;
+      direction[3 * restriction.place + c] = search[4 * restriction.place + c] = restriction.correction[c];
+    }
+  }
+  if (sum_over_team(static_cast<float>(moved), partial) > 0) {
+    multiply(sheet, problem.block_rows, problem.rigidity, v.search, v.image);
+    for (int i = first; i < size; i += team_threads) {
+      v.residual[i] -= v.image[i];
+      change[i] += v.image[i];
+    }
+  }
+  restricted(v.residual);
+  float squares = 0;
+  for (int i = first; i < size; i += team_threads) squares += v.residual[i] * v.residual[i];
+  float norm = sqrtf(sum_over_team(squares, partial)), previous = 0;
+  const float target = fmaxf(0.1f * norm, problem.tolerance);
+  int iteration = 0;
+  while (norm > target && iteration < most) {
+    ++iteration;
+    for (int i = first; i < size; i += team_threads) preconditioned[i] = v.residual[i];
+    solve(fronts, problem.factor, v.solve, own);
+    restricted(preconditioned);
+    float product = 0;
+    for (int i = first; i < size; i += team_threads) product += v.residual[i] * preconditioned[i];
+    const float along = sum_over_team(product, partial);
+    const float kept = iteration == 1 ? 0 : along / previous;
+    previous = along;
+    for (int i = first; i < size; i += team_threads)
+      search[slot(i)] = preconditioned[i] + (iteration == 1 ? 0 : kept * search[slot(i)]);
+    __syncthreads();
+    multiply(sheet, problem.block_rows, problem.rigidity, v.search, v.image);
+    product = 0;
+    for (int i = first; i < size; i += team_threads) product += search[slot(i)] * v.image[i];
+    const float curvature = sum_over_team(product, partial);
+    // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
+    if (curvature <= 0 && iteration > 1) break;
+    const float step = curvature > 0 ? along / curvature : 1;
+    for (int i = first; i < size; i += team_threads) {
+      direction[i] += step * search[slot(i)];
+      change[i] += step * v.image[i];
+    }
+    if (curvature <= 0) break;
+    restricted(v.image);
+    squares = 0;
+    for (int i = first; i < size; i += team_threads) {
+      v.residual[i] -= step * v.image[i];
+      squares += v.residual[i] * v.residual[i];
+    }
+    norm = sqrtf(sum_over_team(squares, partial));
+  }
+  __syncthreads();
+  return iteration;
+}
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,56 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include <utility>
+#include <vector>
+
+#include "sim/cuda/launch.h"
+
+namespace flash::sim::cuda {
+
+/// Numbers in the memory of the device.
+template <typename Number>
+class DeviceArray {
+ public:
+  DeviceArray() = default;
+  /// All zero.
+  explicit DeviceArray(size_t size) : size_(size) {
+    if (size == 0) return;
+    check(cudaMalloc(&data_, size * sizeof(Number)));
+    check(cudaMemset(data_, 0, size * sizeof(Number)));
+  }
+  explicit DeviceArray(const std::vector<Number>& numbers) : DeviceArray(numbers.size()) {
+    write(0, numbers.data(), numbers.size());
+  }
+  ~DeviceArray() { cudaFree(data_); }
+  DeviceArray(DeviceArray&& other) noexcept { swap(other); }
+  DeviceArray& operator=(DeviceArray&& other) noexcept {
+    swap(other);
+    return *this;
+  }
+
+  Number* data() const { return data_; }
+  size_t size() const { return size_; }
+
+  /// Waits for what runs before, as `read` does.
+  void write(size_t first, const Number* numbers, size_t count) {
+    if (count > 0) check(cudaMemcpy(data_ + first, numbers, count * sizeof(Number), cudaMemcpyHostToDevice));
+  }
+  std::vector<Number> read(size_t first, size_t count) const {
+    std::vector<Number> numbers(count);
+    if (count > 0)
+      check(cudaMemcpy(numbers.data(), data_ + first, count * sizeof(Number), cudaMemcpyDeviceToHost));
+    return numbers;
+  }
+
+ private:
+  void swap(DeviceArray& other) noexcept {
+    std::swap(data_, other.data_);
+    std::swap(size_, other.size_);
+  }
+
+  Number* data_ = nullptr;
+  size_t size_ = 0;
+};
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,53 @@
+#include "sim/cuda/device_plan.h"
+
+namespace flash::sim::cuda {
+
+template <typename Number>
+const Number* DevicePlan::upload(const std::vector<Number>& numbers,
+                                 std::vector<DeviceArray<Number>>& arrays) {
+  arrays.emplace_back(numbers);
+  return arrays.back().data();
+}
+
+DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
+  fronts.size = plan.size;
+  fronts.level_count = static_cast<int>(plan.levels.size());
+  fronts.shared_panel = plan.shared_panel;
+  fronts.shared_rows = plan.shared_rows;
+  fronts.largest_columns = plan.largest_columns;
+  fronts.vector_size = plan.vector_size;
+  fronts.factor_size = plan.factor_size;
+  fronts.update_size = plan.update_size;
+  fronts.fronts = upload(plan.fronts, fronts_);
+  fronts.levels = upload(plan.levels, levels_);
+  fronts.child_rows = upload(plan.child_rows, ints_);
+  fronts.entries = upload(plan.entries, ints_);
+  fronts.blocks = upload(plan.blocks, places_);
+  fronts.forward = upload(plan.forward, forward_);
+  fronts.backward = upload(plan.backward, backward_);
+
+  sheet.size = layout.size;
+  sheet.triangle_count = layout.triangle_count;
+  sheet.block_count = static_cast<int>(layout.blocks.size());
+  sheet.group_count = static_cast<int>(layout.group_rows.size()) / 4;
+  sheet.triangle_vertices = upload(layout.triangle_vertices, ints_);
+  sheet.gradients = upload(layout.gradients, doubles_);
+  sheet.areas = upload(layout.areas, doubles_);
+  sheet.corner_starts = upload(layout.corner_starts, ints_);
+  sheet.corners = upload(layout.corners, ints_);
+  sheet.blocks = upload(layout.blocks, blocks_);
+  sheet.block_sources = upload(layout.block_sources, ints_);
+  sheet.block_vertex = upload(layout.block_vertex, ints_);
+  sheet.slice_starts = upload(layout.slice_starts, ints_);
+  sheet.slice_columns = upload(layout.slice_columns, ints_);
+  sheet.group_rows = upload(layout.group_rows, ints_);
+  sheet.group_starts = upload(layout.group_starts, ints_);
+  sheet.group_columns = upload(layout.group_columns, ints_);
+  sheet.group_values = upload(layout.group_values, doubles_);
+  sheet.single_group_values =
+      upload(std::vector<float>(layout.group_values.begin(), layout.group_values.end()), floats_);
+  sheet.stand_in = upload(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end()), floats_);
+  sheet.vertex_area = upload(layout.vertex_area, doubles_);
+}
+
+}  // namespace flash::sim::cuda

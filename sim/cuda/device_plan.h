@@ -1,0 +1,32 @@
+#pragma once
+#include "sim/cuda/device_array.h"
+#include "sim/cuda/front_tables.h"
+#include "sim/cuda/layout/sheet_layout.h"
+#include "sim/cuda/sheet_tables.h"
+
+namespace flash::sim::cuda {
+
+/// The structure of a sheet on the device, once for all its environments.
+class DevicePlan {
+ public:
+  DevicePlan(const FrontPlan& fronts, const SheetLayout& layout);
+
+  FrontTables fronts;
+  SheetTables sheet;
+
+ private:
+  template <typename Number>
+  const Number* upload(const std::vector<Number>& numbers, std::vector<DeviceArray<Number>>& arrays);
+
+  std::vector<DeviceArray<int>> ints_;
+  std::vector<DeviceArray<double>> doubles_;
+  std::vector<DeviceArray<float>> floats_;
+  std::vector<DeviceArray<FrontLayout>> fronts_;
+  std::vector<DeviceArray<FrontLevel>> levels_;
+  std::vector<DeviceArray<BlockPlace>> places_;
+  std::vector<DeviceArray<ForwardTask>> forward_;
+  std::vector<DeviceArray<BackwardTask>> backward_;
+  std::vector<DeviceArray<BlockSources>> blocks_;
+};
+
+}  // namespace flash::sim::cuda

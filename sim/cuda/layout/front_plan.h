@@ -1,0 +1,44 @@
+#pragma once
+#include <vector>
+
+#include "data/mesh.h"
+#include "sim/cpu/block_cholesky.h"
+#include "sim/cuda/layout/front_layout.h"
+
+namespace flash::sim::cuda {
+
+/// The elimination of a pattern for teams of threads: what depends on the mesh alone. Fronts go by height,
+/// the leaves first, the dearest of a height first.
+struct FrontPlan {
+  int size = 0;               ///< vertices
+  std::vector<int> position;  ///< vertex -> elimination position
+  std::vector<FrontLayout> fronts;
+  std::vector<FrontLevel> levels;
+  std::vector<int> rows;        ///< positions, ascending in each front
+  std::vector<int> child_rows;  ///< place of a front's vertex below those of its child, -1 where it is none
+  std::vector<int> entries;     ///< of each row of a front: number of its entry in a vector, 0 in padding
+  std::vector<BlockPlace> blocks;
+  std::vector<ForwardTask> forward;
+  std::vector<BackwardTask> backward;
+  long factor_size = 0;     ///< numbers stored of an environment's factor
+  long update_size = 0;     ///< for update matrices
+  int vector_size = 0;      ///< for what fronts pass up in a forward solve
+  int shared_panel = 0;     ///< numbers of on-chip memory for the panels of a level
+  int shared_rows = 0;      ///< for the rows of its fronts that have children
+  int largest_columns = 0;  ///< of a front
+  long factor_entries = 0;  ///< that are not zero by structure
+  double factor_flops = 0;  ///< additions and multiplications of a factorization with its inverses
+};
+
+struct FrontSettings {
+  int leaf_size = 8;             ///< vertices, at most, of a front without children
+  int panel_capacity = 22000;    ///< numbers of on-chip memory that a team has for panels
+  int most_groups = team_warps;  ///< of a team in a factorization
+};
+
+/// `places` of the vertices guide the order (dissection.h). Fronts too large for `panel_capacity` become
+/// chains of smaller ones.
+FrontPlan plan_fronts(const BlockPattern& pattern, const data::Points& places,
+                      const FrontSettings& settings = {});
+
+}  // namespace flash::sim::cuda

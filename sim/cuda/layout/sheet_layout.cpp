@@ -1,0 +1,106 @@
+#include "sim/cuda/layout/sheet_layout.h"
+
+#include <algorithm>
+
+namespace flash::sim::cuda {
+namespace {
+
+/// Lists one after the other, with where each starts and, last, where they end.
+void flatten(const std::vector<std::vector<int>>& lists, std::vector<int>& starts, std::vector<int>& all) {
+  starts.assign(1, 0);
+  for (const std::vector<int>& list : lists) {
+    all.insert(all.end(), list.begin(), list.end());
+    starts.push_back(static_cast<int>(all.size()));
+  }
+}
+
+void add_triangles(const SheetPlan& plan, const std::vector<int>& position, SheetLayout& layout) {
+  layout.triangle_count = static_cast<int>(plan.sheet.triangles.size());
+  const int count = layout.triangle_count;
+  layout.triangle_vertices.resize(3L * count);
+  layout.gradients.resize(4L * count);
+  layout.areas.resize(count);
+  std::vector<std::vector<int>> corners(layout.size), sources(plan.pattern.size + plan.pattern.pairs.size());
+  int t = 0;
+  for (const TriangleGroup& group : plan.triangle_groups) {
+    for (int lane = 0; lane < group.count; ++lane, ++t) {
+      for (int k = 0; k < 3; ++k) {
+        const int vertex = group.vertices[k][lane];
+        layout.triangle_vertices[k * count + t] = position[vertex];
+        corners[position[vertex]].push_back(k * count + t);
+        sources[vertex].push_back(k * count + t);
+        sources[group.slots[k][lane]].push_back((3 + k) * count + t);
+      }
+      for (int k = 0; k < 4; ++k) layout.gradients[k * count + t] = group.gradients[k][lane];
+      layout.areas[t] = group.area[lane];
+    }
+  }
+  flatten(corners, layout.corner_starts, layout.corners);
+  std::vector<int> starts;
+  flatten(sources, starts, layout.block_sources);
+  for (std::size_t block = 0; block < sources.size(); ++block)
+    layout.blocks.push_back({starts[block], starts[block + 1] - starts[block], -1, -1});
+}
+
+void add_block_rows(const SheetPlan& plan, const std::vector<int>& position, SheetLayout& layout) {
+  struct Entry {
+    int column, block;
+    bool turned;
+  };
+  std::vector<std::vector<Entry>> rows(layout.size);
+  for (int vertex = 0; vertex < layout.size; ++vertex)
+    rows[position[vertex]].push_back({position[vertex], vertex, false});
+  for (std::size_t k = 0; k < plan.edge_count; ++k) {
+    const int row = position[plan.pattern.pairs[k].first], column = position[plan.pattern.pairs[k].second];
+    const int block = plan.pattern.size + static_cast<int>(k);
+    rows[row].push_back({column, block, false});
+    rows[column].push_back({row, block, true});
+  }
+  layout.slice_starts.assign(1, 0);
+  for (int first = 0; first < layout.size; first += slice_size) {
+    const int end = std::min(first + slice_size, layout.size), start = layout.slice_starts.back();
+    std::size_t most = 0;
+    for (int row = first; row < end; ++row) most = std::max(most, rows[row].size());
+    for (std::size_t k = 0; k < most; ++k)
+      for (int row = first; row < first + slice_size; ++row) {
+        const bool there = row < end && k < rows[row].size();
+        layout.slice_columns.push_back(there ? rows[row][k].column : std::min(row, layout.size - 1));
+        if (!there) continue;
+        const int place = (start + static_cast<int>(k)) * slice_numbers + 3 * (row - first);
+        BlockSources& block = layout.blocks[rows[row][k].block];
+        (rows[row][k].turned ? block.turned_place : block.place) = place;
+      }
+    layout.slice_starts.push_back(start + static_cast<int>(most));
+  }
+}
+
+void add_scalar_rows(const BendingOperator& bending, const std::vector<int>& position, SheetLayout& layout) {
+  const RowGroups& stiffness = bending.stiffness;
+  for (const auto& group : stiffness.rows)
+    for (const int row : group) layout.group_rows.push_back(row < 0 ? -1 : position[row]);
+  layout.group_starts = stiffness.starts;
+  for (const int column : stiffness.columns) layout.group_columns.push_back(position[column]);
+  layout.group_values = stiffness.values;
+  layout.stand_in = bending.stand_in;
+}
+
+}  // namespace
+
+SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts) {
+  SheetLayout layout;
+  layout.size = plan.pattern.size;
+  layout.order.resize(layout.size);
+  layout.vertex_area.resize(layout.size);
+  layout.block_vertex.assign(plan.pattern.size + plan.pattern.pairs.size(), -1);
+  for (int vertex = 0; vertex < layout.size; ++vertex) {
+    layout.order[fronts.position[vertex]] = vertex;
+    layout.vertex_area[fronts.position[vertex]] = plan.sheet.vertex_area[vertex];
+    layout.block_vertex[vertex] = fronts.position[vertex];
+  }
+  add_triangles(plan, fronts.position, layout);
+  add_block_rows(plan, fronts.position, layout);
+  add_scalar_rows(bending, fronts.position, layout);
+  return layout;
+}
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,41 @@
+#pragma once
+#include <vector>
+
+#include "sim/cuda/layout/block_sources.h"
+#include "sim/cuda/layout/front_plan.h"
+#include "sim/plan/sheet_plan.h"
+
+namespace flash::sim::cuda {
+
+/// The structure of a sheet for kernels, vertices in the order of a FrontPlan.
+struct SheetLayout {
+  int size = 0, triangle_count = 0;
+  std::vector<int> order;  ///< vertex at each place
+
+  // Triangles, each array by triangle. Vertices ascend as numbered in the mesh, so that blocks need no turn.
+  std::vector<int> triangle_vertices;  ///< three times triangle_count
+  std::vector<double> gradients;       ///< four times, as in TriangleGroup
+  std::vector<double> areas;
+  /// What of the triangles enters each vertex: corner * triangle_count + triangle.
+  std::vector<int> corner_starts, corners;
+
+  // Blocks of the pattern. A triangle has six, (0,0), (1,1), (2,2), (1,0), (2,0), (2,1).
+  std::vector<BlockSources> blocks;
+  std::vector<int> block_sources;  ///< block * triangle_count + triangle
+  std::vector<int> block_vertex;   ///< place of the vertex of a diagonal block, -1 for others
+
+  // Block rows, in slices of vertices (sliced ELLPACK): as many blocks a vertex as the fullest of its slice.
+  std::vector<int> slice_starts;   ///< of each slice, in blocks a vertex, and their end
+  std::vector<int> slice_columns;  ///< slice_size a block; the vertex itself where there is none
+
+  // The scalar rows, four at a time: as in RowGroups. Empty for hinges.
+  std::vector<int> group_rows, group_starts, group_columns;
+  std::vector<double> group_values;
+  std::vector<double> stand_in;  ///< one number a block
+
+  std::vector<double> vertex_area;  ///< by place [m^2]
+};
+
+SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts);
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,75 @@
+#pragma once
+#include "sim/cuda/four.h"
+#include "sim/cuda/sheet_tables.h"
+#include "sim/cuda/team.cuh"
+
+namespace flash::sim::cuda {
+
+/// y = scale S x over the vertices. S, shared by all environments, comes from the second-level cache; four
+/// lanes share the columns of a group of four rows.
+template <typename Number>
+__device__ void multiply_scalar_rows(const SheetTables& tables, const Number* values, Number scale,
+                                     const Four<Number>* x, Number* y) {
+  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size && tables.group_count == 0;
+       i += team_threads)
+    y[i] = 0;
+  const int part = lane() % 4;
+  // Whole warps stay in the loop: their lanes exchange sums.
+  for (int first = 8 * warp(); first < tables.group_count; first += 8 * team_warps) {
+    const int group = min(first + lane() / 4, tables.group_count - 1);
+    const int end = tables.group_starts[group + 1];
+    Number sums[4][3] = {};
+#pragma unroll 2
+    for (int k = tables.group_starts[group] + part; k < end; k += 4) {
+      const Four<Number> vertex = x[tables.group_columns[k]];
+      const Four<Number> value = reinterpret_cast<const Four<Number>*>(values)[k];
+      const Number rows[4] = {value.x, value.y, value.z, value.w};
+#pragma unroll
+      for (int row = 0; row < 4; ++row) {
+        sums[row][0] += rows[row] * vertex.x;
+        sums[row][1] += rows[row] * vertex.y;
+        sums[row][2] += rows[row] * vertex.z;
+      }
+    }
+    Number own[3] = {};
+#pragma unroll
+    for (int row = 0; row < 4; ++row)
+#pragma unroll
+      for (int c = 0; c < 3; ++c) {
+        Number sum = sums[row][c];
+        sum += __shfl_xor_sync(0xffffffffu, sum, 1);
+        sum += __shfl_xor_sync(0xffffffffu, sum, 2);
+        if (row == part) own[c] = sum;
+      }
+    const int row = tables.group_rows[4 * group + part];
+    if (row >= 0 && first + lane() / 4 < tables.group_count)
+      for (int c = 0; c < 3; ++c) y[3 * row + c] = scale * own[c];
+  }
+}
+
+/// y += B x, B the block rows of one environment: a thread a scalar row.
+inline __device__ void add_block_rows(const SheetTables& tables, const float* blocks, const Four<float>* x,
+                                      float* y) {
+  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size; i += team_threads) {
+    const int slice = i / (3 * slice_size), row = i - slice * 3 * slice_size, vertex = row / 3;
+    float sum = y[i];
+#pragma unroll 2
+    for (int k = tables.slice_starts[slice]; k < tables.slice_starts[slice + 1]; ++k) {
+      const Four<float> from = x[tables.slice_columns[k * slice_size + vertex]];
+      const float* column = blocks + static_cast<long>(k) * slice_numbers + row;
+      sum += column[0] * from.x + column[3 * slice_size] * from.y + column[6 * slice_size] * from.z;
+    }
+    y[i] = sum;
+  }
+}
+
+/// y = (B + scale S) x, x four numbers a vertex. The caller has synchronized x; y is of the calling threads'
+/// own rows i, i + team_threads, ...
+inline __device__ void multiply(const SheetTables& tables, const float* blocks, float scale,
+                                const Four<float>* x, float* y) {
+  multiply_scalar_rows(tables, tables.single_group_values, scale, x, y);
+  __syncthreads();
+  add_block_rows(tables, blocks, x, y);
+}
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,56 @@
+#pragma once
+#include "sim/cuda/layout/front_layout.h"
+
+namespace flash::sim::cuda {
+
+// A team is the block of threads that works on one environment. What a thread computes for an entry never
+// depends on how many threads, groups or environments there are: so a batch equals alone, bitwise.
+
+/// On-chip memory of the block, as many bytes as the launch asked for.
+template <typename Number>
+__device__ Number* shared_memory() {
+  extern __shared__ float4 block_memory[];
+  return reinterpret_cast<Number*>(block_memory);
+}
+
+__device__ inline int lane() { return static_cast<int>(threadIdx.x % 32); }
+__device__ inline int warp() { return static_cast<int>(threadIdx.x / 32); }
+
+/// Whole warps of a team that work on something of their own.
+struct Group {
+  int index, rank, size;
+
+  /// One of `count`, a power of two.
+  __device__ static Group of(int count) {
+    const int size = team_threads / count, rank = static_cast<int>(threadIdx.x);
+    return {rank / size, rank % size, size};
+  }
+  __device__ void synchronize() const {
+    if (size == team_threads)
+      __syncthreads();
+    else if (size == 32)
+      __syncwarp();
+    else
+      __barrier_sync_count(1 + index, size);
+  }
+};
+
+template <typename Number>
+__device__ Number sum_over_warp(Number value) {
+  for (int offset = 16; offset > 0; offset /= 2) value += __shfl_xor_sync(0xffffffffu, value, offset);
+  return value;
+}
+
+/// The sum of one value a thread, for all threads. `partial`: on-chip memory for a number a warp.
+template <typename Number>
+__device__ Number sum_over_team(Number value, Number* partial) {
+  value = sum_over_warp(value);
+  __syncthreads();
+  if (lane() == 0) partial[warp()] = value;
+  __syncthreads();
+  Number sum = 0;
+  for (int w = 0; w < team_warps; ++w) sum += partial[w];
+  return sum;
+}
+
+}  // namespace flash::sim::cuda
