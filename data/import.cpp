@@ -1,6 +1,7 @@
 #include "data/import.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -23,85 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kTimes = "rate:10";  // without any other word
-constexpr double kLargestSheet = 20;       // above it, millimetres were given for metres [m]
-
-InputError option_error(const char* option, const std::string& found, const std::string& expected) {
-  return InputError("--" + std::string(option) + ": found \"" + found + "\", expected " + expected);
-}
-
-std::vector<std::string> files_in(const std::string& folder, const std::vector<std::string>& extensions,
-                                  const char* option) {
-  std::vector<std::string> files = files_in_order(folder, extensions);
-  if (files.empty()) throw InputError(folder + ": found no " + extensions.front() + " files for --" + option);
-  return files;
-}
-
-void parse_range(const std::string& range, const char* option, int axis, CropBox& crop) {
-  if (range.empty()) return;
-  const std::vector<std::string_view> ends = split(range, ":");
-  const auto parse = [&](std::string_view end, double& bound) {
-    if (end.empty()) return;
-    const std::optional<double> value = parse_number(end);
-    if (!value) throw option_error(option, range, "LOW:HIGH in metres, either side may be empty");
-    bound = *value;
-  };
-  if (ends.size() != 2) throw option_error(option, range, "LOW:HIGH in metres, either side may be empty");
-  parse(ends[0], crop.min[axis]);
-  parse(ends[1], crop.max[axis]);
-  if (!(crop.min[axis] < crop.max[axis])) throw option_error(option, range, "a low end below the high one");
-}
-
-std::string mesh_spec(const ImportOptions& options) {
-  if (options.sheet.empty() == options.mesh.empty())
-    throw InputError("import: expected either --sheet or --mesh");
-  return options.mesh.empty() ? "sheet:" + options.sheet + ":" + format_number(options.cell) : options.mesh;
-}
-
-TriangleMesh load_mesh(const ImportOptions& options, const std::string& spec) {
-  TriangleMesh mesh = is_mesh_spec(spec)
-                          ? parse_mesh_spec(spec, "import", options.mesh.empty() ? "--sheet" : "--mesh")
-                          : load_triangle_mesh(spec);
-  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff();
-  if (size.norm() > kLargestSheet)
-    throw option_error(options.mesh.empty() ? "sheet" : "mesh",
-                       options.mesh.empty() ? options.sheet : options.mesh,
-                       "metres (millimetres read as metres?)");
-  if (options.mesh.empty() && options.cell > size.head<2>().minCoeff())
-    throw option_error(
-        "cell", format_number(options.cell),
-        "at most the shorter side of the sheet, " + format_short(size.head<2>().minCoeff()) + " m");
-  return mesh;
-}
-
-RecordedGrasp parse_grasp(const ImportOptions& options) {
-  RecordedGrasp grasp;
-  grasp.gripper = "gripper";
-  grasp.shape = options.shape;
-  grasp.select.within = options.within.value_or(1.2 * options.cell);
-  const std::size_t colon = std::min(options.grasp.find(':'), options.grasp.size());
-  const std::string kind = options.grasp.substr(0, colon);
-  std::vector<int> indices;
-  if (colon < options.grasp.size())
-    for (const std::string_view word : split(std::string_view(options.grasp).substr(colon + 1), ",")) {
-      const std::optional<long> index = parse_integer(word);
-      if (!index || *index < 0)
-        throw option_error("grasp", options.grasp, "whole numbers from 0 after the colon");
-      indices.push_back(to_index(static_cast<double>(*index)));
-    }
-  if (kind == "corner" && (indices.empty() || (indices.size() == 2 && indices[0] <= 1 && indices[1] <= 1))) {
-    grasp.select.corner =
-        indices.empty() ? std::array<int, 2>{0, 0} : std::array<int, 2>{indices[0], indices[1]};
-  } else if (kind == "vertices" && !indices.empty()) {
-    grasp.select.vertices = indices;
-  } else if (options.grasp == "position") {
-    grasp.select.position = Eigen::Vector3d::Zero();
-  } else {
-    throw option_error("grasp", options.grasp,
-                       "corner, corner:I,J with I and J 0 or 1, vertices:A,B,... or position");
-  }
-  return grasp;
-}
+constexpr double kRate = 10;  // frames a second, where nothing else is said
 
 /// Horizontal direction from the gripper's start to the middle of the cloth: the median over the frames,
 /// which neither stray clusters nor frames that show a rim only can turn far.
@@ -236,37 +159,34 @@ std::string numbered(std::size_t index, const char* extension) {
 }
 
 /// Names the frames, where they are, in the recording.
-void import_frames(const ImportOptions& options, Recording& recording) {
-  if (options.clouds.empty() == options.depth.empty())
-    throw InputError("import: expected either a folder of clouds or --depth");
-  const bool depth = !options.depth.empty();
-  const std::vector<std::string> frames = depth ? files_in(options.depth, {".png"}, "depth")
-                                                : files_in(options.clouds, {".ply", ".pcd"}, "clouds");
-  const std::vector<double> times =
-      frame_times(options.times.empty() ? kTimes : options.times, frames.size());
+void import_frames(const ImportSettings& settings, Recording& recording) {
+  const bool depth = !settings.depth.empty();
+  const std::vector<std::string>& frames = depth ? settings.depth : settings.clouds;
+  if (frames.empty()) throw InputError("import: found no frames, expected clouds or depth images");
+  if (!settings.times.empty() && settings.times.size() != frames.size())
+    throw InputError("import: found " + std::to_string(settings.times.size()) + " times, expected " +
+                     std::to_string(frames.size()) + ", one a frame");
   for (std::size_t i = 0; i < frames.size(); ++i) {
     RecordedKeyframe keyframe;
-    keyframe.time = times[i];
+    keyframe.time = settings.times.empty() ? static_cast<double>(i) / kRate : settings.times[i];
     (depth ? keyframe.depth : keyframe.cloud) = frames[i];
-    if (!options.masks.empty())
-      keyframe.mask = (fs::path(options.masks) / fs::path(frames[i]).filename()).string();
+    if (!settings.masks.empty())
+      keyframe.mask = (fs::path(settings.masks) / fs::path(frames[i]).filename()).string();
     recording.keyframes.push_back(keyframe);
   }
   if (!depth) return;
-  if (options.intrinsics.empty() || options.extrinsics.empty())
-    throw InputError("import: --depth needs --intrinsics and --extrinsics");
   RecordedCamera camera;
-  camera.intrinsics = load_camera_intrinsics(options.intrinsics);
-  camera.intrinsics_path = options.intrinsics;
-  const CameraPose pose = load_camera_pose(options.extrinsics, options.accept_unusable);
+  camera.intrinsics = load_camera_intrinsics(settings.intrinsics);
+  camera.intrinsics_path = settings.intrinsics;
+  const CameraPose pose = load_camera_pose(settings.extrinsics, settings.accept_unusable);
   camera.base_from_camera = pose.transform.T;
   camera.warnings = pose.warnings;
   if (!pose.usable)
     camera.warnings.insert(camera.warnings.begin(),
                            "flash-calib handeye ended with exit code 3, an answer that cannot be used");
   for (const std::string& warning : camera.warnings)
-    recording.notices.push_back(options.extrinsics + ": " + warning);
-  camera.depth_scale = options.depth_scale;
+    recording.notices.push_back(settings.extrinsics + ": " + warning);
+  camera.depth_scale = settings.depth_scale;
   recording.camera = camera;
 }
 
@@ -298,47 +218,49 @@ void copy_files(const fs::path& out, Recording& recording) {
 
 }  // namespace
 
-Recording import_recording(const ImportOptions& options) {
-  const fs::path out(options.out);
+Recording import_recording(const ImportSettings& settings) {
+  const fs::path out(settings.out);
   const std::string path = (out / "recording.json").string();
-  if (fs::exists(path) && !options.overwrite)
+  if (fs::exists(path) && !settings.overwrite)
     throw InputError(path + ": exists already; choose another folder or --force");
-  check_folder_writable(options.out);
+  check_folder_writable(settings.out);
 
   Recording recording;
   recording.source = "import";
   recording.name =
-      !options.name.empty() ? options.name : fs::weakly_canonical(fs::absolute(out)).filename().string();
-  recording.kind = options.kind;
-  recording.gravity = options.gravity;
-  recording.nuisance = options.nuisance;
-  recording.mesh_spec = mesh_spec(options);
-  recording.mesh = load_mesh(options, recording.mesh_spec);
-  recording.grasps = {parse_grasp(options)};
-  parse_range(options.crop_x, "crop-x", 0, recording.crop);
-  parse_range(options.crop_y, "crop-y", 1, recording.crop);
-  parse_range(options.crop_z, "crop-z", 2, recording.crop);
-  const Trajectory trajectory = load_trajectory(options.trajectory);
+      !settings.name.empty() ? settings.name : fs::weakly_canonical(fs::absolute(out)).filename().string();
+  recording.kind = settings.kind;
+  recording.gravity = settings.gravity;
+  recording.nuisance = settings.nuisance;
+  recording.mesh_spec = settings.mesh_spec;
+  recording.mesh = settings.mesh;
+  RecordedGrasp grasp;
+  grasp.gripper = "gripper";
+  grasp.select = settings.grasp;
+  grasp.shape = settings.shape;
+  recording.grasps = {grasp};
+  recording.crop = settings.crop;
+  const Trajectory trajectory = load_trajectory(settings.trajectory);
   if (trajectory.poses.size() < 2)
-    throw InputError("--trajectory: " + options.trajectory + ": found one pose, expected two or more");
+    throw InputError("--trajectory: " + settings.trajectory + ": found one pose, expected two or more");
   recording.trajectories["gripper"] = trajectory;
-  recording.trajectory_paths["gripper"] = options.trajectory;
+  recording.trajectory_paths["gripper"] = settings.trajectory;
 
-  import_frames(options, recording);
+  import_frames(settings, recording);
   recording.grasps[0].from = grasp_time(trajectory, recording.keyframes.front().time);
   std::vector<double> times;
   for (const RecordedKeyframe& keyframe : recording.keyframes) times.push_back(keyframe.time);
   std::vector<std::string> notices = recording.notices;
-  for (const std::string& line : compare_clocks(times, trajectory, options.trajectory))
+  for (const std::string& line : compare_clocks(times, trajectory, settings.trajectory))
     notices.push_back(line);
 
   std::vector<std::string> guesses;
-  if (options.times.empty()) guesses.push_back("10 frames a second (--times)");
+  if (settings.times.empty()) guesses.push_back("10 frames a second (--times)");
   const Eigen::Vector3d gripper = trajectory.poses.front().translation();
   double table_height =
       std::min(gripper.z(), std::isfinite(recording.crop.min.z()) ? recording.crop.min.z() : gripper.z());
-  if (options.table_height)
-    table_height = *options.table_height;
+  if (settings.table_height)
+    table_height = *settings.table_height;
   else
     guesses.push_back("table height " + format_short(table_height) +
                       " m, from the gripper's start and the crop (--table-height)");
@@ -357,32 +279,33 @@ Recording import_recording(const ImportOptions& options) {
   if (corner) {
     const Points& rest = recording.mesh.vertices;
     Eigen::RowVector3d held = corner_of(rest, *corner);
-    if (options.tool_at_patch)
+    if (settings.tool_at_patch)
       held = rest(select_vertices(recording, recording.grasps[0]), Eigen::all).colwise().mean();
-    const double heading = options.heading.value_or(heading_of_clouds(keyframes, gripper));
+    const double heading = settings.heading.value_or(heading_of_clouds(keyframes, gripper));
     recording.base_from_object = start_pose(rest, *corner, held, gripper, table_height, heading);
     for (const std::string& line : compare_sides(recording, keyframes, heading)) notices.push_back(line);
-    if (!options.heading)
+    if (!settings.heading)
       guesses.push_back("the sheet's diagonal points to " + format_short(heading * 180 / std::numbers::pi) +
                         " deg from x, where the clouds are; a few degrees off are usual: give --heading DEG, "
                         "or --start-yaw 0.2 here and as an axis of grid");
     guesses.push_back("the sheet starts flat on the table, " +
-                      std::string(options.tool_at_patch ? "the middle of the grasped patch" : "its corner") +
+                      std::string(settings.tool_at_patch ? "the middle of the grasped patch" : "its corner") +
                       " under the gripper (--tool-at)");
   }
 
   const std::string doubt =
-      corner && !options.table_height
+      corner && !settings.table_height
           ? "; or the table's height, guessed as " + format_short(table_height) +
                 " m from the gripper's start and the crop, is wrong: give it as --table-height"
           : "";
-  StagedFolder staged(options.out);
+  StagedFolder staged(settings.out);
   copy_files(staged.path(), recording);
   check_as_file(recording, (fs::path(staged.path()) / "recording.json").string(), doubt);
-  if (!options.asset.empty()) {
-    if (!fs::exists(options.asset)) throw option_error("asset", options.asset, "a file");
+  if (!settings.asset.empty()) {
+    if (!fs::exists(settings.asset))
+      throw InputError("--asset: found \"" + settings.asset + "\", expected a file");
     // Named as from the place where the recording will stand.
-    recording.asset = (fs::path(staged.path()) / relative_path(options.asset, path)).string();
+    recording.asset = (fs::path(staged.path()) / relative_path(settings.asset, path)).string();
   }
   save_recording(recording, (fs::path(staged.path()) / "recording.json").string());
   staged.publish("recording.json");

@@ -22,12 +22,24 @@ TEST(FrameFiles, NumbersCountInNames) {
             std::string::npos);
 }
 
-TEST(FrameFiles, TimesOfARateHaveAStart) {
-  EXPECT_EQ(frame_times("rate:4:1764000000", 3),
-            (std::vector<double>{1764000000, 1764000000.25, 1764000000.5}));
-  for (const char* wrong :
-       {"rate:", "rate:0", "rate:-1", "rate:nan", "rate:inf", "rate:10:inf", "rate:1:2:3", "rate:10:1e300"})
-    EXPECT_TRUE(input_error_of([&] { frame_times(wrong, 3); }).starts_with("--times: found")) << wrong;
+TEST(FrameFiles, TimesAreAColumnOfAFile) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("times.csv", "frame,t_s\n0,0.01\n1,0.11\n2,0.19\n");
+  EXPECT_EQ(load_frame_times(path, 3), (std::vector<double>{0.01, 0.11, 0.19}));
+  EXPECT_EQ(input_error_of([&] { load_frame_times(path, 2); }),
+            path + ": found 3 times, expected 2, one a frame");
+  folder.write("times.csv", "frame,t\n0,0.01\n1,0.01\n");
+  EXPECT_EQ(input_error_of([&] { load_frame_times(path, 2); }),
+            path + ": line 3: found \"1,0.01\", expected strictly increasing times");
+  folder.write("times.csv", "frame,time\n0,0.01\n");
+  EXPECT_EQ(input_error_of([&] { load_frame_times(path, 1); }),
+            path + ": header: found \"frame,time\", expected a column t or t_s");
+}
+
+std::vector<double> times_at(double rate) {
+  std::vector<double> times;
+  for (int i = 0; i <= 50; ++i) times.push_back(i / rate);
+  return times;
 }
 
 Trajectory between(double begin, double end) {
@@ -40,7 +52,7 @@ Trajectory between(double begin, double end) {
 }
 
 TEST(FrameFiles, FramesOfAnotherClockAreRefused) {
-  const std::vector<double> times = frame_times("rate:10", 51);
+  const std::vector<double> times = times_at(10);
   EXPECT_TRUE(compare_clocks(times, between(0, 5), "g.tum").empty());
   EXPECT_EQ(
       input_error_of([&] { compare_clocks(times, between(1.764e9, 1.764e9 + 5), "g.tum"); }),
@@ -49,7 +61,7 @@ TEST(FrameFiles, FramesOfAnotherClockAreRefused) {
   EXPECT_NE(input_error_of([&] { compare_clocks(times, between(0, 2), "g.tum"); }), "");
   EXPECT_NE(compare_clocks(times, between(0, 4), "g.tum").at(0).find("10 of 51 frames are outside"),
             std::string::npos);
-  EXPECT_NE(compare_clocks(frame_times("rate:1000", 51), between(0, 5), "g.tum").at(0).find("far longer"),
+  EXPECT_NE(compare_clocks(times_at(1000), between(0, 5), "g.tum").at(0).find("far longer"),
             std::string::npos);
 }
 

@@ -3,18 +3,26 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "data/atomic_file.h"
 #include "data/depth_image.h"
 #include "data/extrinsics.h"
+#include "data/frame_files.h"
 #include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
 #include "data/text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
 namespace {
+
+void set_sheet(const std::string& spec, ImportSettings& settings) {
+  settings.mesh_spec = spec;
+  settings.mesh = parse_mesh_spec(spec);
+}
 
 /// Clouds of a 0.2 m sheet on a table at z = 0.05 m, grasped at (0.5, 0.1), its diagonal along +y.
 class ImportFiles : public testing::Test {
@@ -28,17 +36,19 @@ class ImportFiles : public testing::Test {
     cloud(3, 0) += 1e-3;
     save_point_cloud(cloud, folder_ / "clouds/11.ply");
     folder_.write("clouds/notes.txt", "not a cloud");
-    options_.clouds = folder_ / "clouds";
-    options_.trajectory = folder_ / "tcp.csv";
-    options_.sheet = "0.2x0.2";
-    options_.cell = 0.02;
-    options_.crop_z = "0.055:";
-    options_.table_height = 0.05;
-    options_.out = folder_ / "lift";
+    settings_.clouds = clouds();
+    settings_.trajectory = folder_ / "tcp.csv";
+    set_sheet("sheet:0.2x0.2:0.02", settings_);
+    settings_.grasp.within = 0.024;
+    settings_.crop.min.z() = 0.055;
+    settings_.table_height = 0.05;
+    settings_.out = folder_ / "lift";
   }
 
+  std::vector<std::string> clouds() const { return files_in_order(folder_ / "clouds", {".ply", ".pcd"}); }
+
   TemporaryFolder folder_;
-  ImportOptions options_;
+  ImportSettings settings_;
 };
 
 // The gripper stands still for 3 s, then lifts; the clouds begin at 2 s.
@@ -48,9 +58,9 @@ TEST_F(ImportFiles, TheGraspBeginsByTheClockOfTheFilesWhenTheGripperSetsOff) {
       return format_number(first_pose + t) + ",0.5," + y + ",0.052,0,0,0,1\n";
     };
     folder_.write("tcp.csv", "t,tx,ty,tz,qx,qy,qz,qw\n" + pose(0, "0.1") + pose(3, "0.1") + pose(4, "0.15"));
-    options_.times = "rate:10:" + format_number(first_cloud);
-    options_.overwrite = true;
-    const Recording recording = import_recording(options_);
+    settings_.times = {first_cloud, first_cloud + 0.1, first_cloud + 0.2};
+    settings_.overwrite = true;
+    const Recording recording = import_recording(settings_);
     return recording.origin + recording.grasps[0].from;
   };
   EXPECT_EQ(grasp_of(1.764e9, 1.764e9 + 2), 1.764e9 + 2);
@@ -59,8 +69,8 @@ TEST_F(ImportFiles, TheGraspBeginsByTheClockOfTheFilesWhenTheGripperSetsOff) {
 }
 
 TEST_F(ImportFiles, CloudsAndATrajectoryBecomeARecording) {
-  options_.nuisance.offset.setConstant(0.06);
-  const Recording recording = import_recording(options_);
+  settings_.nuisance.offset.setConstant(0.06);
+  const Recording recording = import_recording(settings_);
   EXPECT_EQ(recording.name, "lift");
   EXPECT_EQ(recording.keyframes.size(), 3u);
   EXPECT_DOUBLE_EQ(recording.keyframes[2].time, 0.2);
@@ -82,30 +92,31 @@ TEST_F(ImportFiles, CloudsAndATrajectoryBecomeARecording) {
 }
 
 TEST_F(ImportFiles, EveryCornerCanBeTheGraspedOne) {
-  for (const char* corner : {"corner:0,0", "corner:0,1", "corner:1,0", "corner:1,1"}) {
-    options_.grasp = corner;
-    options_.overwrite = true;
-    const Recording recording = import_recording(options_);
+  for (int k = 0; k < 4; ++k) {
+    const std::array<int, 2> corner{k / 2, k % 2};
+    settings_.grasp.corner = corner;
+    settings_.overwrite = true;
+    const Recording recording = import_recording(settings_);
     const std::vector<int> held = select_vertices(recording, recording.grasps[0]);
     double nearest = 1;
     for (const int vertex : held)
       nearest = std::min(nearest, (recording.start.row(vertex) - Eigen::RowVector3d(0.5, 0.1, 0.05)).norm());
-    EXPECT_LT(nearest, 1e-9) << corner;
-    EXPECT_NEAR(recording.start.col(0).mean(), 0.5, 1e-6) << corner;
-    EXPECT_NEAR(recording.start.col(1).mean(), 0.1 + 0.1 * std::numbers::sqrt2, 1e-6) << corner;
+    EXPECT_LT(nearest, 1e-9) << k;
+    EXPECT_NEAR(recording.start.col(0).mean(), 0.5, 1e-6) << k;
+    EXPECT_NEAR(recording.start.col(1).mean(), 0.1 + 0.1 * std::numbers::sqrt2, 1e-6) << k;
   }
 }
 
-TEST_F(ImportFiles, TimesFromAFile) {
-  options_.times = folder_.write("times.csv", "frame,t_s\n0,0.01\n1,0.11\n2,0.19\n");
-  EXPECT_DOUBLE_EQ(import_recording(options_).keyframes[1].time, 0.11);
-  options_.overwrite = true;
-  options_.times = folder_.write("times.csv", "frame,t_s\n0,0.01\n1,0.11\n");
-  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
-            options_.times + ": found 2 times, expected 3, one a frame");
-  options_.times = "rate:ten";
-  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
-            "--times: found \"rate:ten\", expected rate:HZ, rate:HZ:START or a CSV file with a column t");
+TEST_F(ImportFiles, EveryFrameHasATime) {
+  settings_.times = {0.01, 0.11, 0.19};
+  EXPECT_DOUBLE_EQ(import_recording(settings_).keyframes[1].time, 0.11);
+  settings_.overwrite = true;
+  settings_.times = {0.01, 0.11};
+  EXPECT_EQ(input_error_of([&] { import_recording(settings_); }),
+            "import: found 2 times, expected 3, one a frame");
+  settings_.clouds.clear();
+  EXPECT_EQ(input_error_of([&] { import_recording(settings_); }),
+            "import: found no frames, expected clouds or depth images");
 }
 
 TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
@@ -122,13 +133,13 @@ TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
   mask.at(1, 2) = 255;
   save_depth_image(depth, folder_ / "depth/a.png");
   save_mask(mask, folder_ / "masks/a.png");
-  options_.clouds.clear();
-  options_.depth = folder_ / "depth";
-  options_.masks = folder_ / "masks";
-  options_.intrinsics = folder_ / "camera.yaml";
-  options_.extrinsics = folder_ / "camera.tum";
-  options_.depth_scale = 0.0005;
-  const Recording recording = import_recording(options_);
+  settings_.clouds.clear();
+  settings_.depth = {folder_ / "depth/a.png"};
+  settings_.masks = folder_ / "masks";
+  settings_.intrinsics = folder_ / "camera.yaml";
+  settings_.extrinsics = folder_ / "camera.tum";
+  settings_.depth_scale = 0.0005;
+  const Recording recording = import_recording(settings_);
   std::vector<std::string> notices;
   const Points cloud = load_keyframes(recording, notices)[0].cloud;
   ASSERT_EQ(cloud.rows(), 1);
@@ -140,20 +151,17 @@ TEST_F(ImportFiles, DepthImagesBecomePointsInTheBaseFrame) {
     "child": "camera", "translation": [0.5, 0.24, 1.06], "rotation_xyzw": [1, 0, 0, 0]}})");
   EXPECT_TRUE(load_camera_pose(folder_ / "camera.json", false)
                   .transform.T.isApprox(load_camera_pose(folder_ / "camera.tum", false).transform.T));
-  options_.overwrite = true;
+  settings_.overwrite = true;
   folder_.write(
       "camera.json",
       R"({"schema": "flash-extrinsics/1", "exit_code": 3, "warnings": ["one axis only"], "transform": {
     "translation": [0.5, 0.24, 1.06], "rotation_xyzw": [1, 0, 0, 0]}})");
-  options_.extrinsics = folder_ / "camera.json";
-  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("cannot be used (one axis only)"),
+  settings_.extrinsics = folder_ / "camera.json";
+  EXPECT_NE(input_error_of([&] { import_recording(settings_); }).find("cannot be used (one axis only)"),
             std::string::npos);
-  options_.accept_unusable = true;
-  const std::vector<std::string> said = import_recording(options_).notices;
+  settings_.accept_unusable = true;
+  const std::vector<std::string> said = import_recording(settings_).notices;
   EXPECT_NE(std::find(said.begin(), said.end(), (folder_ / "camera.json") + ": one axis only"), said.end());
-  options_.extrinsics.clear();
-  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
-            "import: --depth needs --intrinsics and --extrinsics");
 }
 
 TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
@@ -163,26 +171,26 @@ TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
     for (int j = 0; j < 21; ++j) cloud.row(21 * i + j) << 0.5 - 0.01 * i, 0.1 + 0.01 * j, 0.06;
   for (const char* name : {"clouds/2.ply", "clouds/10.pcd", "clouds/11.ply"})
     save_point_cloud(cloud, folder_ / name);
-  options_.overwrite = true;
-  const auto told = [&](const std::string& sheet, const std::string& grasp) {
-    options_.sheet = sheet;
-    options_.grasp = grasp;
-    for (const std::string& notice : import_recording(options_).notices)
+  settings_.overwrite = true;
+  const auto told = [&](const std::string& sheet, const std::array<int, 2>& corner) {
+    set_sheet("sheet:" + sheet + ":0.02", settings_);
+    settings_.grasp.corner = corner;
+    for (const std::string& notice : import_recording(settings_).notices)
       if (notice.find("--sheet") != std::string::npos) return notice;
     return std::string();
   };
-  EXPECT_EQ(told("0.2x0.3", "corner"), "");
-  EXPECT_EQ(told("0.2x0.3", "corner:1,1"), "");
-  EXPECT_EQ(told("0.3x0.2", "corner:1,0"), "");
-  EXPECT_NE(told("0.3x0.2", "corner").find("--sheet: with the sides changed over, 0.2x0.3, the sheet is"),
+  EXPECT_EQ(told("0.2x0.3", {0, 0}), "");
+  EXPECT_EQ(told("0.2x0.3", {1, 1}), "");
+  EXPECT_EQ(told("0.3x0.2", {1, 0}), "");
+  EXPECT_NE(told("0.3x0.2", {0, 0}).find("--sheet: with the sides changed over, 0.2x0.3, the sheet is"),
             std::string::npos);
-  EXPECT_NE(told("0.2x0.3", "corner:0,1"), "");
+  EXPECT_NE(told("0.2x0.3", {0, 1}), "");
 }
 
 TEST_F(ImportFiles, TheMiddleOfThePatchCanBeAtTheTool) {
-  options_.tool_at_patch = true;
-  options_.within = 0.04;
-  const Recording recording = import_recording(options_);
+  settings_.tool_at_patch = true;
+  settings_.grasp.within = 0.04;
+  const Recording recording = import_recording(settings_);
   Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
   const std::vector<int> held = select_vertices(recording, recording.grasps[0]);
   for (const int vertex : held) middle += recording.start.row(vertex) / static_cast<double>(held.size());
@@ -191,9 +199,9 @@ TEST_F(ImportFiles, TheMiddleOfThePatchCanBeAtTheTool) {
 
 TEST_F(ImportFiles, ATableAboveTheGripperIsDoubted) {
   const auto doubts = [&](double table_height) {
-    options_.table_height = table_height;
-    options_.out = folder_ / (table_height < 0.055 ? "known" : "doubted");
-    const std::vector<std::string> notices = import_recording(options_).notices;
+    settings_.table_height = table_height;
+    settings_.out = folder_ / (table_height < 0.055 ? "known" : "doubted");
+    const std::vector<std::string> notices = import_recording(settings_).notices;
     return std::count_if(notices.begin(), notices.end(), [](const std::string& notice) {
       return notice.find("warning: --table-height: found") != std::string::npos;
     });
@@ -202,66 +210,60 @@ TEST_F(ImportFiles, ATableAboveTheGripperIsDoubted) {
   EXPECT_EQ(doubts(0.06), 1);
 }
 
-TEST_F(ImportFiles, SenselessOptionsAreRefusedByTheirNames) {
+TEST_F(ImportFiles, SenselessSettingsAreRefusedByTheirNames) {
   const auto message = [&](auto change) {
-    ImportOptions options = options_;
-    change(options);
-    return input_error_of([&] { import_recording(options); });
+    ImportSettings settings = settings_;
+    change(settings);
+    return input_error_of([&] { import_recording(settings); });
   };
-  EXPECT_EQ(message([](ImportOptions& o) { o.cell = 100; }),
-            "--cell: found \"100\", expected at most the shorter side of the sheet, 0.2 m");
-  EXPECT_EQ(message([](ImportOptions& o) { o.sheet = "200x200", o.cell = 10; }),
-            "--sheet: found \"200x200\", expected metres (millimetres read as metres?)");
-  EXPECT_EQ(message([](ImportOptions& o) { o.times = "rate:1e300"; }),
-            "--times: found \"rate:1e300\", expected rate:HZ, rate:HZ:START or a CSV file with a column t");
-  EXPECT_EQ(message([](ImportOptions& o) { o.asset = "nowhere.json"; }),
+  EXPECT_EQ(message([](ImportSettings& o) { o.asset = "nowhere.json"; }),
             "--asset: found \"nowhere.json\", expected a file");
   const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
-  EXPECT_EQ(message([&](ImportOptions& o) { o.trajectory = one; }),
+  EXPECT_EQ(message([&](ImportSettings& o) { o.trajectory = one; }),
             "--trajectory: " + one + ": found one pose, expected two or more");
-  EXPECT_NE(
-      message([](ImportOptions& o) { o.times = "rate:10:1764000000"; }).find("expected one clock for both"),
-      std::string::npos);
+  EXPECT_NE(message([](ImportSettings& o) {
+              o.times = {1.764e9, 1.764e9 + 0.1, 1.764e9 + 0.2};
+            }).find("expected one clock for both"),
+            std::string::npos);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "lift"));
 }
 
 TEST_F(ImportFiles, TheAssetIsNamedFromTheRecording) {
-  options_.asset = folder_.write("towel.json", "{}");
+  settings_.asset = folder_.write("towel.json", "{}");
   for (const bool again : {false, true}) {
-    options_.overwrite = again;
-    EXPECT_EQ(std::filesystem::weakly_canonical(import_recording(options_).asset),
-              std::filesystem::weakly_canonical(options_.asset));
+    settings_.overwrite = again;
+    EXPECT_EQ(std::filesystem::weakly_canonical(import_recording(settings_).asset),
+              std::filesystem::weakly_canonical(settings_.asset));
     EXPECT_NE(read_file(folder_ / "lift/recording.json").find("\"../towel.json\""), std::string::npos);
   }
 }
 
 TEST_F(ImportFiles, WhatFailsItsCheckLeavesNothing) {
-  options_.grasp = "corner:0,2";
-  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("--grasp: found \"corner:0,2\""),
-            std::string::npos);
-  options_.grasp = "position";  // the sheet would lie at the origin, half a metre from the gripper
-  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("no vertex lies within"),
+  const GraspSelection corner = settings_.grasp;
+  settings_.grasp.corner.reset();
+  settings_.grasp.position =
+      Eigen::Vector3d::Zero();  // the sheet would lie at the origin, half a metre from the gripper
+  EXPECT_NE(input_error_of([&] { import_recording(settings_); }).find("no vertex lies within"),
             std::string::npos);
   std::size_t entries = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder_ / "."))
     entries += !entry.path().empty();
   EXPECT_EQ(entries, 2u);  // tcp.csv, clouds
-  options_.grasp = "corner";
-  options_.crop_z = "0.5:0.1";
-  EXPECT_EQ(input_error_of([&] { import_recording(options_); }),
-            "--crop-z: found \"0.5:0.1\", expected a low end below the high one");
-  options_.crop_z = "1:";
-  EXPECT_NE(
-      input_error_of([&] { import_recording(options_); }).find("no keyframe has a point inside the crop box"),
-      std::string::npos);
-  options_.crop_z.clear();
-  import_recording(options_);
-  EXPECT_NE(input_error_of([&] { import_recording(options_); }).find("exists already"), std::string::npos);
+  settings_.grasp = corner;
+  settings_.crop.min.z() = 1;
+  EXPECT_NE(input_error_of([&] {
+              import_recording(settings_);
+            }).find("no keyframe has a point inside the crop box"),
+            std::string::npos);
+  settings_.crop = {};
+  import_recording(settings_);
+  EXPECT_NE(input_error_of([&] { import_recording(settings_); }).find("exists already"), std::string::npos);
   // A shorter recording over a longer one leaves none of its frames, but what it did not write.
   folder_.write("lift/frames/notes.txt", "mine");
   std::filesystem::remove(folder_ / "clouds/11.ply");
-  options_.overwrite = true;
-  import_recording(options_);
+  settings_.clouds = clouds();
+  settings_.overwrite = true;
+  import_recording(settings_);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "lift/frames/000002.ply"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/000001.ply"));
   EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/notes.txt"));
@@ -276,19 +278,20 @@ TEST_P(ImportedClip, StartsNearTheRecordingMadeByHand) {
   if (!std::filesystem::exists(clip)) GTEST_SKIP() << clip << " is absent";
   const Recording by_hand = load_recording(clip);
   const TemporaryFolder folder;
-  ImportOptions options;
-  options.clouds = clip + "/frames";
-  options.trajectory = by_hand.trajectory_paths.at("gripper");
+  ImportSettings settings;
+  settings.clouds = files_in_order(clip + "/frames", {".ply"});
+  settings.trajectory = by_hand.trajectory_paths.at("gripper");
   const bool twin = std::string(GetParam()).starts_with("twin");
-  options.sheet = twin ? "0.4x0.4" : "0.278x0.278";
-  options.grasp = twin ? "corner:1,1" : "corner";
-  if (!twin) {
-    options.crop_z = "0.075:";
-    options.crop_y = ":0.3";
-    options.nuisance.offset.setConstant(0.06);
+  set_sheet(twin ? "sheet:0.4x0.4:0.01" : "sheet:0.278x0.278:0.01", settings);
+  if (twin) {
+    settings.grasp.corner = {1, 1};
+  } else {
+    settings.crop.min.z() = 0.075;
+    settings.crop.max.y() = 0.3;
+    settings.nuisance.offset.setConstant(0.06);
   }
-  options.out = folder / "recording";
-  const Recording imported = import_recording(options);
+  settings.out = folder / "recording";
+  const Recording imported = import_recording(settings);
   const Eigen::Matrix3d turn =
       by_hand.base_from_object.linear().transpose() * imported.base_from_object.linear();
   EXPECT_LT(std::acos(std::min(1.0, (turn.trace() - 1) / 2)), 0.35);  // the bound of start_yaw_rad
