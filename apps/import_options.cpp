@@ -100,7 +100,7 @@ data::CropBox parse_crop(const ImportOptions& options) {
   return crop;
 }
 
-void read_options(const ImportOptions& options, data::ImportSettings& settings) {
+void read_options(const ImportOptions& options, sysid::ImportSettings& settings) {
   settings.mesh_spec = mesh_spec(options);
   settings.mesh = load_mesh(options, settings.mesh_spec);
   settings.grasp = parse_grasp(options.grasp);

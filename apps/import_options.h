@@ -2,7 +2,7 @@
 #include <optional>
 #include <string>
 
-#include "data/import.h"
+#include "sysid/capture/import.h"
 
 namespace flash {
 
@@ -28,6 +28,6 @@ data::CropBox parse_crop(const ImportOptions& options);
 
 /// Puts sheet, grasp, crop, frames and their times into `settings`. Throws data::InputError that names the
 /// option, also where a folder holds no frames or where `settings` has no camera for depth images.
-void read_options(const ImportOptions& options, data::ImportSettings& settings);
+void read_options(const ImportOptions& options, sysid::ImportSettings& settings);
 
 }  // namespace flash

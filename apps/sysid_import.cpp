@@ -11,8 +11,8 @@
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
-#include "data/import.h"
 #include "data/text.h"
+#include "sysid/capture/import.h"
 
 namespace flash {
 namespace {
@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 struct ImportVerbOptions {
   CommonOptions common;
   ImportOptions texts;
-  data::ImportSettings settings;
+  sysid::ImportSettings settings;
   std::vector<std::string> offset;
   std::string shape = "clamp", tool_at = "corner";
   double within = 0, table_height = 0, heading_degrees = 0;
@@ -44,7 +44,7 @@ Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
 }
 
 int run_import(const CLI::App& verb, ImportVerbOptions options) {
-  data::ImportSettings& settings = options.settings;
+  sysid::ImportSettings& settings = options.settings;
   settings.overwrite = settings.accept_unusable = options.common.force;
   if (!options.offset.empty()) settings.nuisance.offset = parse_bounds(options.offset);
   settings.tool_at_patch = options.tool_at == "patch";
@@ -55,7 +55,7 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;
   read_options(options.texts, settings);
 
-  const data::Recording recording = data::import_recording(settings);
+  const data::Recording recording = sysid::import_recording(settings);
   for (const std::string& notice : recording.notices) say(options.common, notice);
   const std::string path = (fs::path(settings.out) / "recording.json").string();
   if (options.common.json) {
@@ -77,7 +77,7 @@ void add_import_verb(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand(
       "import", "Make a recording from a folder of clouds, or of depth images, and a trajectory");
   ImportOptions& texts = options->texts;
-  data::ImportSettings& settings = options->settings;
+  sysid::ImportSettings& settings = options->settings;
   CLI::Option* clouds =
       verb->add_option("clouds", texts.clouds, "Folder of .ply or .pcd, base frame [m], in order of name");
   CLI::Option* depth =

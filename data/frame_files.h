@@ -17,12 +17,6 @@ std::vector<std::string> files_in_order(const std::string& folder,
 /// names the file.
 std::vector<double> load_frame_times(const std::string& path, std::size_t frames);
 
-/// Whether frames and trajectory were stamped by one clock. Throws InputError, naming the trajectory's
-/// `path`, where more frames lie outside the trajectory than inside; what else is odd is returned for people
-/// to read.
-std::vector<std::string> compare_clocks(const std::vector<double>& times, const Trajectory& trajectory,
-                                        const std::string& path);
-
 /// Jumps that no robot makes, faster than 5 m/s, for people to read; at most one line. Empty where there are
 /// none.
 std::vector<std::string> find_jumps(const Trajectory& trajectory, const std::string& path);

@@ -60,7 +60,7 @@ class ImportOptionsOfAFolder : public testing::Test {
   std::string message_of(const Change& change) const {
     ImportOptions options = options_;
     change(options);
-    data::ImportSettings settings;
+    sysid::ImportSettings settings;
     return data::input_error_of([&] { read_options(options, settings); });
   }
 
@@ -69,7 +69,7 @@ class ImportOptionsOfAFolder : public testing::Test {
 };
 
 TEST_F(ImportOptionsOfAFolder, BecomeValues) {
-  data::ImportSettings settings;
+  sysid::ImportSettings settings;
   read_options(options_, settings);
   EXPECT_EQ(settings.clouds, (std::vector<std::string>{folder_ / "clouds/2.ply", folder_ / "clouds/10.pcd",
                                                        folder_ / "clouds/11.ply"}));

@@ -36,12 +36,6 @@ TEST(FrameFiles, TimesAreAColumnOfAFile) {
             path + ": header: found \"frame,time\", expected a column t or t_s");
 }
 
-std::vector<double> times_at(double rate) {
-  std::vector<double> times;
-  for (int i = 0; i <= 50; ++i) times.push_back(i / rate);
-  return times;
-}
-
 Trajectory between(double begin, double end) {
   Trajectory trajectory;
   for (int k = 0; k <= 10; ++k) {
@@ -49,20 +43,6 @@ Trajectory between(double begin, double end) {
     trajectory.poses.emplace_back(Eigen::Translation3d(0.01 * k, 0, 0));
   }
   return trajectory;
-}
-
-TEST(FrameFiles, FramesOfAnotherClockAreRefused) {
-  const std::vector<double> times = times_at(10);
-  EXPECT_TRUE(compare_clocks(times, between(0, 5), "g.tum").empty());
-  EXPECT_EQ(
-      input_error_of([&] { compare_clocks(times, between(1.764e9, 1.764e9 + 5), "g.tum"); }),
-      "g.tum: the frames are of 0.000 to 5.000 s, the trajectory of 1764000000.000 to 1764000005.000 s: "
-      "51 of 51 frames are outside of it, expected one clock for both (--times)");
-  EXPECT_NE(input_error_of([&] { compare_clocks(times, between(0, 2), "g.tum"); }), "");
-  EXPECT_NE(compare_clocks(times, between(0, 4), "g.tum").at(0).find("10 of 51 frames are outside"),
-            std::string::npos);
-  EXPECT_NE(compare_clocks(times_at(1000), between(0, 5), "g.tum").at(0).find("far longer"),
-            std::string::npos);
 }
 
 TEST(FrameFiles, JumpsOfATrajectoryAreFound) {

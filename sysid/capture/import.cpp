@@ -1,4 +1,4 @@
-#include "data/import.h"
+#include "sysid/capture/import.h"
 
 #include <algorithm>
 #include <array>
@@ -10,16 +10,16 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/extrinsics.h"
-#include "data/frame_files.h"
 #include "data/json_reader.h"
-#include "data/lying_sheet.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/staged_folder.h"
 #include "data/text.h"
 #include "data/writable.h"
+#include "sysid/capture/clocks.h"
+#include "sysid/capture/lying_sheet.h"
 
-namespace flash::data {
+namespace flash::sysid {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,9 +28,9 @@ constexpr double kRate = 10;  // frames a second, where nothing else is said
 
 /// Horizontal direction from the gripper's start to the middle of the cloth: the median over the frames,
 /// which neither stray clusters nor frames that show a rim only can turn far.
-double heading_of_clouds(const std::vector<Keyframe>& keyframes, const Eigen::Vector3d& gripper) {
+double heading_of_clouds(const std::vector<data::Keyframe>& keyframes, const Eigen::Vector3d& gripper) {
   std::vector<double> x, y;
-  for (const Keyframe& keyframe : keyframes) {
+  for (const data::Keyframe& keyframe : keyframes) {
     if (keyframe.cloud.rows() == 0) continue;
     x.push_back(keyframe.cloud.col(0).mean() - gripper.x());
     y.push_back(keyframe.cloud.col(1).mean() - gripper.y());
@@ -43,14 +43,14 @@ double heading_of_clouds(const std::vector<Keyframe>& keyframes, const Eigen::Ve
   return x.empty() ? 0.0 : std::atan2(median(y), median(x));
 }
 
-Eigen::RowVector3d corner_of(const Points& rest, const std::array<int, 2>& corner) {
+Eigen::RowVector3d corner_of(const data::Points& rest, const std::array<int, 2>& corner) {
   const Eigen::RowVector3d low = rest.colwise().minCoeff(), high = rest.colwise().maxCoeff();
   return {corner[0] == 0 ? low.x() : high.x(), corner[1] == 0 ? low.y() : high.y(), low.z()};
 }
 
 /// Flat on the table, the point `held` of the rest sheet under the gripper, the diagonal from `corner` along
 /// `heading`.
-Eigen::Isometry3d start_pose(const Points& rest, const std::array<int, 2>& corner,
+Eigen::Isometry3d start_pose(const data::Points& rest, const std::array<int, 2>& corner,
                              const Eigen::RowVector3d& held, const Eigen::Vector3d& gripper,
                              double table_height, double heading) {
   const Eigen::RowVector3d diagonal =
@@ -65,15 +65,15 @@ Eigen::Isometry3d start_pose(const Points& rest, const std::array<int, 2>& corne
 }
 
 /// What the clouds of the gripper's first stand show of the sheet that still lies, seen from above; thinned.
-std::vector<Eigen::Vector2d> lying_points(const Recording& recording,
-                                          const std::vector<Keyframe>& keyframes) {
+std::vector<Eigen::Vector2d> lying_points(const data::Recording& recording,
+                                          const std::vector<data::Keyframe>& keyframes) {
   constexpr double still = 0.005;  // the gripper has not moved farther [m]
   constexpr std::size_t most = 1500;
-  const Trajectory& trajectory = recording.trajectories.at("gripper");
+  const data::Trajectory& trajectory = recording.trajectories.at("gripper");
   std::vector<Eigen::Vector2d> points;
-  for (const Keyframe& keyframe : keyframes) {
+  for (const data::Keyframe& keyframe : keyframes) {
     const Eigen::Vector3d moved =
-        pose_at(trajectory, keyframe.time).translation() - trajectory.poses.front().translation();
+        data::pose_at(trajectory, keyframe.time).translation() - trajectory.poses.front().translation();
     if (moved.norm() > still) break;
     for (Eigen::Index i = 0; i < keyframe.cloud.rows(); ++i)
       points.emplace_back(keyframe.cloud.row(i).head<2>().transpose());
@@ -85,9 +85,9 @@ std::vector<Eigen::Vector2d> lying_points(const Recording& recording,
 }
 
 /// Whether the first clouds, of a sheet that still lies, fit it better with its sides changed over or turned.
-std::vector<std::string> compare_sides(const Recording& recording, const std::vector<Keyframe>& keyframes,
-                                       double heading) {
-  const Points& rest = recording.mesh.vertices;
+std::vector<std::string> compare_sides(const data::Recording& recording,
+                                       const std::vector<data::Keyframe>& keyframes, double heading) {
+  const data::Points& rest = recording.mesh.vertices;
   const std::array<int, 2> corner = *recording.grasps[0].select.corner;
   const Eigen::RowVector3d size = rest.colwise().maxCoeff() - rest.colwise().minCoeff();
   const std::vector<Eigen::Vector2d> points = lying_points(recording, keyframes);
@@ -98,7 +98,7 @@ std::vector<std::string> compare_sides(const Recording& recording, const std::ve
     return {
         "import: --sheet: no cloud shows the sheet before the gripper moves, so its sides cannot be "
         "checked: " +
-        format_short(corner[0] == corner[1] ? size.x() : size.y()) +
+        data::format_short(corner[0] == corner[1] ? size.x() : size.y()) +
         " m are on the right hand, from the grasped corner and seen from above"};
   LyingSheet given{(recording.base_from_object * corner_of(rest, corner).transpose()).head<2>(), size.x(),
                    size.y(), heading};
@@ -110,33 +110,33 @@ std::vector<std::string> compare_sides(const Recording& recording, const std::ve
   const double as_swapped = distance_to(turned_to(swapped, points), points);
   constexpr double clear = 0.002;  // below it, noise decides [m]
   if (as_swapped < 0.5 * as_given && as_given - as_swapped > clear)
-    return {"import: warning: --sheet: with the sides changed over, " + format_short(size.y()) + "x" +
-            format_short(size.x()) + ", the sheet is " + format_short(1000 * as_swapped) +
-            " mm from what the first clouds show of it, as given " + format_short(1000 * as_given) +
+    return {"import: warning: --sheet: with the sides changed over, " + data::format_short(size.y()) + "x" +
+            data::format_short(size.x()) + ", the sheet is " + data::format_short(1000 * as_swapped) +
+            " mm from what the first clouds show of it, as given " + data::format_short(1000 * as_given) +
             " mm: change the sides over, or name another corner with --grasp corner:I,J"};
   constexpr double good = 0.008;  // what a cloud of 10 mm between its points is from its sheet [m]
   const double turn = (fitted.heading - heading) * 180 / std::numbers::pi;
   if (as_given > good || std::abs(turn) < 1.5) return {};
   return {"import: what the first clouds show of the lying sheet fits best with --heading " +
-          format_short(fitted.heading * 180 / std::numbers::pi)};
+          data::format_short(fitted.heading * 180 / std::numbers::pi)};
 }
 
 /// Loads the recording as its users will, which checks it; what is wrong is not yet in a file of the user.
 /// `doubt` is said where the grasp is wrong.
-void check_as_file(const Recording& recording, const std::string& path, const std::string& doubt) {
-  save_recording(recording, path);
+void check_as_file(const data::Recording& recording, const std::string& path, const std::string& doubt) {
+  data::save_recording(recording, path);
   try {
-    load_recording(path);
-  } catch (const InputError& error) {
+    data::load_recording(path);
+  } catch (const data::InputError& error) {
     std::string message = error.what();
     if (message.starts_with(path)) message.replace(0, path.size(), "import");
     if (message.starts_with("import: grasps")) message += doubt;
-    throw InputError(message);
+    throw data::InputError(message);
   }
 }
 
 /// When the grasp acts at the latest: the first keyframe, or before it when the gripper sets off.
-double grasp_time(const Trajectory& trajectory, double first_keyframe) {
+double grasp_time(const data::Trajectory& trajectory, double first_keyframe) {
   constexpr double kStill = 1e-3;  // [m]
   const Eigen::Vector3d start = trajectory.poses.front().translation();
   double last = trajectory.times.front();
@@ -148,7 +148,7 @@ double grasp_time(const Trajectory& trajectory, double first_keyframe) {
 }
 
 std::string copied(const std::string& file, const fs::path& to) {
-  write_atomically(to.string(), read_file(file));
+  data::write_atomically(to.string(), data::read_file(file));
   return to.string();
 }
 
@@ -159,15 +159,15 @@ std::string numbered(std::size_t index, const char* extension) {
 }
 
 /// Names the frames, where they are, in the recording.
-void import_frames(const ImportSettings& settings, Recording& recording) {
+void import_frames(const ImportSettings& settings, data::Recording& recording) {
   const bool depth = !settings.depth.empty();
   const std::vector<std::string>& frames = depth ? settings.depth : settings.clouds;
-  if (frames.empty()) throw InputError("import: found no frames, expected clouds or depth images");
+  if (frames.empty()) throw data::InputError("import: found no frames, expected clouds or depth images");
   if (!settings.times.empty() && settings.times.size() != frames.size())
-    throw InputError("import: found " + std::to_string(settings.times.size()) + " times, expected " +
-                     std::to_string(frames.size()) + ", one a frame");
+    throw data::InputError("import: found " + std::to_string(settings.times.size()) + " times, expected " +
+                           std::to_string(frames.size()) + ", one a frame");
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    RecordedKeyframe keyframe;
+    data::RecordedKeyframe keyframe;
     keyframe.time = settings.times.empty() ? static_cast<double>(i) / kRate : settings.times[i];
     (depth ? keyframe.depth : keyframe.cloud) = frames[i];
     if (!settings.masks.empty())
@@ -175,10 +175,10 @@ void import_frames(const ImportSettings& settings, Recording& recording) {
     recording.keyframes.push_back(keyframe);
   }
   if (!depth) return;
-  RecordedCamera camera;
-  camera.intrinsics = load_camera_intrinsics(settings.intrinsics);
+  data::RecordedCamera camera;
+  camera.intrinsics = data::load_camera_intrinsics(settings.intrinsics);
   camera.intrinsics_path = settings.intrinsics;
-  const CameraPose pose = load_camera_pose(settings.extrinsics, settings.accept_unusable);
+  const data::CameraPose pose = data::load_camera_pose(settings.extrinsics, settings.accept_unusable);
   camera.base_from_camera = pose.transform.T;
   camera.warnings = pose.warnings;
   if (!pose.usable)
@@ -191,41 +191,41 @@ void import_frames(const ImportSettings& settings, Recording& recording) {
 }
 
 /// Copies all that the recording names below `out`, and names the copies.
-void copy_files(const fs::path& out, Recording& recording) {
+void copy_files(const fs::path& out, data::Recording& recording) {
   for (std::size_t i = 0; i < recording.keyframes.size(); ++i) {
-    RecordedKeyframe& keyframe = recording.keyframes[i];
+    data::RecordedKeyframe& keyframe = recording.keyframes[i];
     if (!keyframe.depth.empty()) keyframe.depth = copied(keyframe.depth, out / "depth" / numbered(i, ".png"));
     if (!keyframe.mask.empty()) keyframe.mask = copied(keyframe.mask, out / "mask" / numbered(i, ".png"));
     if (keyframe.cloud.empty()) continue;
     const std::string copy = (out / "frames" / numbered(i, ".ply")).string();
-    if (lower_extension(keyframe.cloud) == ".ply")
+    if (data::lower_extension(keyframe.cloud) == ".ply")
       copied(keyframe.cloud, copy);
     else
-      save_point_cloud(load_point_cloud(keyframe.cloud), copy);
+      data::save_point_cloud(data::load_point_cloud(keyframe.cloud), copy);
     keyframe.cloud = copy;
   }
   if (recording.camera) {
     recording.camera->intrinsics_path = (out / "camera_info.yaml").string();
-    save_camera_info(recording.camera->intrinsics, recording.camera->intrinsics_path);
+    data::save_camera_info(recording.camera->intrinsics, recording.camera->intrinsics_path);
   }
   for (auto& [name, path] : recording.trajectory_paths) {
     path = (out / (name + ".tum")).string();
-    save_tum(recording.trajectories.at(name), path);
+    data::save_tum(recording.trajectories.at(name), path);
   }
-  if (!is_mesh_spec(recording.mesh_spec))
+  if (!data::is_mesh_spec(recording.mesh_spec))
     recording.mesh_spec = copied(recording.mesh_spec, out / fs::path(recording.mesh_spec).filename());
 }
 
 }  // namespace
 
-Recording import_recording(const ImportSettings& settings) {
+data::Recording import_recording(const ImportSettings& settings) {
   const fs::path out(settings.out);
   const std::string path = (out / "recording.json").string();
   if (fs::exists(path) && !settings.overwrite)
-    throw InputError(path + ": exists already; choose another folder or --force");
-  check_folder_writable(settings.out);
+    throw data::InputError(path + ": exists already; choose another folder or --force");
+  data::check_folder_writable(settings.out);
 
-  Recording recording;
+  data::Recording recording;
   recording.source = "import";
   recording.name =
       !settings.name.empty() ? settings.name : fs::weakly_canonical(fs::absolute(out)).filename().string();
@@ -234,22 +234,22 @@ Recording import_recording(const ImportSettings& settings) {
   recording.nuisance = settings.nuisance;
   recording.mesh_spec = settings.mesh_spec;
   recording.mesh = settings.mesh;
-  RecordedGrasp grasp;
+  data::RecordedGrasp grasp;
   grasp.gripper = "gripper";
   grasp.select = settings.grasp;
   grasp.shape = settings.shape;
   recording.grasps = {grasp};
   recording.crop = settings.crop;
-  const Trajectory trajectory = load_trajectory(settings.trajectory);
+  const data::Trajectory trajectory = data::load_trajectory(settings.trajectory);
   if (trajectory.poses.size() < 2)
-    throw InputError("--trajectory: " + settings.trajectory + ": found one pose, expected two or more");
+    throw data::InputError("--trajectory: " + settings.trajectory + ": found one pose, expected two or more");
   recording.trajectories["gripper"] = trajectory;
   recording.trajectory_paths["gripper"] = settings.trajectory;
 
   import_frames(settings, recording);
   recording.grasps[0].from = grasp_time(trajectory, recording.keyframes.front().time);
   std::vector<double> times;
-  for (const RecordedKeyframe& keyframe : recording.keyframes) times.push_back(keyframe.time);
+  for (const data::RecordedKeyframe& keyframe : recording.keyframes) times.push_back(keyframe.time);
   std::vector<std::string> notices = recording.notices;
   for (const std::string& line : compare_clocks(times, trajectory, settings.trajectory))
     notices.push_back(line);
@@ -262,30 +262,31 @@ Recording import_recording(const ImportSettings& settings) {
   if (settings.table_height)
     table_height = *settings.table_height;
   else
-    guesses.push_back("table height " + format_short(table_height) +
+    guesses.push_back("table height " + data::format_short(table_height) +
                       " m, from the gripper's start and the crop (--table-height)");
   constexpr double kKnown = 5e-3;  // what a table's height is known to [m]
   if (gripper.z() < table_height - kKnown)
-    notices.push_back("import: warning: --table-height: found " + format_short(table_height) +
+    notices.push_back("import: warning: --table-height: found " + data::format_short(table_height) +
                       " m, expected at most the height at which the gripper starts, " +
-                      format_short(gripper.z()) + " m: does it grasp below the table?");
+                      data::format_short(gripper.z()) + " m: does it grasp below the table?");
   recording.has_table = true;
   recording.table_point.z() = table_height;
 
   recording.start = recording.mesh.vertices;
   const auto& corner = recording.grasps[0].select.corner;
   if (corner) recording.start.rowwise() += Eigen::RowVector3d(gripper.x(), gripper.y(), table_height);
-  const std::vector<Keyframe> keyframes = load_keyframes(recording, notices);
+  const std::vector<data::Keyframe> keyframes = data::load_keyframes(recording, notices);
   if (corner) {
-    const Points& rest = recording.mesh.vertices;
+    const data::Points& rest = recording.mesh.vertices;
     Eigen::RowVector3d held = corner_of(rest, *corner);
     if (settings.tool_at_patch)
-      held = rest(select_vertices(recording, recording.grasps[0]), Eigen::all).colwise().mean();
+      held = rest(data::select_vertices(recording, recording.grasps[0]), Eigen::all).colwise().mean();
     const double heading = settings.heading.value_or(heading_of_clouds(keyframes, gripper));
     recording.base_from_object = start_pose(rest, *corner, held, gripper, table_height, heading);
     for (const std::string& line : compare_sides(recording, keyframes, heading)) notices.push_back(line);
     if (!settings.heading)
-      guesses.push_back("the sheet's diagonal points to " + format_short(heading * 180 / std::numbers::pi) +
+      guesses.push_back("the sheet's diagonal points to " +
+                        data::format_short(heading * 180 / std::numbers::pi) +
                         " deg from x, where the clouds are; a few degrees off are usual: give --heading DEG, "
                         "or --start-yaw 0.2 here and as an axis of grid");
     guesses.push_back("the sheet starts flat on the table, " +
@@ -295,24 +296,24 @@ Recording import_recording(const ImportSettings& settings) {
 
   const std::string doubt =
       corner && !settings.table_height
-          ? "; or the table's height, guessed as " + format_short(table_height) +
+          ? "; or the table's height, guessed as " + data::format_short(table_height) +
                 " m from the gripper's start and the crop, is wrong: give it as --table-height"
           : "";
-  StagedFolder staged(settings.out);
+  data::StagedFolder staged(settings.out);
   copy_files(staged.path(), recording);
   check_as_file(recording, (fs::path(staged.path()) / "recording.json").string(), doubt);
   if (!settings.asset.empty()) {
     if (!fs::exists(settings.asset))
-      throw InputError("--asset: found \"" + settings.asset + "\", expected a file");
+      throw data::InputError("--asset: found \"" + settings.asset + "\", expected a file");
     // Named as from the place where the recording will stand.
-    recording.asset = (fs::path(staged.path()) / relative_path(settings.asset, path)).string();
+    recording.asset = (fs::path(staged.path()) / data::relative_path(settings.asset, path)).string();
   }
-  save_recording(recording, (fs::path(staged.path()) / "recording.json").string());
+  data::save_recording(recording, (fs::path(staged.path()) / "recording.json").string());
   staged.publish("recording.json");
-  Recording written = load_recording(path);
+  data::Recording written = data::load_recording(path);
   written.notices.insert(written.notices.end(), notices.begin(), notices.end());
   for (const std::string& guess : guesses) written.notices.push_back("import: guessed: " + guess);
   return written;
 }
 
-}  // namespace flash::data
+}  // namespace flash::sysid

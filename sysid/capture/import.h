@@ -7,7 +7,7 @@
 #include "data/mesh.h"
 #include "data/recording.h"
 
-namespace flash::data {
+namespace flash::sysid {
 
 /// What observations need to become a recording.
 struct ImportSettings {
@@ -22,18 +22,18 @@ struct ImportSettings {
   std::vector<double> times;  ///< one a frame, increasing [s]; empty: 10 a second, and a notice
   std::string trajectory;     ///< T_base_gripper, TUM or CSV
   std::string mesh_spec;      ///< mesh spec or file that `mesh` came from
-  TriangleMesh mesh;          ///< the sheet at rest, in the plane z = 0 [m]
-  GraspSelection grasp{std::array<int, 2>{0, 0}, {}, {}, 0.012};  ///< by the one gripper
-  GraspShape shape = GraspShape::clamp;
+  data::TriangleMesh mesh;    ///< the sheet at rest, in the plane z = 0 [m]
+  data::GraspSelection grasp{std::array<int, 2>{0, 0}, {}, {}, 0.012};  ///< by the one gripper
+  data::GraspShape shape = data::GraspShape::clamp;
   bool tool_at_patch =
       false;  ///< the middle of the grasped patch is at the tool centre point, not the corner
-  CropBox crop;
+  data::CropBox crop;
   std::optional<double>
       table_height;  ///< [m]; empty: the lower of the gripper's start and the crop's lower end
   /// Heading of the sheet's diagonal from the grasped corner, about z from x [rad]; empty: towards the
   /// clouds.
   std::optional<double> heading;
-  NuisanceBounds nuisance;
+  data::NuisanceBounds nuisance;
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
   std::string asset;                     ///< file, may be empty
   std::string kind = "corner_lift";
@@ -47,6 +47,6 @@ struct ImportSettings {
 /// check it. The start pose is a guess: flat on the table, the grasped corner under the gripper, the diagonal
 /// along `heading`; notices say what was guessed, and where first clouds, of a sheet that still lies, fit it
 /// better with its sides changed over. Throws InputError, and leaves nothing behind, where the check fails.
-Recording import_recording(const ImportSettings& settings);
+data::Recording import_recording(const ImportSettings& settings);
 
-}  // namespace flash::data
+}  // namespace flash::sysid
