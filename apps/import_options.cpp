@@ -11,6 +11,7 @@
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
+#include "data/trajectory.h"
 
 namespace flash {
 namespace {
@@ -67,6 +68,13 @@ data::TriangleMesh load_mesh(const ImportOptions& options, const std::string& sp
   return mesh;
 }
 
+data::Trajectory load_gripper(const std::string& path) {
+  data::Trajectory trajectory = data::load_trajectory(path);
+  if (trajectory.poses.size() < 2)
+    throw data::InputError("--trajectory: " + path + ": found one pose, expected two or more");
+  return trajectory;
+}
+
 }  // namespace
 
 data::GraspSelection parse_grasp(const std::string& text) {
@@ -106,6 +114,8 @@ void read_options(const ImportOptions& options, sysid::ImportSettings& settings)
   settings.grasp = parse_grasp(options.grasp);
   settings.grasp.within = options.within.value_or(1.2 * options.cell);
   settings.crop = parse_crop(options);
+  settings.trajectory = load_gripper(options.trajectory);
+  settings.trajectory_path = options.trajectory;
   if (options.clouds.empty() == options.depth.empty())
     throw data::InputError("import: expected either a folder of clouds or --depth");
   if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");

@@ -10,6 +10,7 @@ namespace flash {
 struct ImportOptions {
   std::string clouds;                  ///< folder of .ply or .pcd, taken in order of name, 2 before 10; or
   std::string depth;                   ///< folder of .png
+  std::string trajectory;              ///< T_base_gripper, TUM or CSV
   std::string times;                   ///< as frame_times reads them
   std::string sheet;                   ///< "WIDTHxHEIGHT" [m]; or
   std::string mesh;                    ///< mesh spec or file
@@ -26,8 +27,8 @@ data::GraspSelection parse_grasp(const std::string& text);
 /// The box of the three ranges. Throws data::InputError that names the option.
 data::CropBox parse_crop(const ImportOptions& options);
 
-/// Puts sheet, grasp, crop, frames and their times into `settings`. Throws data::InputError that names the
-/// option, also where a folder holds no frames or where `settings` has no camera for depth images.
+/// Puts sheet, grasp, crop, trajectory, frames and their times into `settings`. Throws data::InputError that
+/// names the option, also where a folder holds no frames or where `settings` has no camera for depth images.
 void read_options(const ImportOptions& options, sysid::ImportSettings& settings);
 
 }  // namespace flash

@@ -90,7 +90,7 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--depth-scale", settings.depth_scale, "Metres a count")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--trajectory", settings.trajectory, "T_base_gripper, TUM or CSV")->required();
+  verb->add_option("--trajectory", texts.trajectory, "T_base_gripper, TUM or CSV")->required();
   verb->add_option("--times", texts.times,
                    "rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
   CLI::Option* sheet =

@@ -240,18 +240,19 @@ data::Recording import_recording(const ImportSettings& settings) {
   grasp.shape = settings.shape;
   recording.grasps = {grasp};
   recording.crop = settings.crop;
-  const data::Trajectory trajectory = data::load_trajectory(settings.trajectory);
+  const data::Trajectory& trajectory = settings.trajectory;
   if (trajectory.poses.size() < 2)
-    throw data::InputError("--trajectory: " + settings.trajectory + ": found one pose, expected two or more");
+    throw data::InputError("import: found " + std::to_string(trajectory.poses.size()) +
+                           " poses of the gripper, expected two or more");
   recording.trajectories["gripper"] = trajectory;
-  recording.trajectory_paths["gripper"] = settings.trajectory;
+  recording.trajectory_paths["gripper"] = settings.trajectory_path;
 
   import_frames(settings, recording);
   recording.grasps[0].from = grasp_time(trajectory, recording.keyframes.front().time);
   std::vector<double> times;
   for (const data::RecordedKeyframe& keyframe : recording.keyframes) times.push_back(keyframe.time);
   std::vector<std::string> notices = recording.notices;
-  for (const std::string& line : compare_clocks(times, trajectory, settings.trajectory))
+  for (const std::string& line : compare_clocks(times, trajectory, settings.trajectory_path))
     notices.push_back(line);
 
   std::vector<std::string> guesses;

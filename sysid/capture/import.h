@@ -6,6 +6,7 @@
 
 #include "data/mesh.h"
 #include "data/recording.h"
+#include "data/trajectory.h"
 
 namespace flash::sysid {
 
@@ -19,10 +20,11 @@ struct ImportSettings {
       extrinsics;  ///< T_base_camera: "flash-extrinsics/1" JSON, or a TUM file whose first pose counts
   double depth_scale = 0.001;  ///< [m] a count
 
-  std::vector<double> times;  ///< one a frame, increasing [s]; empty: 10 a second, and a notice
-  std::string trajectory;     ///< T_base_gripper, TUM or CSV
-  std::string mesh_spec;      ///< mesh spec or file that `mesh` came from
-  data::TriangleMesh mesh;    ///< the sheet at rest, in the plane z = 0 [m]
+  std::vector<double> times;    ///< one a frame, increasing [s]; empty: 10 a second, and a notice
+  data::Trajectory trajectory;  ///< T_base_gripper, two poses or more
+  std::string trajectory_path;  ///< where it stands, for messages
+  std::string mesh_spec;        ///< mesh spec or file that `mesh` came from
+  data::TriangleMesh mesh;      ///< the sheet at rest, in the plane z = 0 [m]
   data::GraspSelection grasp{std::array<int, 2>{0, 0}, {}, {}, 0.012};  ///< by the one gripper
   data::GraspShape shape = data::GraspShape::clamp;
   bool tool_at_patch =

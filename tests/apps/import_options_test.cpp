@@ -52,6 +52,7 @@ class ImportOptionsOfAFolder : public testing::Test {
     for (const char* name : {"clouds/2.ply", "clouds/10.pcd", "clouds/11.ply", "clouds/notes.txt"})
       folder_.write(name, "");
     options_.clouds = folder_ / "clouds";
+    options_.trajectory = folder_.write("tcp.tum", "0 0.5 0.1 0.052 0 0 0 1\n1 0.5 0.1 0.1 0 0 0 1\n");
     options_.sheet = "0.2x0.1";
     options_.cell = 0.02;
   }
@@ -78,6 +79,7 @@ TEST_F(ImportOptionsOfAFolder, BecomeValues) {
   EXPECT_EQ(settings.mesh_spec, "sheet:0.2x0.1:0.02");
   EXPECT_EQ(settings.mesh.vertices.rows(), 11 * 6);
   EXPECT_DOUBLE_EQ(settings.grasp.within, 0.024);
+  EXPECT_EQ(settings.trajectory.times, (std::vector<double>{0, 1}));
   options_.times = "rate:4:1";
   options_.within = 0.05;
   read_options(options_, settings);
@@ -95,6 +97,9 @@ TEST_F(ImportOptionsOfAFolder, AreRefusedByTheirNames) {
               }).starts_with("import: --sheet: found \"sheet:0.2:0.02\", expected sheet:WIDTHxHEIGHT"));
   EXPECT_EQ(message_of([](ImportOptions& o) { o.mesh = "sheet:0.2x0.2:0.02"; }),
             "import: expected either --sheet or --mesh");
+  const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
+  EXPECT_EQ(message_of([&](ImportOptions& o) { o.trajectory = one; }),
+            "--trajectory: " + one + ": found one pose, expected two or more");
   EXPECT_EQ(message_of([](ImportOptions& o) { o.clouds = ""; }),
             "import: expected either a folder of clouds or --depth");
   EXPECT_EQ(message_of([](ImportOptions& o) { o.depth = o.clouds, o.clouds = ""; }),

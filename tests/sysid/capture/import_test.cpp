@@ -37,12 +37,17 @@ class ImportFiles : public testing::Test {
     data::save_point_cloud(cloud, folder_ / "clouds/11.ply");
     folder_.write("clouds/notes.txt", "not a cloud");
     settings_.clouds = clouds();
-    settings_.trajectory = folder_ / "tcp.csv";
+    load_gripper();
     set_sheet("sheet:0.2x0.2:0.02", settings_);
     settings_.grasp.within = 0.024;
     settings_.crop.min.z() = 0.055;
     settings_.table_height = 0.05;
     settings_.out = folder_ / "lift";
+  }
+
+  void load_gripper() {
+    settings_.trajectory_path = folder_ / "tcp.csv";
+    settings_.trajectory = data::load_trajectory(settings_.trajectory_path);
   }
 
   std::vector<std::string> clouds() const {
@@ -60,6 +65,7 @@ TEST_F(ImportFiles, TheGraspBeginsByTheClockOfTheFilesWhenTheGripperSetsOff) {
       return data::format_number(first_pose + t) + ",0.5," + y + ",0.052,0,0,0,1\n";
     };
     folder_.write("tcp.csv", "t,tx,ty,tz,qx,qy,qz,qw\n" + pose(0, "0.1") + pose(3, "0.1") + pose(4, "0.15"));
+    load_gripper();
     settings_.times = {first_cloud, first_cloud + 0.1, first_cloud + 0.2};
     settings_.overwrite = true;
     const data::Recording recording = import_recording(settings_);
@@ -220,9 +226,8 @@ TEST_F(ImportFiles, SenselessSettingsAreRefusedByTheirNames) {
   };
   EXPECT_EQ(message([](ImportSettings& o) { o.asset = "nowhere.json"; }),
             "--asset: found \"nowhere.json\", expected a file");
-  const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
-  EXPECT_EQ(message([&](ImportSettings& o) { o.trajectory = one; }),
-            "--trajectory: " + one + ": found one pose, expected two or more");
+  EXPECT_EQ(message([](ImportSettings& o) { o.trajectory = {}; }),
+            "import: found 0 poses of the gripper, expected two or more");
   EXPECT_NE(message([](ImportSettings& o) {
               o.times = {1.764e9, 1.764e9 + 0.1, 1.764e9 + 0.2};
             }).find("expected one clock for both"),
@@ -283,7 +288,8 @@ TEST_P(ImportedClip, StartsNearTheRecordingMadeByHand) {
   const data::TemporaryFolder folder;
   ImportSettings settings;
   settings.clouds = data::files_in_order(clip + "/frames", {".ply"});
-  settings.trajectory = by_hand.trajectory_paths.at("gripper");
+  settings.trajectory_path = by_hand.trajectory_paths.at("gripper");
+  settings.trajectory = data::load_trajectory(settings.trajectory_path);
   const bool twin = std::string(GetParam()).starts_with("twin");
   set_sheet(twin ? "sheet:0.4x0.4:0.01" : "sheet:0.278x0.278:0.01", settings);
   if (twin) {
