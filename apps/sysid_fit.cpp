@@ -12,6 +12,7 @@
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
+#include "apps/prior_option.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
@@ -94,7 +95,7 @@ sysid::FitSettings fit_settings(const FitOptions& options, const sysid::Summary&
     if (!contains(searched, name)) hold(name, found, settings.grid.fixed);
   if (settings.grid.axes.empty()) throw data::InputError("--freeze, --fix: no parameter is left to fit");
   for (const std::string& text : options.priors) {
-    settings.priors.push_back(sysid::parse_prior(text));
+    settings.priors.push_back(parse_prior(text));
     const std::string& name = settings.priors.back().name;
     if (std::none_of(settings.grid.axes.begin(), settings.grid.axes.end(),
                      [&](const sysid::Axis& axis) { return axis.name == name; }))

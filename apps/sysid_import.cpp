@@ -6,12 +6,13 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/import_options.h"
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
-#include "data/import.h"
 #include "data/text.h"
+#include "sysid/capture/import.h"
 
 namespace flash {
 namespace {
@@ -20,7 +21,8 @@ namespace fs = std::filesystem;
 
 struct ImportVerbOptions {
   CommonOptions common;
-  data::ImportOptions import;
+  ImportOptions texts;
+  sysid::ImportSettings settings;
   std::vector<std::string> offset;
   std::string shape = "clamp", tool_at = "corner";
   double within = 0, table_height = 0, heading_degrees = 0;
@@ -42,19 +44,20 @@ Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
 }
 
 int run_import(const CLI::App& verb, ImportVerbOptions options) {
-  data::ImportOptions& import = options.import;
-  import.overwrite = import.accept_unusable = options.common.force;
-  if (!options.offset.empty()) import.nuisance.offset = parse_bounds(options.offset);
-  import.tool_at_patch = options.tool_at == "patch";
-  if (options.shape == "point") import.shape = data::GraspShape::point;
-  if (options.shape == "pinch") import.shape = data::GraspShape::pinch;
-  if (verb.count("--within") > 0) import.within = options.within;
-  if (verb.count("--table-height") > 0) import.table_height = options.table_height;
-  if (verb.count("--heading") > 0) import.heading = options.heading_degrees * M_PI / 180;
+  sysid::ImportSettings& settings = options.settings;
+  settings.overwrite = settings.accept_unusable = options.common.force;
+  if (!options.offset.empty()) settings.nuisance.offset = parse_bounds(options.offset);
+  settings.tool_at_patch = options.tool_at == "patch";
+  if (options.shape == "point") settings.shape = data::GraspShape::point;
+  if (options.shape == "pinch") settings.shape = data::GraspShape::pinch;
+  if (verb.count("--within") > 0) options.texts.within = options.within;
+  if (verb.count("--table-height") > 0) settings.table_height = options.table_height;
+  if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;
+  read_options(options.texts, settings);
 
-  const data::Recording recording = data::import_recording(import);
+  const data::Recording recording = sysid::import_recording(settings);
   for (const std::string& notice : recording.notices) say(options.common, notice);
-  const std::string path = (fs::path(import.out) / "recording.json").string();
+  const std::string path = (fs::path(settings.out) / "recording.json").string();
   if (options.common.json) {
     std::cout << nlohmann::ordered_json{{"recording", path},
                                         {"keyframes", recording.keyframes.size()},
@@ -73,31 +76,32 @@ void add_import_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<ImportVerbOptions>();
   CLI::App* verb = app.add_subcommand(
       "import", "Make a recording from a folder of clouds, or of depth images, and a trajectory");
-  data::ImportOptions& import = options->import;
+  ImportOptions& texts = options->texts;
+  sysid::ImportSettings& settings = options->settings;
   CLI::Option* clouds =
-      verb->add_option("clouds", import.clouds, "Folder of .ply or .pcd, base frame [m], in order of name");
+      verb->add_option("clouds", texts.clouds, "Folder of .ply or .pcd, base frame [m], in order of name");
   CLI::Option* depth =
-      verb->add_option("--depth", import.depth, "Folder of 16-bit depth PNG, in place of clouds")
+      verb->add_option("--depth", texts.depth, "Folder of 16-bit depth PNG, in place of clouds")
           ->excludes(clouds);
-  verb->add_option("--masks", import.masks, "Folder of masks of the same names")->needs(depth);
-  verb->add_option("--intrinsics", import.intrinsics, "camera_info or OpenCV YAML")->needs(depth);
-  verb->add_option("--extrinsics", import.extrinsics, "T_base_camera: flash-extrinsics/1, or a TUM file")
+  verb->add_option("--masks", settings.masks, "Folder of masks of the same names")->needs(depth);
+  verb->add_option("--intrinsics", settings.intrinsics, "camera_info or OpenCV YAML")->needs(depth);
+  verb->add_option("--extrinsics", settings.extrinsics, "T_base_camera: flash-extrinsics/1, or a TUM file")
       ->needs(depth);
-  verb->add_option("--depth-scale", import.depth_scale, "Metres a count")
+  verb->add_option("--depth-scale", settings.depth_scale, "Metres a count")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--trajectory", import.trajectory, "T_base_gripper, TUM or CSV")->required();
-  verb->add_option("--times", import.times,
+  verb->add_option("--trajectory", texts.trajectory, "T_base_gripper, TUM or CSV")->required();
+  verb->add_option("--times", texts.times,
                    "rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
   CLI::Option* sheet =
-      verb->add_option("--sheet", import.sheet,
+      verb->add_option("--sheet", texts.sheet,
                        "WIDTHxHEIGHT [m], as 0.3x0.24; from corner 0,0 or 1,1, seen from above, the "
                        "width is on the right hand");
-  verb->add_option("--mesh", import.mesh, "Mesh specification or file, in place of --sheet")->excludes(sheet);
-  verb->add_option("--cell", import.cell, "Of the sheet's mesh [m]")
+  verb->add_option("--mesh", texts.mesh, "Mesh specification or file, in place of --sheet")->excludes(sheet);
+  verb->add_option("--cell", texts.cell, "Of the sheet's mesh [m]")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--grasp", import.grasp, "corner, corner:I,J, vertices:A,B,... or position")
+  verb->add_option("--grasp", texts.grasp, "corner, corner:I,J, vertices:A,B,... or position")
       ->capture_default_str();
   verb->add_option("--within", options->within, "Size of the grasped patch [m]; without it 1.2 cells")
       ->check(positive_number());
@@ -107,9 +111,9 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--shape", options->shape, "How the patch sits in the fingers")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}))
       ->capture_default_str();
-  verb->add_option("--crop-x", import.crop_x, "LOW:HIGH [m], either may be empty");
-  verb->add_option("--crop-y", import.crop_y, "LOW:HIGH [m], either may be empty");
-  verb->add_option("--crop-z", import.crop_z, "LOW:HIGH [m], either may be empty, as 0.075:");
+  verb->add_option("--crop-x", texts.crop_x, "LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-y", texts.crop_y, "LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-z", texts.crop_z, "LOW:HIGH [m], either may be empty, as 0.075:");
   verb->add_option("--table-height", options->table_height,
                    "[m]; without it from the gripper's start and the crop")
       ->check(any_number());
@@ -119,18 +123,18 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--offset", options->offset, "Bound on the camera's offset, one or x,y,z [m]")
       ->delimiter(',')
       ->check(number_from(0));
-  verb->add_option("--yaw", import.nuisance.yaw, "Bound on the camera's yaw [rad]")->check(number_from(0));
-  verb->add_option("--clock", import.nuisance.time, "Bound on the camera's clock against the robot's [s]")
+  verb->add_option("--yaw", settings.nuisance.yaw, "Bound on the camera's yaw [rad]")->check(number_from(0));
+  verb->add_option("--clock", settings.nuisance.time, "Bound on the camera's clock against the robot's [s]")
       ->check(number_from(0));
-  verb->add_option("--start-yaw", import.nuisance.start_yaw, "Bound on the sheet's turn on the table [rad]")
+  verb->add_option("--start-yaw", settings.nuisance.start_yaw, "Bound on the sheet's turn on the table [rad]")
       ->check(number_from(0));
-  verb->add_option("--table-error", import.nuisance.table_height, "Bound on the table's height [m]")
+  verb->add_option("--table-error", settings.nuisance.table_height, "Bound on the table's height [m]")
       ->check(number_from(0));
-  verb->add_option("--asset", import.asset, "The object");
-  verb->add_option("--kind", import.kind, "corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free")
+  verb->add_option("--asset", settings.asset, "The object");
+  verb->add_option("--kind", settings.kind, "corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free")
       ->capture_default_str();
-  verb->add_option("--name", import.name, "Without it the folder's");
-  verb->add_option("-o,--out", import.out, "Folder of the recording")->required();
+  verb->add_option("--name", settings.name, "Without it the folder's");
+  verb->add_option("-o,--out", settings.out, "Folder of the recording")->required();
   add_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
       "Example:\n"

@@ -1,13 +1,9 @@
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <system_error>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
@@ -17,16 +13,14 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
-#include "sysid/capture/render_depth.h"
-#include "sysid/capture/synth.h"
 #include "sysid/design/plan.h"
+#include "sysid/design/usual_ranges.h"
+#include "sysid/design/virtual_experiment.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/parameter_label.h"
 
 namespace flash {
 namespace {
-
-namespace fs = std::filesystem;
 
 struct PlanOptions {
   CommonOptions common;
@@ -39,89 +33,11 @@ struct PlanOptions {
   std::string out;
 };
 
-// A folder of its own, which nobody else can read; removed with all that is in it.
-struct ScratchFolder {
-  ScratchFolder() {
-    if (mkdtemp(path.data()) == nullptr) throw std::system_error(errno, std::generic_category(), path);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  std::string path = (fs::temp_directory_path() / "flash-plan-XXXXXX").string();
-};
-
-// What may be unknown of a cloth (618 fabrics measured: bending 1 to 110 uN m at 5 and 95 %), unless told.
-const std::vector<std::pair<std::string, std::string>>& usual_ranges() {
-  static const std::vector<std::pair<std::string, std::string>> ranges = {{"young", "0.2:5:2:log"},
-                                                                          {"poisson", "0:0.45:2"},
-                                                                          {"bending", "0.1:10:2:log"},
-                                                                          {"friction", "0.15:0.6:2:log"}};
-  return ranges;
-}
-
-double current_value(const sysid::MaterialBase& base, const std::string& name) {
-  const data::SheetMaterial& m = base.material;
-  if (name == "young") return m.membrane_stiffness / base.thickness.value_or(1.0);
-  if (name == "poisson") return m.poissons_ratio;
-  if (name == "bending") return sysid::make_candidate(base, {}, {}).material.bending_rigidity;
-  if (name == "friction") return m.friction;
-  if (name == "areal_density") return m.areal_density;
-  if (name == "air_drag") return m.air_drag;
-  if (name == "stiffness_damping") return m.stiffness_damping;
-  return 0;
-}
-
 // The parameters asked about; without options the four of a cloth, stiffnesses about those of the asset.
 std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::MaterialBase& base) {
   std::vector<sysid::Axis> axes;
   for (const auto& [name, text] : options.axes) axes.push_back(sysid::parse_axis(name, text));
-  if (!axes.empty()) return axes;
-  for (const auto& [name, text] : usual_ranges()) {
-    axes.push_back(sysid::parse_axis(name, text));
-    if (name == "young" || name == "bending")
-      for (double& value : axes.back().values) value *= current_value(base, name);
-  }
-  return axes;
-}
-
-constexpr double kMotion = 2.0, kLongestExperiment = 3.0;  // of the experiments that synth knows [s]
-
-// A sheet of the recording's size in each of the experiments that synth knows, seen by two cameras.
-sysid::Replay virtual_replay(const std::string& kind, const data::Recording& like,
-                             const data::SheetMaterial& material, const sysid::ReplaySettings& replay,
-                             unsigned seed) {
-  sysid::SynthSettings settings;
-  settings.name = kind;
-  settings.kind = kind;
-  settings.duration = kMotion;
-  settings.rest = kind == "hang" ? kLongestExperiment - kMotion : 0.0;
-  settings.depth_noise = 0;
-  settings.forces = kind == "bar_pull" || kind == "bias_pull" || kind == "drag";
-  settings.seed = seed;
-  const Eigen::Vector3d low = like.mesh.vertices.colwise().minCoeff(),
-                        high = like.mesh.vertices.colwise().maxCoeff();
-  const double size = (high - low).maxCoeff();
-  settings.grasp_within = std::max(0.0201, 0.08 * size);
-  const Eigen::Vector3d target = 0.5 * (low + high) + 0.3 * size * Eigen::Vector3d::UnitZ();
-  sysid::SynthCamera camera;
-  camera.intrinsics.width = 64;
-  camera.intrinsics.height = 48;
-  camera.intrinsics.fx = camera.intrinsics.fy = 55;
-  camera.intrinsics.cx = 31.5;
-  camera.intrinsics.cy = 23.5;
-  for (const Eigen::Vector3d& from : {Eigen::Vector3d(0, -2.25, 1.6), Eigen::Vector3d(1.6, 1.6, 1.4)}) {
-    camera.base_from_camera = sysid::look_at(target + size * from, target, Eigen::Vector3d::UnitZ());
-    settings.cameras.push_back(camera);
-  }
-  data::TriangleMesh mesh = like.mesh;
-  mesh.vertices.rowwise() -= low.transpose();
-  sysid::SynthRecording made = sysid::synthesize(mesh, like.mesh_spec, material, settings, replay.solver);
-  const ScratchFolder scratch;  // after the simulation, so that it stands for a moment only
-  sysid::save_synthetic(made, scratch.path);
-  return sysid::make_replay(data::load_recording(scratch.path), replay);
+  return axes.empty() ? sysid::usual_ranges(base) : axes;
 }
 
 std::string spread_text(const sysid::Axis& axis, double spread) {
@@ -171,11 +87,10 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   settings.grid.axes = axes_of(options, settings.grid.base);
   settings.error = options.error;
   settings.keyframes = options.keyframes;
-  for (const sysid::Axis& axis : settings.grid.axes)
-    settings.at.push_back(
-        std::clamp(current_value(settings.grid.base, axis.name), axis.values.front(), axis.values.back()));
+  settings.at = sysid::values_in_range(settings.grid.base, settings.grid.axes);
   check_output_file(options.out, options.common);
-  sysid::steps_in(kLongestExperiment, options.replay.time_step);  // refused before anything is simulated
+  // Refused before anything is simulated.
+  sysid::steps_in(sysid::longest_virtual_experiment, options.replay.time_step);
 
   const data::SheetMaterial material = sysid::candidate_at(settings.at, settings.grid).material;
   std::vector<sysid::PlannedExperiment> experiments;
@@ -186,12 +101,10 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     sysid::check_job(replays, static_cast<double>(batch), sysid::estimate_batch(replays, batch));
     experiments.push_back(sysid::plan_experiment(recording.name, replays, settings));
   }
-  for (const char* kind : {"corner_lift", "hang", "bar_pull", "bias_pull", "drag"}) {
+  for (const char* kind : sysid::virtual_experiments) {
     say(options.common, std::string("simulating ") + kind);
-    sysid::ReplaySettings own;
-    own.solver = replay.solver;
-    own.threads = threads;
-    const sysid::Replay made = virtual_replay(kind, recordings.front(), material, own, options.common.seed);
+    const sysid::Replay made = sysid::virtual_experiment(kind, recordings.front(), material,
+                                                         {replay.solver, threads, options.common.seed});
     experiments.push_back(sysid::plan_experiment(kind, {made}, settings));
   }
   const std::vector<sysid::Axis>& axes = settings.grid.axes;

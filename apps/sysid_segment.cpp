@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "apps/command_line.h"
+#include "apps/frame_times.h"
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
@@ -75,7 +76,7 @@ std::vector<double> times_of(const SegmentOptions& options, std::size_t frames) 
     throw data::InputError(
         "--trajectory: the frames need times by its clock, expected --times FILE.csv or rate:HZ:START, or "
         "--rate HZ where the first frame is at 0 s");
-  return data::frame_times(times.empty() ? "rate:1" : times, frames);
+  return frame_times(times.empty() ? "rate:1" : times, frames);
 }
 
 void check_lengths(const SegmentOptions& options) {

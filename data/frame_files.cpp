@@ -38,27 +38,6 @@ bool natural_less(const std::string& a, const std::string& b) {
   return a < b;  // they differ in leading zeros
 }
 
-constexpr double kFastest = 1e5;  // frames a second: no camera has more
-
-InputError times_error(const std::string& times, const char* expected) {
-  return InputError("--times: found \"" + times + "\", expected " + expected);
-}
-
-std::vector<double> even_times(const std::string& times, std::size_t frames) {
-  const std::vector<std::string_view> parts = split(times, ":");
-  const std::optional<double> rate = parts.size() >= 2 ? parse_number(parts[1]) : std::nullopt;
-  const std::optional<double> start = parts.size() == 3 ? parse_number(parts[2]) : 0.0;
-  if (!rate || !start || parts.size() > 3 || !(*rate > 0 && *rate <= kFastest) || !std::isfinite(*start))
-    throw times_error(times, "rate:HZ, rate:HZ:START or a CSV file with a column t");
-  std::vector<double> result;
-  for (std::size_t i = 0; i < frames; ++i) {
-    result.push_back(*start + static_cast<double>(i) / *rate);
-    if (!std::isfinite(result[i]) || (i > 0 && !(result[i] > result[i - 1])))
-      throw times_error(times, "a rate by which every frame is later than the one before");
-  }
-  return result;
-}
-
 }  // namespace
 
 std::vector<std::string> files_in_order(const std::string& folder,
@@ -77,9 +56,8 @@ std::vector<std::string> files_in_order(const std::string& folder,
   return files;
 }
 
-std::vector<double> frame_times(const std::string& times, std::size_t frames) {
-  if (times.starts_with("rate:")) return even_times(times, frames);
-  const std::string text = read_file(times);
+std::vector<double> load_frame_times(const std::string& path, std::size_t frames) {
+  const std::string text = read_file(path);
   LineReader lines(text);
   std::string_view line;
   lines.next(line);
@@ -87,7 +65,7 @@ std::vector<double> frame_times(const std::string& times, std::size_t frames) {
   const auto column = std::find_if(names.begin(), names.end(),
                                    [](std::string_view name) { return name == "t" || name == "t_s"; });
   if (column == names.end())
-    throw input_error(times, "header", "found \"" + std::string(line) + "\", expected a column t or t_s");
+    throw input_error(path, "header", "found \"" + std::string(line) + "\", expected a column t or t_s");
   const std::size_t index = static_cast<std::size_t>(column - names.begin());
   std::vector<double> result;
   while (lines.next(line)) {
@@ -96,44 +74,14 @@ std::vector<double> frame_times(const std::string& times, std::size_t frames) {
     const std::optional<double> time =
         cells.size() == names.size() ? parse_number(cells[index]) : std::nullopt;
     if (!time || !std::isfinite(*time) || (!result.empty() && *time <= result.back()))
-      throw input_error(times, "line " + std::to_string(lines.number()),
+      throw input_error(path, "line " + std::to_string(lines.number()),
                         "found \"" + std::string(line) + "\", expected strictly increasing times");
     result.push_back(*time);
   }
   if (result.size() != frames)
-    throw InputError(times + ": found " + std::to_string(result.size()) + " times, expected " +
+    throw InputError(path + ": found " + std::to_string(result.size()) + " times, expected " +
                      std::to_string(frames) + ", one a frame");
   return result;
-}
-
-std::vector<std::string> compare_clocks(const std::vector<double>& times, const Trajectory& trajectory,
-                                        const std::string& path) {
-  if (times.empty() || trajectory.times.empty()) return {};
-  constexpr double rounding = 1e-6;  // of the files [s]
-  const double begin = trajectory.times.front(), end = trajectory.times.back();
-  const auto outside = static_cast<std::size_t>(std::count_if(
-      times.begin(), times.end(), [&](double t) { return t < begin - rounding || t > end + rounding; }));
-  const auto span = [](double from, double to) {
-    char text[64];
-    std::snprintf(text, sizeof text, "%.3f to %.3f s", from, to);
-    return std::string(text);
-  };
-  const std::string spans =
-      "the frames are of " + span(times.front(), times.back()) + ", the trajectory of " + span(begin, end);
-  const std::string of_all = std::to_string(outside) + " of " + std::to_string(times.size()) + " frames";
-  if (2 * outside > times.size())
-    throw InputError(path + ": " + spans + ": " + of_all +
-                     " are outside of it, expected one clock for both (--times)");
-  std::vector<std::string> notices;
-  if (outside > 0)
-    notices.push_back(path + ": " + spans + ": " + of_all +
-                      " are outside of it, and the gripper is taken to stand still there");
-  else if (times.size() > 1 && times.back() - times.front() < 2.0 / 3 * (end - begin))
-    notices.push_back(
-        path + ": " + spans +
-        ", far longer: are the times of the frames right (--times, --rate)? A wrong rate takes the arm "
-        "for cloth");
-  return notices;
 }
 
 std::vector<std::string> find_jumps(const Trajectory& trajectory, const std::string& path) {

@@ -13,15 +13,9 @@ namespace flash::data {
 std::vector<std::string> files_in_order(const std::string& folder,
                                         const std::vector<std::string>& extensions);
 
-/// One time a frame [s], strictly increasing, from "rate:HZ", "rate:HZ:START" or a CSV file with a column t
-/// or t_s. Throws InputError that names --times or the file.
-std::vector<double> frame_times(const std::string& times, std::size_t frames);
-
-/// Whether frames and trajectory were stamped by one clock. Throws InputError, naming the trajectory's
-/// `path`, where more frames lie outside the trajectory than inside; what else is odd is returned for people
-/// to read.
-std::vector<std::string> compare_clocks(const std::vector<double>& times, const Trajectory& trajectory,
-                                        const std::string& path);
+/// One time a frame [s], strictly increasing, from a CSV file with a column t or t_s. Throws InputError that
+/// names the file.
+std::vector<double> load_frame_times(const std::string& path, std::size_t frames);
 
 /// Jumps that no robot makes, faster than 5 m/s, for people to read; at most one line. Empty where there are
 /// none.

@@ -22,12 +22,18 @@ TEST(FrameFiles, NumbersCountInNames) {
             std::string::npos);
 }
 
-TEST(FrameFiles, TimesOfARateHaveAStart) {
-  EXPECT_EQ(frame_times("rate:4:1764000000", 3),
-            (std::vector<double>{1764000000, 1764000000.25, 1764000000.5}));
-  for (const char* wrong :
-       {"rate:", "rate:0", "rate:-1", "rate:nan", "rate:inf", "rate:10:inf", "rate:1:2:3", "rate:10:1e300"})
-    EXPECT_TRUE(input_error_of([&] { frame_times(wrong, 3); }).starts_with("--times: found")) << wrong;
+TEST(FrameFiles, TimesAreAColumnOfAFile) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("times.csv", "frame,t_s\n0,0.01\n1,0.11\n2,0.19\n");
+  EXPECT_EQ(load_frame_times(path, 3), (std::vector<double>{0.01, 0.11, 0.19}));
+  EXPECT_EQ(input_error_of([&] { load_frame_times(path, 2); }),
+            path + ": found 3 times, expected 2, one a frame");
+  folder.write("times.csv", "frame,t\n0,0.01\n1,0.01\n");
+  EXPECT_EQ(input_error_of([&] { load_frame_times(path, 2); }),
+            path + ": line 3: found \"1,0.01\", expected strictly increasing times");
+  folder.write("times.csv", "frame,time\n0,0.01\n");
+  EXPECT_EQ(input_error_of([&] { load_frame_times(path, 1); }),
+            path + ": header: found \"frame,time\", expected a column t or t_s");
 }
 
 Trajectory between(double begin, double end) {
@@ -37,20 +43,6 @@ Trajectory between(double begin, double end) {
     trajectory.poses.emplace_back(Eigen::Translation3d(0.01 * k, 0, 0));
   }
   return trajectory;
-}
-
-TEST(FrameFiles, FramesOfAnotherClockAreRefused) {
-  const std::vector<double> times = frame_times("rate:10", 51);
-  EXPECT_TRUE(compare_clocks(times, between(0, 5), "g.tum").empty());
-  EXPECT_EQ(
-      input_error_of([&] { compare_clocks(times, between(1.764e9, 1.764e9 + 5), "g.tum"); }),
-      "g.tum: the frames are of 0.000 to 5.000 s, the trajectory of 1764000000.000 to 1764000005.000 s: "
-      "51 of 51 frames are outside of it, expected one clock for both (--times)");
-  EXPECT_NE(input_error_of([&] { compare_clocks(times, between(0, 2), "g.tum"); }), "");
-  EXPECT_NE(compare_clocks(times, between(0, 4), "g.tum").at(0).find("10 of 51 frames are outside"),
-            std::string::npos);
-  EXPECT_NE(compare_clocks(frame_times("rate:1000", 51), between(0, 5), "g.tum").at(0).find("far longer"),
-            std::string::npos);
 }
 
 TEST(FrameFiles, JumpsOfATrajectoryAreFound) {

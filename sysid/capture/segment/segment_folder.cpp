@@ -16,6 +16,7 @@
 #include "data/mesh_io.h"
 #include "data/staged_folder.h"
 #include "data/text.h"
+#include "sysid/capture/clocks.h"
 #include "sysid/capture/segment/segment_picture.h"
 
 namespace flash::sysid {
@@ -164,8 +165,7 @@ SegmentedFolder segment_folder(const std::vector<RawView>& views, const std::vec
                                   std::to_string(frames) + ": one a time stamp, the same in every view");
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what it has to say is said here
   SegmentedFolder result;
-  if (settings.gripper)
-    result.warnings = data::compare_clocks(times, *settings.gripper, settings.gripper_path);
+  if (settings.gripper) result.warnings = compare_clocks(times, *settings.gripper, settings.gripper_path);
   for (const RawView& view : views)
     result.warnings.insert(result.warnings.end(), view.warnings.begin(), view.warnings.end());
   if (settings.table_height)

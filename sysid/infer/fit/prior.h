@@ -11,7 +11,4 @@ struct Prior {
   double spread = 2;  ///< of a positive parameter a factor above 1, else a difference
 };
 
-/// "bending=1e-5:2" of `--prior`. Throws data::InputError.
-Prior parse_prior(const std::string& text);
-
 }  // namespace flash::sysid

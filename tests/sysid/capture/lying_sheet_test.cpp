@@ -1,4 +1,4 @@
-#include "data/lying_sheet.h"
+#include "sysid/capture/lying_sheet.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace flash::data {
+namespace flash::sysid {
 namespace {
 
 std::vector<Eigen::Vector2d> points_on(const LyingSheet& sheet) {
@@ -33,4 +33,4 @@ TEST(LyingSheet, FindsItsTurnAndTellsItsSidesApart) {
 }
 
 }  // namespace
-}  // namespace flash::data
+}  // namespace flash::sysid

@@ -2,7 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
-namespace flash::data {
+namespace flash::sysid {
 
 /// A rectangle that lies flat with one corner at `corner`: seen from above and looking along its diagonal
 /// from there, `right` is the length of the edge on the right hand, `left` that of the other.
@@ -19,4 +19,4 @@ double distance_to(const LyingSheet& sheet, const std::vector<Eigen::Vector2d>& 
 /// The same rectangle turned about its corner, by at most 25 degrees, to where it fits the points best.
 LyingSheet turned_to(LyingSheet sheet, const std::vector<Eigen::Vector2d>& points);
 
-}  // namespace flash::data
+}  // namespace flash::sysid

@@ -1,4 +1,4 @@
-#include "data/lying_sheet.h"
+#include "sysid/capture/lying_sheet.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-namespace flash::data {
+namespace flash::sysid {
 
 double distance_to(const LyingSheet& sheet, const std::vector<Eigen::Vector2d>& points) {
   if (points.empty()) return std::numeric_limits<double>::infinity();
@@ -45,4 +45,4 @@ LyingSheet turned_to(LyingSheet sheet, const std::vector<Eigen::Vector2d>& point
   return sheet;
 }
 
-}  // namespace flash::data
+}  // namespace flash::sysid

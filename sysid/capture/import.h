@@ -1,41 +1,41 @@
 #pragma once
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "data/mesh.h"
 #include "data/recording.h"
+#include "data/trajectory.h"
 
-namespace flash::data {
+namespace flash::sysid {
 
-/// What a folder of observations needs to become a recording. Texts are as on the command line.
-struct ImportOptions {
-  std::string clouds;      ///< folder of .ply or .pcd in the base frame, by name, 2 before 10; or
-  std::string depth;       ///< folder of 16-bit .png in the camera frame, with
-  std::string masks;       ///< a folder of masks of the same names, may be empty
-  std::string intrinsics;  ///< camera_info or OpenCV YAML
+/// What observations need to become a recording.
+struct ImportSettings {
+  std::vector<std::string> clouds;  ///< .ply or .pcd in the base frame, in order of time; or
+  std::vector<std::string> depth;   ///< 16-bit .png in the camera frame, in order of time, with
+  std::string masks;                ///< a folder of masks of the same names, may be empty
+  std::string intrinsics;           ///< camera_info or OpenCV YAML
   std::string
       extrinsics;  ///< T_base_camera: "flash-extrinsics/1" JSON, or a TUM file whose first pose counts
   double depth_scale = 0.001;  ///< [m] a count
 
-  std::string trajectory;  ///< T_base_gripper, TUM or CSV
-  std::string times;       ///< "rate:HZ", "rate:HZ:START", or a CSV with a column t or t_s, one line a frame;
-                           ///< empty: 10 a second, and a notice
-  std::string sheet;       ///< "WIDTHxHEIGHT" [m]; or
-  std::string mesh;        ///< mesh spec or file
-  double cell = 0.01;      ///< of the sheet [m]
-  std::string grasp =
-      "corner";  ///< "corner", "corner:I,J", "vertices:A,B,..." or "position": what is near the gripper
-  std::optional<double> within;  ///< [m]; empty: 1.2 cells
+  std::vector<double> times;    ///< one a frame, increasing [s]; empty: 10 a second, and a notice
+  data::Trajectory trajectory;  ///< T_base_gripper, two poses or more
+  std::string trajectory_path;  ///< where it stands, for messages
+  std::string mesh_spec;        ///< mesh spec or file that `mesh` came from
+  data::TriangleMesh mesh;      ///< the sheet at rest, in the plane z = 0 [m]
+  data::GraspSelection grasp{std::array<int, 2>{0, 0}, {}, {}, 0.012};  ///< by the one gripper
+  data::GraspShape shape = data::GraspShape::clamp;
   bool tool_at_patch =
       false;  ///< the middle of the grasped patch is at the tool centre point, not the corner
-  GraspShape shape = GraspShape::clamp;
-  std::string crop_x, crop_y, crop_z;  ///< "LOW:HIGH" [m], either side may be empty
+  data::CropBox crop;
   std::optional<double>
       table_height;  ///< [m]; empty: the lower of the gripper's start and the crop's lower end
   /// Heading of the sheet's diagonal from the grasped corner, about z from x [rad]; empty: towards the
   /// clouds.
   std::optional<double> heading;
-  NuisanceBounds nuisance;
+  data::NuisanceBounds nuisance;
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
   std::string asset;                     ///< file, may be empty
   std::string kind = "corner_lift";
@@ -49,6 +49,6 @@ struct ImportOptions {
 /// check it. The start pose is a guess: flat on the table, the grasped corner under the gripper, the diagonal
 /// along `heading`; notices say what was guessed, and where first clouds, of a sheet that still lies, fit it
 /// better with its sides changed over. Throws InputError, and leaves nothing behind, where the check fails.
-Recording import_recording(const ImportOptions& options);
+data::Recording import_recording(const ImportSettings& settings);
 
-}  // namespace flash::data
+}  // namespace flash::sysid

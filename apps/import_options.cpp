@@ -1,0 +1,129 @@
+#include "apps/import_options.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <vector>
+
+#include "apps/frame_times.h"
+#include "data/error.h"
+#include "data/frame_files.h"
+#include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
+#include "data/text.h"
+#include "data/trajectory.h"
+
+namespace flash {
+namespace {
+
+constexpr double kLargestSheet = 20;  // above it, millimetres were given for metres [m]
+
+data::InputError option_error(const char* option, const std::string& found, const std::string& expected) {
+  return data::InputError("--" + std::string(option) + ": found \"" + found + "\", expected " + expected);
+}
+
+std::vector<std::string> files_in(const std::string& folder, const std::vector<std::string>& extensions,
+                                  const char* option) {
+  std::vector<std::string> files = data::files_in_order(folder, extensions);
+  if (files.empty())
+    throw data::InputError(folder + ": found no " + extensions.front() + " files for --" + option);
+  return files;
+}
+
+void parse_range(const std::string& range, const char* option, int axis, data::CropBox& crop) {
+  if (range.empty()) return;
+  const std::vector<std::string_view> ends = data::split(range, ":");
+  const auto parse = [&](std::string_view end, double& bound) {
+    if (end.empty()) return;
+    const std::optional<double> value = data::parse_number(end);
+    if (!value) throw option_error(option, range, "LOW:HIGH in metres, either side may be empty");
+    bound = *value;
+  };
+  if (ends.size() != 2) throw option_error(option, range, "LOW:HIGH in metres, either side may be empty");
+  parse(ends[0], crop.min[axis]);
+  parse(ends[1], crop.max[axis]);
+  if (!(crop.min[axis] < crop.max[axis])) throw option_error(option, range, "a low end below the high one");
+}
+
+std::string mesh_spec(const ImportOptions& options) {
+  if (options.sheet.empty() == options.mesh.empty())
+    throw data::InputError("import: expected either --sheet or --mesh");
+  return options.mesh.empty() ? "sheet:" + options.sheet + ":" + data::format_number(options.cell)
+                              : options.mesh;
+}
+
+data::TriangleMesh load_mesh(const ImportOptions& options, const std::string& spec) {
+  const bool sheet = options.mesh.empty();
+  data::TriangleMesh mesh = data::is_mesh_spec(spec)
+                                ? data::parse_mesh_spec(spec, "import", sheet ? "--sheet" : "--mesh")
+                                : data::load_triangle_mesh(spec);
+  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff();
+  if (size.norm() > kLargestSheet)
+    throw option_error(sheet ? "sheet" : "mesh", sheet ? options.sheet : options.mesh,
+                       "metres (millimetres read as metres?)");
+  const double shorter = size.head<2>().minCoeff();
+  if (sheet && options.cell > shorter)
+    throw option_error("cell", data::format_number(options.cell),
+                       "at most the shorter side of the sheet, " + data::format_short(shorter) + " m");
+  return mesh;
+}
+
+data::Trajectory load_gripper(const std::string& path) {
+  data::Trajectory trajectory = data::load_trajectory(path);
+  if (trajectory.poses.size() < 2)
+    throw data::InputError("--trajectory: " + path + ": found one pose, expected two or more");
+  return trajectory;
+}
+
+}  // namespace
+
+data::GraspSelection parse_grasp(const std::string& text) {
+  data::GraspSelection grasp;
+  const std::size_t colon = std::min(text.find(':'), text.size());
+  const std::string kind = text.substr(0, colon);
+  std::vector<int> indices;
+  if (colon < text.size())
+    for (const std::string_view word : data::split(std::string_view(text).substr(colon + 1), ",")) {
+      const std::optional<long> index = data::parse_integer(word);
+      if (!index || *index < 0) throw option_error("grasp", text, "whole numbers from 0 after the colon");
+      indices.push_back(data::to_index(static_cast<double>(*index)));
+    }
+  if (kind == "corner" && (indices.empty() || (indices.size() == 2 && indices[0] <= 1 && indices[1] <= 1))) {
+    grasp.corner = indices.empty() ? std::array<int, 2>{0, 0} : std::array<int, 2>{indices[0], indices[1]};
+  } else if (kind == "vertices" && !indices.empty()) {
+    grasp.vertices = indices;
+  } else if (text == "position") {
+    grasp.position = Eigen::Vector3d::Zero();
+  } else {
+    throw option_error("grasp", text, "corner, corner:I,J with I and J 0 or 1, vertices:A,B,... or position");
+  }
+  return grasp;
+}
+
+data::CropBox parse_crop(const ImportOptions& options) {
+  data::CropBox crop;
+  parse_range(options.crop_x, "crop-x", 0, crop);
+  parse_range(options.crop_y, "crop-y", 1, crop);
+  parse_range(options.crop_z, "crop-z", 2, crop);
+  return crop;
+}
+
+void read_options(const ImportOptions& options, sysid::ImportSettings& settings) {
+  settings.mesh_spec = mesh_spec(options);
+  settings.mesh = load_mesh(options, settings.mesh_spec);
+  settings.grasp = parse_grasp(options.grasp);
+  settings.grasp.within = options.within.value_or(1.2 * options.cell);
+  settings.crop = parse_crop(options);
+  settings.trajectory = load_gripper(options.trajectory);
+  settings.trajectory_path = options.trajectory;
+  if (options.clouds.empty() == options.depth.empty())
+    throw data::InputError("import: expected either a folder of clouds or --depth");
+  if (!options.clouds.empty()) settings.clouds = files_in(options.clouds, {".ply", ".pcd"}, "clouds");
+  if (!options.depth.empty()) settings.depth = files_in(options.depth, {".png"}, "depth");
+  if (!options.times.empty())
+    settings.times = frame_times(options.times, settings.clouds.size() + settings.depth.size());
+  if (!options.depth.empty() && (settings.intrinsics.empty() || settings.extrinsics.empty()))
+    throw data::InputError("import: --depth needs --intrinsics and --extrinsics");
+}
+
+}  // namespace flash

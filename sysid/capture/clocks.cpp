@@ -1,0 +1,40 @@
+#include "sysid/capture/clocks.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "data/error.h"
+
+namespace flash::sysid {
+
+std::vector<std::string> compare_clocks(const std::vector<double>& times, const data::Trajectory& trajectory,
+                                        const std::string& path) {
+  if (times.empty() || trajectory.times.empty()) return {};
+  constexpr double rounding = 1e-6;  // of the files [s]
+  const double begin = trajectory.times.front(), end = trajectory.times.back();
+  const auto outside = static_cast<std::size_t>(std::count_if(
+      times.begin(), times.end(), [&](double t) { return t < begin - rounding || t > end + rounding; }));
+  const auto span = [](double from, double to) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.3f to %.3f s", from, to);
+    return std::string(text);
+  };
+  const std::string spans =
+      "the frames are of " + span(times.front(), times.back()) + ", the trajectory of " + span(begin, end);
+  const std::string of_all = std::to_string(outside) + " of " + std::to_string(times.size()) + " frames";
+  if (2 * outside > times.size())
+    throw data::InputError(path + ": " + spans + ": " + of_all +
+                           " are outside of it, expected one clock for both (--times)");
+  std::vector<std::string> notices;
+  if (outside > 0)
+    notices.push_back(path + ": " + spans + ": " + of_all +
+                      " are outside of it, and the gripper is taken to stand still there");
+  else if (times.size() > 1 && times.back() - times.front() < 2.0 / 3 * (end - begin))
+    notices.push_back(
+        path + ": " + spans +
+        ", far longer: are the times of the frames right (--times, --rate)? A wrong rate takes the arm "
+        "for cloth");
+  return notices;
+}
+
+}  // namespace flash::sysid

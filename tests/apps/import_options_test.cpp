@@ -1,0 +1,113 @@
+#include "apps/import_options.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+
+#include "tests/data/temporary_folder.h"
+
+namespace flash {
+namespace {
+
+constexpr double kOpen = std::numeric_limits<double>::infinity();
+
+TEST(ImportOptions, AGraspIsACornerVerticesOrAPosition) {
+  EXPECT_EQ(parse_grasp("corner").corner, (std::array<int, 2>{0, 0}));
+  EXPECT_EQ(parse_grasp("corner:0,1").corner, (std::array<int, 2>{0, 1}));
+  EXPECT_EQ(parse_grasp("vertices:3,1").vertices, (std::vector<int>{3, 1}));
+  EXPECT_EQ(parse_grasp("position").position, Eigen::Vector3d(Eigen::Vector3d::Zero()));
+  for (const char* wrong : {"corner:0,2", "corner:1", "vertices", "position:1", "edge", ""})
+    EXPECT_EQ(data::input_error_of([&] { parse_grasp(wrong); }),
+              "--grasp: found \"" + std::string(wrong) +
+                  "\", expected corner, corner:I,J with I and J 0 or 1, vertices:A,B,... or position");
+  for (const char* wrong : {"vertices:1,x", "corner:-1,0", "vertices:"})
+    EXPECT_EQ(data::input_error_of([&] { parse_grasp(wrong); }),
+              "--grasp: found \"" + std::string(wrong) + "\", expected whole numbers from 0 after the colon");
+}
+
+TEST(ImportOptions, EitherSideOfACropMayBeOpen) {
+  ImportOptions options;
+  options.crop_x = "-0.1:0.2";
+  options.crop_y = ":0.3";
+  options.crop_z = "0.075:";
+  const data::CropBox crop = parse_crop(options);
+  EXPECT_EQ(crop.min, Eigen::Vector3d(-0.1, -kOpen, 0.075));
+  EXPECT_EQ(crop.max, Eigen::Vector3d(0.2, 0.3, kOpen));
+  options.crop_z = "0.5:0.1";
+  EXPECT_EQ(data::input_error_of([&] { parse_crop(options); }),
+            "--crop-z: found \"0.5:0.1\", expected a low end below the high one");
+  for (const char* wrong : {"1", "1:2:3", "low:1"}) {
+    options.crop_x = wrong;
+    EXPECT_EQ(data::input_error_of([&] { parse_crop(options); }),
+              "--crop-x: found \"" + std::string(wrong) +
+                  "\", expected LOW:HIGH in metres, either side may be empty");
+  }
+}
+
+/// A folder with three frames, and options that can be used.
+class ImportOptionsOfAFolder : public testing::Test {
+ protected:
+  ImportOptionsOfAFolder() {
+    for (const char* name : {"clouds/2.ply", "clouds/10.pcd", "clouds/11.ply", "clouds/notes.txt"})
+      folder_.write(name, "");
+    options_.clouds = folder_ / "clouds";
+    options_.trajectory = folder_.write("tcp.tum", "0 0.5 0.1 0.052 0 0 0 1\n1 0.5 0.1 0.1 0 0 0 1\n");
+    options_.sheet = "0.2x0.1";
+    options_.cell = 0.02;
+  }
+
+  template <class Change>
+  std::string message_of(const Change& change) const {
+    ImportOptions options = options_;
+    change(options);
+    sysid::ImportSettings settings;
+    return data::input_error_of([&] { read_options(options, settings); });
+  }
+
+  data::TemporaryFolder folder_;
+  ImportOptions options_;
+};
+
+TEST_F(ImportOptionsOfAFolder, BecomeValues) {
+  sysid::ImportSettings settings;
+  read_options(options_, settings);
+  EXPECT_EQ(settings.clouds, (std::vector<std::string>{folder_ / "clouds/2.ply", folder_ / "clouds/10.pcd",
+                                                       folder_ / "clouds/11.ply"}));
+  EXPECT_TRUE(settings.depth.empty());
+  EXPECT_TRUE(settings.times.empty());
+  EXPECT_EQ(settings.mesh_spec, "sheet:0.2x0.1:0.02");
+  EXPECT_EQ(settings.mesh.vertices.rows(), 11 * 6);
+  EXPECT_DOUBLE_EQ(settings.grasp.within, 0.024);
+  EXPECT_EQ(settings.trajectory.times, (std::vector<double>{0, 1}));
+  options_.times = "rate:4:1";
+  options_.within = 0.05;
+  read_options(options_, settings);
+  EXPECT_EQ(settings.times, (std::vector<double>{1, 1.25, 1.5}));
+  EXPECT_EQ(settings.grasp.within, 0.05);
+}
+
+TEST_F(ImportOptionsOfAFolder, AreRefusedByTheirNames) {
+  EXPECT_EQ(message_of([](ImportOptions& o) { o.cell = 100; }),
+            "--cell: found \"100\", expected at most the shorter side of the sheet, 0.1 m");
+  EXPECT_EQ(message_of([](ImportOptions& o) { o.sheet = "200x200", o.cell = 10; }),
+            "--sheet: found \"200x200\", expected metres (millimetres read as metres?)");
+  EXPECT_TRUE(message_of([](ImportOptions& o) {
+                o.sheet = "0.2";
+              }).starts_with("import: --sheet: found \"sheet:0.2:0.02\", expected sheet:WIDTHxHEIGHT"));
+  EXPECT_EQ(message_of([](ImportOptions& o) { o.mesh = "sheet:0.2x0.2:0.02"; }),
+            "import: expected either --sheet or --mesh");
+  const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
+  EXPECT_EQ(message_of([&](ImportOptions& o) { o.trajectory = one; }),
+            "--trajectory: " + one + ": found one pose, expected two or more");
+  EXPECT_EQ(message_of([](ImportOptions& o) { o.clouds = ""; }),
+            "import: expected either a folder of clouds or --depth");
+  EXPECT_EQ(message_of([](ImportOptions& o) { o.depth = o.clouds, o.clouds = ""; }),
+            options_.clouds + ": found no .png files for --depth");
+  folder_.write("depth/a.png", "");
+  EXPECT_EQ(message_of([&](ImportOptions& o) { o.depth = folder_ / "depth", o.clouds = ""; }),
+            "import: --depth needs --intrinsics and --extrinsics");
+}
+
+}  // namespace
+}  // namespace flash
