@@ -207,8 +207,9 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
       make_replays(recordings, replay_settings(verb, options.replay, threads), options.common);
 
   std::vector<std::string> notices;
-  const sysid::GridSettings settings =
-      grid_settings(options, material_base(asset, replays.front().sheet().rest, notices), threads);
+  const sysid::GridSettings settings = grid_settings(
+      options, material_base(asset, replays.front().sheet().rest, notices, parse_fixed(options.fixed)),
+      threads);
   sysid::check_grasp_axes(settings.axes, replays);
   sysid::check_grasp_axes(settings.fixed, replays);
   if (!options.no_solver_check)  // which halves the step

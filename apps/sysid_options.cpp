@@ -54,6 +54,28 @@ void set_sigma(const std::string& assignment, sysid::Objective& objective) {
   *sigma = *value;
 }
 
+/// As though the asset itself held the constants.
+data::Asset with_fixed(data::Asset asset, const std::vector<sysid::Axis>& fixed) {
+  for (const sysid::Axis& axis : fixed) {
+    const double value = axis.values.front();
+    if (axis.name == "young") asset.young = value;
+    if (axis.name == "poisson") asset.poisson = value;
+    if (axis.name == "bending") {
+      asset.bending_rigidity = value;
+      if (asset.published_bending.has_value() && !asset.bending_model)
+        asset.bending_model = data::BendingModel::isometric;
+      asset.published_bending.reset();
+    }
+    if (axis.name == "areal_density") {
+      asset.areal_density = value;
+      for (std::optional<double>* other : {&asset.density, &asset.mass, &asset.object_mass}) other->reset();
+    }
+    for (const char* name : {"young", "poisson", "bending", "areal_density"})
+      if (axis.name == name) asset.source += " --fix " + axis.name + "=" + data::format_short(value);
+  }
+  return asset;
+}
+
 }  // namespace
 
 void add_common_options(CLI::App& verb, CommonOptions& options, const char* force) {
@@ -265,10 +287,11 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
 }
 
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
-                                  std::vector<std::string>& notices) {
+                                  std::vector<std::string>& notices, const std::vector<sysid::Axis>& fixed) {
   const double area = sim::make_sheet(mesh).vertex_area.sum();
   const data::ResolvedSheet resolved = data::resolve_sheet(asset, area);
-  notices.insert(notices.end(), resolved.notices.begin(), resolved.notices.end());
+  const std::vector<std::string> said = data::resolve_sheet(with_fixed(asset, fixed), area).notices;
+  notices.insert(notices.end(), said.begin(), said.end());
   sysid::MaterialBase base;
   base.material = resolved.material;
   base.thickness = asset.thickness;

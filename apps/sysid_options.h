@@ -85,9 +85,11 @@ std::vector<data::Recording> load_recordings(const std::vector<std::string>& pat
 /// The asset named on the command line or, without one, by the recording.
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
 
-/// The asset's material; what was understood is appended to `notices`.
+/// The asset's material; what was understood, with `fixed` in place of the asset's values, is appended to
+/// `notices`.
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
-                                  std::vector<std::string>& notices);
+                                  std::vector<std::string>& notices,
+                                  const std::vector<sysid::Axis>& fixed = {});
 
 /// Progress with rate and time left on stderr: one line drawn over itself on a terminal, elsewhere a line
 /// each tenth of the way (at most one a second) or half a minute. Silent with --quiet.
