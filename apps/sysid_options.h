@@ -6,6 +6,7 @@
 
 #include "data/asset.h"
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/answer_work.h"
 #include "sysid/replay/replay.h"
 
 namespace flash {
@@ -98,10 +99,12 @@ class ProgressLine {
   explicit ProgressLine(const CommonOptions& options);
   ~ProgressLine();
   void show(const sysid::Progress& progress);
+  void show(const sysid::AnswerMeter& meter);
 
  private:
   using Clock = std::chrono::steady_clock;
-  bool due(const sysid::Progress& progress);
+  bool due(int done, int total);
+  void draw(const std::string& line);
 
   bool visible_, terminal_;
   bool drawn_ = false;

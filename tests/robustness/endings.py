@@ -267,9 +267,8 @@ def main():
         folder = pathlib.Path(temporary)
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
-        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume, check_fixed,
-                      check_killed_replay,
-                      *([check_fit] if options.calib else [])):
+        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume,
+                      check_fixed, check_killed_replay, *([check_fit] if options.calib else [])):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds
