@@ -33,17 +33,10 @@ int run_export(const ExportOptions& options) {
   std::vector<std::string> notices;
   const data::TriangleMesh mesh = data::load_asset_mesh(tuned);
   const double area = sim::make_sheet(mesh).vertex_area.sum();
-  if (!summary.settings.contains("object_mesh")) {
-    warn(
-        "summary.json is of an earlier program and does not say which sheet was identified: mesh and mass "
-        "are "
-        "those of " +
-        base.source);
-  } else if (tuned.mesh != base.mesh) {
+  if (tuned.mesh != base.mesh)
     say(options.common, "mesh and mass are those of the sheet in the recording, " + tuned.mesh + " (" +
                             data::format_short(area * *tuned.areal_density) + " kg), not those of " +
                             base.source);
-  }
   const auto format =
       options.format == "published" ? data::AssetFormat::published : data::AssetFormat::flash_1;
   data::save_asset(data::express_as(tuned, format, area, notices), options.out);

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <mutex>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
@@ -17,6 +18,7 @@
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
 #include "sysid/infer/answer.h"
+#include "sysid/infer/refine.h"
 #include "sysid/report/overlay.h"
 #include "sysid/report/parameter_label.h"
 #include "sysid/report/recording_names.h"
@@ -169,6 +171,26 @@ void write_results(const sysid::Summary& summary, const sysid::GridResults& resu
   sysid::write_report(summary, results, overlays, report, (fs::path(options.out) / "report.html").string());
 }
 
+/// Shows how far the answer is, told by any thread.
+class AnswerLine {
+ public:
+  AnswerLine(const CommonOptions& options, const sysid::AnswerWork& most) : line_(options), meter_(most) {}
+
+  void take(const sysid::AnswerWork& done, const sysid::AnswerWork& spared) {
+    const std::scoped_lock lock(mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    meter_.take(done, spared, std::chrono::duration<double>(now - last_).count());
+    last_ = now;
+    line_.show(meter_);
+  }
+
+ private:
+  std::mutex mutex_;
+  ProgressLine line_;
+  sysid::AnswerMeter meter_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
 // Judges what was found and writes the answer.
 int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
              const sysid::GridSettings& settings, const sysid::ResultsStore& store,
@@ -179,7 +201,12 @@ int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
   asked.horizon = !options.no_horizon;
   asked.solver_check = !options.no_solver_check;
-  const sysid::Answer answer = sysid::find_answer(results, replays, settings, asked);
+  const sysid::Answer answer = [&] {
+    AnswerLine line(options.common, sysid::most_work(settings, replays.size(), asked.solver_check));
+    return sysid::find_answer(
+        results, replays, settings, asked,
+        [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
+  }();
   sysid::Summary summary = sysid::summarize(results, answer, replays, settings, asked);
   summary.asset = fs::absolute(asset.source).lexically_normal().string();
   summary.device = device;
@@ -207,8 +234,9 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
       make_replays(recordings, replay_settings(verb, options.replay, threads), options.common);
 
   std::vector<std::string> notices;
-  const sysid::GridSettings settings =
-      grid_settings(options, material_base(asset, replays.front().sheet().rest, notices), threads);
+  const sysid::GridSettings settings = grid_settings(
+      options, material_base(asset, replays.front().sheet().rest, notices, parse_fixed(options.fixed)),
+      threads);
   sysid::check_grasp_axes(settings.axes, replays);
   sysid::check_grasp_axes(settings.fixed, replays);
   if (!options.no_solver_check)  // which halves the step
@@ -230,6 +258,13 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
           data::format_count(static_cast<std::size_t>(replays.front().sheet().rest.vertices.rows())) +
           " vertices, " + std::to_string(threads) + " threads, about " +
           data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) + " MB of memory");
+  if (!settings.rollouts.empty()) {
+    const sysid::AnswerWork most = sysid::most_work(settings, replays.size(), !options.no_solver_check);
+    say(options.common, "then the answer: at most " +
+                            data::format_count(static_cast<std::size_t>(most.motions)) +
+                            " motions more and " + data::format_count(static_cast<std::size_t>(most.scores)) +
+                            " scores between them");
+  }
   const auto kept = [&] {
     warn("stopped with " + data::format_count(store.results().candidates.size()) + " of " +
          data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) +

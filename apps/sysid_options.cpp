@@ -54,6 +54,28 @@ void set_sigma(const std::string& assignment, sysid::Objective& objective) {
   *sigma = *value;
 }
 
+/// As though the asset itself held the constants.
+data::Asset with_fixed(data::Asset asset, const std::vector<sysid::Axis>& fixed) {
+  for (const sysid::Axis& axis : fixed) {
+    const double value = axis.values.front();
+    if (axis.name == "young") asset.young = value;
+    if (axis.name == "poisson") asset.poisson = value;
+    if (axis.name == "bending") {
+      asset.bending_rigidity = value;
+      if (asset.published_bending.has_value() && !asset.bending_model)
+        asset.bending_model = data::BendingModel::isometric;
+      asset.published_bending.reset();
+    }
+    if (axis.name == "areal_density") {
+      asset.areal_density = value;
+      for (std::optional<double>* other : {&asset.density, &asset.mass, &asset.object_mass}) other->reset();
+    }
+    for (const char* name : {"young", "poisson", "bending", "areal_density"})
+      if (axis.name == name) asset.source += " --fix " + axis.name + "=" + data::format_short(value);
+  }
+  return asset;
+}
+
 }  // namespace
 
 void add_common_options(CLI::App& verb, CommonOptions& options, const char* force) {
@@ -265,10 +287,11 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
 }
 
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
-                                  std::vector<std::string>& notices) {
+                                  std::vector<std::string>& notices, const std::vector<sysid::Axis>& fixed) {
   const double area = sim::make_sheet(mesh).vertex_area.sum();
   const data::ResolvedSheet resolved = data::resolve_sheet(asset, area);
-  notices.insert(notices.end(), resolved.notices.begin(), resolved.notices.end());
+  const std::vector<std::string> said = data::resolve_sheet(with_fixed(asset, fixed), area).notices;
+  notices.insert(notices.end(), said.begin(), said.end());
   sysid::MaterialBase base;
   base.material = resolved.material;
   base.thickness = asset.thickness;
@@ -283,9 +306,10 @@ ProgressLine::~ProgressLine() {
   if (drawn_) std::cerr << '\n';
 }
 
-bool ProgressLine::due(const sysid::Progress& progress) {
-  if (terminal_ || progress.done == progress.total) return true;
-  const int tenths = 10 * progress.done / std::max(1, progress.total);
+bool ProgressLine::due(int done, int total) {
+  if (!visible_) return false;
+  if (terminal_ || done == total) return true;
+  const int tenths = static_cast<int>(10.0 * done / std::max(1, total));
   const double since = std::chrono::duration<double>(Clock::now() - last_).count();
   if (since < 30 && (tenths == tenths_ || since < 1)) return false;
   tenths_ = tenths;
@@ -293,13 +317,29 @@ bool ProgressLine::due(const sysid::Progress& progress) {
 }
 
 void ProgressLine::show(const sysid::Progress& progress) {
-  if (!visible_ || !due(progress)) return;
-  last_ = Clock::now();
-  drawn_ = terminal_;
+  if (!due(progress.done, progress.total)) return;
   char line[160];
   std::snprintf(line, sizeof line, "%d of %d candidates, %.2f/s, %s left, best %.2f mm", progress.done,
                 progress.total, progress.candidates_per_second, duration_text(progress.seconds_left).c_str(),
                 1000 * progress.best_score);
+  draw(line);
+}
+
+void ProgressLine::show(const sysid::AnswerMeter& meter) {
+  const auto [done, most] = std::pair(meter.done(), meter.most());
+  if (!due(done.motions + done.scores, most.motions + most.scores)) return;
+  const auto part = [](int count, int of, const std::string& what) {
+    return data::format_count(static_cast<std::size_t>(count)) + " of at most " +
+           data::format_count(static_cast<std::size_t>(of)) + what;
+  };
+  draw("the answer: " + part(done.motions, most.motions, " motions, ") +
+       part(done.scores, most.scores, " scores between them, at most ") +
+       duration_text(meter.seconds_left()) + " left" + (done.scores == 0 ? " and the scores" : ""));
+}
+
+void ProgressLine::draw(const std::string& line) {
+  last_ = Clock::now();
+  drawn_ = terminal_;
   std::cerr << (terminal_ ? "\r" : "") << line << (terminal_ ? "\033[K" : "\n") << std::flush;
 }
 

@@ -6,6 +6,7 @@
 
 #include "data/asset.h"
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/answer_work.h"
 #include "sysid/replay/replay.h"
 
 namespace flash {
@@ -85,9 +86,11 @@ std::vector<data::Recording> load_recordings(const std::vector<std::string>& pat
 /// The asset named on the command line or, without one, by the recording.
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
 
-/// The asset's material; what was understood is appended to `notices`.
+/// The asset's material; what was understood, with `fixed` in place of the asset's values, is appended to
+/// `notices`.
 sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
-                                  std::vector<std::string>& notices);
+                                  std::vector<std::string>& notices,
+                                  const std::vector<sysid::Axis>& fixed = {});
 
 /// Progress with rate and time left on stderr: one line drawn over itself on a terminal, elsewhere a line
 /// each tenth of the way (at most one a second) or half a minute. Silent with --quiet.
@@ -96,10 +99,12 @@ class ProgressLine {
   explicit ProgressLine(const CommonOptions& options);
   ~ProgressLine();
   void show(const sysid::Progress& progress);
+  void show(const sysid::AnswerMeter& meter);
 
  private:
   using Clock = std::chrono::steady_clock;
-  bool due(const sysid::Progress& progress);
+  bool due(int done, int total);
+  void draw(const std::string& line);
 
   bool visible_, terminal_;
   bool drawn_ = false;

@@ -130,8 +130,8 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;
-  const sysid::MaterialBase base = material_base(asset, replay.sheet().rest, notices);
   const std::vector<sysid::Axis> axes = parse_fixed(options.fixed);
+  const sysid::MaterialBase base = material_base(asset, replay.sheet().rest, notices, axes);
   sysid::check_grasp_axes(axes, {replay});
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());

@@ -94,8 +94,8 @@ int run_synth(SynthOptions options) {
                                   : data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
                                                                   : data::load_triangle_mesh(mesh_spec);
   std::vector<std::string> notices;
-  const sysid::MaterialBase base = material_base(asset, mesh, notices);
   const std::vector<sysid::Axis> axes = parse_fixed(options.fixed);
+  const sysid::MaterialBase base = material_base(asset, mesh, notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
   check_output(options.out, options.common);

@@ -5,21 +5,28 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/sha256.h"
 
 namespace flash::sysid {
 namespace {
 
 constexpr const char* kSchema = "flash-sysid-grid/1";
 
-}  // namespace
-
-void save_grid_file(const GridFile& grid, const std::string& path) {
+std::string text_of(const GridFile& grid) {
   nlohmann::json json = {{"schema", kSchema}, {"recordings", grid.recordings}};
   if (grid.fingerprint) json["fingerprint"] = *grid.fingerprint;
   json["axes"] = nlohmann::json::array();
   for (const Axis& axis : grid.axes)
     json["axes"].push_back({{"name", axis.name}, {"values", axis.values}, {"log", axis.logarithmic}});
-  data::write_atomically(path, json.dump(1) + "\n");
+  return json.dump(1) + "\n";
+}
+
+}  // namespace
+
+std::string search_digest(const GridFile& grid) { return data::sha256(text_of(grid)); }
+
+void save_grid_file(const GridFile& grid, const std::string& path) {
+  data::write_atomically(path, text_of(grid));
 }
 
 GridFile load_grid_file(const std::string& path) {

@@ -18,6 +18,9 @@ struct GridFile {
   std::optional<Fingerprint> fingerprint;  ///< of inputs and settings; earlier programs wrote none
 };
 
+/// SHA-256 of all that grid.json says: what a search is told from others by.
+std::string search_digest(const GridFile& grid);
+
 void save_grid_file(const GridFile& grid, const std::string& path);
 
 /// Throws data::InputError naming the file and what it lacks.

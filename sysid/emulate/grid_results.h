@@ -43,6 +43,7 @@ struct CandidateResult {
   double penetration_max = 0;  ///< [m]
   CandidateStatus status = CandidateStatus::ok;
   std::vector<RecordingScore> recordings;
+  std::string digest;  ///< of its lines in the tables (candidate_lines.h); empty before they are written
 };
 
 /// Everything a search found; candidates in order of id.

@@ -10,6 +10,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "sysid/emulate/candidate_lines.h"
 #include "sysid/emulate/grid_file.h"
 #include "sysid/emulate/results_table.h"
 #include "sysid/observe/registration_parameter.h"
@@ -86,13 +87,14 @@ CandidateResult read_result(const Row& row, const GridFile& grid) {
 class ScoreReader {
  public:
   ScoreReader(const std::string& folder, const std::vector<std::string>& recordings, CutLine cut)
-      : registrations_(path_of(folder, "registrations.csv"), cut),
-        keyframes_(path_of(folder, "keyframes.csv"), cut),
+      : registrations_(path_of(folder, "registrations.csv"), registrations_columns(), cut),
+        keyframes_(path_of(folder, "keyframes.csv"), keyframes_columns(), cut),
         names_(recordings),
         observed_(recordings.size()) {}
 
   /// Those of `result`, which are next in both files. False where one of them ends before.
   bool read(CandidateResult& result) {
+    lines_ = {};
     for (std::size_t r = 0; r < names_.size(); ++r) {
       const Row* const row = registrations_.row();
       if (row == nullptr) return lacks(registrations_);
@@ -112,6 +114,7 @@ class ScoreReader {
           throw row->error("score_m", data::format_number(mean) + ", the mean of its keyframes.csv");
         }
       }
+      lines_.registrations += std::string(row->line()) + '\n';
       registrations_.next();
     }
     return true;
@@ -127,6 +130,9 @@ class ScoreReader {
           throw table->row()->error("id", "a candidate of results.csv; grid --resume finds it again");
       }
   }
+
+  /// Of the candidate that was read last; `result` is left empty.
+  const CandidateLines& lines() const { return lines_; }
 
   /// The file that ended within a candidate.
   const std::string& ended() const { return ended_; }
@@ -148,6 +154,7 @@ class ScoreReader {
     if (first_ < 0) first_ = id;
     const std::string why = "as of candidate " + std::to_string(first_);
     const auto read_one = [&](const Row& row) {
+      lines_.keyframes += std::string(row.line()) + '\n';
       const double score = row.score("score_m");
       if (!std::isfinite(score)) throw row.error("score_m", "a finite number");
       return KeyframeScore{row.finite("t"), score, row.index("points"), row.not_negative("weight")};
@@ -179,6 +186,7 @@ class ScoreReader {
   std::vector<std::vector<KeyframeScore>> observed_;  ///< by recording, of the first candidate that has any
   int first_ = -1;                                    ///< its id
   std::string ended_;
+  CandidateLines lines_;
 };
 
 /// results.csv repeats what registrations.csv holds: the mean of the scores, and the first registration.
@@ -197,6 +205,15 @@ void check_against_recordings(const Row& row, const CandidateResult& result) {
   row.expect("time_offset_s", first.time_offset, why);
 }
 
+/// The digest stands last in its line and covers the rest of it.
+void check_digest(const Row& row, CandidateLines lines, const std::string& search) {
+  lines.result = row.line().substr(0, row.line().rfind(','));
+  row.expect(
+      "digest", digest_of(lines, search),
+      "as of its lines in the tables and grid.json: one belongs to another search, or was edited; grid "
+      "--force searches anew");
+}
+
 /// Only axes and numbers stand in results.csv.
 void check_plain_text(const std::string& path) {
   const std::string text = data::read_file(path);
@@ -213,7 +230,8 @@ GridResults load_grid_results(const std::string& folder, Incomplete incomplete) 
   const GridFile grid = load_grid_file(path_of(folder, "grid.json"));
   const CutLine cut = incomplete == Incomplete::refuse ? CutLine::refuse : CutLine::leave_out;
   check_plain_text(path_of(folder, "results.csv"));
-  Table lines(path_of(folder, "results.csv"), cut);
+  const std::string search = search_digest(grid);
+  Table lines(path_of(folder, "results.csv"), results_columns(grid.axes), cut);
   ScoreReader scores(folder, grid.recordings, cut);
   GridResults results{grid.axes, grid.recordings, {}};
   std::set<int> seen, whole;
@@ -227,6 +245,8 @@ GridResults load_grid_results(const std::string& folder, Incomplete incomplete) 
           ": found the end of the file, expected all its lines; grid --resume finds it again");
     if (!complete) continue;
     check_against_recordings(*lines.row(), result);
+    check_digest(*lines.row(), scores.lines(), search);
+    result.digest = lines.row()->text("digest");
     whole.insert(result.id);
     results.candidates.push_back(std::move(result));
   }

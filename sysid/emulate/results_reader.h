@@ -16,7 +16,8 @@ enum class Incomplete { refuse, leave_out };
 /// Reads a folder that ResultsStore wrote. Throws data::InputError naming file and line where it holds what
 /// no search can have written: a candidate that is not of the grid, or there twice; another registration than
 /// one a recording; keyframes of another time, number of points or weight than those of the other candidates;
-/// a score that is not the mean of those it was formed from; values out of range.
+/// a score that is not the mean of those it was formed from; values out of range; lines of a candidate that
+/// are not those of its digest.
 GridResults load_grid_results(const std::string& folder, Incomplete incomplete = Incomplete::refuse);
 
 }  // namespace flash::sysid

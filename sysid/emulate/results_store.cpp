@@ -15,9 +15,9 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "sysid/emulate/candidate_lines.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/results_reader.h"
-#include "sysid/emulate/results_table.h"
 
 namespace flash::sysid {
 namespace {
@@ -28,23 +28,11 @@ std::string path_of(const std::string& folder, const char* file) {
   return (fs::path(folder) / file).string();
 }
 
-std::string joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
-  return text;
+std::string header_of(const std::vector<std::string>& columns) {
+  std::string header;
+  for (const std::string& column : columns) header += (header.empty() ? "" : ",") + column;
+  return header + "\n";
 }
-
-std::string results_header(const std::vector<Axis>& axes) {
-  std::string header = "id";
-  for (const Axis& axis : axes) header += "," + axis.name;
-  return header +
-         ",score_m,converged,residual_max,penetration_max_m,offset_x,offset_y,offset_z,time_offset_s,status,"
-         "yaw_rad,"
-         "bounds_hit\n";
-}
-constexpr const char* kRegistrationsHeader =
-    "id,recording,score_m,offset_x,offset_y,offset_z,yaw_rad,time_offset_s,bounds_hit\n";
-constexpr const char* kKeyframesHeader = "id,recording,t,score_m,points,weight\n";
 
 /// At the end of the file, and on the disk when it returns.
 void append_text(const std::string& path, std::string_view text) {
@@ -75,21 +63,6 @@ void keep_lines_of(const std::string& path, const std::set<int>& ids) {
       kept += std::string(line) + '\n';
   }
   if (kept != text) data::write_atomically(path, kept);
-}
-
-std::string results_line(const CandidateResult& result) {
-  const RecordingScore first = result.recordings.empty() ? RecordingScore{} : result.recordings.front();
-  std::string line = std::to_string(result.id);
-  for (const double value : result.values) line += "," + data::format_number(value);
-  for (const std::string& text :
-       {data::format_number(result.score), std::string(result.converged ? "true" : "false"),
-        data::format_number(result.residual_max), data::format_number(result.penetration_max),
-        data::format_number(first.offset.x()), data::format_number(first.offset.y()),
-        data::format_number(first.offset.z()), data::format_number(first.time_offset),
-        std::string(to_string(result.status)), data::format_number(first.yaw), joined(first.bounds_hit)}) {
-    line += "," + text;
-  }
-  return line + "\n";
 }
 
 void remove_results(const std::string& folder) {
@@ -130,10 +103,12 @@ void ResultsStore::begin(const std::vector<Axis>& axes, const std::vector<std::s
                          const Fingerprint& fingerprint) {
   results_.axes = axes;
   results_.recordings = recordings;
-  data::write_atomically(path_of(folder_, "registrations.csv"), kRegistrationsHeader);
-  data::write_atomically(path_of(folder_, "keyframes.csv"), kKeyframesHeader);
-  data::write_atomically(path_of(folder_, "results.csv"), results_header(axes));
-  save_grid_file({axes, recordings, fingerprint}, path_of(folder_, "grid.json"));  // last: all is there
+  data::write_atomically(path_of(folder_, "registrations.csv"), header_of(registrations_columns()));
+  data::write_atomically(path_of(folder_, "keyframes.csv"), header_of(keyframes_columns()));
+  data::write_atomically(path_of(folder_, "results.csv"), header_of(results_columns(axes)));
+  const GridFile grid{axes, recordings, fingerprint};
+  search_ = search_digest(grid);
+  save_grid_file(grid, path_of(folder_, "grid.json"));  // last: all is there
 }
 
 void ResultsStore::go_on(const Fingerprint& fingerprint) {
@@ -144,6 +119,7 @@ void ResultsStore::go_on(const Fingerprint& fingerprint) {
     throw data::InputError(folder_ + ": --resume: these are not the inputs and settings of its results: " +
                            changed + "; name another folder, or repeat the first command");
   }
+  search_ = search_digest(grid);
   results_ = load_grid_results(folder_, Incomplete::leave_out);
   std::set<int> ids;
   for (const CandidateResult& result : results_.candidates) ids.insert(result.id);
@@ -152,31 +128,21 @@ void ResultsStore::go_on(const Fingerprint& fingerprint) {
 
 void ResultsStore::append(const std::vector<CandidateResult>& batch) {
   std::string registrations, keyframes, lines;
-  for (const CandidateResult& result : batch) {
-    lines += results_line(result);
-    for (std::size_t r = 0; r < result.recordings.size(); ++r) {
-      const RecordingScore& recording = result.recordings[r];
-      const std::string head = std::to_string(result.id) + "," + quoted_field(results_.recordings[r]);
-      registrations += head;
-      for (const double value : {recording.score, recording.offset.x(), recording.offset.y(),
-                                 recording.offset.z(), recording.yaw, recording.time_offset}) {
-        registrations += "," + data::format_number(value);
-      }
-      registrations += "," + joined(recording.bounds_hit) + "\n";
-      for (const KeyframeScore& keyframe : recording.keyframes) {
-        keyframes += head + "," + data::format_number(keyframe.t) + "," +
-                     data::format_number(keyframe.score) + "," + std::to_string(keyframe.points) + "," +
-                     data::format_number(keyframe.weight) + "\n";
-      }
-    }
+  std::vector<CandidateResult> written = batch;
+  for (CandidateResult& result : written) {
+    const CandidateLines text = lines_of(result, results_.recordings);
+    result.digest = digest_of(text, search_);
+    lines += text.result + ',' + result.digest + '\n';
+    registrations += text.registrations;
+    keyframes += text.keyframes;
   }
   append_text(path_of(folder_, "keyframes.csv"), keyframes);
   append_text(path_of(folder_, "registrations.csv"), registrations);
   append_text(path_of(folder_, "results.csv"), lines);
-  for (const CandidateResult& result : batch) {
+  for (CandidateResult& result : written) {
     const auto place = std::lower_bound(results_.candidates.begin(), results_.candidates.end(), result,
                                         [](const auto& a, const auto& b) { return a.id < b.id; });
-    results_.candidates.insert(place, result);
+    results_.candidates.insert(place, std::move(result));
   }
 }
 

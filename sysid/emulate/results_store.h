@@ -17,7 +17,8 @@ enum class Existing {
 /// A folder of results that only ever grows: results.csv (one line a candidate; with several recordings its
 /// offsets are those of the first), registrations.csv (one line a candidate and recording) and keyframes.csv
 /// (one line a candidate, recording and keyframe). grid.json holds axes, recordings and the fingerprint of
-/// inputs and settings.
+/// inputs and settings. The digest in a line of results.csv binds the lines of a candidate to each other and
+/// to grid.json.
 ///
 /// It survives an end at any moment, by kill -9 or a power cut. Every batch is on the disk before the next
 /// begins, its lines in results.csv last: a candidate is there as a whole or not at all. Opening the folder
@@ -44,6 +45,7 @@ class ResultsStore {
   void go_on(const Fingerprint& fingerprint);
 
   std::string folder_;
+  std::string search_;  ///< search_digest
   GridResults results_;
   int lock_ = -1;  ///< descriptor of the file that is locked
 };

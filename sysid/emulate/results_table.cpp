@@ -26,6 +26,19 @@ std::vector<std::string> fields_of(std::string_view line) {
   return fields;
 }
 
+/// Names the first column that differs.
+void check_header(const std::string& path, const std::vector<std::string>& found,
+                  const std::vector<std::string>& expected) {
+  const auto name = [](const std::vector<std::string>& names, std::size_t k) {
+    return k < names.size() ? '"' + names[k] + '"' : std::string("none");
+  };
+  for (std::size_t k = 0; k < std::max(found.size(), expected.size()); ++k)
+    if (name(found, k) != name(expected, k))
+      throw data::input_error(path, "header",
+                              "column " + std::to_string(k + 1) + ": found " + name(found, k) +
+                                  ", expected " + name(expected, k) + "; grid --force searches anew");
+}
+
 std::string whole_lines(const std::string& path, CutLine cut) {
   std::string text = data::read_file(path);
   const std::size_t whole = text.rfind('\n') + 1;
@@ -44,8 +57,8 @@ std::string quoted_field(const std::string& text) {
   return quoted + "\"";
 }
 
-Row::Row(const std::vector<std::string>& names, std::vector<std::string> fields, std::string place)
-    : names_(&names), fields_(std::move(fields)), place_(std::move(place)) {
+Row::Row(const std::vector<std::string>& names, std::string_view line, std::string place)
+    : names_(&names), line_(line), fields_(fields_of(line)), place_(std::move(place)) {
   if (fields_.size() != names.size())
     throw data::InputError(place_ + ": found " + std::to_string(fields_.size()) + " fields, expected " +
                            std::to_string(names.size()));
@@ -105,12 +118,14 @@ void Row::expect(const std::string& name, const std::string& value, const std::s
   if (text(name) != value) throw error(name, '"' + value + "\", " + why);
 }
 
-Table::Table(std::string path, CutLine cut)
-    : path_(std::move(path)), text_(whole_lines(path_, cut)), lines_(text_) {
+Table::Table(std::string path, std::vector<std::string> columns, CutLine cut)
+    : path_(std::move(path)), text_(whole_lines(path_, cut)), lines_(text_), names_(std::move(columns)) {
   std::string_view header;
   if (!lines_.next(header))
-    throw data::input_error(path_, "header", "missing, expected the names of the columns");
-  names_ = fields_of(header);
+    throw data::input_error(
+        path_, "header",
+        "found an empty file, expected the names of the columns; grid --force searches anew");
+  check_header(path_, fields_of(header), names_);
   next();
 }
 
@@ -118,7 +133,7 @@ void Table::next() {
   row_.reset();
   std::string_view line;
   while (!row_ && lines_.next(line))
-    if (!line.empty()) row_.emplace(names_, fields_of(line), path_ + ":" + std::to_string(lines_.number()));
+    if (!line.empty()) row_.emplace(names_, line, path_ + ":" + std::to_string(lines_.number()));
 }
 
 }  // namespace flash::sysid

@@ -12,11 +12,13 @@ namespace flash::sysid {
 /// A field of a line of comma-separated values: quoted where it holds a comma or a quote.
 std::string quoted_field(const std::string& text);
 
-/// One line, by the names of its columns. What it refuses throws data::InputError with file, line and column.
+/// One line, by the names of its columns; `line` must outlive it. What it refuses throws data::InputError
+/// with file, line and column.
 class Row {
  public:
-  Row(const std::vector<std::string>& names, std::vector<std::string> fields, std::string place);
+  Row(const std::vector<std::string>& names, std::string_view line, std::string place);
 
+  std::string_view line() const { return line_; }
   const std::string& text(const std::string& name) const;
   double finite(const std::string& name) const;
   double not_negative(const std::string& name) const;  ///< infinite where there is none
@@ -34,6 +36,7 @@ class Row {
   double number(const std::string& name) const;
 
   const std::vector<std::string>* names_;
+  std::string_view line_;
   std::vector<std::string> fields_;
   std::string place_;
 };
@@ -44,8 +47,9 @@ enum class CutLine { refuse, leave_out };
 /// The lines of a file of comma-separated values one by one, after a header with the names of the columns.
 class Table {
  public:
-  /// Stands at the first line. Throws data::InputError naming the file: no header, or a cut line to refuse.
-  Table(std::string path, CutLine cut);
+  /// Stands at the first line. Throws data::InputError naming the file: a header of other columns, or a cut
+  /// line to refuse.
+  Table(std::string path, std::vector<std::string> columns, CutLine cut);
   Table(const Table&) = delete;
   Table& operator=(const Table&) = delete;
 

@@ -23,7 +23,8 @@ void keep_read(const Replay& replay, Motion& motion) {
 
 /// At every point of a grid; empty where one diverged.
 std::optional<std::vector<Motion>> motions_over(const Replay& replay, const std::vector<Axis>& axes,
-                                                const GridSettings& grid, const MotionStore& store) {
+                                                const GridSettings& grid, const MotionStore& store,
+                                                const std::function<void()>& told) {
   const std::vector<std::vector<double>> points = cartesian_product(axes);
   std::vector<ReplayCandidate> candidates;
   for (const std::vector<double>& point : points) candidates.push_back(candidate_at(point, grid));
@@ -31,6 +32,7 @@ std::optional<std::vector<Motion>> motions_over(const Replay& replay, const std:
   store.run(replay, candidates, [&](std::size_t i, ReplayResult result) {
     keep_read(replay, result.motion);
     if (result.finite) motions[i] = std::move(result.motion);
+    if (told) told();
   });
   std::vector<Motion> all;
   for (std::optional<Motion>& motion : motions) {
@@ -121,18 +123,19 @@ std::vector<Axis> thinned(const std::vector<Axis>& axes) {
 }
 
 std::optional<MotionInterpolant> motion_interpolant(const Replay& replay, const GridSettings& grid,
-                                                    const MotionStore& store) {
-  const auto motions = motions_over(replay, grid.axes, grid, store);
+                                                    const MotionStore& store,
+                                                    const std::function<void()>& told) {
+  const auto motions = motions_over(replay, grid.axes, grid, store, told);
   if (!motions) return std::nullopt;
   return MotionInterpolant(grid.axes, *motions);
 }
 
 std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const MotionInterpolant& motions,
                                               const std::vector<Axis>& axes, const GridSettings& grid,
-                                              const MotionStore& store) {
+                                              const MotionStore& store, const std::function<void()>& told) {
   std::optional<Replay> fine = on_half_the_cell(replay);
   if (!fine) return std::nullopt;
-  auto differences = motions_over(*fine, axes, grid, store);
+  auto differences = motions_over(*fine, axes, grid, store, told);
   if (!differences) return std::nullopt;
   const auto matrix = std::make_shared<const Eigen::SparseMatrix<double>>(
       prolongation(replay.recording.mesh, fine->recording.mesh));

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/SparseCore>
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -67,12 +68,14 @@ MotionsAt motions_of(const std::vector<ModelledReplay>& models, double share);
 
 /// The motions at every point of `grid.axes`, from the store where it has them. Empty where one diverged.
 std::optional<MotionInterpolant> motion_interpolant(const Replay& replay, const GridSettings& grid,
-                                                    const MotionStore& store);
+                                                    const MotionStore& store,
+                                                    const std::function<void()>& told = {});
 
 /// Those motions with what they lack of a mesh of half the cell, which is simulated at the points of `axes`.
 /// Empty where one diverged, or where the sheet cannot be meshed anew.
 std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const MotionInterpolant& motions,
                                               const std::vector<Axis>& axes, const GridSettings& grid,
-                                              const MotionStore& store);
+                                              const MotionStore& store,
+                                              const std::function<void()>& told = {});
 
 }  // namespace flash::sysid

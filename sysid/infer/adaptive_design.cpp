@@ -41,6 +41,7 @@ std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searc
 }
 
 constexpr double kSame = 1e-9;  // of a width
+constexpr int kRounds = 16;     // of a zoom
 
 double distance(const Axis& axis, double from, double to) {
   return axis.logarithmic ? std::log(to / from) : to - from;
@@ -94,7 +95,7 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
 }
 
 GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
-                         double share, const GridSettings& settings) {
+                         double share, const GridSettings& settings, const TellWork& told) {
   GridResults results;
   results.axes = axes;
   std::vector<Replay> replays;
@@ -117,6 +118,7 @@ GridResults score_models(const std::vector<ModelledReplay>& models, const std::v
     results.candidates[i] = score_motions(replays, motions, settings.score);
     results.candidates[i].id = static_cast<int>(i);
     results.candidates[i].values = points[i];
+    if (told) told({0, 1}, {});
   };
   // Points that share their first values share the slices there.
   const auto visit = [&](const auto& self, const std::vector<TwoMeshMotions>& slices, std::size_t k,
@@ -134,15 +136,16 @@ GridResults score_models(const std::vector<ModelledReplay>& models, const std::v
 }
 
 Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
-            const GridSettings& settings, std::optional<double> repeatability) {
-  constexpr int kRounds = 16;
+            const GridSettings& settings, std::optional<double> repeatability, const TellWork& told) {
   Extent extent = start;
   std::vector<Replay> replays;
   for (const ModelledReplay& model : models) replays.push_back(model.replay);
   const MotionsAt motions = motions_of(models, share);
   Zoomed found;
+  int scored = 0;
   for (int round = 0; round < kRounds; ++round) {
-    found.results = score_models(models, axes_over(extent, settings.axes), share, settings);
+    found.results = score_models(models, axes_over(extent, settings.axes), share, settings, told);
+    scored += static_cast<int>(found.results.candidates.size());
     found.verdict = profile_grid(found.results, repeatability);
     if (found.verdict.best < 0) break;
     const std::vector<double> estimate(found.verdict.estimate.begin(), found.verdict.estimate.end());
@@ -152,7 +155,12 @@ Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Exten
     if (next == extent) break;
     extent = next;
   }
+  if (told) told({}, {0, most_scores(settings.axes) - scored});
   return found;
+}
+
+int most_scores(const std::vector<Axis>& axes) {
+  return kRounds * static_cast<int>(cartesian_product(axes_over(extent_of(axes), axes)).size());
 }
 
 std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count) {

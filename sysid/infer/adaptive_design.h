@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sysid/emulate/two_mesh_motions.h"
+#include "sysid/infer/answer_work.h"
 #include "sysid/infer/profile.h"
 
 namespace flash::sysid {
@@ -23,7 +24,7 @@ struct Zoomed {
 
 /// Registers and scores modelled motions at every point of a grid. `share`: see TwoMeshMotions.
 GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
-                         double share, const GridSettings& settings);
+                         double share, const GridSettings& settings, const TellWork& told = {});
 
 /// An extent about the estimate, of which the interval of every parameter takes a half or which ends with the
 /// range of `axes`; `extent`, on which the verdict stands, itself where it is not much too large and leaves
@@ -34,7 +35,10 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
 /// parameter takes a third to a half of the extent or ends with the searched range. A point costs a score, no
 /// simulation. `start`: the first extent.
 Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
-            const GridSettings& settings, std::optional<double> repeatability);
+            const GridSettings& settings, std::optional<double> repeatability, const TellWork& told = {});
+
+/// Of zoom over such axes: the points of all its grids, at most.
+int most_scores(const std::vector<Axis>& axes);
 
 /// Values at which motions are simulated anew about an answer: `count` over the extent of an axis, evenly,
 /// where that is no wider than a cell of the search; else the values of the search.

@@ -21,7 +21,7 @@ void fall_back_on_best(const GridResults& results, GridVerdict& verdict) {
 }  // namespace
 
 Answer find_answer(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
-                   const AnswerSettings& settings) {
+                   const AnswerSettings& settings, const TellWork& told) {
   Answer answer;
   GridVerdict& verdict = answer.verdict;
   std::vector<SolverCheck>& checks = answer.checks;
@@ -43,7 +43,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   SolverError error;
   std::optional<Refined> refined;
   if (!grid.rollouts.empty())
-    refined = refine(results, verdict, replays, grid, settings.repeatability, settings.solver_check);
+    refined = refine(results, verdict, replays, grid, settings.repeatability, settings.solver_check, told);
   if (refined) {
     verdict = refined->verdict;
     checks = std::move(refined->checks);

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/answer_work.h"
 #include "sysid/infer/profile.h"
 #include "sysid/infer/solver_check.h"
 
@@ -24,8 +25,9 @@ struct Answer {
 
 /// From the results of a search to its answer: measures how long the best candidate's motion can be predicted
 /// and takes the weight from later keyframes (in `results` and `replays`), solves the estimate under finer
-/// settings, and lets what these shift widen the intervals.
+/// settings, and lets what these shift widen the intervals. `told`: where motions were kept, of the work that
+/// most_work counts.
 Answer find_answer(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
-                   const AnswerSettings& settings);
+                   const AnswerSettings& settings, const TellWork& told = {});
 
 }  // namespace flash::sysid

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/answer_work.h"
 #include "sysid/infer/profile.h"
 #include "sysid/infer/solver_check.h"
 
@@ -26,6 +27,10 @@ struct Refined {
 /// candidate.
 std::optional<Refined> refine(const GridResults& results, const GridVerdict& whole,
                               const std::vector<Replay>& replays, const GridSettings& grid,
-                              std::optional<double> repeatability, bool solver_check);
+                              std::optional<double> repeatability, bool solver_check,
+                              const TellWork& told = {});
+
+/// Of refine, at most. The motions of the grid itself are kept already and do not count.
+AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check);
 
 }  // namespace flash::sysid

@@ -145,7 +145,7 @@ ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std:
   if (whole.substr(kMagic.size(), kDigest) != key) bytes.fail("key", "that of another motion", key);
   const std::string_view kept_sum = whole.substr(kMagic.size() + kDigest, kDigest);
   if (const std::string sum = data::sha256(whole.substr(header)); sum != kept_sum)
-    bytes.fail("SHA-256 of its numbers", sum, "the " + std::string(kept_sum) + " it was written with");
+    bytes.fail("SHA-256 of its numbers", sum, "the one it was written with");  // which may be any bytes
   ReplayResult result;
   for (double* value : {&result.motion.start, &result.motion.step, &result.residual_max,
                         &result.penetration_max, &result.unconverged_share})

@@ -13,8 +13,7 @@ struct SearchFolder {
 };
 
 /// Reads summary.json and the results it was made from. Throws data::InputError as load_summary and
-/// load_grid_results do, and where they are not of one search: their candidates, parameters or recordings
-/// differ.
+/// load_grid_results do, and where the summary was made from other tables than those beside it.
 SearchFolder load_search_folder(const std::string& folder);
 
 }  // namespace flash::sysid

@@ -8,6 +8,7 @@
 #include "data/procedural_mesh.h"
 #include "data/recording_digest.h"
 #include "data/text.h"
+#include "sysid/emulate/candidate_lines.h"
 #include "sysid/infer/modes.h"
 #include "sysid/observe/registration_parameter.h"
 
@@ -164,6 +165,7 @@ Summary summarize(const GridResults& results, const GridVerdict& verdict, const 
                   const GridSettings& settings) {
   Summary summary;
   summary.tool_version = FLASH_VERSION;
+  summary.results_digest = digest_of(results);
   summary.candidates = static_cast<int>(results.candidates.size());
   for (const CandidateResult& candidate : results.candidates)
     summary.unconverged += candidate.status != CandidateStatus::ok;

@@ -6,6 +6,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/sha256.h"
 #include "data/text.h"
 #include "sysid/emulate/parameter_grid.h"
 
@@ -14,6 +15,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 constexpr const char* schema = "flash-sysid-summary/1";
+
+/// Of all fields but the digest itself, whatever their order and layout.
+std::string digest_of(nlohmann::json fields) {
+  fields.erase("digest");
+  return data::sha256(fields.dump()).substr(0, 16);
+}
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
@@ -294,6 +301,8 @@ std::string summary_text(const Summary& summary) {
   json["wall_seconds"] = summary.wall_seconds;
   json["warnings"] = summary.warnings;
   json["exit_code"] = summary.exit_code;
+  json["results_digest"] = summary.results_digest;
+  json["digest"] = digest_of(nlohmann::json::parse(data::format_json(json)));  // of numbers as they are read
   return data::format_json(json);
 }
 
@@ -305,9 +314,10 @@ Summary load_summary(const std::string& path) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject json(file, path);
   if (json.string("schema") != schema) throw json.error("schema", schema);
-  json.expect_fields({"schema", "tool_version", "best", "level95", "axes", "parameters", "fixed",
-                      "covariance_log", "recordings", "solver_check", "settings", "asset", "candidates",
-                      "unconverged", "device", "wall_seconds", "warnings", "exit_code"});
+  json.expect_fields({"schema",       "tool_version", "best",           "level95",        "axes",
+                      "parameters",   "fixed",        "covariance_log", "recordings",     "solver_check",
+                      "settings",     "asset",        "candidates",     "unconverged",    "device",
+                      "wall_seconds", "warnings",     "exit_code",      "results_digest", "digest"});
   check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
@@ -337,7 +347,11 @@ Summary load_summary(const std::string& path) {
   summary.wall_seconds = json.number("wall_seconds");
   summary.warnings = typed<std::vector<std::string>>(json, "warnings", "a list of texts");
   summary.exit_code = json.integer("exit_code");
+  summary.results_digest = json.string("results_digest", "");
   check_values(summary, path);
+  if (const std::string digest = digest_of(file); json.string("digest", "") != digest)
+    throw json.error(
+        "digest", '"' + digest + "\", as of its other fields: one was edited; grid --resume writes it anew");
   return summary;
 }
 

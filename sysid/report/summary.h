@@ -56,11 +56,12 @@ struct Summary {
   std::string device = "cpu";
   double wall_seconds = 0;
   std::string tool_version;
+  std::string results_digest;  ///< of the tables it was made from (candidate_lines.h)
   std::vector<std::string> warnings;
   int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used
 };
 
-/// The text of summary.json.
+/// The text of summary.json. Its last field, `digest`, covers the others: 16 digits of a SHA-256.
 std::string summary_text(const Summary& summary);
 
 /// Written to a temporary file and renamed, so that a reader never sees half of it. Throws std::runtime_error
@@ -69,7 +70,7 @@ void save_summary(const Summary& summary, const std::string& path);
 
 /// Throws data::InputError naming file and field unless the file is of schema "flash-sysid-summary/1", was
 /// written by this program or an earlier one of the same major version, and holds values that a search can
-/// find.
+/// find, as they were written: `digest` is that of its other fields.
 Summary load_summary(const std::string& path);
 
 }  // namespace flash::sysid

@@ -221,6 +221,16 @@ def check_resume(options, folder):
            f"--resume --time-step: exit code {done.returncode}: {done.stderr}")
 
 
+def check_fixed(options, folder):
+    """What is said to be understood is what is simulated: a constant of the command line, not the asset's."""
+    words = ["--asset", folder / "asset.json", "--fix", "areal_density=0.25", "-o", folder / "fixed", "--force"]
+    for verb in (["replay"], ["grid", "--bending", "1e-4", "--no-solver-check", "--no-horizon"]):
+        done = program.call(options.sysid, *verb, folder / "recording", *words)
+        said = [line for line in done.stderr.splitlines() if "kg/m^2" in line]
+        yield (len(said) == 1 and said[0].endswith(", 0.25 kg/m^2") and "--fix areal_density=0.25" in said[0],
+               f"{verb[0]} --fix: {done.stderr}")
+
+
 def check_killed_replay(options, folder):
     """What a replay that was killed leaves beside its pictures is gone after the next."""
     replay = [options.sysid, "replay", folder / "recording", "--asset", folder / "asset.json", "--quiet", "-o", folder / "replayed"]
@@ -258,8 +268,7 @@ def main():
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
         for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume,
-                      check_killed_replay,
-                      *([check_fit] if options.calib else [])):
+                      check_fixed, check_killed_replay, *([check_fit] if options.calib else [])):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds

@@ -10,9 +10,10 @@ import sys
 import tempfile
 
 import program
-from malformed_inputs import Case, complaint, edited, rewritten, verbs, write_sound_files
+from malformed_inputs import ABSENT, Case, complaint, edited, rewritten, verbs, write_sound_files
 
 READERS = ("export", "report", "resume")
+TABLES = ("results.csv", "registrations.csv", "keyframes.csv")
 AXES = ["--bending", "5e-5,1e-4,2e-4", "--no-solver-check", "--no-horizon", "--quiet"]  # as write_sound_files
 
 
@@ -72,6 +73,8 @@ def table_cases(verb):
     for name, value in (("score_m", "null"), ("score_m", "nan"), ("score_m", "-5"), ("score_m", "inf"), ("bending", "1"),
                         ("residual_max", "-1"), ("yaw_rad", "inf"), ("status", "")):
         yield Case(f"{verb}: {name} \"{value}\"", verb, field(name, value), "results.csv:3", name)
+    for name, value in (("penetration_max_m", "0.5"), ("digest", ""), ("digest", "0123456789abcdef")):
+        yield Case(f"{verb}: {name} \"{value}\"", verb, field(name, value), "results.csv:3", "digest", "was edited")
 
 
 def score_cases(verb):
@@ -108,6 +111,43 @@ def score_cases(verb):
                    "candidate 2", "--resume")
 
 
+def copied(*files):
+    """Files of another search over the same axes."""
+    return both(*(lambda folder, file=file: shutil.copy(folder / "other" / file, folder / "run" / file) for file in files))
+
+
+def exchanged(folder):
+    """Candidates 0 and 2 in all tables, but for the values of the grid."""
+    def change(ids):
+        return lambda text: [text[0], *(line for number in (b"0", b"1", b"2") for line in text[1:]
+                                        if ids.get(line.split(b",")[0], line.split(b",")[0]) == number)]
+
+    for name in ("results", "registrations", "keyframes"):
+        kept = 2 if name == "results" else 1
+        path = folder / "run" / f"{name}.csv"
+        text = path.read_bytes().split(b"\n")[:-1]
+        heads = {line.split(b",")[0]: line.split(b",")[:kept] for line in text[1:]}
+        ids = {b"0": b"2", b"2": b"0"}
+        table(name, change(ids))(folder)
+        table(name, lambda lines: [lines[0], *(b",".join([*heads[ids.get(line.split(b",")[0], line.split(b",")[0])],
+                                                          *line.split(b",")[kept:]]) for line in lines[1:])])(folder)
+
+
+def digest_cases(verb):
+    """What agrees with all else that the tables say."""
+    yield Case(f"{verb}: tables of another search", verb, copied(*TABLES), "results.csv:2", "digest", "another search")
+    yield Case(f"{verb}: candidates exchanged", verb, exchanged, "results.csv:2", "digest", "another search")
+    yield Case(f"{verb}: another bound hit", verb, field("bounds_hit", "yaw", 3, "registrations"), "results.csv:4", "digest")
+    if verb == "resume":  # which writes the summary
+        return
+    yield Case(f"{verb}: summary of another search", verb, copied("summary.json"), "summary.json", "results_digest")
+    yield Case(f"{verb}: a candidate missing in all tables", verb,
+               both(*(table(name, lambda text: [line for line in text if not line.startswith(b"2,")])
+                      for name in ("results", "registrations", "keyframes"))), "summary.json", "results_digest", "--resume")
+    for place, value in (("wall_seconds", 1), ("unconverged", 1), ("warnings", ["mine"]), ("digest", ABSENT), ("results_digest", ABSENT)):
+        yield Case(f"{verb}: {place} {value}", verb, edited("run/summary.json", place, value), "summary.json: digest")
+
+
 def summary_cases(verb):
     file, bending = "run/summary.json", "parameters.bending."
     decided = both(edited(file, bending + "identifiable", "yes"), edited(file, bending + "interval95", [6e-5, 1.5e-4]),
@@ -118,7 +158,7 @@ def summary_cases(verb):
     for place, value in ((bending + "estimate", "1e-4"), (bending + "estimate", 5.0), (bending + "interval95", [None, None]),
                          (bending + "identifiable", None), (bending + "profile.values", [None, None, None]),
                          ("best.parameters.bending", None), ("best.score", None), ("best.membrane_stiffness", None),
-                         ("recordings.0.score", None), ("candidates", None), ("exit_code", None), ("warnings", [None]), ("unconverged", 1)):
+                         ("recordings.0.score", None), ("candidates", None), ("exit_code", None), ("warnings", [None])):
         last = [part for part in place.split(".") if not part.isdigit()][-1]
         yield Case(f"{verb}: {place} {json.dumps(value)}", verb, both(decided, edited(file, place, value)), "summary.json",
                    last)
@@ -135,15 +175,13 @@ def cases(fits):
     for verb in READERS:
         yield from table_cases(verb)
         yield from score_cases(verb)
+        yield from digest_cases(verb)
         if verb != "resume":  # which writes the summary
             yield from summary_cases(verb)
             yield Case(f"{verb}: the last line cut off", verb,
                        rewritten("run/results.csv", lambda content: content[:-9]), "results.csv", "cut off")
             yield Case(f"{verb}: a line missing", verb, results(lambda text: [*text[:2], *text[3:]]), "registrations.csv:3", "id",
                        "results.csv")
-
-
-TABLES = ("results.csv", "registrations.csv", "keyframes.csv")
 
 
 def resumed(sysid, sound, work):
@@ -156,7 +194,9 @@ def resumed(sysid, sound, work):
                          ("keyframes.csv without its last line", table("keyframes", lambda text: text[:-1])),
                          ("keyframes.csv without half of its lines", table("keyframes", lambda text: text[:len(text) // 2])),
                          ("registrations.csv without its last line", table("registrations", lambda text: text[:-1])),
-                         ("keyframes.csv without lines", table("keyframes", lambda text: text[:1]))):
+                         ("keyframes.csv without lines", table("keyframes", lambda text: text[:1])),
+                         ("lines that end in CRLF", rewritten("run/results.csv", lambda c: c.replace(b"\n", b"\r\n"))),
+                         ("summary of another search", copied("summary.json"))):
         folder = work / "killed"
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(sound, folder)
@@ -166,6 +206,8 @@ def resumed(sysid, sound, work):
         for file in TABLES:
             yield ((folder / "run" / file).read_bytes() == (sound / "run" / file).read_bytes(),
                    f"resume, {name}: another {file}")
+        done = program.call(*commands["report"](folder), "--quiet")
+        yield done.returncode == 0, f"resume, {name}, then report: exit code {done.returncode}: {done.stderr}"
 
 
 def renamed_copies(sysid, sound, work):
@@ -220,15 +262,18 @@ def main():
     done, wrong = 0, []
     with tempfile.TemporaryDirectory() as temporary:
         work = pathlib.Path(temporary)
-        write_sound_files(options.sysid, options.sim, work / "sound")
+        sound = work / "sound"
+        write_sound_files(options.sysid, options.sim, sound)
+        program.call(options.sysid, "grid", sound / "recording", "--asset", sound / "asset.json", *AXES, "--fix",
+                     "friction=0.5", "-o", sound / "other")
         commands = verbs(options.sysid, options.sim) | {
             "fit": lambda f: [options.sysid, "fit", f / "recording", "--start", f / "run", "-o", f / "fitted"]}
         for case in cases("fit" in program.call(options.sysid, "--help").stdout):
             done += 1
-            found = complaint(case, commands, work / "sound", work)
+            found = complaint(case, commands, sound, work)
             wrong += [f"{case.name}: {found}"] if found else []
         for check in (resumed, renamed_copies):
-            for holds, what in check(options.sysid, work / "sound", work):
+            for holds, what in check(options.sysid, sound, work):
                 done += 1
                 wrong += [] if holds else [what]
     print("\n".join([*wrong, f"{done - len(wrong)} of {done} statements about tampered results and copies hold"]))

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <string_view>
 
 #include "data/atomic_file.h"
+#include "data/text.h"
 #include "sysid/emulate/results_store.h"
 #include "tests/data/temporary_folder.h"
 
@@ -130,6 +132,79 @@ TEST_F(ResultsReader, ExpectsTheSameKeyframesOfEveryCandidate) {
   EXPECT_EQ(message("0,b,0,", "1,b,0,").find("keyframes.csv:5: id: found \"1\", expected 0"), 0u);
   const std::string last = "2,b,0.4,0.012,100,1\n";
   EXPECT_EQ(message(last, last + last).find("keyframes.csv:14: id: found \"2\", expected no more lines"), 0u);
+}
+
+// What agrees with all else that the tables say.
+TEST_F(ResultsReader, LinesThatWereEditedAreToldByTheirDigest) {
+  const auto expect_named = [&](const char* table, const char* line, const char* from, const char* to) {
+    const std::string message = message_of(table, from, to);
+    EXPECT_EQ(message.find(std::string("results.csv:") + line + ": digest: found \""), 0u) << message;
+    EXPECT_NE(message.find("belongs to another search, or was edited"), std::string::npos) << message;
+  };
+  expect_named("results.csv", "2", ",9e-04,0,", ",9e-04,0.5,");         // penetration_max_m
+  expect_named("registrations.csv", "2", "0,0,\n0,b", "0,0,yaw\n0,b");  // bounds_hit
+  expect_named("registrations.csv", "2", "0,b,0.004,0", "0,b,0.004,0.01");
+  expect_named("keyframes.csv", "4", "2,b,0.2,0,", "2,b,0.2,0.5,");  // of no points
+  expect_named("grid.json", "2", "\"log\": true", "\"log\": false");
+  EXPECT_EQ(message_of("results.csv", ",digest", ""),
+            "results.csv: header: column 14: found none, expected \"digest\"; grid --force searches anew");
+}
+
+TEST_F(ResultsReader, CandidatesThatWereExchangedInAllTablesAreToldByTheirDigest) {
+  const std::string whole = data::read_file(file("results.csv"));
+  const auto exchange = [&](const std::string& name, const std::string& zero, const std::string& two) {
+    std::string text;
+    const std::string old = data::read_file(file(name));
+    data::LineReader lines(old);
+    for (std::string_view line; lines.next(line);) {
+      const bool is_zero = line.starts_with(zero), is_two = line.starts_with(two);
+      text += is_zero  ? two + std::string(line.substr(zero.size()))
+              : is_two ? zero + std::string(line.substr(two.size()))
+                       : std::string(line);
+      text += '\n';
+    }
+    // Back into the order of the ids.
+    std::vector<std::string> heads = {"id,", "0,", "1,", "2,"};
+    std::string sorted;
+    for (const std::string& head : heads) {
+      data::LineReader again(text);
+      for (std::string_view line; again.next(line);)
+        if (line.starts_with(head)) sorted += std::string(line) + '\n';
+    }
+    data::write_atomically(file(name), sorted);
+  };
+  exchange("results.csv", "0,10,", "2,1000,");
+  exchange("registrations.csv", "0,", "2,");
+  exchange("keyframes.csv", "0,", "2,");
+  EXPECT_NE(data::read_file(file("results.csv")), whole);
+  EXPECT_EQ(data::input_error_of([&] { load_grid_results(run); }).find(file("results.csv") + ":2: digest: "),
+            0u);
+}
+
+TEST_F(ResultsReader, TablesOfAnotherSearchAreToldByTheirDigest) {
+  const std::string other = folder / "other";
+  {
+    ResultsStore store(other, {{"young", {10, 100, 1000}, true}}, {"a", "b"},
+                       {{"tolerance", "0.001"}, {"fixed friction", "0.5"}}, Existing::refuse);
+    store.append(ok(0, 10, 0.004));
+  }
+  for (const char* table : result_tables)
+    data::write_atomically(file(table), data::read_file(other + "/" + table));
+  EXPECT_EQ(load_grid_results(other).candidates.size(), 1u);
+  EXPECT_EQ(data::input_error_of([&] { load_grid_results(run); }).find(file("results.csv") + ":2: digest: "),
+            0u);
+}
+
+TEST_F(ResultsReader, LinesMayEndAsOtherSystemsEndThem) {
+  const std::vector<CandidateResult> before = load_grid_results(run).candidates;
+  for (const char* table : result_tables) {
+    std::string text;
+    for (const char c : data::read_file(file(table))) text += c == '\n' ? "\r\n" : std::string(1, c);
+    data::write_atomically(file(table), text);
+  }
+  const std::vector<CandidateResult> after = load_grid_results(run).candidates;
+  ASSERT_EQ(after.size(), before.size());
+  for (std::size_t i = 0; i < after.size(); ++i) EXPECT_EQ(after[i].digest, before[i].digest);
 }
 
 // Which no kill leaves, but a disk that lost the end of a file, or a copy that stopped.

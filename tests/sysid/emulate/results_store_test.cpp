@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "data/atomic_file.h"
+#include "data/sha256.h"
 #include "sysid/emulate/results_reader.h"
 #include "tests/data/temporary_folder.h"
 
@@ -80,6 +81,23 @@ TEST_F(Results, ComeBackAsTheyWereWritten) {
   ASSERT_EQ(result.recordings[0].keyframes.size(), 2u);
   EXPECT_EQ(result.recordings[0].keyframes[0].points, 120);
   EXPECT_EQ(result.recordings[0].keyframes[1].weight, 0);
+}
+
+// As docs/formats.md says it.
+TEST_F(Results, DigestIsThatOfTheLinesAndOfTheSearch) {
+  {
+    ResultsStore store(folder, kAxes, {"lift, one", "lift two"}, kPrint, Existing::refuse);
+    store.append(result_of(3, 0.005));
+  }
+  const auto text = [&](const char* file) { return data::read_file(folder + "/" + file); };
+  const auto lines = [&](const char* file) { return text(file).substr(text(file).find('\n') + 1); };
+  const std::string line = lines("results.csv");
+  const std::size_t last = line.rfind(',');
+  EXPECT_EQ(line.substr(last + 1),
+            data::sha256(data::sha256(text("grid.json")) + "\n" + line.substr(0, last) + "\n" +
+                         lines("registrations.csv") + lines("keyframes.csv"))
+                    .substr(0, 16) +
+                "\n");
 }
 
 TEST_F(Results, GoOnWhereTheyStoppedAfterACutLine) {
@@ -162,10 +180,9 @@ TEST_F(Results, HeaderNamesTheColumnsOfTheContract) {
   std::ifstream file(folder + "/results.csv");
   std::string header;
   std::getline(file, header);
-  EXPECT_EQ(
-      header.find("id,young,friction,score_m,converged,residual_max,penetration_max_m,offset_x,offset_y,"
-                  "offset_z,time_offset_s,status"),
-      0u);
+  EXPECT_EQ(header,
+            "id,young,friction,score_m,converged,residual_max,penetration_max_m,offset_x,offset_y,offset_z,"
+            "time_offset_s,status,yaw_rad,bounds_hit,digest");
 }
 
 GridResults two_keyframes() {

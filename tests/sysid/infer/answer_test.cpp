@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "sysid/infer/refine.h"
 #include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {
@@ -55,7 +56,19 @@ TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   ResultsStore store(folder / "run", grid.axes, {"lift"}, {}, Existing::refuse);
   ASSERT_TRUE(grid_search(replays, grid, store));
   GridResults results = store.results();
-  const Answer answer = find_answer(results, replays, grid, without_horizon());
+  AnswerWork all, unused;
+  const AnswerWork most = most_work(grid, 1, true);
+  const Answer answer = find_answer(results, replays, grid, without_horizon(),
+                                    [&](const AnswerWork& done, const AnswerWork& spared) {
+                                      all.motions += done.motions, all.scores += done.scores;
+                                      unused.scores += spared.scores;
+                                    });
+  // Three values of five on the finer mesh, and the estimate; 17 points a grid.
+  EXPECT_GE(all.motions, 3 + 1);
+  EXPECT_LE(all.motions, most.motions);
+  EXPECT_GT(all.scores, 0);
+  EXPECT_EQ(all.scores % 17, 2);  // one with bending held at each end of its range
+  EXPECT_LE(all.scores + unused.scores, most.scores);
   const ParameterFinding& bending = answer.verdict.parameters.front();
   EXPECT_EQ(bending.identifiable, Identifiable::yes);
   EXPECT_LT((*bending.interval95)[0], 2e-4);

@@ -22,7 +22,7 @@ GridResults grid_of(const std::vector<Axis>& axes, std::size_t keyframes, const 
   for (const std::vector<double>& values : cartesian_product(axes)) {
     CandidateResult result;
     result.id = static_cast<int>(results.candidates.size());
-    result.values = values;
+    result.values = std::vector<double>(values);  // assigning it makes GCC 12 warn of a null pointer
     result.converged = true;
     result.recordings.resize(recordings);
     std::vector<double> x = values;

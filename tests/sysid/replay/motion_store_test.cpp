@@ -99,6 +99,10 @@ TEST(MotionStore, AFileThatIsNotAsItWasWrittenIsNamed) {
   flipped[whole.size() / 2] = static_cast<char>(flipped[whole.size() / 2] ^ 1);
   EXPECT_EQ(message_of(flipped).find("SHA-256"), 0u);
 
+  const std::string bytes(64, '\xff');  // in place of the SHA-256
+  EXPECT_EQ(message_of(whole.substr(0, header - 64) + bytes + whole.substr(header)).find('\xff'),
+            std::string::npos);
+
   // Sound in itself, but of no vertices, or too short.
   const auto sealed = [&](const std::string& numbers) {
     return whole.substr(0, header - 64) + data::sha256(numbers) + numbers;

@@ -74,6 +74,12 @@ TEST(Summary, SaysWhichFieldIsWrong) {
             std::string::npos);
   EXPECT_NE(message_of("0.00015", "1e9").find("parameters.bending.interval95"), std::string::npos);
   EXPECT_NE(message_of("\"exit_code\": 0", "\"exit_code\": 7").find("exit_code"), std::string::npos);
+  // What a search can find, but did not.
+  for (const auto& [from, to] : {std::pair("\"exit_code\": 0", "\"exit_code\": 3"),
+                                 std::pair("\"estimate\": 0.00011", "\"estimate\": 0.00012"),
+                                 std::pair("\"identifiable\": \"yes\"", "\"identifiable\": \"no\""),
+                                 std::pair("\"digest\"", "\"results_digest\"")})
+    EXPECT_NE(message_of(from, to).find("digest"), std::string::npos) << to;
   EXPECT_NE(message_of("\"candidates\"", "\"candidate\"").find("did you mean \"candidates\"?"),
             std::string::npos);
 }
