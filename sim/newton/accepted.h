@@ -10,8 +10,7 @@ inline constexpr double accepted_residual = 1.0;
 
 /// Whether the motion of a run may be used, with `unconverged_share` of its steps above the tolerance.
 inline bool accepted(double unconverged_share, double residual_max) {
-  return unconverged_share <= accepted_share &&
-         (unconverged_share == 0 || residual_max <= accepted_residual);
+  return unconverged_share <= accepted_share && (unconverged_share == 0 || residual_max <= accepted_residual);
 }
 
 }  // namespace flash::sim

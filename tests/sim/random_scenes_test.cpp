@@ -24,8 +24,9 @@ TEST(RandomScenes, AreSolvedOrSaidNotToBe) {
   EXPECT_LE(unsolved, 1);  // 2 % of the scenes
 }
 
-/// Five of the sheets of `make deep-starts`, stiff ones that each vertex's own way out tore in two: they came out
-/// at 35 to 88 m/s. What is strained by v sqrt(rho / (E t)) and let go moves at v; waves that meet add up.
+/// Five of the sheets of `make deep-starts`, stiff ones that each vertex's own way out tore in two: they came
+/// out at 35 to 88 m/s. What is strained by v sqrt(rho / (E t)) and let go moves at v; waves that meet add
+/// up.
 TEST(RandomScenes, SheetsThatStartInsideAreNotShotOut) {
   for (const unsigned long seed : {5, 11, 16, 43, 49}) {
     const SceneFindings found = observe(random_deep_start(seed));
