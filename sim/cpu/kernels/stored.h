@@ -29,13 +29,13 @@ typename VectorOf<Scalar>::type load_stored(const Scalar* from) {
   return *reinterpret_cast<const typename VectorOf<Scalar>::type*>(from);
 }
 
-inline void store_rounded(const VectorOf<double>::type& vector, double* to) {
+inline void store_rounded(VectorOf<double>::type vector, double* to) {
   *reinterpret_cast<VectorOf<double>::type*>(to) = vector;
 }
 
 #ifndef __F16C__
 /// Rounded to eleven bits (Veltkamp 1968).
-inline void store_rounded(const VectorOf<float>::type& vector, float* to) {
+inline void store_rounded(VectorOf<float>::type vector, float* to) {
   const VectorOf<float>::type large = 8193.0f * vector;
   *reinterpret_cast<VectorOf<float>::type*>(to) = large - (large - vector);
 }
@@ -48,7 +48,7 @@ __m512 load_stored(const unsigned short* from) {
   return _mm512_cvtph_ps(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(from)));
 }
 /// The largest there is in place of what is larger.
-inline void store_rounded(const __m512& vector, unsigned short* to) {
+inline void store_rounded(__m512 vector, unsigned short* to) {
   const __m512 bounded =
       _mm512_min_ps(_mm512_max_ps(vector, _mm512_set1_ps(-largest_half)), _mm512_set1_ps(largest_half));
   _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), _mm512_cvtps_ph(bounded, _MM_FROUND_TO_NEAREST_INT));
@@ -59,7 +59,7 @@ __m256 load_stored(const unsigned short* from) {
   return _mm256_cvtph_ps(_mm_loadu_si128(reinterpret_cast<const __m128i*>(from)));
 }
 /// The largest there is in place of what is larger.
-inline void store_rounded(const __m256& vector, unsigned short* to) {
+inline void store_rounded(__m256 vector, unsigned short* to) {
   const __m256 bounded =
       _mm256_min_ps(_mm256_max_ps(vector, _mm256_set1_ps(-largest_half)), _mm256_set1_ps(largest_half));
   _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm256_cvtps_ph(bounded, _MM_FROUND_TO_NEAREST_INT));
