@@ -18,8 +18,10 @@ SheetLame sheet_lame(double membrane_stiffness, double poissons_ratio);
 //   tri_corotated   mu (e1^2 + e2^2) + lambda/2 (e1 + e2)^2
 //   tri_stvk        mu |S|^2 + lambda/2 tr(S)^2,  S = (F^T F - I)/2
 //   tri_neohookean  mu/2 (s1^2 + s2^2 - 2) - mu ln J + lambda/2 ln(J)^2,  J = s1 s2 (infinite at J = 0)
-// All are per rest area [N/m]; a derivative by F is taken by vec(F) = (first column, second column).
-// The functions throw data::InputError on a tet_* model.
+// s1 + s2, in the first two laws, is sqrt(s1^2 + s2^2 + 2 J), and has a kink where a triangle becomes a line.
+// There J is made smooth: below collapsed_share of the rest area. All are per rest area [N/m]; a derivative
+// by F is taken by vec(F) = (first column, second column). The functions throw data::InputError on a tet_*
+// model.
 
 /// A law with the parameters that it takes.
 struct Membrane {
@@ -34,7 +36,7 @@ double membrane_energy_density(data::Constitutive constitutive, const Matrix32& 
 /// First Piola-Kirchhoff stress P = dPsi/dF [N/m].
 Matrix32 membrane_stress(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
 
-/// Exact d vec(P) / d vec(F) [N/m]. Undefined where s2 = 0, except for tri_stvk.
+/// Exact d vec(P) / d vec(F) [N/m]. Undefined at s2 = 0 for tri_neohookean.
 Matrix66 membrane_hessian(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
 
 /// The same with negative eigenvalues set to zero: positive semi-definite at every F, s2 = 0 included. The

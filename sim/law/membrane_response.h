@@ -91,22 +91,55 @@ struct PrincipalResponse {
   Real bend1, bend2;
 };
 
-/// With lambda = 0 the ARAP sheet.
+/// J where a triangle is larger than collapsed, smooth in the vector f1 x f2 of that length below:
+/// J' = j (3/8 + 3/4 u^2 - 1/8 u^4), u = J / j, j = collapsed_share, with two continuous derivatives at u
+/// = 1.
+template <typename Real>
+struct SmoothArea {
+  Real value, slope, slope_per_area, curvature;  ///< J', dJ'/dJ, (dJ'/dJ) / J, d^2J'/dJ^2
+};
+
+template <typename Real>
+FLASH_HOST_DEVICE inline SmoothArea<Real> smooth_area(const Real& area) {
+  const Real zero{}, one = zero + 1.0, u = (1.0 / collapsed_share) * area, squared = u * u;
+  const auto whole = u >= 1.0;
+  const Real per_u = 1.5 - 0.5 * squared;
+  return {select(whole, area, Real(collapsed_share * (0.375 + (0.75 - 0.125 * squared) * squared))),
+          select(whole, one, Real(per_u * u)),
+          select(whole, Real(1.0 / larger_of(area, Real(zero + collapsed_share))),
+                 Real((1.0 / collapsed_share) * per_u)),
+          select(whole, zero, Real((1.5 / collapsed_share) * (1.0 - squared)))};
+}
+
+/// With lambda = 0 the ARAP sheet. s1 + s2 = sqrt(s1^2 + s2^2 + 2 J) has a kink where a triangle has become a
+/// line: J' in place of J takes it out, so that a sheet drawn so far that it becomes one there has an
+/// equilibrium with a stress.
 struct Corotated {
   template <typename Real>
   FLASH_HOST_DEVICE static PrincipalResponse<Real> at(const Real& s1, const Real& s2, double mu,
                                                       double lambda) {
-    const Real zero{}, least = zero + 1e-150, e1 = s1 - 1.0, e2 = s2 - 1.0, sum = e1 + e2;
+    const Real zero{}, one = zero + 1.0, e1 = s1 - 1.0, e2 = s2 - 1.0;
+    const SmoothArea<Real> area = smooth_area(Real(s1 * s2));
+    const auto whole = s1 * s2 >= collapsed_share;
+    // s1 + s2 and its derivatives, exact where nothing has collapsed: what follows cancels at small strains.
+    const Real smooth = square_root(s1 * s1 + s2 * s2 + 2.0 * area.value);
+    const Real excess = select(whole, zero, Real(smooth - (s1 + s2))), sum = s1 + s2 + excess;
+    const Real inverse_sum = 1.0 / sum, strain = e1 + e2 + excess;
+    const Real d1 = select(whole, one, Real((s1 + area.slope * s2) * inverse_sum)),
+               d2 = select(whole, one, Real((s2 + area.slope * s1) * inverse_sum));
+    const Real per_sum = (lambda * strain - 2 * mu) * inverse_sum;
     PrincipalResponse<Real> r;
-    r.energy = mu * (e1 * e1 + e2 * e2) + 0.5 * lambda * sum * sum;
-    r.p1 = 2 * mu * e1 + lambda * sum;
-    r.p2 = 2 * mu * e2 + lambda * sum;
-    r.p11 = r.p22 = zero + (2 * mu + lambda);
-    r.p12 = zero + lambda;
-    r.twist = 2 * (mu + lambda) * sum / larger_of(Real(s1 + s2), least);
-    r.flip = zero + 2 * mu;
-    r.bend1 = r.p1 / larger_of(s1, least);
-    r.bend2 = r.p2 / larger_of(s2, least);
+    r.energy = mu * (e1 * e1 + e2 * e2 - 2.0 * excess) + 0.5 * lambda * strain * strain;
+    r.p1 = 2 * mu * (s1 - d1) + lambda * strain * d1;
+    r.p2 = 2 * mu * (s2 - d2) + lambda * strain * d2;
+    const Real both = lambda - per_sum;
+    r.p11 = 2 * mu + per_sum * (1.0 + area.curvature * s2 * s2) + both * d1 * d1;
+    r.p22 = 2 * mu + per_sum * (1.0 + area.curvature * s1 * s1) + both * d2 * d2;
+    r.p12 = per_sum * (area.slope + area.curvature * s1 * s2) + both * d1 * d2;
+    r.twist = 2 * mu + per_sum * (1.0 + area.slope);
+    r.flip = 2 * mu + per_sum * (1.0 - area.slope);
+    r.bend1 = 2 * mu + per_sum * (1.0 + area.slope_per_area * s2 * s2);
+    r.bend2 = 2 * mu + per_sum * (1.0 + area.slope_per_area * s1 * s1);
     return r;
   }
 };

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "data/mesh.h"
+#include "sim/law/membrane_law.h"
 #include "sim/scene/sheet.h"
 
 namespace flash::sim {
@@ -27,9 +28,6 @@ using Matrix12 = Eigen::Matrix<double, 12, 12>;
 /// Signed angle between the normals in (-pi, pi], positive where the edge is a ridge seen from the normal
 /// side.
 double hinge_angle(const HingePositions& x);
-
-/// Share of its rest area below which a triangle loses its part in bending.
-inline constexpr double collapsed_share = 0.1;
 
 /// Energy 1/2 s_0 s_1 weight (theta - rest_angle)^2 for D = 1, the difference taken the short way round
 /// (Grinspun et al. 2003, "Discrete shells"; derivatives after Tamstorf, Grinspun 2013). A triangle without

@@ -392,8 +392,10 @@ SceneFindings observe(RandomScene scene) {
     }());
     put_in += falls;
     if (report.converged && scene.kind != SceneKind::deep) {
+      // What the weight does over a nanometre is rounding.
+      const double weight = environment.material.areal_density * scene.sheet.vertex_area.sum() * 9.81;
       found.energy_gain = std::max(found.energy_gain, gain);
-      found.energy_gain_share = std::max(found.energy_gain_share, gain / std::max(put_in, 1e-12));
+      found.energy_gain_share = std::max(found.energy_gain_share, gain / std::max(put_in, 1e-9 * weight));
     }
     energy = now;
   }

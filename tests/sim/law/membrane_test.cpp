@@ -45,6 +45,13 @@ std::vector<Matrix32> random_gradients(double low, double high, int count, unsig
   return all;
 }
 
+// s1 + s2 as the corotated laws take it: by a smooth area where a triangle has collapsed.
+double smooth_sum(const Eigen::Vector2d& s) {
+  const double u = s[0] * s[1] / collapsed_share;
+  const double area = collapsed_share * (u < 1 ? 0.375 + 0.75 * u * u - 0.125 * u * u * u * u : u);
+  return std::sqrt(s.squaredNorm() + 2 * area);
+}
+
 // The definitions in the header, on singular values from Eigen's Jacobi SVD.
 double energy_by_svd(Constitutive model, const Matrix32& F) {
   const Eigen::Vector2d s = Eigen::JacobiSVD<Eigen::MatrixXd>(F).singularValues();
@@ -52,9 +59,9 @@ double energy_by_svd(Constitutive model, const Matrix32& F) {
   const Eigen::Matrix2d green = 0.5 * (F.transpose() * F - Eigen::Matrix2d::Identity());
   switch (model) {
     case Constitutive::tri_arap:
-      return mu * (s.array() - 1).square().sum();
+      return mu * (s.squaredNorm() - 2 * smooth_sum(s) + 2);
     case Constitutive::tri_corotated:
-      return mu * (s.array() - 1).square().sum() + 0.5 * lambda * std::pow(s.sum() - 2, 2);
+      return mu * (s.squaredNorm() - 2 * smooth_sum(s) + 2) + 0.5 * lambda * std::pow(smooth_sum(s) - 2, 2);
     case Constitutive::tri_stvk:
       return mu * green.squaredNorm() + 0.5 * lambda * std::pow(green.trace(), 2);
     default:
@@ -114,6 +121,48 @@ TEST(Membrane, HessianIsTheDerivativeOfTheStress) {
             (2 * step);
         EXPECT_LT((H.col(i) - slope).norm(), 1e-6 * H.norm());  // step^2 times third derivatives
       }
+    }
+}
+
+TEST(Membrane, DerivativesOfACollapsedTriangleAreThoseOfItsEnergy) {
+  const double step = 1e-6;
+  std::mt19937 rng(10);
+  std::uniform_real_distribution<double> area(0, 1.2 * collapsed_share), stretch(0.5, 3);
+  for (const Constitutive model : {Constitutive::tri_arap, Constitutive::tri_corotated})
+    for (int k = 0; k < 100; ++k) {
+      const double s1 = stretch(rng);
+      const Matrix32 F = random_gradient(rng, s1, area(rng) / s1);
+      const Matrix32 P = membrane_stress(model, F, lame);
+      const Matrix66 H = membrane_hessian(model, F, lame);
+      for (int i = 0; i < 6; ++i) {
+        Matrix32 forward = F, backward = F;
+        forward.data()[i] += step;
+        backward.data()[i] -= step;
+        const double slope = (energy_by_svd(model, forward) - energy_by_svd(model, backward)) / (2 * step);
+        // Rounding 1e-16 / step, and step^2 times third derivatives, which grow as the inverse square of the
+        // share; of the Hessian fourth derivatives, where it is not kinked itself.
+        EXPECT_NEAR(P.data()[i], slope, 1e-7 * lame.mu);
+        const Eigen::Matrix<double, 6, 1> bent =
+            (flat(membrane_stress(model, forward, lame)) - flat(membrane_stress(model, backward, lame))) /
+            (2 * step);
+        EXPECT_LT((H.col(i) - bent).norm(), 1e-4 * H.norm());
+      }
+    }
+}
+
+// Where the transverse fibres of a drawn triangle have become points, the force on them would change its sign
+// at once, and nothing would be an equilibrium.
+TEST(Membrane, ATriangleThatBecomesALineHasNoTransverseForce) {
+  for (const double s1 : {0.5, 1.5, 4.0, 30.0})
+    for (const double side : {-1.0, 1.0}) {
+      Matrix32 F = Matrix32::Zero();
+      F(0, 0) = s1;
+      F(1, 1) = side * 1e-9;
+      const Matrix32 P = membrane_stress(Constitutive::tri_corotated, F, lame);
+      // The force per stretch s2: that of (s1 + s2)'s curvature, and of the law without it.
+      const double stiffness =
+          2 * lame.mu + (lame.lambda * (s1 + 2) + 2 * lame.mu) * (1 + 1.5 / collapsed_share * s1 * s1) / s1;
+      EXPECT_LT(std::abs(P(1, 1)), 1e-9 * stiffness);
     }
 }
 
