@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "data/error.h"
 #include "data/parallel.h"
@@ -126,20 +127,27 @@ int Batch::step() const { return storage_->step; }
 
 void Batch::advance(int steps, const std::function<void(int)>& finished) {
   Storage& s = *storage_;
+  if (s.step < 0) throw std::invalid_argument("batch: it cannot advance after it has thrown");
   if (steps < 0 || steps > s.settings.steps - s.step)
     throw std::invalid_argument("batch: it cannot advance beyond its last step");
   const std::atomic<bool>* stop = s.settings.solver.stop;
+  const auto throw_if_stopped = [&] {
+    if (stop != nullptr && *stop) throw data::Stopped();
+  };
+  const int first = std::exchange(s.step, -1);
   data::for_each_in_parallel(s.environments.size(), s.settings.threads, [&](std::size_t index) {
     const int e = static_cast<int>(index);
+    throw_if_stopped();
     for (int k = 0; k < steps; ++k) {
-      if (stop != nullptr && *stop) throw data::Stopped();
-      s.take_step(e, s.step + k);
+      s.take_step(e, first + k);
+      // A solver that was stopped in a step did not solve it as well as it can: the step is no result.
+      throw_if_stopped();
     }
     s.show(e);
-    if (s.step + steps == s.settings.steps) s.solvers[e].reset();
+    if (first + steps == s.settings.steps) s.solvers[e].reset();
     if (finished) finished(e);
   });
-  s.step += steps;
+  s.step = first + steps;
 }
 
 const State& Batch::state(int environment) const { return storage_->environments[environment].state; }

@@ -54,12 +54,12 @@ class Batch {
   Batch(Batch&&) noexcept;
 
   int size() const;
-  int step() const;  ///< steps taken, first_step included
+  int step() const;  ///< steps taken, first_step included; -1 after advance has thrown
 
   /// Takes the next `steps` steps of each environment. The thread that took them calls `finished` with the
   /// number of the environment, so that its results can be used while others go on. Unconverged steps are
   /// in the statistics, never thrown. Throws what a worker threw, data::Stopped where settings.solver.stop
-  /// ended it; after that the batch stands at no step.
+  /// ended it; a batch that has thrown cannot advance any more.
   void advance(int steps, const std::function<void(int)>& finished = {});
 
   /// Of one environment: what another batch needs to go on from here.

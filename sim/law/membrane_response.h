@@ -169,7 +169,8 @@ struct NeoHookean {
   template <typename Real>
   FLASH_HOST_DEVICE static PrincipalResponse<Real> at(const Real& s1, const Real& s2, double mu,
                                                       double lambda) {
-    const Real zero{}, least = zero + 1e-150, infinite = zero + HUGE_VAL;
+    // The square of the Hessian's entries, of 1 / least^2, has to be finite.
+    const Real zero{}, least = zero + 1e-70, infinite = zero + HUGE_VAL;
     const Real area = larger_of(Real(s1 * s2), least), log_area = logarithm(area);
     const Real i1 = 1.0 / larger_of(s1, least), i2 = 1.0 / larger_of(s2, least);
     const Real pressure = lambda * log_area - mu;

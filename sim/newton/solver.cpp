@@ -31,9 +31,10 @@ struct Iterate {
 
 constexpr double rounding_tolerance = 1e-6;  ///< relative residual below which a shorter step is no help
 constexpr int coupled_after = 20;            ///< iterations
-constexpr double vertex_tolerance = 30;      ///< that of a vertex over that of the sheet
-constexpr double gap_tolerance = 1e-9;       ///< on gaps and complementarity [m]
-constexpr double energy_tolerance = 1e-2;    ///< on energy from nothing, of what there is to turn
+constexpr int linear_problems = 6;  ///< an iteration, each with the contacts that the one before asks for
+constexpr double vertex_tolerance = 30;    ///< that of a vertex over that of the sheet
+constexpr double gap_tolerance = 1e-9;     ///< on gaps and complementarity [m]
+constexpr double energy_tolerance = 1e-2;  ///< on energy from nothing, of what there is to turn
 
 }  // namespace
 
@@ -118,18 +119,20 @@ void iterate_to_balance(const StepProblem& problem, Solver::Workspace& w, StepRe
     // residual.
     const bool coupled = !stuck && h < w.settings.time_step && report.iterations > coupled_after;
     const LinearizedAt iterate{problem.contacts, now.positions, now.force, now.residual};
-    const std::vector<Eigen::Matrix3d> couplings =
-        coupled ? friction_couplings(problem.contacts, now.contacts) : std::vector<Eigen::Matrix3d>();
     w.linear = now.contacts;
     w.gradient = now.residual;
-    for (int exchange = 0; exchange < 6; ++exchange) {
+    w.refactor = false;
+    for (int solved = 0; solved < linear_problems; ++solved) {
       w.force = now.force;
       const double enough = 0.3 * tolerance * problem.force_scale;
       const int solves =
-          coupled ? w.matrix.solve_coupled(w.linear, couplings, w.gradient, enough, w.direction, w.force)
+          coupled ? w.matrix.solve_coupled(w.linear, friction_couplings(problem.contacts, w.linear),
+                                           w.gradient, enough, w.direction, w.force)
                   : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
       report.solves += solves;
-      w.refactor = solves > w.settings.stale_factor_solves;
+      w.refactor = w.refactor || solves > w.settings.stale_factor_solves;
+      // What holds in the last one has to be what its direction was found with.
+      if (solved + 1 == linear_problems) break;
       const bool changed = stuck ? hold_touching(iterate, w.direction, w.linear)
                                  : exchange_contacts(iterate, w.direction, w.force, w.gradient, w.linear);
       if (!changed) break;
@@ -164,7 +167,7 @@ void iterate_to_balance(const StepProblem& problem, Solver::Workspace& w, StepRe
     stuck = false;
     // A sheet about to buckle: the matrix, made positive, is stiffer than the sheet, and steps are too short.
     // Go on along the direction, by secants, while the potential falls.
-    for (double end_slope; length >= 1 && length < 30; std::swap(trial, longer)) {
+    for (double end_slope; !coupled && length >= 1 && length < 30; std::swap(trial, longer)) {
       end_slope = trial.residual.cwiseProduct(w.direction).sum();
       if (end_slope > 0.2 * slope) break;
       length *= std::clamp(slope / (slope - end_slope), 1.5, 3.0);
@@ -189,27 +192,29 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
     }
     for (const Touch& touch : end.contacts.touches_of(k)) {
       if (!touch.holds) continue;
-      report.complementarity = std::max(report.complementarity, touch.gap);
+      report.complementarity = worst(report.complementarity, touch.gap);
       report.obstacle_forces[touch.obstacle] += touch.normal_force * touch.normal + touch.friction;
     }
   }
   for (int i = 0; i < end.positions.rows(); ++i) {
     const VertexConstraint* c = end.contacts.find(i);
-    if (c != nullptr && c->hold == Hold::fixed) continue;
+    // One that is held in some axes meets no obstacle in the others: such a step is not solved.
+    if (c != nullptr && c->hold == Hold::fixed && c->free.isZero(0)) continue;
     for (size_t k = 0; k < environment.obstacles.size(); ++k) {
       const Gap gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
       const double depth =
           gap.starts_inside
               ? -gap_to(environment.obstacles[k], problem.contacts.motions[k], end.positions.row(i)).distance
               : -gap.distance;
-      report.penetration_max = std::max(report.penetration_max, depth);
+      report.penetration_max = worst(report.penetration_max, depth);
       // Where it is let out slowly it may stay below the surface.
-      report.complementarity = std::max(report.complementarity, -gap.distance);
+      report.complementarity = worst(report.complementarity, -gap.distance);
     }
   }
   report.held_penetration = deepest_held(problem.contacts, end.contacts, end.positions);
   report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
-  report.start_penetration = deepest_at_start(problem.contacts, end.contacts, gap_tolerance);
+  report.start_penetration =
+      deepest_at_start(problem.contacts, vertices_inside(problem.contacts, end.contacts));
 }
 
 /// Energies at the end of a step, and whether they came from somewhere: the potential of the step must not
@@ -351,7 +356,7 @@ bool try_step(Environment& environment, double h, Solver::Workspace& w, StepRepo
   const StepProblem problem(*w.plan, environment, h, {exit_speed});
   bool solved = solve_step(problem, w, report);
   if (report.start_penetration.depth > 0) {
-    const auto inside = vertices_inside(environment, problem.contacts.motions);
+    const auto inside = vertices_inside(problem.contacts, w.now.contacts);
     const std::vector<Exit> exits = exits_of(problem.contacts, inside);
     for (size_t k = 1; k < exits.size(); ++k) {
       if (solved && let_out_gently(problem, *w.plan, inside, w.now.positions, exit_speed)) break;
@@ -381,17 +386,16 @@ const Penetration& deeper(const Penetration& a, const Penetration& b) { return a
 /// What two halves of a step come to.
 StepReport joined(const StepReport& first, const StepReport& second) {
   StepReport whole = second;
-  whole.residual = std::isnan(first.residual) ? first.residual : std::max(first.residual, second.residual);
+  whole.residual = worst(first.residual, second.residual);
   whole.iterations += first.iterations;
   whole.solves += first.solves;
   whole.factorizations += first.factorizations;
   whole.substeps += first.substeps;
   whole.converged = first.converged && second.converged;
-  whole.penetration_max = std::max(first.penetration_max, second.penetration_max);
+  whole.penetration_max = worst(first.penetration_max, second.penetration_max);
   whole.held_penetration = deeper(first.held_penetration, second.held_penetration);
   whole.start_penetration = first.start_penetration;
-  whole.complementarity = std::max(first.complementarity, second.complementarity);
-  whole.cone_violation = std::max(first.cone_violation, second.cone_violation);
+  whole.complementarity = worst(first.complementarity, second.complementarity);
   whole.work += first.work;
   for (size_t k = 0; k < whole.grasp_forces.size(); ++k)
     whole.grasp_forces[k] = 0.5 * (first.grasp_forces[k] + second.grasp_forces[k]);

@@ -28,14 +28,13 @@ struct StepReport {
   int solves = 0;       ///< with a factor: iterations of the linear solver
   int factorizations = 0;
   int substeps = 1;  ///< more where the step could not be solved as one
-  /// Force balance to the tolerance, as a whole and to 30 times of it at every vertex; gaps, complementarity
-  /// and the friction cone; no energy from nothing.
+  /// Force balance to the tolerance, as a whole and to 30 times of it at every vertex; gaps and
+  /// complementarity; no energy from nothing. Contact forces lie in the friction cone at every iterate.
   bool converged = false;
   double penetration_max = 0;     ///< deepest vertex below a surface, held ones too [m]
   Penetration held_penetration;   ///< the deepest that a support or a gripper holds below a surface
   Penetration start_penetration;  ///< the deepest other that started the step inside an obstacle
-  double complementarity = 0;     ///< max |min(gap, lambda / stiffness)| [m]
-  double cone_violation = 0;      ///< max(|lambda_t| - mu lambda_n) [N]
+  double complementarity = 0;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
   double kinetic = 0, membrane = 0, bending = 0, potential = 0;  ///< energies [J]
   double work = 0;  ///< that supports, grippers and obstacles did on the sheet, those that do any [J]
   // Forces of a step in parts are their means over time.

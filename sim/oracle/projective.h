@@ -28,6 +28,7 @@ struct ProjectiveSettings {
 };
 
 struct ProjectiveReport : StepReport {
+  double cone_violation = 0;                   ///< max(|lambda_t| - mu lambda_n) [N]
   ContactMetric metric = ContactMetric::full;  ///< the one used
   int contacts = 0;                            ///< vertices against obstacles in the last iteration
   int constraint_iterations = 0;               ///< Newton steps on the multipliers, summed

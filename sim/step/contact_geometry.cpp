@@ -227,6 +227,12 @@ Gap gap_to(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3
   return std::visit([&](const auto& shape) { return gap_of(shape, motion, point); }, obstacle.shape);
 }
 
+Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& point) {
+  ObstacleMotion still = motion;
+  still.end = still.start;
+  return gap_to(obstacle, still, point);
+}
+
 Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double time_step) {
   return gap_to(obstacle, motion_of(obstacle, time - time_step, time), point);
 }

@@ -46,6 +46,9 @@ std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, dou
 /// inside a box the nearest face decides.
 Gap gap_to(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& point);
 
+/// Signed distance of `point` [m] to the obstacle where it stands at the start of the step.
+Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& point);
+
 /// The same at `time` [s], the end of a step of `time_step`.
 Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, double time_step);
 

@@ -116,12 +116,10 @@ std::vector<std::vector<StartSurface>> find_start_surfaces(const Environment& en
   std::vector<std::vector<StartSurface>> surfaces(static_cast<size_t>(starts.rows()));
   for (size_t k = 0; k < obstacles.size(); ++k) {
     if (std::holds_alternative<Cylinder>(obstacles[k].shape)) continue;
-    ObstacleMotion at_start = motions[k];
-    at_start.end = at_start.start;
     const Eigen::Isometry3d moved = motions[k].end * motions[k].start.inverse(Eigen::Isometry);
     for (int i = 0; i < starts.rows(); ++i) {
       const Vector3d start = starts.row(i);
-      const Gap gap = gap_to(obstacles[k], at_start, start);
+      const Gap gap = gap_at_start(obstacles[k], motions[k], start);
       if (std::abs(gap.distance) <= inside_depth)
         surfaces[i].push_back({int(k), gap.normal, gap.normal.dot(moved * start - start)});
     }

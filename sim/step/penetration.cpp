@@ -15,19 +15,30 @@ Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, co
   return deepest;
 }
 
-Penetration deepest_at_start(const ContactStep& step, const ContactSet& contacts, double tolerance) {
+std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const ContactSet& contacts) {
+  const Environment& environment = step.environment;
+  std::vector<std::vector<int>> inside(step.motions.size());
+  for (int i = 0; i < environment.state.positions.rows(); ++i) {
+    const VertexConstraint* constraint = contacts.find(i);
+    if (constraint != nullptr && constraint->hold == Hold::fixed) continue;
+    for (size_t k = 0; k < step.motions.size(); ++k)
+      if (gap_at_start(environment.obstacles[k], step.motions[k], environment.state.positions.row(i))
+              .distance < -inside_depth)
+        inside[k].push_back(i);
+  }
+  return inside;
+}
+
+Penetration deepest_at_start(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
   const Environment& environment = step.environment;
   Penetration deepest;
-  for (int k = 0; k < static_cast<int>(step.motions.size()); ++k) {
-    ObstacleMotion at_start = step.motions[k];
-    at_start.end = at_start.start;
-    for (int i = 0; i < environment.state.positions.rows(); ++i) {
-      if (contacts.place[i] >= 0 && contacts.constraints[contacts.place[i]].hold == Hold::fixed) continue;
+  for (size_t k = 0; k < inside.size(); ++k)
+    for (const int i : inside[k]) {
       const double depth =
-          -gap_to(environment.obstacles[k], at_start, environment.state.positions.row(i)).distance;
-      if (depth > tolerance && depth > deepest.depth) deepest = {depth, i, k};
+          -gap_at_start(environment.obstacles[k], step.motions[k], environment.state.positions.row(i))
+               .distance;
+      if (depth > deepest.depth) deepest = {depth, i, static_cast<int>(k)};
     }
-  }
   return deepest;
 }
 

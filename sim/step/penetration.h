@@ -1,4 +1,6 @@
 #pragma once
+#include <vector>
+
 #include "sim/step/contact_set.h"
 
 namespace flash::sim {
@@ -7,7 +9,11 @@ namespace flash::sim {
 /// step, or took through it in the step: below the face through which the way came in.
 Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
 
-/// The deepest of all others that started the step inside an obstacle, by more than `tolerance` [m].
-Penetration deepest_at_start(const ContactStep& step, const ContactSet& contacts, double tolerance);
+/// Which vertices start the step inside each obstacle, those apart that supports or grippers hold: one list
+/// an obstacle, ascending.
+std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const ContactSet& contacts);
+
+/// The deepest of vertices that start the step inside an obstacle, as vertices_inside finds them.
+Penetration deepest_at_start(const ContactStep& step, const std::vector<std::vector<int>>& inside);
 
 }  // namespace flash::sim

@@ -30,20 +30,6 @@ void add_directions(const Obstacle& obstacle, const ObstacleMotion& motion,
 
 }  // namespace
 
-std::vector<std::vector<int>> vertices_inside(const Environment& environment,
-                                              const std::vector<ObstacleMotion>& motions) {
-  const data::Points& positions = environment.state.positions;
-  std::vector<std::vector<int>> inside(motions.size());
-  for (std::size_t k = 0; k < motions.size(); ++k) {
-    ObstacleMotion at_start = motions[k];
-    at_start.end = at_start.start;
-    for (int i = 0; i < positions.rows(); ++i)
-      if (gap_to(environment.obstacles[k], at_start, positions.row(i)).distance < -inside_depth)
-        inside[k].push_back(i);
-  }
-  return inside;
-}
-
 Vector3d common_way_out(const Environment& environment, const std::vector<ObstacleMotion>& motions,
                         const std::vector<std::vector<int>>& inside) {
   std::vector<Vector3d> directions;
