@@ -1,6 +1,7 @@
 #include "sim/step/contact_geometry.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -78,13 +79,15 @@ void face_facing(const Vector3d& way, int& axis, double& sign) {
   sign = std::copysign(1.0, way[axis]);
 }
 
-Gap gap_after_way(const Plane& plane, const ObstacleMotion& motion, const Vector3d& start,
-                  const Vector3d& point, const Vector3d&, double time_step, const Exit& exit) {
+Gap gap_after_way(const Plane& plane, const ObstacleMotion& motion, const OtherObstacles&,
+                  const Vector3d& start, const Vector3d& point, const Vector3d&, double time_step,
+                  const Exit& exit) {
   return let_out(gap_of(plane, motion, point), -plane.normal.dot(start - plane.point), time_step, exit);
 }
 
-Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const Vector3d& start,
-                  const Vector3d& point, const Vector3d&, double time_step, const Exit& exit) {
+Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const OtherObstacles&,
+                  const Vector3d& start, const Vector3d& point, const Vector3d&, double time_step,
+                  const Exit& exit) {
   Gap gap = gap_of(cylinder, motion, point);
   const Vector3d from = radial_of(cylinder, start), to = radial_of(cylinder, point), way = to - from;
   // Where the way enters the circle: |from + s way| = radius, the first of two; at once where it starts
@@ -119,6 +122,7 @@ struct Passage {
   bool enters = false;
   int entry_axis = 0, exit_axis = 0;
   double entry_sign = 1;
+  double entry = 0;  ///< share of the way before it
 };
 
 /// What starts inside came in by the nearest face, or by the one that faces `way_out` where that is not zero.
@@ -154,51 +158,107 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
     enters = 0;
   }
   passage.enters = enters >= 0 && enters <= 1 && enters < leaves;
+  passage.entry = enters;
   return passage;
 }
 
-/// Takes a way in the plane of a face, to within rounding, out of the box where the face looks up, into it
-/// where it looks down and the way begins at another face or outside. Returns the axis of the face that looks
-/// up, or -1.
-int decide_grazing(const Box& box, const Vector3d& down, Vector3d& from, Vector3d& to) {
-  constexpr double grazing = 1e-9;  // [m]
-  int upper = -1;
-  const Vector3d excess = from.cwiseAbs() - box.half_extents;
+/// A way in the frame of a box.
+struct LocalWay {
+  Vector3d from, to;
+  int grazed_axis = -1;  ///< of an open face in whose plane it lies; -1: there is none
+};
+
+/// Takes the way out of the box where it lies in the plane of an open face, to within rounding of poses in
+/// files; to the middle of the box, away from that face, where another obstacle covers it.
+LocalWay local_way(const Box& box, const ObstacleMotion& motion, const OtherObstacles& others,
+                   const Vector3d& start, const Vector3d& end) {
+  constexpr double grazing = 1e-6;  // [m]
+  LocalWay way{motion.start.inverse(Eigen::Isometry) * start, motion.end.inverse(Eigen::Isometry) * end};
+  // Where the way has just come to the box.
+  const Vector3d first = way.from.cwiseMax(-box.half_extents).cwiseMin(box.half_extents),
+                 last = way.to.cwiseMax(-box.half_extents).cwiseMin(box.half_extents);
+  const auto grazes = [&](int axis) {
+    const auto at_face = [&](double x) {
+      return std::abs(std::copysign(1.0, way.from[axis]) * x - box.half_extents[axis]) <= grazing;
+    };
+    return at_face(way.from[axis]) && at_face(way.to[axis]);
+  };
+  const std::array<bool, 3> grazed = {grazes(0), grazes(1), grazes(2)};
   for (int axis = 0; axis < 3; ++axis) {
-    const double side = std::copysign(1.0, from[axis]);
-    const auto grazes = [&](double x) { return std::abs(side * x - box.half_extents[axis]) <= grazing; };
-    if (std::abs(down[axis]) < 0.5 || !grazes(from[axis]) || !grazes(to[axis])) continue;
-    const bool looks_down = side * down[axis] > 0;
-    const bool beside = excess[(axis + 1) % 3] >= -grazing || excess[(axis + 2) % 3] >= -grazing;
-    if (looks_down && !beside) continue;
-    if (!looks_down) upper = axis;
-    const double decided = side * (box.half_extents[axis] + (looks_down ? -2 : 2) * grazing);
-    from[axis] = to[axis] = decided;
+    if (!grazed[axis]) continue;
+    const double side = std::copysign(1.0, way.from[axis]);
+    // Inside the other faces, so that only what lies beyond this one counts.
+    Vector3d beyond = first + 1e-3 * (last - first);
+    for (int other = 0; other < 3; ++other)
+      beyond[other] = std::clamp(beyond[other], std::min(0.0, 2 * grazing - box.half_extents[other]),
+                                 std::max(0.0, box.half_extents[other] - 2 * grazing));
+    beyond[axis] = side * (box.half_extents[axis] + 2 * grazing);
+    if (others.cover(motion.end * beyond)) {
+      way.from[axis] = way.to[axis] = 0;
+    } else {
+      way.grazed_axis = axis;
+      way.from[axis] = way.to[axis] = side * (box.half_extents[axis] + 2 * grazing);
+    }
   }
-  return upper;
+  return way;
 }
 
-Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const Vector3d& start, const Vector3d& point,
-                  const Vector3d& slid, double time_step, const Exit& exit) {
-  Vector3d from = motion.start.inverse(Eigen::Isometry) * start;
+/// Whether the way ends over the face that it grazes, or in the box below.
+bool ends_at_grazed_face(const Box& box, const LocalWay& way) {
+  if (way.grazed_axis < 0) return false;
+  Vector3d excess = way.to.cwiseAbs() - box.half_extents;
+  excess[way.grazed_axis] = 0;
+  return excess.maxCoeff() <= 0;
+}
+
+Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const OtherObstacles& others,
+                  const Vector3d& start, const Vector3d& point, const Vector3d& slid, double time_step,
+                  const Exit& exit) {
+  const LocalWay way = local_way(box, motion, others, start, slid);
   const Vector3d local = motion.end.inverse(Eigen::Isometry) * point;
-  Vector3d to = motion.end.inverse(Eigen::Isometry) * slid;
-  const int upper = decide_grazing(box, motion.end.linear().transpose() * motion.down, from, to);
-  if (upper >= 0) {
-    const Gap gap = gap_to_face(box, motion, point, local, upper, std::copysign(1.0, from[upper]));
-    Vector3d above = local.cwiseAbs() - box.half_extents;
-    above[upper] = gap.distance;
-    if (above.maxCoeff() <= 0) return gap;
-  }
-  const Passage passage = passage_through(box, from, to, motion.end.linear().transpose() * exit.way);
+  if (ends_at_grazed_face(box, way))
+    return gap_to_face(box, motion, point, local, way.grazed_axis,
+                       std::copysign(1.0, way.from[way.grazed_axis]));
+  const Passage passage = passage_through(box, way.from, way.to, motion.end.linear().transpose() * exit.way);
   if (!passage.enters) return gap_of(box, motion, point);
-  const bool ends_inside = ((to.cwiseAbs() - box.half_extents).array() <= 0).all();
+  const bool ends_inside = ((way.to.cwiseAbs() - box.half_extents).array() <= 0).all();
   const bool behind = passage.exit_axis == passage.entry_axis &&
-                      passage.entry_sign * to[passage.entry_axis] < -box.half_extents[passage.entry_axis];
+                      passage.entry_sign * way.to[passage.entry_axis] < -box.half_extents[passage.entry_axis];
   if (!ends_inside && !behind) return gap_of(box, motion, point);
   const Gap gap = gap_to_face(box, motion, point, local, passage.entry_axis, passage.entry_sign);
-  const double depth = box.half_extents[passage.entry_axis] - passage.entry_sign * from[passage.entry_axis];
+  const double depth =
+      box.half_extents[passage.entry_axis] - passage.entry_sign * way.from[passage.entry_axis];
   return let_out(gap, depth, time_step, exit);
+}
+
+std::optional<MetSurface> surface_of(const Plane& plane, const ObstacleMotion&, const OtherObstacles&,
+                                     const Vector3d& start, const Vector3d& end) {
+  const double from = plane.normal.dot(start - plane.point), to = plane.normal.dot(end - plane.point);
+  if (from < -inside_depth || to > inside_depth) return {};
+  return MetSurface{from <= inside_depth ? 0 : std::min(1.0, from / (from - to)), plane.normal,
+                    plane.normal.dot(plane.point)};
+}
+
+std::optional<MetSurface> surface_of(const Cylinder&, const ObstacleMotion&, const OtherObstacles&,
+                                     const Vector3d&, const Vector3d&) {
+  return {};
+}
+
+std::optional<MetSurface> surface_of(const Box& box, const ObstacleMotion& motion,
+                                     const OtherObstacles& others, const Vector3d& start,
+                                     const Vector3d& end) {
+  const LocalWay way = local_way(box, motion, others, start, end);
+  int axis = way.grazed_axis;
+  double sign = axis < 0 ? 0 : std::copysign(1.0, way.from[axis]), entry = 0;
+  if (axis < 0) {
+    const Passage passage = passage_through(box, way.from, way.to, Vector3d::Zero());
+    if (!passage.enters) return {};
+    axis = passage.entry_axis;
+    sign = passage.entry_sign;
+    entry = passage.entry;
+  }
+  const Vector3d normal = sign * motion.end.linear().col(axis);
+  return MetSurface{entry, normal, normal.dot(motion.end.translation()) + box.half_extents[axis]};
 }
 
 ObstacleMotion motion_of(const Obstacle& obstacle, double start, double end) {
@@ -215,11 +275,7 @@ ObstacleMotion motion_of(const Obstacle& obstacle, double start, double end) {
 
 std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, double start, double end) {
   std::vector<ObstacleMotion> motions;
-  const double gravity = environment.gravity.norm();
-  for (const Obstacle& obstacle : environment.obstacles) {
-    motions.push_back(motion_of(obstacle, start, end));
-    if (gravity > 0) motions.back().down = environment.gravity / gravity;
-  }
+  for (const Obstacle& obstacle : environment.obstacles) motions.push_back(motion_of(obstacle, start, end));
   return motions;
 }
 
@@ -237,10 +293,27 @@ Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double 
   return gap_to(obstacle, motion_of(obstacle, time - time_step, time), point);
 }
 
-Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& start,
-              const Vector3d& point, const Vector3d& slid, double time_step, const Exit& exit) {
+bool OtherObstacles::cover(const Vector3d& point) const {
+  if (obstacles == nullptr) return false;
+  for (int k = 0; k < static_cast<int>(obstacles->size()); ++k)
+    if (k != own && gap_to((*obstacles)[k], (*motions)[k], point).distance < 0) return true;
+  return false;
+}
+
+std::optional<MetSurface> met_surface(const Obstacle& obstacle, const ObstacleMotion& motion,
+                                      const OtherObstacles& others, const Vector3d& start,
+                                      const Vector3d& end) {
+  return std::visit([&](const auto& shape) { return surface_of(shape, motion, others, start, end); },
+                    obstacle.shape);
+}
+
+Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const OtherObstacles& others,
+              const Vector3d& start, const Vector3d& point, const Vector3d& slid, double time_step,
+              const Exit& exit) {
   return std::visit(
-      [&](const auto& shape) { return gap_after_way(shape, motion, start, point, slid, time_step, exit); },
+      [&](const auto& shape) {
+        return gap_after_way(shape, motion, others, start, point, slid, time_step, exit);
+      },
       obstacle.shape);
 }
 
@@ -266,7 +339,7 @@ void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const
   std::visit(
       [&](const auto& shape) {
         for (Eigen::Index i = 0; i < points.rows(); ++i)
-          distances[i] = std::min(distances[i], gap_after_way(shape, motion, starts.row(i), points.row(i),
+          distances[i] = std::min(distances[i], gap_after_way(shape, motion, {}, starts.row(i), points.row(i),
                                                               points.row(i), time_step, exit)
                                                     .distance);
       },

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 #include "sim/scene/environment.h"
@@ -30,7 +31,6 @@ struct Penetration {
 struct ObstacleMotion {
   Eigen::Isometry3d start = Eigen::Isometry3d::Identity(), end = Eigen::Isometry3d::Identity();
   bool moves = false;
-  Eigen::Vector3d down = Eigen::Vector3d::Zero();  ///< unit, the way of gravity; zero without
 };
 
 /// How vertices that start a step inside an obstacle come out of it.
@@ -52,21 +52,45 @@ Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const E
 /// The same at `time` [s], the end of a step of `time_step`.
 Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, double time_step);
 
+/// The other obstacles of a step, as one of them sees them; none by default.
+struct OtherObstacles {
+  const std::vector<Obstacle>* obstacles = nullptr;
+  const std::vector<ObstacleMotion>* motions = nullptr;
+  int own = -1;
+
+  /// Whether one of them covers `point` at the end of the step [m].
+  bool cover(const Eigen::Vector3d& point) const;
+};
+
+/// A flat surface that the way of a vertex meets: normal . x >= offset outside, at the end of the step.
+struct MetSurface {
+  double entry;  ///< share of the way before it; 0: the vertex starts on it
+  Eigen::Vector3d normal;
+  double offset;  ///< [m]
+};
+
+/// The surface of a plane or a box that the straight way from `start` to `end`, seen from the obstacle,
+/// meets, also where it ends on it or leaves it by an edge beside; none for a cylinder.
+std::optional<MetSurface> met_surface(const Obstacle& obstacle, const ObstacleMotion& motion,
+                                      const OtherObstacles& others, const Eigen::Vector3d& start,
+                                      const Eigen::Vector3d& end);
+
 /// How a vertex that comes from `start` [m] at the start of the step stands at `point` at its end. The way
 /// between them is straight, seen from the obstacle:
 /// - a point in a box, or behind it, stands against the face through which its way entered; one behind the
 ///   axis of a cylinder against the tangent plane where its way entered. So nothing passes through, however
 ///   thin. A way that leaves a box by a face beside rounds its edge and is let go.
-/// - a way in the plane of a face, to within rounding, belongs to that face where it looks up, so that a
-///   sheet slides over boxes that stand flush; a face that looks down carries nothing, and what is pushed
-///   against a box that stands on a table meets its side.
-/// - a vertex that starts on another surface slides along it: `slid` is where its way would end so, `point`
-///   where it starts on none. That way decides which face of a box it meets, so that it slides from one box
-///   to the next.
+/// - a way in the plane of a face, to within a micrometre, belongs to that face. Where another obstacle
+/// covers
+///   it, it is no surface: the way enters by the face that it crosses.
+/// - a vertex that meets other surfaces before slides along them: `slid` is where its way would end so,
+///   `point` where it meets none. That way decides which face of a box it meets, so that it slides over boxes
+///   that stand flush.
 /// - a vertex that starts inside stands against a surface below the obstacle's own (`sunk`), so that it comes
 ///   out as `exit` says.
-Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
-              const Eigen::Vector3d& point, const Eigen::Vector3d& slid, double time_step, const Exit& exit);
+Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const OtherObstacles& others,
+              const Eigen::Vector3d& start, const Eigen::Vector3d& point, const Eigen::Vector3d& slid,
+              double time_step, const Exit& exit);
 
 /// How far a vertex at `start` is from coming out of the obstacle on the side that faces `way`, at the start
 /// of the step; infinity where there is no such side [m].
@@ -74,7 +98,7 @@ double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const
                    const Eigen::Vector3d& way);
 
 /// Lowers distances[i] to that of gap_after for every vertex, where it is smaller: rows of `starts` and
-/// `points`, of vertices that start on no other surface.
+/// `points`, of vertices that meet no other obstacle.
 void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
                    const data::Points& points, double time_step, const Exit& exit,
                    std::vector<double>& distances);

@@ -107,24 +107,10 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   return constraint;
 }
 
-std::vector<std::vector<StartSurface>> find_start_surfaces(const Environment& environment,
-                                                           const std::vector<ObstacleMotion>& motions) {
-  const std::vector<Obstacle>& obstacles = environment.obstacles;
-  const auto is_box = [](const Obstacle& obstacle) { return std::holds_alternative<Box>(obstacle.shape); };
-  if (obstacles.size() < 2 || std::none_of(obstacles.begin(), obstacles.end(), is_box)) return {};
-  const Points& starts = environment.state.positions;
-  std::vector<std::vector<StartSurface>> surfaces(static_cast<size_t>(starts.rows()));
-  for (size_t k = 0; k < obstacles.size(); ++k) {
-    if (std::holds_alternative<Cylinder>(obstacles[k].shape)) continue;
-    const Eigen::Isometry3d moved = motions[k].end * motions[k].start.inverse(Eigen::Isometry);
-    for (int i = 0; i < starts.rows(); ++i) {
-      const Vector3d start = starts.row(i);
-      const Gap gap = gap_at_start(obstacles[k], motions[k], start);
-      if (std::abs(gap.distance) <= inside_depth)
-        surfaces[i].push_back({int(k), gap.normal, gap.normal.dot(moved * start - start)});
-    }
-  }
-  return surfaces;
+bool is_box(const Obstacle& obstacle) { return std::holds_alternative<Box>(obstacle.shape); }
+
+bool stand_beside(const std::vector<Obstacle>& obstacles) {
+  return obstacles.size() > 1 && std::any_of(obstacles.begin(), obstacles.end(), is_box);
 }
 
 }  // namespace
@@ -135,16 +121,46 @@ ContactStep::ContactStep(const Environment& environment_in, double time_step_in,
       time_step(time_step_in),
       exit(exit_in),
       motions(obstacle_motions(environment_in, environment_in.state.time, time)),
-      start_surfaces(find_start_surfaces(environment_in, motions)) {}
+      several(stand_beside(environment_in.obstacles)) {}
 
-Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& point, int i) const {
+Gap ContactStep::gap(int obstacle, const Points& positions, int i) const {
+  const Vector3d start = environment.state.positions.row(i), point = positions.row(i);
+  const Obstacle& own = environment.obstacles[obstacle];
+  if (!several || !is_box(own))
+    return gap_after(own, motions[obstacle], {}, start, point, point, time_step, exit);
+  // Far away nothing else counts.
+  const ObstacleMotion& motion = motions[obstacle];
+  const Vector3d carried =
+      motion.moves ? Vector3d(motion.end * (motion.start.inverse(Eigen::Isometry) * start)) : start;
+  const Gap gap = gap_to(own, motion, point);
+  if (gap.distance > 2 * (point - carried).norm() + touching_gap) return gap;
+  return gap_after(own, motion, {&environment.obstacles, &motions, obstacle}, start, point,
+                   slid(obstacle, start, point), time_step, exit);
+}
+
+Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& point) const {
+  const auto surface_of = [&](int k, const Vector3d& end) {
+    return met_surface(environment.obstacles[k], motions[k], {&environment.obstacles, &motions, k}, start,
+                       end);
+  };
   Vector3d end = point;
-  for (const StartSurface& surface : start_surfaces[i]) {
-    if (surface.obstacle == obstacle) continue;
-    const double inward = surface.rises - surface.normal.dot(end - start);
-    if (inward > 0) end += inward * surface.normal;
+  std::vector<int> others;
+  for (int k = 0; k < static_cast<int>(motions.size()); ++k)
+    if (k != obstacle) others.push_back(k);
+  while (true) {
+    const std::optional<MetSurface> own = surface_of(obstacle, end);
+    std::optional<MetSurface> first;
+    auto its_place = others.end();
+    for (auto k = others.begin(); k != others.end(); ++k) {
+      const std::optional<MetSurface> met = surface_of(*k, end);
+      if (!met || (first && first->entry <= met->entry) || (own && own->entry < met->entry)) continue;
+      first = met;
+      its_place = k;
+    }
+    if (!first) return end;
+    end += std::max(0.0, first->offset - first->normal.dot(end)) * first->normal;
+    others.erase(its_place);
   }
-  return end;
 }
 
 ContactSet begin_step(const ContactStep& step, Points& positions) {
@@ -191,7 +207,7 @@ ContactSet begin_step(const ContactStep& step, Points& positions) {
 void find_clearance(const ContactStep& step, const Points& positions, std::vector<double>& clearance) {
   clearance.assign(positions.rows(), std::numeric_limits<double>::infinity());
   for (size_t k = 0; k < step.motions.size(); ++k) {
-    if (!step.start_surfaces.empty()) {
+    if (step.several) {
       for (int i = 0; i < positions.rows(); ++i)
         clearance[i] = std::min(clearance[i], step.gap(int(k), positions, i).distance);
       continue;

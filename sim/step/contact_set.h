@@ -12,13 +12,6 @@ namespace flash::sim {
 /// Slip up to which a vertex has not moved: rounding of a position [m].
 inline constexpr double resting_slip = 1e-13;
 
-/// A flat surface that a vertex starts a step on.
-struct StartSurface {
-  int obstacle;
-  Eigen::Vector3d normal;
-  double rises;  ///< along the normal, over the step [m]
-};
-
 /// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
 struct ContactStep {
   ContactStep(const Environment& environment, double time_step, const Exit& exit);
@@ -27,18 +20,14 @@ struct ContactStep {
   double time, time_step;  ///< [s]
   Exit exit;               ///< of vertices that start inside an obstacle
   std::vector<ObstacleMotion> motions;
-  /// Of each vertex; empty where no box stands beside another obstacle.
-  std::vector<std::vector<StartSurface>> start_surfaces;
+  bool several;  ///< whether a box stands beside another obstacle, so that one may continue the other
 
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
-  Gap gap(int obstacle, const data::Points& positions, int i) const {
-    const Eigen::Vector3d start = environment.state.positions.row(i), point = positions.row(i);
-    return gap_after(environment.obstacles[obstacle], motions[obstacle], start, point,
-                     start_surfaces.empty() ? point : slid(obstacle, start, point, i), time_step, exit);
-  }
+  Gap gap(int obstacle, const data::Points& positions, int i) const;
 
-  /// Where the way of vertex i would end along the surfaces of other obstacles that it starts on.
-  Eigen::Vector3d slid(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point, int i) const;
+  /// Where the way of a vertex from `start` to `point` would end along the surfaces of other obstacles that
+  /// it meets before this one.
+  Eigen::Vector3d slid(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
 };
 
 /// What a vertex may do at the current iterate of a step.

@@ -45,7 +45,7 @@ TEST(ContactGeometry, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
     }
     if (by_an_edge) continue;
     const Gap gap =
-        gap_after({box}, motion, motion.start * from, motion.end * to, motion.end * to, 0.01, Exit{1});
+        gap_after({box}, motion, {}, motion.start * from, motion.end * to, motion.end * to, 0.01, Exit{1});
     const bool ends_inside = (to.cwiseAbs() - box.half_extents).maxCoeff() <= 0;
     if (in < 0 || (!ends_inside && out != in)) {
       // Never in, or out by a face beside: the distance of the point alone.
@@ -72,7 +72,7 @@ TEST(ContactGeometry, NoWayPassesThroughACylinder) {
     double nearest = 1;
     for (int k = 0; k <= 1000; ++k)
       nearest = std::min(nearest, across(from + k / 1000.0 * (to - from)).norm());
-    const Gap gap = gap_after({cylinder}, {}, from, to, to, 0.01, Exit{1});
+    const Gap gap = gap_after({cylinder}, {}, {}, from, to, to, 0.01, Exit{1});
     if (nearest > 0.301) {
       EXPECT_GT(gap.distance, 0) << sample;
     }
@@ -93,12 +93,12 @@ TEST(ContactGeometry, WhatStartsInsideMayStayThereForItsWayOut) {
   const double time_step = 0.01, speed = 1;
   for (const Obstacle& obstacle : obstacles) {
     const Vector3d start(0, 0, 0.02);  // 30 mm deep, 10 mm a step
-    const Gap gap = gap_after(obstacle, {}, start, start, start, time_step, Exit{speed});
+    const Gap gap = gap_after(obstacle, {}, {}, start, start, start, time_step, Exit{speed});
     EXPECT_NEAR(gap.sunk, 0.02, 1e-12);
     EXPECT_NEAR(gap.distance, -0.01, 1e-12);
     EXPECT_NEAR((gap.normal - Vector3d::UnitZ()).norm(), 0, 1e-12);
-    EXPECT_NEAR(gap_after(obstacle, {}, Vector3d(0, 0, 0.045), start, start, time_step, Exit{speed}).sunk, 0,
-                1e-12);
+    EXPECT_NEAR(gap_after(obstacle, {}, {}, Vector3d(0, 0, 0.045), start, start, time_step, Exit{speed}).sunk,
+                0, 1e-12);
   }
 }
 
