@@ -162,42 +162,45 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
   return passage;
 }
 
+/// Distance up to which a way lies in the plane of a face: rounding of poses in files [m].
+constexpr double grazing = 1e-6;
+
 /// A way in the frame of a box.
 struct LocalWay {
   Vector3d from, to;
   int grazed_axis = -1;  ///< of an open face in whose plane it lies; -1: there is none
 };
 
-/// Takes the way out of the box where it lies in the plane of an open face, to within rounding of poses in
-/// files; to the middle of the box, away from that face, where another obstacle covers it.
+/// Whether another obstacle covers the face of a box across `axis` where the way comes upon it. The point
+/// asked for lies just beyond that face and inside all others.
+bool face_is_covered(const Box& box, const ObstacleMotion& motion, const OtherObstacles& others,
+                     const LocalWay& way, int axis) {
+  const Vector3d inner = (box.half_extents.array() - 2 * grazing).cwiseMax(0.0);
+  const Vector3d first = way.from.cwiseMax(-inner).cwiseMin(inner),
+                 last = way.to.cwiseMax(-inner).cwiseMin(inner);
+  Vector3d beyond = first + 1e-3 * (last - first);
+  beyond[axis] = std::copysign(box.half_extents[axis] + 2 * grazing, way.from[axis]);
+  return others.cover(motion.end * beyond);
+}
+
+/// A way in the plane of an open face is taken out of the box there. One that comes from beside a covered
+/// face is taken to the middle of the box, where that face does not count.
 LocalWay local_way(const Box& box, const ObstacleMotion& motion, const OtherObstacles& others,
                    const Vector3d& start, const Vector3d& end) {
-  constexpr double grazing = 1e-6;  // [m]
   LocalWay way{motion.start.inverse(Eigen::Isometry) * start, motion.end.inverse(Eigen::Isometry) * end};
-  // Where the way has just come to the box.
-  const Vector3d first = way.from.cwiseMax(-box.half_extents).cwiseMin(box.half_extents),
-                 last = way.to.cwiseMax(-box.half_extents).cwiseMin(box.half_extents);
-  const auto grazes = [&](int axis) {
-    const auto at_face = [&](double x) {
-      return std::abs(std::copysign(1.0, way.from[axis]) * x - box.half_extents[axis]) <= grazing;
-    };
-    return at_face(way.from[axis]) && at_face(way.to[axis]);
-  };
-  const std::array<bool, 3> grazed = {grazes(0), grazes(1), grazes(2)};
+  const LocalWay straight = way;
+  const Vector3d excess = way.from.cwiseAbs() - box.half_extents;
   for (int axis = 0; axis < 3; ++axis) {
-    if (!grazed[axis]) continue;
-    const double side = std::copysign(1.0, way.from[axis]);
-    // Inside the other faces, so that only what lies beyond this one counts.
-    Vector3d beyond = first + 1e-3 * (last - first);
-    for (int other = 0; other < 3; ++other)
-      beyond[other] = std::clamp(beyond[other], std::min(0.0, 2 * grazing - box.half_extents[other]),
-                                 std::max(0.0, box.half_extents[other] - 2 * grazing));
-    beyond[axis] = side * (box.half_extents[axis] + 2 * grazing);
-    if (others.cover(motion.end * beyond)) {
+    const double side = std::copysign(1.0, straight.from[axis]), half = box.half_extents[axis];
+    if (std::abs(side * straight.from[axis] - half) > grazing ||
+        std::abs(side * straight.to[axis] - half) > grazing)
+      continue;
+    const bool from_beside = std::max(excess[(axis + 1) % 3], excess[(axis + 2) % 3]) >= -grazing;
+    if (from_beside && face_is_covered(box, motion, others, straight, axis)) {
       way.from[axis] = way.to[axis] = 0;
     } else {
       way.grazed_axis = axis;
-      way.from[axis] = way.to[axis] = side * (box.half_extents[axis] + 2 * grazing);
+      way.from[axis] = way.to[axis] = side * (half + 2 * grazing);
     }
   }
   return way;
@@ -251,6 +254,7 @@ std::optional<MetSurface> surface_of(const Box& box, const ObstacleMotion& motio
   int axis = way.grazed_axis;
   double sign = axis < 0 ? 0 : std::copysign(1.0, way.from[axis]), entry = 0;
   if (axis < 0) {
+    if ((way.from.cwiseAbs() - box.half_extents).maxCoeff() < -inside_depth) return {};
     const Passage passage = passage_through(box, way.from, way.to, Vector3d::Zero());
     if (!passage.enters) return {};
     axis = passage.entry_axis;

@@ -70,7 +70,8 @@ struct MetSurface {
 };
 
 /// The surface of a plane or a box that the straight way from `start` to `end`, seen from the obstacle,
-/// meets, also where it ends on it or leaves it by an edge beside; none for a cylinder.
+/// meets, also where it ends on it or leaves it by an edge beside. None for a cylinder, and where the way
+/// starts inside.
 std::optional<MetSurface> met_surface(const Obstacle& obstacle, const ObstacleMotion& motion,
                                       const OtherObstacles& others, const Eigen::Vector3d& start,
                                       const Eigen::Vector3d& end);

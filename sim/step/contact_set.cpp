@@ -128,14 +128,20 @@ Gap ContactStep::gap(int obstacle, const Points& positions, int i) const {
   const Obstacle& own = environment.obstacles[obstacle];
   if (!several || !is_box(own))
     return gap_after(own, motions[obstacle], {}, start, point, point, time_step, exit);
-  // Far away nothing else counts.
+  if (!within_reach(obstacle, start, point)) return gap_to(own, motions[obstacle], point);
+  // A vertex that starts inside goes straight out.
+  if (gap_at_start(own, motions[obstacle], start).distance < -inside_depth)
+    return gap_after(own, motions[obstacle], {}, start, point, point, time_step, exit);
+  return gap_after(own, motions[obstacle], {&environment.obstacles, &motions, obstacle}, start, point,
+                   slid(obstacle, start, point), time_step, exit);
+}
+
+bool ContactStep::within_reach(int obstacle, const Vector3d& start, const Vector3d& point) const {
   const ObstacleMotion& motion = motions[obstacle];
   const Vector3d carried =
       motion.moves ? Vector3d(motion.end * (motion.start.inverse(Eigen::Isometry) * start)) : start;
-  const Gap gap = gap_to(own, motion, point);
-  if (gap.distance > 2 * (point - carried).norm() + touching_gap) return gap;
-  return gap_after(own, motion, {&environment.obstacles, &motions, obstacle}, start, point,
-                   slid(obstacle, start, point), time_step, exit);
+  return gap_to(environment.obstacles[obstacle], motion, point).distance <=
+         2 * (point - carried).norm() + touching_gap;
 }
 
 Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& point) const {
@@ -146,7 +152,7 @@ Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& 
   Vector3d end = point;
   std::vector<int> others;
   for (int k = 0; k < static_cast<int>(motions.size()); ++k)
-    if (k != obstacle) others.push_back(k);
+    if (k != obstacle && within_reach(k, start, point)) others.push_back(k);
   while (true) {
     const std::optional<MetSurface> own = surface_of(obstacle, end);
     std::optional<MetSurface> first;
