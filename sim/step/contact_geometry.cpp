@@ -214,20 +214,55 @@ bool ends_at_grazed_face(const Box& box, const LocalWay& way) {
   return excess.maxCoeff() <= 0;
 }
 
+/// The passage of a way through a box that stands beside others. A way that comes by a covered face at the
+/// edge of an open one enters by that.
+Passage passage_beside(const Box& box, const ObstacleMotion& motion, const OtherObstacles& others,
+                       const LocalWay& way, const Vector3d& way_out) {
+  if (others.obstacles == nullptr) return passage_through(box, way.from, way.to, way_out);
+  // A way along the surface of a neighbour ends on the box, not above it by rounding.
+  const Box reached{.half_extents = box.half_extents.array() + 0.5 * grazing};
+  Passage passage = passage_through(reached, way.from, way.to, way_out);
+  if (!passage.enters) return passage;
+  const Vector3d entered = way.from + passage.entry * (way.to - way.from);
+  for (int axis = 0; axis < 3; ++axis) {
+    const double side = std::copysign(1.0, entered[axis]), half = box.half_extents[axis];
+    if (axis == passage.entry_axis || std::abs(side * entered[axis] - half) > grazing ||
+        side * way.from[axis] < half - grazing ||
+        !face_is_covered(box, motion, others, way, passage.entry_axis) ||
+        face_is_covered(box, motion, others, way, axis))
+      continue;
+    passage.entry_axis = axis;
+    passage.entry_sign = side;
+    break;
+  }
+  return passage;
+}
+
+/// Whether a way that enters a box ends in it or behind it.
+bool ends_behind_its_entry(const Box& box, const LocalWay& way, const Passage& passage) {
+  if (!passage.enters) return false;
+  const bool ends_inside = ((way.to.cwiseAbs() - box.half_extents).array() <= 0.5 * grazing).all();
+  return ends_inside ||
+         (passage.exit_axis == passage.entry_axis &&
+          passage.entry_sign * way.to[passage.entry_axis] < -box.half_extents[passage.entry_axis]);
+}
+
 Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const OtherObstacles& others,
                   const Vector3d& start, const Vector3d& point, const Vector3d& slid, double time_step,
                   const Exit& exit) {
-  const LocalWay way = local_way(box, motion, others, start, slid);
   const Vector3d local = motion.end.inverse(Eigen::Isometry) * point;
+  LocalWay way = local_way(box, motion, others, start, slid);
   if (ends_at_grazed_face(box, way))
     return gap_to_face(box, motion, point, local, way.grazed_axis,
                        std::copysign(1.0, way.from[way.grazed_axis]));
-  const Passage passage = passage_through(box, way.from, way.to, motion.end.linear().transpose() * exit.way);
-  if (!passage.enters) return gap_of(box, motion, point);
-  const bool ends_inside = ((way.to.cwiseAbs() - box.half_extents).array() <= 0).all();
-  const bool behind = passage.exit_axis == passage.entry_axis &&
-                      passage.entry_sign * way.to[passage.entry_axis] < -box.half_extents[passage.entry_axis];
-  if (!ends_inside && !behind) return gap_of(box, motion, point);
+  const Vector3d way_out = motion.end.linear().transpose() * exit.way;
+  Passage passage = passage_beside(box, motion, others, way, way_out);
+  if (!passage.enters && slid != point) {
+    // Beyond the end of the surface that it slid along.
+    way = {motion.end.inverse(Eigen::Isometry) * slid, local};
+    passage = passage_beside(box, motion, others, way, way_out);
+  }
+  if (!ends_behind_its_entry(box, way, passage)) return gap_of(box, motion, point);
   const Gap gap = gap_to_face(box, motion, point, local, passage.entry_axis, passage.entry_sign);
   const double depth =
       box.half_extents[passage.entry_axis] - passage.entry_sign * way.from[passage.entry_axis];
@@ -255,7 +290,7 @@ std::optional<MetSurface> surface_of(const Box& box, const ObstacleMotion& motio
   double sign = axis < 0 ? 0 : std::copysign(1.0, way.from[axis]), entry = 0;
   if (axis < 0) {
     if ((way.from.cwiseAbs() - box.half_extents).maxCoeff() < -inside_depth) return {};
-    const Passage passage = passage_through(box, way.from, way.to, Vector3d::Zero());
+    const Passage passage = passage_beside(box, motion, others, way, Vector3d::Zero());
     if (!passage.enters) return {};
     axis = passage.entry_axis;
     sign = passage.entry_sign;
