@@ -183,6 +183,7 @@ void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t
                        const BatchSettings& settings,
                        const std::function<Environment(std::size_t)>& environment_of,
                        const std::function<void(std::size_t, const Batch&, int)>& finished) {
+  if (at_once <= 0) throw std::invalid_argument("batch: at least one environment has to run at once");
   for (std::size_t first = 0; first < count; first += at_once) {
     std::vector<Environment> environments;
     for (std::size_t i = first; i < std::min(count, first + at_once); ++i)

@@ -308,7 +308,6 @@ BlockCholesky<Scalar>::BlockCholesky(std::shared_ptr<const SymbolicFactor> symbo
   columns_.resize(symbolic_->largest_columns + front_padding);
   stack_.resize(symbolic_->stack_size);
   front_.resize(symbolic_->largest_front + front_padding);
-  permuted_.resize(4 * symbolic_->position.size());
 }
 
 template <typename Scalar>
@@ -318,18 +317,19 @@ bool BlockCholesky<Scalar>::factorize(const BlockValues<double>& values) {
 }
 
 template <typename Scalar>
-void BlockCholesky<Scalar>::solve_in_order(Scalar* x) const {
+void BlockCholesky<Scalar>::solve_in_order(Scalar* x) {
   linear<Scalar>(*kernels_).solve(symbolic_->tree(), factor_.data(), inverses_.data(), front_.data(), x);
 }
 
 template <typename Scalar>
-void BlockCholesky<Scalar>::solve_in_place(double* x) const {
+void BlockCholesky<Scalar>::solve_in_place(double* x) {
   const std::vector<int>& position = symbolic_->position;
+  AlignedStorage<Scalar> permuted(4 * position.size());
   for (std::size_t vertex = 0; vertex < position.size(); ++vertex)
-    for (int c = 0; c < 3; ++c) permuted_[4 * position[vertex] + c] = static_cast<Scalar>(x[3 * vertex + c]);
-  solve_in_order(permuted_.data());
+    for (int c = 0; c < 3; ++c) permuted[4 * position[vertex] + c] = static_cast<Scalar>(x[3 * vertex + c]);
+  solve_in_order(permuted.data());
   for (std::size_t vertex = 0; vertex < position.size(); ++vertex)
-    for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted_[4 * position[vertex] + c];
+    for (int c = 0; c < 3; ++c) x[3 * vertex + c] = permuted[4 * position[vertex] + c];
 }
 
 template class BlockCholesky<double>;

@@ -42,11 +42,11 @@ class BlockCholesky {
   bool factorize(const BlockValues<double>& values);
 
   /// x <- (L L^T)^-1 x, for x of 3 * size entries, vertex by vertex.
-  void solve_in_place(double* x) const;
+  void solve_in_place(double* x);
 
   /// The same for vertices in elimination order, four numbers each, the last of them zero: no number is
   /// moved.
-  void solve_in_order(Scalar* x) const;
+  void solve_in_order(Scalar* x);
 
  private:
   std::shared_ptr<const SymbolicFactor> symbolic_;
@@ -55,7 +55,7 @@ class BlockCholesky {
   AlignedStorage<Scalar> inverses_;  ///< of the panels' diagonal blocks
   AlignedStorage<Scalar> columns_;   ///< of the front that is eliminated
   AlignedStorage<Scalar> stack_;     ///< update matrices waiting for their parent
-  mutable AlignedStorage<Scalar> front_, permuted_;
+  AlignedStorage<Scalar> front_;     ///< numbers of the front that a solve has come to
 };
 
 extern template class BlockCholesky<double>;

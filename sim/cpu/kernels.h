@@ -70,7 +70,8 @@ struct LinearKernels {
   /// x <- (L L^T)^-1 x, four numbers a vertex, the last of them zero. `front`: memory for the rows of the
   /// largest front and `front_padding` more.
   void (*solve)(const FrontTree& tree, const void* factor, const Scalar* inverses, Scalar* front, Scalar* x);
-  /// Three columns of four numbers for each block, from blocks of nine, transposed where `turned`.
+  /// Copies blocks of nine numbers to three columns of four, transposed where `turned`. The fourth numbers
+  /// are not written: they have to be zero.
   void (*copy_blocks)(int count, const int* sources, const char* turned, const double* from, Scalar* to);
   /// y = B x of such blocks, four numbers a vertex.
   void (*multiply_blocks)(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* y);

@@ -39,13 +39,13 @@ void restrict_to_free(const std::vector<Restriction<Scalar>>& restrictions, Vect
   }
 }
 
-void precondition(const BlockCholesky<float>& factor, const Vector<float>& residual, Vector<float>&,
+void precondition(BlockCholesky<float>& factor, const Vector<float>& residual, Vector<float>&,
                   Vector<float>& result) {
   result = residual;
   factor.solve_in_order(result.data());
 }
 
-void precondition(const BlockCholesky<float>& factor, const Vector<double>& residual, Vector<float>& single,
+void precondition(BlockCholesky<float>& factor, const Vector<double>& residual, Vector<float>& single,
                   Vector<double>& result) {
   const double size = residual.cwiseAbs().maxCoeff();  // out of the range of single precision at times
   single = (residual / size).cast<float>();
@@ -63,9 +63,9 @@ NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
 
 void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse, const BendingOperator& bending,
                           double rigidity, double least_eigenvalue) {
-  // Of the blocks between vertices: the stiffness of friction, large where slip starts, rounds in its own
-  // vertex alone.
-  double largest = 0;
+  // Only blocks between vertices count: friction's stiffness, large where slip starts, rounds in its own
+  // vertex's block alone.
+  double largest = rigidity * bending.largest_entry;
   for (size_t k = plan_->pattern.size; k < plan_->pattern.size + plan_->edge_count; ++k)
     for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(blocks[9 * k + 4 * c]));
   single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < 0.01 * least_eigenvalue;

@@ -58,7 +58,8 @@ class Solver {
   ~Solver();
   Solver(Solver&&) noexcept;
 
-  /// Advances environment.state by one time step. An unconverged step is reported, never thrown.
+  /// Advances environment.state by one time step. An unconverged step is reported, never thrown. Throws
+  /// data::InputError for a material that the sheet cannot have, such as a plate with a rest shape not flat.
   StepReport step(Environment& environment);
 
   /// The next step starts as that of a new Solver does.

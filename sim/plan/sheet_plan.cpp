@@ -54,6 +54,7 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
       model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio, 1e-6)
                                          : isometric;
+  bending->largest_entry = stiffness.coeffs().abs().maxCoeff();
   std::vector<int> as_numbered(plan.pattern.size);
   std::iota(as_numbered.begin(), as_numbered.end(), 0);
   bending->stiffness = row_groups(stiffness, as_numbered);

@@ -28,6 +28,7 @@ struct BendingOperator {
   const Kernels* kernels;           ///< as in the plan
   RowGroups stiffness;              ///< empty for the hinge model
   RowGroups elimination_stiffness;  ///< the same in elimination order
+  double largest_entry = 0;         ///< of the stiffness, in magnitude [1/m^2]
   std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 

@@ -121,7 +121,8 @@ struct Passage {
   double entry_sign = 1;
 };
 
-/// What starts inside came in by the nearest face, or by the one that faces `way_out` where that is not zero.
+/// What starts inside came in by the nearest face, or by the one that faces `way_out` where that is not zero:
+/// a direction in the frame of the box at the start of the step, as in depth_along.
 Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to, const Vector3d& way_out) {
   Passage passage;
   const Vector3d excess = from.cwiseAbs() - box.half_extents;
@@ -190,7 +191,7 @@ Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const Vector3d& 
     above[upper] = gap.distance;
     if (above.maxCoeff() <= 0) return gap;
   }
-  const Passage passage = passage_through(box, from, to, motion.end.linear().transpose() * exit.way);
+  const Passage passage = passage_through(box, from, to, motion.start.linear().transpose() * exit.way);
   if (!passage.enters) return gap_of(box, motion, point);
   const bool ends_inside = ((to.cwiseAbs() - box.half_extents).array() <= 0).all();
   const bool behind = passage.exit_axis == passage.entry_axis &&

@@ -45,10 +45,12 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
     energy.bending = add_hinge_gradient(plan.hinges, material.bending_rigidity, positions, gradient);
     return energy;
   }
+  // Far from the origin positions would round the energy: its differences between them are all that counts.
+  const Points relative = positions.rowwise() - positions.row(0);
   Points bent = Points::Zero(positions.rows(), 3);
-  add_bending_product(bending, material.bending_rigidity, positions, bent);
+  add_bending_product(bending, material.bending_rigidity, relative, bent);
   gradient += bent;
-  energy.bending = 0.5 * bent.cwiseProduct(positions).sum();
+  energy.bending = 0.5 * bent.cwiseProduct(relative).sum();
   return energy;
 }
 

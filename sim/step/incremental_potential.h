@@ -32,8 +32,9 @@ class IncrementalPotential {
   /// Potential at the start of the step, where the energy of the sheet is `elastic` [J].
   double at_start(const ElasticEnergy& elastic) const;
 
-  /// Hessian of the potential, without the stiffness of a quadratic bending model.
-  /// `sparse`: over edges alone, which is all where no hinges bend.
+  /// Hessian of the potential, without the stiffness of a quadratic bending model: of hinges the Gauss-Newton
+  /// part, of that model's damping without the derivative of the turn. `sparse`: only blocks over edges are
+  /// filled, which are all where no hinges bend.
   void assemble(const data::Points& positions, Curvature curvature, bool sparse,
                 BlockValues<double>& values) const;
 
