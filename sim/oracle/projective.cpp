@@ -257,7 +257,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   environment.state.time = time;
   const Points& v = environment.state.velocities;
   report.kinetic = 0.5 * (system.mass().asDiagonal() * v).cwiseProduct(v).sum();
-  report.potential = -(system.mass().transpose() * x * environment.gravity)(0);
+  report.gravitational = -(system.mass().transpose() * x * environment.gravity)(0);
   return report;
 }
 

@@ -20,12 +20,6 @@ struct Gap {
   double sunk = 0;  ///< how far the surface that `distance` is to lies below the obstacle's own [m]
 };
 
-/// A vertex below the surface of an obstacle.
-struct Penetration {
-  double depth = 0;  ///< [m]; 0: there is none
-  int vertex = -1, obstacle = -1;
-};
-
 /// Where an obstacle stands at the start and at the end of a step.
 struct ObstacleMotion {
   Eigen::Isometry3d start = Eigen::Isometry3d::Identity(), end = Eigen::Isometry3d::Identity();

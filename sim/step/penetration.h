@@ -1,9 +1,18 @@
 #pragma once
 #include <vector>
 
-#include "sim/step/contact_set.h"
+#include "data/mesh.h"
 
 namespace flash::sim {
+
+struct ContactStep;
+struct ContactSet;
+
+/// A vertex below the surface of an obstacle.
+struct Penetration {
+  double depth = 0;  ///< [m]; 0: there is none
+  int vertex = -1, obstacle = -1;
+};
 
 /// The deepest of the vertices that supports or grippers hold below an obstacle's surface at the end of the
 /// step, or took through it in the step: below the face through which the way came in.

@@ -158,12 +158,5 @@ TEST(Batch, RefusesWhatDoesNotFit) {
   EXPECT_THROW(replay_in_batches(plan, 1, 0, {.steps = 1}, make, ignore), std::invalid_argument);
 }
 
-TEST(Batch, TheWorstOfTwoIsNeverLostForNotBeingANumber) {
-  EXPECT_EQ(worst(1, 2), 2);
-  EXPECT_EQ(worst(2, 1), 2);
-  EXPECT_TRUE(std::isinf(worst(1, NAN)));
-  EXPECT_TRUE(std::isinf(worst(NAN, 1)));
-}
-
 }  // namespace
 }  // namespace flash::sim

@@ -472,7 +472,7 @@ TEST(Contact, NoEnergyComesOfAnImpactOfAStiffSheetInLongSteps) {
     for (int n = 0; n < 40; ++n) {
       const StepReport report = solver.step(environment);
       EXPECT_TRUE(report.converged);
-      const double now = report.kinetic + report.membrane + report.bending + report.potential;
+      const double now = report.kinetic + report.membrane + report.bending + report.gravitational;
       EXPECT_LT(now, 1.01 * energy);
       energy = now;
     }
