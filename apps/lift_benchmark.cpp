@@ -11,6 +11,7 @@
 #include "data/text.h"
 #include "data/worst.h"
 #include "sim/batch.h"
+#include "sim/cpu/block_cholesky.h"
 #include "sim/step/elastic_energy.h"
 
 namespace flash::sim {

@@ -1,7 +1,8 @@
 #pragma once
 #include <vector>
 
-#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/aligned_storage.h"
+#include "sim/cpu/block_pattern.h"
 #include "sim/cpu/row_groups.h"
 
 namespace flash::sim {

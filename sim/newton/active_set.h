@@ -1,5 +1,5 @@
 #pragma once
-#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/block_pattern.h"
 #include "sim/step/contact_set.h"
 
 namespace flash::sim {

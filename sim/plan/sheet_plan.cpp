@@ -58,7 +58,7 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   std::vector<int> as_numbered(plan.pattern.size);
   std::iota(as_numbered.begin(), as_numbered.end(), 0);
   bending->stiffness = row_groups(stiffness, as_numbered);
-  bending->elimination_stiffness = row_groups(stiffness, elimination_position(*plan.symbolic));
+  bending->elimination_stiffness = row_groups(stiffness, plan.symbolic->position);
   // Against the plate the isometric stiffness has its eigenvalues between 0.5 and 4.6 (regular meshes, nu =
   // 0.3): scaled, they lie around 1, where those of the membrane and the mass are.
   const double scale = model == data::BendingModel::plate ? 0.6 : 1.0;
@@ -91,7 +91,7 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, Instruction
                                  slot(v[3], v[1]), slot(v[3], v[2])});
   }
   plan->symbolic = analyze(plan->pattern);
-  const std::vector<int>& position = elimination_position(*plan->symbolic);
+  const std::vector<int>& position = plan->symbolic->position;
   plan->triangle_product = product_pattern(plan->pattern, plan->edge_count, position);
   plan->full_product = product_pattern(plan->pattern, plan->pattern.pairs.size(), position);
   return plan;

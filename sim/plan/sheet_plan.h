@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "data/material.h"
-#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/symbolic_factor.h"
 #include "sim/cpu/instruction_level.h"
 #include "sim/cpu/sheet_product.h"
 #include "sim/cpu/triangle_group.h"
