@@ -11,15 +11,11 @@
 
 namespace flash::sim {
 
-/// Where a batch computes and keeps its numbers.
-enum class Device { cpu };
-
 /// Numbers that a Batch owns, as DLPack describes them: valid until the batch advances or ends.
 template <class Number>
 struct View {
   const Number* data = nullptr;
   std::vector<std::ptrdiff_t> shape, strides;  ///< strides in numbers, not bytes
-  Device device = Device::cpu;
 };
 
 /// How one step of one environment went, in numbers alone.
@@ -36,7 +32,6 @@ struct BatchSettings {
   std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; 0 is the start
   int first_step = 0;             ///< at which the states of the environments stand
   int threads = 1;                ///< 0: one a processor
-  Device device = Device::cpu;
 };
 
 /// Steps after which a solver forgets what it holds besides the state of its environment: a replay that goes

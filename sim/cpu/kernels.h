@@ -70,9 +70,9 @@ struct LinearKernels {
   /// x <- (L L^T)^-1 x, four numbers a vertex, the last of them zero. `front`: memory for the rows of the
   /// largest front and `front_padding` more.
   void (*solve)(const FrontTree& tree, const void* factor, const Scalar* inverses, Scalar* front, Scalar* x);
-  /// Copies blocks of nine numbers to three columns of four, transposed where `turned`. The fourth numbers
-  /// are not written: they have to be zero.
-  void (*copy_blocks)(int count, const int* sources, const char* turned, const double* from, Scalar* to);
+  /// Copies blocks of nine numbers to three columns of four, transposed where `transposed`. The fourth
+  /// numbers are not written: they have to be zero.
+  void (*copy_blocks)(int count, const int* sources, const char* transposed, const double* from, Scalar* to);
   /// y = B x of such blocks, four numbers a vertex.
   void (*multiply_blocks)(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* y);
   /// y += scale S x, S scalar: four values a column. Four numbers a vertex.

@@ -10,10 +10,10 @@ namespace flash::sim {
 /// Where the blocks of a BlockPattern stand in the rows of a product: both triangles of the matrix, vertices
 /// in elimination order.
 struct ProductPattern {
-  std::vector<int> starts;   ///< of each row in the lists below, and their end
-  std::vector<int> columns;  ///< elimination position of the column's vertex
-  std::vector<int> sources;  ///< block of the BlockPattern
-  std::vector<char> turned;  ///< whether the source is the transpose
+  std::vector<int> starts;       ///< of each row in the lists below, and their end
+  std::vector<int> columns;      ///< elimination position of the column's vertex
+  std::vector<int> sources;      ///< block of the BlockPattern
+  std::vector<char> transposed;  ///< whether the source is the transpose
 };
 
 /// Of the diagonal and the first `pair_count` pairs.

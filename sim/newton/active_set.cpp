@@ -24,9 +24,9 @@ void add_slip_stiffness(const ContactSet& contacts, BlockValues<double>& values)
 void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& values) {
   for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k)
     for (const Touch& touch : contacts.touches_of(k))
-      if (touch.holds && !touch.curved.isZero(0))
+      if (touch.holds && !touch.curvature_direction.isZero(0))
         block(values, contacts.constraints[k].vertex) -=
-            touch.normal_force * touch.curved * touch.curved.transpose();
+            touch.normal_force * touch.curvature_direction * touch.curvature_direction.transpose();
 }
 
 void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, BlockValues<double>& values) {
@@ -58,9 +58,9 @@ namespace {
 bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touches) {
   const auto holds = [](const Touch& touch) { return touch.holds; };
   const auto held = std::count_if(touches.begin(), touches.end(), holds);
-  for (Touch& touch : touches) touch.let_go = touch.let_go || touch.holds;
+  for (Touch& touch : touches) touch.released = touch.released || touch.holds;
   share_force(touches, force, holds);
-  for (Touch& touch : touches) touch.let_go = touch.let_go && !touch.holds;
+  for (Touch& touch : touches) touch.released = touch.released && !touch.holds;
   const auto still_held = std::count_if(touches.begin(), touches.end(), holds);
   if (still_held == held) return false;
   c.hold = still_held > 0 ? Hold::slip : Hold::free;
@@ -73,7 +73,7 @@ bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touche
 bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Touch> touches) {
   bool any = false;
   for (Touch& touch : touches) {
-    if (touch.holds || touch.let_go || touch.gap > reach || touch.gap + touch.normal.dot(step) >= -1e-12)
+    if (touch.holds || touch.released || touch.gap > reach || touch.gap + touch.normal.dot(step) >= -1e-12)
       continue;
     // Within the surfaces that hold already, up to the edge.
     const Vector3d inward = c.free * touch.normal;
@@ -88,7 +88,8 @@ bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Tou
 }
 
 /// The same for a vertex that nothing holds so far.
-bool hold_free(const LinearizedAt& iterate, const Vector3d& step, double reach, int i, ContactSet& contacts) {
+bool hold_free(const Linearization& iterate, const Vector3d& step, double reach, int i,
+               ContactSet& contacts) {
   const double clearance = contacts.clearance[i];
   if (clearance > reach || clearance > step.norm()) return false;
   const size_t first = contacts.touches.size();
@@ -103,7 +104,7 @@ bool hold_free(const LinearizedAt& iterate, const Vector3d& step, double reach, 
   return true;
 }
 
-bool hold_free_vertices(const LinearizedAt& iterate, const Points& direction, double reach,
+bool hold_free_vertices(const Linearization& iterate, const Points& direction, double reach,
                         ContactSet& contacts) {
   bool any = false;
   for (int i = 0; i < direction.rows(); ++i)
@@ -113,7 +114,7 @@ bool hold_free_vertices(const LinearizedAt& iterate, const Points& direction, do
 
 }  // namespace
 
-bool exchange_contacts(const LinearizedAt& iterate, const Points& direction, const Points& force,
+bool exchange_contacts(const Linearization& iterate, const Points& direction, const Points& force,
                        Points& gradient, ContactSet& contacts) {
   constexpr double any_reach = std::numeric_limits<double>::infinity();
   bool any = false;
@@ -131,7 +132,7 @@ bool exchange_contacts(const LinearizedAt& iterate, const Points& direction, con
   return hold_free_vertices(iterate, direction, any_reach, contacts) || any;
 }
 
-bool hold_touching(const LinearizedAt& iterate, const Points& direction, ContactSet& contacts) {
+bool hold_touching(const Linearization& iterate, const Points& direction, ContactSet& contacts) {
   bool any = false;
   for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
     VertexConstraint& c = contacts.constraints[k];

@@ -15,7 +15,7 @@ void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& valu
 void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, BlockValues<double>& values);
 
 /// The iterate about which a problem is linear.
-struct LinearizedAt {
+struct Linearization {
   const ContactStep& step;
   const data::Points& positions;  ///< [m]
   const data::Points& force;      ///< what each vertex needs from outside [N]
@@ -26,11 +26,11 @@ struct LinearizedAt {
 /// surface and frees those that the surface would have to pull (`force`: what they would need at its end);
 /// what was let go once is not held again. `gradient` of a freed vertex becomes its row of the force at the
 /// iterate, of one that still slides on another surface that of the residual. Returns whether any changed.
-bool exchange_contacts(const LinearizedAt& iterate, const data::Points& direction, const data::Points& force,
+bool exchange_contacts(const Linearization& iterate, const data::Points& direction, const data::Points& force,
                        data::Points& gradient, ContactSet& contacts);
 
 /// Holds vertices on a surface that `direction` would take below it, and changes nothing else: directions of
 /// the problem that is left lead down, however short the step. Returns whether any.
-bool hold_touching(const LinearizedAt& iterate, const data::Points& direction, ContactSet& contacts);
+bool hold_touching(const Linearization& iterate, const data::Points& direction, ContactSet& contacts);
 
 }  // namespace flash::sim

@@ -53,7 +53,7 @@ void assemble_matrix(const StepProblem& problem, bool positive, NewtonWorkspace&
 void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWorkspace& w,
                  StepReport& report) {
   assemble_matrix(problem, stuck, w);
-  const LinearizedAt iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
+  const Linearization iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
   const double enough = linear_tolerance * w.settings.tolerance * problem.force_scale;
   w.linear = w.now.contacts;
   w.gradient = w.now.residual;

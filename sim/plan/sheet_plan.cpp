@@ -73,7 +73,6 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
 std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, InstructionLevel level) {
   auto plan = std::make_shared<SheetPlan>();
   plan->sheet = sheet;
-  plan->level = level;
   plan->kernels = &kernels_of(level);
   plan->hinges = sheet_hinges(sheet);
   plan->pattern.size = static_cast<int>(sheet.rest.vertices.rows());

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "data/material.h"
-#include "sim/cpu/symbolic_factor.h"
 #include "sim/cpu/instruction_level.h"
 #include "sim/cpu/sheet_product.h"
+#include "sim/cpu/symbolic_factor.h"
 #include "sim/cpu/triangle_group.h"
 #include "sim/plan/hinge_bending.h"
 #include "sim/scene/sheet.h"
@@ -18,8 +18,8 @@ namespace flash::sim {
 
 /// A 3 x 3 block of the system matrix between two vertices; stored once, for row > column.
 struct BlockSlot {
-  int block;       ///< index among the blocks of a BlockPattern, the diagonal ones first
-  bool transpose;  ///< the stored block is that of (column, row)
+  int block;        ///< index among the blocks of a BlockPattern, the diagonal ones first
+  bool transposed;  ///< the stored block is that of (column, row)
 };
 
 /// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
@@ -42,8 +42,7 @@ struct BendingOperators {
 /// the kernels that work on it.
 struct SheetPlan {
   Sheet sheet;
-  InstructionLevel level;
-  const Kernels* kernels;  ///< of that level
+  const Kernels* kernels;  ///< of the instruction level that was asked for
   std::vector<Hinge> hinges;
   BlockPattern pattern;   ///< neighbours over an edge, then those across a hinge
   size_t edge_count = 0;  ///< of the pattern's pairs, those over an edge

@@ -102,14 +102,14 @@ Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const 
     if (to.norm() >= cylinder.radius) return gap;
     gap.normal = side;
     gap.distance = side.dot(to) - cylinder.radius;
-    gap.curved.setZero();
+    gap.curvature_direction.setZero();
     return let_out(gap, cylinder.radius - side.dot(from), time_step, exit);
   }
   const Vector3d entered = from + entry * way;
   if (entered.norm() > 0 && entered.dot(to) <= 0) {
     gap.normal = entered.normalized();
     gap.distance = gap.normal.dot(to) - cylinder.radius;
-    gap.curved.setZero();
+    gap.curvature_direction.setZero();
   }
   return let_out(gap, cylinder.radius - from.norm(), time_step, exit);
 }
@@ -232,10 +232,6 @@ Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const V
   ObstacleMotion still = motion;
   still.end = still.start;
   return gap_to(obstacle, still, point);
-}
-
-Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double time_step) {
-  return gap_to(obstacle, motion_of(obstacle, time - time_step, time), point);
 }
 
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Vector3d& start,

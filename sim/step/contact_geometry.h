@@ -15,7 +15,8 @@ struct Gap {
   double distance;                ///< to the surface, negative inside [m]
   Eigen::Vector3d normal;         ///< unit, out of the obstacle
   Eigen::Vector3d surface_moved;  ///< by the obstacle's material at the contact, over the step [m]
-  Eigen::Vector3d curved;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
+  Eigen::Vector3d
+      curvature_direction;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
   bool starts_inside = false;  ///< the vertex, at the start of the step
   double sunk = 0;  ///< how far the surface that `distance` is to lies below the obstacle's own [m]
 };
@@ -42,9 +43,6 @@ Gap gap_to(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::
 
 /// Signed distance of `point` [m] to the obstacle where it stands at the start of the step.
 Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& point);
-
-/// The same at `time` [s], the end of a step of `time_step`.
-Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, double time_step);
 
 /// How a vertex that comes from `start` [m] at the start of the step stands at `point` at its end. The way
 /// between them is straight, seen from the obstacle:

@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "sim/law/contact_law.h"
 #include "sim/scene/environment.h"
 #include "sim/step/contact_geometry.h"
+#include "sim/step/touch.h"
 
 namespace flash::sim {
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sim/law/contact_law.h"
+
 namespace flash::sim {
 
 using data::Points;
@@ -48,7 +50,7 @@ void project_vertex(const ContactStep& step, std::span<const Touch> touches, Poi
     if (count == 1) {
       way = std::max(0.0, depths[0]) * normals[0];
     } else {
-      const std::vector<double> x = complementary(normals, normals, depths);
+      const std::vector<double> x = solve_lcp(normals, normals, depths);
       for (size_t k = 0; k < count; ++k) way += x[k] * normals[k];
     }
     positions.row(i) += way.transpose();

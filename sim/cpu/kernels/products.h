@@ -10,10 +10,10 @@ namespace flash::sim {
 inline namespace FLASH_LEVEL {
 
 template <typename Scalar>
-void copy_blocks(int count, const int* sources, const char* turned, const double* from, Scalar* to) {
+void copy_blocks(int count, const int* sources, const char* transposed, const double* from, Scalar* to) {
   for (int k = 0; k < count; ++k, to += 12) {
     const double* block = from + 9L * sources[k];
-    if (turned[k]) {
+    if (transposed[k]) {
       for (int c = 0; c < 3; ++c)
         for (int r = 0; r < 3; ++r) to[4 * c + r] = static_cast<Scalar>(block[3 * r + c]);
     } else {
