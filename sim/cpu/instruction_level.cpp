@@ -26,7 +26,7 @@ const char* to_string(InstructionLevel level) {
 
 #ifdef __x86_64__
 
-// Compiled from sim/kernels for each of them.
+// sim/cpu/kernels is compiled once for each level.
 namespace v2 {
 extern const Kernels kernels;
 }

@@ -33,8 +33,8 @@ Membrane membrane_of(data::Constitutive constitutive, const SheetLame& lame);
 /// Whether a Hessian is exact or has its negative eigenvalues set to zero.
 enum class Curvature { exact, positive };
 
-/// Energy per rest area [N/m], first Piola-Kirchhoff stress P = dPsi/dF and (unless null) the Hessian
-/// d vec(P) / d vec(F) from one singular value decomposition. The exact Hessian is undefined at s2 = 0 for
+/// Energy Psi per rest area [N/m], stress P = dPsi/dF (first Piola-Kirchhoff) and (unless null) the Hessian
+/// d vec(P) / d vec(F), from one singular value decomposition. The exact Hessian is undefined at s2 = 0 for
 /// tri_neohookean; the positive one is semi-definite at every F. The eigenvectors of an isotropic energy are
 /// known from the singular vectors of F (Smith, de Goes, Kim 2019, "Analytic eigensystems for isotropic
 /// distortion energies", sec. 4): a 2 x 2 scaling block, twist, flip, and one rotation out of the plane for

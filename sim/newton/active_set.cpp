@@ -12,6 +12,9 @@ using Eigen::Vector3d;
 
 namespace {
 
+constexpr double least_depth = 1e-12;  ///< to which a direction has to sink a vertex, above rounding [m]
+constexpr double least_inward = 1e-6;  ///< squared length of the part of a normal that is free
+
 Map<Matrix3d> block(BlockValues<double>& values, size_t k) { return Map<Matrix3d>(values.data() + 9 * k); }
 
 }  // namespace
@@ -54,7 +57,7 @@ void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, Bl
 
 namespace {
 
-/// Frees a vertex from the touches that would have to pull. Returns whether from any.
+/// Frees a vertex from the touches that would have to pull. Returns whether any touch was released.
 bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touches) {
   const auto holds = [](const Touch& touch) { return touch.holds; };
   const auto held = std::count_if(touches.begin(), touches.end(), holds);
@@ -69,15 +72,17 @@ bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touche
   return true;
 }
 
-/// Holds a vertex on the touches up to `reach` away that `step` drives it into. Returns whether on any.
+/// Holds a vertex on the touches up to `reach` away that `step` drives it into. Returns whether any touch was
+/// added.
 bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Touch> touches) {
   bool any = false;
   for (Touch& touch : touches) {
-    if (touch.holds || touch.released || touch.gap > reach || touch.gap + touch.normal.dot(step) >= -1e-12)
+    if (touch.holds || touch.released || touch.gap > reach ||
+        touch.gap + touch.normal.dot(step) >= -least_depth)
       continue;
-    // Within the surfaces that hold already, up to the edge.
+    // The correction stays within the surfaces that hold already.
     const Vector3d inward = c.free * touch.normal;
-    if (inward.squaredNorm() < 1e-6) continue;
+    if (inward.squaredNorm() < least_inward) continue;
     c.correction += (-touch.gap - touch.normal.dot(c.correction)) / inward.squaredNorm() * inward;
     touch.holds = true;
     c.hold = Hold::slip;
@@ -87,7 +92,7 @@ bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Tou
   return any;
 }
 
-/// The same for a vertex that nothing holds so far.
+/// Holds a vertex that nothing holds so far. Returns whether it is held now.
 bool hold_free(const Linearization& iterate, const Vector3d& step, double reach, int i,
                ContactSet& contacts) {
   const double clearance = contacts.clearance[i];

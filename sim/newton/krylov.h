@@ -43,8 +43,8 @@ struct KrylovSolution {
 template <typename Scalar>
 KrylovSolution<Scalar> conjugate_gradients(const RestrictedProblem<Scalar>& problem, const Kernels& kernels);
 
-/// The generalized minimal residual method (Saad and Schultz 1986) for L A x = P b, with the list L of
-/// matrices for the vertices of `problem.free`.
+/// The generalized minimal residual method (Saad and Schultz 1986) for L A x = P b. The list L has matrices
+/// for the vertices of `problem.free`.
 template <typename Scalar>
 KrylovSolution<Scalar> gmres(const RestrictedProblem<Scalar>& problem,
                              const std::vector<VertexMatrix<Scalar>>& left);

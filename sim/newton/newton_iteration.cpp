@@ -22,7 +22,8 @@ constexpr double least_growth = 1.5, greatest_growth = 3.0;  ///< of a length at
 constexpr double residual_growth = 10;  ///< of the residual by a lengthened step, at most
 
 /// Friction at the normal forces of the iterate converges where these change little. In the parts of a step
-/// that could not be solved as one it goes round in circles at times: then both at once, by the residual.
+/// that could not be solved as one it goes round in circles at times. Then both are solved at once, guided by
+/// the residual.
 bool couples_friction(const StepProblem& problem, const SolverSettings& settings, const StepReport& report) {
   return problem.contacts.time_step < settings.time_step && report.iterations > coupled_after;
 }
@@ -100,8 +101,8 @@ LinePoint move(const SearchLine& line, double length, Iterate& to) {
   return {length, potential_at(line.problem, line.w.now, to)};
 }
 
-/// The potential guides the step. It is not exact where the surface is curved or the normal forces change,
-/// and near the solution it falls by less than its rounding: a smaller residual does as well.
+/// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
+/// Near the solution it falls by less than its rounding. So a smaller residual does as well.
 bool acceptable(const SearchLine& line, const LinePoint& point, const Iterate& trial) {
   return (!line.coupled && point.potential <= line.potential + armijo_share * point.length * line.slope) ||
          trial.residual.norm() <= (1 - residual_share * point.length) * line.w.now.residual.norm();

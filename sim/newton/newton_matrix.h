@@ -31,9 +31,9 @@ class NewtonMatrix {
   int solve(const ContactSet& contacts, const data::Points& gradient, double tolerance,
             data::Points& direction, data::Points& force);
 
-  /// Solves likewise where friction grows with the normal forces: the matrix is L A P, P the free directions
-  /// and L = P + C, with the `couplings` C of the constraints (friction_couplings). It is not symmetric:
-  /// GMRES.
+  /// Solves likewise where friction grows with the normal forces. The matrix is L A P with the free
+  /// directions P, L = P + C and the `couplings` C of the constraints (friction_couplings). It is not
+  /// symmetric: GMRES.
   int solve_coupled(const ContactSet& contacts, const std::vector<Eigen::Matrix3d>& couplings,
                     const data::Points& gradient, double tolerance, data::Points& direction,
                     data::Points& force);

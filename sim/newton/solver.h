@@ -17,8 +17,8 @@ inline constexpr double solver_bytes_per_vertex = 14e3;
 
 /// Steps an environment by implicit Euler: semi-smooth Newton on the potential of the step, feasible at every
 /// iterate. A step that does not converge, or whose potential or energy would end above where it began, is
-/// repeated in halves. Holds what depends on the sheet and the last factorization, which later steps start
-/// from: one Solver an environment, and last digits that depend on where it began, unless it forgets.
+/// repeated in halves. Each environment has its own Solver, which holds the last factorization for later
+/// steps to start from. So last digits depend on where it began, unless it forgets.
 class Solver {
  public:
   Solver(const Sheet& sheet, const SolverSettings& settings);

@@ -37,8 +37,8 @@ struct ElasticEnergy;
 void report_contacts(const StepProblem& problem, const Iterate& end, StepReport& report);
 
 /// Fills in the energies at the end of a step, after report_contacts. Returns whether they came from
-/// somewhere: the potential of the step must not end above its start value, nor the energy above that of the
-/// start and the work done.
+/// somewhere: the potential of the step must not end above its start value. The energy must not end above
+/// that of the start and the work done.
 bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic_at_start, const Iterate& end,
                         StepReport& report);
 

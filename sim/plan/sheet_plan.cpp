@@ -52,15 +52,14 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   if (model == data::BendingModel::hinge) return bending;
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
-      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio, 1e-6)
-                                         : isometric;
+      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio) : isometric;
   bending->largest_entry = stiffness.coeffs().abs().maxCoeff();
   std::vector<int> as_numbered(plan.pattern.size);
   std::iota(as_numbered.begin(), as_numbered.end(), 0);
   bending->stiffness = row_groups(stiffness, as_numbered);
   bending->elimination_stiffness = row_groups(stiffness, plan.symbolic->position);
   // Against the plate the isometric stiffness has its eigenvalues between 0.5 and 4.6 (regular meshes, nu =
-  // 0.3): scaled, they lie around 1, where those of the membrane and the mass are.
+  // 0.3). Scaled, they lie around 1, where those of the membrane and the mass are.
   const double scale = model == data::BendingModel::plate ? 0.6 : 1.0;
   for (int i = 0; i < plan.pattern.size; ++i) bending->stand_in.push_back(scale * isometric.coeff(i, i));
   for (const auto& [row, column] : plan.pattern.pairs)

@@ -32,7 +32,7 @@ struct BendingOperator {
   std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 
-/// Those made so far, for all environments of a sheet.
+/// Bending operators made so far for a sheet, shared by its environments.
 struct BendingOperators {
   std::mutex mutex;
   std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
@@ -45,7 +45,7 @@ struct SheetPlan {
   const Kernels* kernels;  ///< of the instruction level that was asked for
   std::vector<Hinge> hinges;
   BlockPattern pattern;   ///< neighbours over an edge, then those across a hinge
-  size_t edge_count = 0;  ///< of the pattern's pairs, those over an edge
+  size_t edge_count = 0;  ///< how many of the pattern's pairs lie over an edge
   std::shared_ptr<const SymbolicFactor> symbolic;
   ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
   std::vector<TriangleGroup> triangle_groups;
@@ -57,8 +57,8 @@ struct SheetPlan {
 std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet,
                                                  InstructionLevel level = highest_instruction_level());
 
-/// Made once for a sheet, model and, where it matters, Poisson's ratio, and kept with the plan; threads may
-/// ask at once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.
+/// The bending operator of a model, made once a Poisson's ratio and kept with the plan; threads may ask at
+/// once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
                                         double poissons_ratio);
 

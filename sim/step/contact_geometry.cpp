@@ -11,11 +11,13 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
+constexpr double least_facing = 0.1;  ///< cosine between a way and a surface that faces it: 84 degrees
+
 Gap gap_of(const Plane& plane, const ObstacleMotion&, const Vector3d& point) {
   return {plane.normal.dot(point - plane.point), plane.normal, Vector3d::Zero(), Vector3d::Zero()};
 }
 
-/// From the axis to the point, across the axis.
+/// Vector from the axis to the point, perpendicular to the axis.
 Vector3d radial_of(const Cylinder& cylinder, const Vector3d& point) {
   const Vector3d radial = point - cylinder.point;
   return radial - cylinder.axis * cylinder.axis.dot(radial);
@@ -36,7 +38,7 @@ Vector3d moved_by(const ObstacleMotion& motion, const Vector3d& point, const Vec
   return motion.moves ? Vector3d(point - motion.start * local) : Vector3d::Zero();
 }
 
-/// Against the face of a box across `axis`, on the side of `sign`.
+/// Gap to the face of a box across `axis`, on the side of `sign`.
 Gap gap_to_face(const Box& box, const ObstacleMotion& motion, const Vector3d& point, const Vector3d& local,
                 int axis, double sign) {
   return {sign * local[axis] - box.half_extents[axis], sign * motion.end.linear().col(axis),
@@ -69,7 +71,7 @@ Gap let_out(Gap gap, double depth, double time_step, const Exit& exit) {
 Vector3d side_facing(const Cylinder& cylinder, const Vector3d& way) {
   const Vector3d across = way - cylinder.axis * cylinder.axis.dot(way);
   const double length = across.norm();
-  return length > 0.1 ? Vector3d(across / length) : Vector3d::Zero();
+  return length > least_facing ? Vector3d(across / length) : Vector3d::Zero();
 }
 
 /// The face of a box that faces `way`, given in the frame of the box.
@@ -87,8 +89,7 @@ Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const 
                   const Vector3d& point, const Vector3d&, double time_step, const Exit& exit) {
   Gap gap = gap_of(cylinder, motion, point);
   const Vector3d from = radial_of(cylinder, start), to = radial_of(cylinder, point), way = to - from;
-  // Where the way enters the circle: |from + s way| = radius, the first of two; at once where it starts
-  // inside.
+  // The way enters the circle at the first s with from + s way on its rim, or at once where it starts inside.
   const double a = way.squaredNorm(), b = from.dot(way),
                c = from.squaredNorm() - cylinder.radius * cylinder.radius;
   double entry = 0;
@@ -121,8 +122,8 @@ struct Passage {
   double entry_sign = 1;
 };
 
-/// What starts inside came in by the nearest face, or by the one that faces `way_out` where that is not zero:
-/// a direction in the frame of the box at the start of the step, as in depth_along.
+/// What starts inside came in by the nearest face, or by the one that faces `way_out` where that is not zero.
+/// This direction is in the frame of the box at the start of the step, as in depth_along.
 Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to, const Vector3d& way_out) {
   Passage passage;
   const Vector3d excess = from.cwiseAbs() - box.half_extents;
@@ -147,7 +148,7 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
     }
   }
   if (excess.maxCoeff() <= 0) {
-    // Starts inside, or on a face: that is where it came in.
+    // A way that starts inside or on a face came in there.
     excess.maxCoeff(&passage.entry_axis);
     passage.entry_sign = std::copysign(1.0, from[passage.entry_axis]);
     if (!way_out.isZero(0) && excess.maxCoeff() < -inside_depth)
@@ -158,17 +159,18 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
   return passage;
 }
 
-/// Takes a way in the plane of a face, to within rounding, out of the box where the face looks up, into it
-/// where it looks down and the way begins at another face or outside. Returns the axis of the face that looks
-/// up, or -1.
+/// Moves a grazing way out of the box at a face that looks up. At one that looks down moves it into the box,
+/// if the way begins at another face or outside. Grazing: in the plane of the face, to within rounding.
+/// Returns the axis of the face that looks up, or -1.
 int decide_grazing(const Box& box, const Vector3d& down, Vector3d& from, Vector3d& to) {
   constexpr double grazing = 1e-9;  // [m]
+  constexpr double level = 0.5;     // cosine between the vertical and a face that looks up or down
   int upper = -1;
   const Vector3d excess = from.cwiseAbs() - box.half_extents;
   for (int axis = 0; axis < 3; ++axis) {
     const double side = std::copysign(1.0, from[axis]);
     const auto grazes = [&](double x) { return std::abs(side * x - box.half_extents[axis]) <= grazing; };
-    if (std::abs(down[axis]) < 0.5 || !grazes(from[axis]) || !grazes(to[axis])) continue;
+    if (std::abs(down[axis]) < level || !grazes(from[axis]) || !grazes(to[axis])) continue;
     const bool looks_down = side * down[axis] > 0;
     const bool beside = excess[(axis + 1) % 3] >= -grazing || excess[(axis + 2) % 3] >= -grazing;
     if (looks_down && !beside) continue;
@@ -245,7 +247,7 @@ double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const
                    const Vector3d& way) {
   constexpr double never = std::numeric_limits<double>::infinity();
   if (const auto* plane = std::get_if<Plane>(&obstacle.shape))
-    return way.dot(plane->normal) > 0.1 ? -plane->normal.dot(start - plane->point) : never;
+    return way.dot(plane->normal) > least_facing ? -plane->normal.dot(start - plane->point) : never;
   if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
     const Vector3d side = side_facing(*cylinder, way);
     return side.isZero(0) ? never : cylinder->radius - side.dot(start - cylinder->point);

@@ -10,14 +10,14 @@ namespace flash::sim {
 /// Depth from which a vertex counts as inside an obstacle at the start of a step, above rounding [m].
 inline constexpr double inside_depth = 1e-9;
 
-/// Where a point stands against an obstacle.
+/// How a point stands against an obstacle.
 struct Gap {
   double distance;                ///< to the surface, negative inside [m]
   Eigen::Vector3d normal;         ///< unit, out of the obstacle
-  Eigen::Vector3d surface_moved;  ///< by the obstacle's material at the contact, over the step [m]
+  Eigen::Vector3d surface_moved;  ///< motion of the obstacle's material at the contact over the step [m]
   Eigen::Vector3d
       curvature_direction;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
-  bool starts_inside = false;  ///< the vertex, at the start of the step
+  bool starts_inside = false;  ///< whether the vertex starts the step inside
   double sunk = 0;  ///< how far the surface that `distance` is to lies below the obstacle's own [m]
 };
 
@@ -30,8 +30,8 @@ struct ObstacleMotion {
 
 /// How vertices that start a step inside an obstacle come out of it.
 struct Exit {
-  double speed;  ///< at most [m/s]; 0: they may stay, no deeper
-  /// Unit: out on the side of each obstacle that faces it. Zero: each vertex on the side nearest to it.
+  double speed;  ///< greatest speed [m/s]; 0: vertices may stay, no deeper
+  /// Unit direction in which vertices leave each obstacle; zero: each leaves by the side nearest to it.
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
 };
 
@@ -44,29 +44,29 @@ Gap gap_to(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::
 /// Signed distance of `point` [m] to the obstacle where it stands at the start of the step.
 Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& point);
 
-/// How a vertex that comes from `start` [m] at the start of the step stands at `point` at its end. The way
-/// between them is straight, seen from the obstacle:
-/// - a point in a box, or behind it, stands against the face through which its way entered; one behind the
-///   axis of a cylinder against the tangent plane where its way entered. So nothing passes through, however
-///   thin. A way that leaves a box by a face beside rounds its edge and is let go.
-/// - a way in the plane of a face, to within rounding, belongs to that face where it looks up, so that a
-///   sheet slides over boxes that stand flush; a face that looks down carries nothing, and what is pushed
-///   against a box that stands on a table meets its side.
-/// - a vertex that starts on another surface slides along it: `slid` is where its way would end so, `point`
-///   where it starts on none. That way decides which face of a box it meets, so that it slides from one box
-///   to the next.
-/// - a vertex that starts inside stands against a surface below the obstacle's own (`sunk`), so that it comes
-///   out as `exit` says.
+/// How a vertex stands at `point` at the end of the step that comes from `start` [m]. The way between them is
+/// straight, seen from the obstacle:
+/// - a point in a box, or behind it, stands against the face through which its way entered. One behind the
+///   axis of a cylinder stands against the tangent plane where its way entered. So nothing passes through,
+///   however thin. A way that leaves a box by a face beside rounds its edge and is released.
+/// - a way in the plane of a face, to within rounding, belongs to that face where it looks up: a sheet slides
+///   over boxes that stand flush. A face that looks down carries nothing: what is pushed against a box that
+///   stands on a table meets its side.
+/// - a vertex that starts on another surface slides along it. `slid` is where its way would end so; `point`
+///   where it starts on none. That way decides which face of a box it meets, so it slides from one box to the
+///   next.
+/// - a vertex that starts inside stands against a surface below the obstacle's own (`sunk`), so that it
+///   leaves as `exit` says.
 Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
               const Eigen::Vector3d& point, const Eigen::Vector3d& slid, double time_step, const Exit& exit);
 
-/// How far a vertex at `start` is from coming out of the obstacle on the side that faces `way`, at the start
-/// of the step; infinity where there is no such side [m].
+/// How far a vertex at `start` is inside the obstacle below the side that faces `way`, at the start of the
+/// step [m]. Infinity where there is no such side.
 double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
                    const Eigen::Vector3d& way);
 
-/// Lowers distances[i] to that of gap_after for every vertex, where it is smaller: rows of `starts` and
-/// `points`, of vertices that start on no other surface.
+/// Lowers distances[i] to that of gap_after for every vertex, where it is smaller. `starts` and `points` have
+/// a row for each vertex; none of them starts on another surface.
 void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
                    const data::Points& points, double time_step, const Exit& exit,
                    std::vector<double>& distances);

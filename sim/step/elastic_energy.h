@@ -15,8 +15,8 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
                                    const data::SheetMaterial& material, const data::Points& positions,
                                    data::Points& gradient);
 
-/// Adds `scale` times the Hessian of the membrane and of hinges, of these the Gauss-Newton part. `positive`:
-/// the negative eigenvalues of each triangle set to zero.
+/// Adds `scale` times the Hessian of the membrane and the Gauss-Newton Hessian of hinges. `positive`: the
+/// negative eigenvalues of each triangle are set to zero.
 void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
                          const data::SheetMaterial& material, const data::Points& positions, double scale,
                          Curvature curvature, BlockValues<double>& values);

@@ -32,8 +32,8 @@ void add_directions(const Obstacle& obstacle, const ObstacleMotion& motion,
   }
 }
 
-/// The unit direction in which a sheet leaves all obstacles that it starts in by the shortest way, all
-/// vertices alike, so that it is not torn; zero where there is none.
+/// The unit direction in which a sheet leaves all obstacles that it starts in by the shortest way; zero where
+/// there is none. All vertices take the same way, so the sheet is not torn.
 Vector3d shortest_way_out(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
   std::vector<Vector3d> directions;
   for (std::size_t k = 0; k < step.motions.size(); ++k)

@@ -27,8 +27,8 @@ struct Touch {
   bool touches() const { return gap <= touching_gap; }
 };
 
-/// Sets `normal_force` and `holds` of the eligible touches, and of all others to none: the non-negative
-/// forces of least squares for `needed` [N], without friction between the surfaces.
+/// Sets `normal_force` and `holds` of the eligible touches to the non-negative forces of least squares for
+/// `needed` [N], without friction between the surfaces. Those of all others become zero.
 void share_force(std::span<Touch> touches, const Eigen::Vector3d& needed, bool (*eligible)(const Touch&));
 
 /// Shares the force among surfaces that each rub against the vertex's own slip: the reaction is the sum of
