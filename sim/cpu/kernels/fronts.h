@@ -33,12 +33,12 @@ void extend_add(const FrontTree& tree, const Front& child, const Front& parent, 
     for (int c = 0; c < 3; ++c, source += child.padded_update_rows) {
       // An update matrix starts at the row below the parent's own.
       const bool eliminated = target_column < own;
-      const int first_row = eliminated ? 0 : own;
+      const long first_row = eliminated ? 0 : own;
       Scalar* target = eliminated
                            ? columns + static_cast<long>(target_column + c) * parent.padded_rows
                            : update + static_cast<long>(target_column - own + c) * parent.padded_update_rows;
       for (int row = column; row < child.row_count; ++row) {
-        Scalar* entry = target + (3 * map[row] - first_row);
+        Scalar* entry = target + (3L * map[row] - first_row);
         entry[0] += source[3 * row];
         entry[1] += source[3 * row + 1];
         entry[2] += source[3 * row + 2];
