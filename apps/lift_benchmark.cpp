@@ -9,7 +9,9 @@
 #include "data/memory_limit.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
+#include "data/worst.h"
 #include "sim/batch.h"
+#include "sim/cpu/block_cholesky.h"
 #include "sim/step/elastic_energy.h"
 
 namespace flash::sim {
@@ -129,7 +131,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
           counts[i].solves += step.solves;
           counts[i].factorizations += step.factorizations;
           counts[i].converged += step.converged;
-          counts[i].residual_max = worst(counts[i].residual_max, step.residual);
+          counts[i].residual_max = data::worst(counts[i].residual_max, step.residual);
         }
         if (i == middle) x = batch.kept_positions(e, 0);
       });
@@ -143,7 +145,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     solves += double(c.solves) / total;
     factorizations += double(c.factorizations) / total;
     converged += double(c.converged);
-    result.residual_max = worst(result.residual_max, c.residual_max);
+    result.residual_max = data::worst(result.residual_max, c.residual_max);
   }
   result.converged_share = converged / total;
   result.step_milliseconds =

@@ -16,6 +16,7 @@
 #include "data/memory_limit.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
+#include "data/worst.h"
 #include "sim/newton/solver.h"
 #include "sim/oracle/projective.h"
 #include "sim/scene/scene.h"
@@ -99,21 +100,21 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
   StepReport largest, sum;
   bool converged = true;
   for (const StepReport& r : reports) {
-    largest.residual = worst(largest.residual, r.residual);
-    largest.penetration_max = worst(largest.penetration_max, r.penetration_max);
+    largest.residual = data::worst(largest.residual, r.residual);
+    largest.penetration_max = data::worst(largest.penetration_max, r.penetration_max);
     largest.substeps = std::max(largest.substeps, r.substeps);
-    largest.complementarity = worst(largest.complementarity, r.complementarity);
+    largest.complementarity = data::worst(largest.complementarity, r.complementarity);
     sum.iterations += r.iterations;
     sum.kinetic += r.kinetic;
     sum.membrane += r.membrane;
     sum.bending += r.bending;
-    sum.potential += r.potential;
+    sum.gravitational += r.gravitational;
     converged = converged && r.converged;
   }
   std::string row = std::to_string(step) + "," + time_text(time);
   row += "," + data::format_number(largest.residual) + "," + std::to_string(sum.iterations);
   for (double value : {largest.penetration_max, largest.complementarity, sum.kinetic,
-                       sum.membrane + sum.bending, sum.potential})
+                       sum.membrane + sum.bending, sum.gravitational})
     row += "," + data::format_number(value);
   row += converged ? ",1" : ",0";
   return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "," +
@@ -292,8 +293,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         if (report.held_penetration.depth > held.penetration.depth)
           holder = holder_of(bodies[b], report.held_penetration.vertex);
         held.see(report.held_penetration, b, time);
-        summary.residual_max = worst(summary.residual_max, report.residual);
-        summary.penetration_max = worst(summary.penetration_max, report.penetration_max);
+        summary.residual_max = data::worst(summary.residual_max, report.residual);
+        summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
         summary.iterations += report.iterations;
       }
       summary.unconverged_steps += !converged;

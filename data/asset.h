@@ -81,7 +81,7 @@ ResolvedSolid resolve_solid(const Asset& asset, double rest_volume);
 /// The asset's triangle mesh. Throws InputError where it is so large that it must be in millimetres.
 TriangleMesh load_rest_mesh(const Asset& asset);
 
-/// The same moved by its transformation.
+/// The asset's triangle mesh, moved by its transformation.
 TriangleMesh load_asset_mesh(const Asset& asset);
 
 /// Rotation about fixed x, then y, then z [deg], then translation.

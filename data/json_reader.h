@@ -15,7 +15,7 @@ namespace flash::data {
 nlohmann::json load_json(const std::string& path);
 nlohmann::json parse_json(const std::string& text, const std::string& source);
 
-/// Of `known`, the name with the fewest edits to `name`; empty where even that is far off.
+/// The name in `known` with the fewest edits to `name`; empty where even that is far off.
 std::string nearest_name(const std::string& name, const std::vector<std::string>& known);
 
 /// Strict view of a JSON object: every message names file and field ("towel.json: mechanical_props.young:

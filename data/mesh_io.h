@@ -29,7 +29,7 @@ TetMesh load_tet_mesh(const std::string& path);
 /// the pixels of an organised cloud that saw nothing, are left out, whatever the format.
 Points load_point_cloud(const std::string& path);
 
-/// The same; adds how many were left out to `left_out`.
+/// Loads likewise, and adds how many points were left out to `left_out`.
 Points load_point_cloud(const std::string& path, std::size_t& left_out);
 
 /// Format by ending: .ply (binary, double), .obj, .vtk (ascii); clouds .ply (binary, float), .pcd. Written

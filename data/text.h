@@ -15,7 +15,7 @@ std::vector<std::string_view> split(std::string_view line, std::string_view sepa
 std::optional<double> parse_number(std::string_view word);
 std::optional<long> parse_integer(std::string_view word);
 
-/// As an index; -1 where it is negative, no whole number, or too large.
+/// The value as an index; -1 where it is negative, no whole number, or too large.
 int to_index(double value);
 
 /// Shortest text that reads back as the same double.

@@ -7,7 +7,7 @@ namespace flash::data {
 /// be made in the folder `path`, which may not exist yet. Leaves nothing.
 void check_folder_writable(const std::string& path);
 
-/// The same of a file, in whose place no folder and no device may be.
+/// Checks likewise that the file `path` can be made; no folder and no device may stand in its place.
 void check_file_writable(const std::string& path);
 
 }  // namespace flash::data

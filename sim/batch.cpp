@@ -84,9 +84,9 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
   }
 }
 
-/// Of numbers that lie densely, the last index fastest.
-View<double> dense(const std::vector<double>& numbers, std::vector<std::ptrdiff_t> shape, Device device) {
-  View<double> view{numbers.data(), std::move(shape), {}, device};
+/// A view of densely stored numbers, the last index fastest.
+View<double> dense(const std::vector<double>& numbers, std::vector<std::ptrdiff_t> shape) {
+  View<double> view{numbers.data(), std::move(shape), {}};
   view.strides.resize(view.shape.size());
   std::ptrdiff_t stride = 1;
   for (std::size_t k = view.shape.size(); k-- > 0; stride *= view.shape[k]) view.strides[k] = stride;
@@ -152,22 +152,20 @@ void Batch::advance(int steps, const std::function<void(int)>& finished) {
 
 const State& Batch::state(int environment) const { return storage_->environments[environment].state; }
 
-View<double> Batch::positions() const {
-  return dense(storage_->positions, {size(), storage_->vertices, 3}, storage_->settings.device);
-}
+View<double> Batch::positions() const { return dense(storage_->positions, {size(), storage_->vertices, 3}); }
 
 View<double> Batch::velocities() const {
-  return dense(storage_->velocities, {size(), storage_->vertices, 3}, storage_->settings.device);
+  return dense(storage_->velocities, {size(), storage_->vertices, 3});
 }
 
 View<double> Batch::kept_positions() const {
   const Storage& s = *storage_;
-  return dense(s.kept, {size(), std::ssize(s.settings.kept_steps), s.vertices, 3}, s.settings.device);
+  return dense(s.kept, {size(), std::ssize(s.settings.kept_steps), s.vertices, 3});
 }
 
 View<double> Batch::grasp_forces() const {
   const Storage& s = *storage_;
-  return dense(s.grasp_forces, {size(), s.steps(), s.grasps, 3}, s.settings.device);
+  return dense(s.grasp_forces, {size(), s.steps(), s.grasps, 3});
 }
 
 std::span<const StepStats> Batch::stats(int environment) const {
@@ -183,6 +181,7 @@ void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t
                        const BatchSettings& settings,
                        const std::function<Environment(std::size_t)>& environment_of,
                        const std::function<void(std::size_t, const Batch&, int)>& finished) {
+  if (at_once <= 0) throw std::invalid_argument("batch: at least one environment has to run at once");
   for (std::size_t first = 0; first < count; first += at_once) {
     std::vector<Environment> environments;
     for (std::size_t i = first; i < std::min(count, first + at_once); ++i)

@@ -11,20 +11,16 @@
 
 namespace flash::sim {
 
-/// Where a batch computes and keeps its numbers.
-enum class Device { cpu };
-
 /// Numbers that a Batch owns, as DLPack describes them: valid until the batch advances or ends.
 template <class Number>
 struct View {
   const Number* data = nullptr;
   std::vector<std::ptrdiff_t> shape, strides;  ///< strides in numbers, not bytes
-  Device device = Device::cpu;
 };
 
 /// How one step of one environment went, in numbers alone.
 struct StepStats {
-  double residual = 0;         ///< as in StepReport
+  double residual = 0;         ///< relative residual, as in StepReport
   double penetration_max = 0;  ///< deepest vertex below a surface [m]
   int iterations = 0, solves = 0, factorizations = 0, substeps = 0;
   bool converged = false;
@@ -32,14 +28,13 @@ struct StepStats {
 
 struct BatchSettings {
   SolverSettings solver{};
-  int steps = 0;                  ///< of the whole replay
-  std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; 0 is the start
-  int first_step = 0;             ///< at which the states of the environments stand
+  int steps = 0;                  ///< last step of the whole replay
+  std::vector<int> kept_steps{};  ///< steps whose positions are kept, ascending; step 0 is the start
+  int first_step = 0;             ///< step at which the states of the environments stand
   int threads = 1;                ///< 0: one a processor
-  Device device = Device::cpu;
 };
 
-/// Steps after which a solver forgets what it holds besides the state of its environment: a replay that goes
+/// Steps after which a solver forgets what it holds besides the state of its environment. A replay that goes
 /// on from a state at a multiple of them is bitwise the one that was not interrupted.
 inline constexpr int restart_interval = 50;
 
@@ -62,7 +57,7 @@ class Batch {
   /// ended it; a batch that has thrown cannot advance any more.
   void advance(int steps, const std::function<void(int)>& finished = {});
 
-  /// Of one environment: what another batch needs to go on from here.
+  /// The state of one environment: another batch can go on from it.
   const State& state(int environment) const;
 
   View<double> positions() const;       ///< environments x vertices x 3 [m]
@@ -80,7 +75,7 @@ class Batch {
 };
 
 /// Replays any number of environments whole, in batches of at most `at_once`, so that memory holds those
-/// alone: `environment_of` makes number i just before its batch, `finished` gets i, its batch and its place
+/// alone. `environment_of` makes number i just before its batch. `finished` gets i, its batch and its place
 /// there, on the thread that simulated it. Throws as Batch does.
 void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t count, int at_once,
                        const BatchSettings& settings,

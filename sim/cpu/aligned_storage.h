@@ -8,7 +8,7 @@ namespace flash::sim {
 /// Widest vector of any instruction level [bytes]; a cache line.
 inline constexpr std::size_t vector_alignment = 64;
 
-/// Starts on a whole vector, the same at every instruction level.
+/// Allocates memory that starts on a whole vector of every instruction level.
 template <typename Scalar>
 struct AlignedAllocator {
   using value_type = Scalar;

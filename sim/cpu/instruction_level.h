@@ -8,10 +8,10 @@ namespace flash::sim {
 /// and on nothing else of the machine.
 enum class InstructionLevel { generic, v2, v3, v4 };
 
-/// "x86-64-v3", say.
+/// The name of a level, such as "x86-64-v3".
 const char* to_string(InstructionLevel level);
 
-/// Those that this machine has, the lowest first; it has to have x86-64-v2, as all since 2013.
+/// The levels that this machine has, lowest first; it needs x86-64-v2.
 std::vector<InstructionLevel> instruction_levels();
 
 InstructionLevel highest_instruction_level();

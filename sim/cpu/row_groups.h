@@ -8,11 +8,11 @@
 namespace flash::sim {
 
 /// A sparse matrix over vertices that acts on each coordinate alike. Its rows go four at a time over the
-/// columns that any of them has (block compressed rows, blocks of 4 x 1): rows next to each other share most
+/// columns that any of them has: block compressed rows, blocks of 4 x 1. Rows next to each other share most
 /// of their columns, and a vertex that was loaded serves four rows.
 struct RowGroups {
-  std::vector<std::array<int, 4>> rows;  ///< of each group; -1 where there are fewer
-  std::vector<int> starts;               ///< of each group in `columns`, and their end
+  std::vector<std::array<int, 4>> rows;  ///< rows of each group, -1 where it has fewer
+  std::vector<int> starts;               ///< where each group starts in `columns`, and where the last ends
   std::vector<int> columns;
   std::vector<double> values;  ///< four a column, one for each row of the group
   std::vector<float> single_values;
@@ -20,7 +20,7 @@ struct RowGroups {
   bool empty() const { return rows.empty(); }
 };
 
-/// `position`: the number of each vertex in the result.
+/// Groups the rows of `matrix`; `position` numbers the vertices of the result.
 RowGroups row_groups(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix,
                      const std::vector<int>& position);
 

@@ -8,7 +8,7 @@ ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
                                const std::vector<int>& position) {
   struct Entry {
     int column, source;
-    bool turned;
+    bool transposed;
   };
   std::vector<std::vector<Entry>> rows(pattern.size);
   for (int vertex = 0; vertex < pattern.size; ++vertex)
@@ -25,7 +25,7 @@ ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
     for (const Entry& entry : row) {
       product.columns.push_back(entry.column);
       product.sources.push_back(entry.source);
-      product.turned.push_back(entry.turned);
+      product.transposed.push_back(entry.transposed);
     }
     product.starts.push_back(static_cast<int>(product.columns.size()));
   }
@@ -40,7 +40,7 @@ void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValu
   scale_ = static_cast<Scalar>(scale);
   blocks_.resize(12 * pattern.sources.size());
   linear<Scalar>(*kernels_).copy_blocks(static_cast<int>(pattern.sources.size()), pattern.sources.data(),
-                                        pattern.turned.data(), values.data(), blocks_.data());
+                                        pattern.transposed.data(), values.data(), blocks_.data());
 }
 
 template <typename Scalar>

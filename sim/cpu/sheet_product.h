@@ -1,7 +1,8 @@
 #pragma once
 #include <vector>
 
-#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/aligned_storage.h"
+#include "sim/cpu/block_pattern.h"
 #include "sim/cpu/row_groups.h"
 
 namespace flash::sim {
@@ -9,13 +10,13 @@ namespace flash::sim {
 /// Where the blocks of a BlockPattern stand in the rows of a product: both triangles of the matrix, vertices
 /// in elimination order.
 struct ProductPattern {
-  std::vector<int> starts;   ///< of each row in the lists below, and their end
-  std::vector<int> columns;  ///< elimination position of the column's vertex
-  std::vector<int> sources;  ///< block of the BlockPattern
-  std::vector<char> turned;  ///< whether the source is the transpose
+  std::vector<int> starts;       ///< where each row starts in the lists below, and where the last ends
+  std::vector<int> columns;      ///< elimination position of the column's vertex
+  std::vector<int> sources;      ///< block of the BlockPattern
+  std::vector<char> transposed;  ///< whether the source is the transpose
 };
 
-/// Of the diagonal and the first `pair_count` pairs.
+/// The product's pattern of the diagonal and the first `pair_count` pairs.
 ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
                                const std::vector<int>& elimination_position);
 

@@ -1,51 +1,15 @@
 #pragma once
 #include <Eigen/Core>
-#include <span>
 #include <vector>
 
 namespace flash::sim {
 
-/// Gap up to which a vertex is on a surface: rounding of a projected position [m].
-inline constexpr double touching_gap = 1e-10;
-
-/// A vertex against an obstacle.
-struct Touch {
-  int obstacle = -1;
-  bool holds = false;          ///< the vertex stays on it
-  bool let_go = false;         ///< in the linear problem of this iterate, which would have had to pull
-  double gap = 0.0;            ///< [m]
-  bool starts_inside = false;  ///< as in Gap
-  double normal_force = 0;     ///< lambda_n of an obstacle that holds [N]
-  double slip = 0.0;           ///< length of the slip against it in this step, as friction takes it [m]
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
-  Eigen::Vector3d curved = Eigen::Vector3d::Zero();          ///< as in Gap
-  Eigen::Vector3d surface_moved = Eigen::Vector3d::Zero();   ///< as in Gap [m]
-  Eigen::Vector3d slip_direction = Eigen::Vector3d::Zero();  ///< of its own slip, over `slip`
-  Eigen::Vector3d friction = Eigen::Vector3d::Zero();        ///< its friction force on the vertex [N]
-
-  bool touches() const { return gap <= touching_gap; }
-};
-
-/// The x >= 0 with y = N^T C x - b >= 0 and x . y = 0 (a linear complementarity problem), N the unit
-/// `normals` as columns and C the `directions`: of at most three of them that are independent. Where there is
-/// none (faces that press against each other), what comes nearest. As forces, with b = N^T f and C = N: the
-/// non-negative ones that come nearest to f. As a displacement N x, with b minus the gaps: the shortest that
-/// closes all of them.
-std::vector<double> complementary(const std::vector<Eigen::Vector3d>& normals,
-                                  const std::vector<Eigen::Vector3d>& directions,
-                                  const std::vector<double>& b);
-
-/// Sets `normal_force` and `holds` of the eligible touches, and of all others to none: the non-negative
-/// forces of least squares for `needed` [N], without friction between the surfaces.
-void share_force(std::span<Touch> touches, const Eigen::Vector3d& needed, bool (*eligible)(const Touch&));
-
-/// The same for surfaces that each rub against the vertex's own slip: the reaction is the sum of
-/// lambda_k (n_k - mu_k d_k). `friction`: mu of each touch.
-void share_force_rubbing(std::span<Touch> touches, const std::vector<double>& friction,
-                         const Eigen::Vector3d& needed, bool (*eligible)(const Touch&));
-
-/// Projector on the directions along all surfaces that hold the vertex: space without any, a plane, the edge
-/// of two, or nothing.
-Eigen::Matrix3d along_surfaces(std::span<const Touch> touches);
+/// Solves a linear complementarity problem: the x >= 0 with y = N^T C x - b >= 0 and x . y = 0. The unit
+/// `normals` are the columns of N, the `directions` those of C. At most three of x are positive, of
+/// independent columns. Where there is none (faces that press against each other), returns what comes
+/// nearest. As forces, with b = N^T f and C = N: the non-negative ones that come nearest to f. As a
+/// displacement N x, with b minus the gaps: the shortest that closes all of them.
+std::vector<double> solve_lcp(const std::vector<Eigen::Vector3d>& normals,
+                              const std::vector<Eigen::Vector3d>& directions, const std::vector<double>& b);
 
 }  // namespace flash::sim

@@ -8,7 +8,7 @@
 namespace flash::sim {
 inline namespace FLASH_LEVEL {
 
-/// Of a vector register.
+/// Size of a vector register [bytes].
 #if defined(__AVX512F__)
 inline constexpr int vector_bytes = 64;
 #elif defined(__AVX2__)
@@ -34,7 +34,7 @@ inline Lanes load_lanes(const double* numbers) {
 }
 inline void store_lanes(const Lanes& lanes, double* numbers) { memcpy(numbers, &lanes, sizeof(lanes)); }
 
-// The C library's functions: those of the C++ library are inline for some types.
+// These call the C library: the C++ library's functions are inline for some types.
 FLASH_HOST_DEVICE inline float square_root(float x) { return ::sqrtf(x); }
 FLASH_HOST_DEVICE inline double square_root(double x) { return ::sqrt(x); }
 FLASH_HOST_DEVICE inline double logarithm(double x) { return ::log(x); }

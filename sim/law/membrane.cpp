@@ -72,28 +72,6 @@ Membrane membrane_of(data::Constitutive constitutive, const SheetLame& lame) {
   }
 }
 
-double membrane_energy_density(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame) {
-  return principal(constitutive, frame_of(F), lame).energy;
-}
-
-Matrix32 membrane_stress(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame) {
-  const SingularFrame<double> frame = frame_of(F);
-  return stress(frame, principal(constitutive, frame, lame));
-}
-
-Matrix66 membrane_hessian(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame) {
-  const SingularFrame<double> frame = frame_of(F);
-  return hessian(frame, principal(constitutive, frame, lame));
-}
-
-Matrix66 membrane_hessian_projected(data::Constitutive constitutive, const Matrix32& F,
-                                    const SheetLame& lame) {
-  const SingularFrame<double> frame = frame_of(F);
-  PrincipalResponse<double> response = principal(constitutive, frame, lame);
-  clamp(response);
-  return hessian(frame, response);
-}
-
 void membrane_response(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame,
                        double& energy, Matrix32& P, Matrix66* response_hessian, Curvature curvature) {
   const SingularFrame<double> frame = frame_of(F);

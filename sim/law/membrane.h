@@ -30,26 +30,15 @@ struct Membrane {
 };
 Membrane membrane_of(data::Constitutive constitutive, const SheetLame& lame);
 
-/// Energy per rest area [N/m].
-double membrane_energy_density(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
-
-/// First Piola-Kirchhoff stress P = dPsi/dF [N/m].
-Matrix32 membrane_stress(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
-
-/// Exact d vec(P) / d vec(F) [N/m]. Undefined at s2 = 0 for tri_neohookean.
-Matrix66 membrane_hessian(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame);
-
-/// The same with negative eigenvalues set to zero: positive semi-definite at every F, s2 = 0 included. The
-/// eigenvectors of an isotropic energy are known from the singular vectors of F (Smith, de Goes, Kim 2019,
-/// "Analytic eigensystems for isotropic distortion energies", sec. 4): a 2 x 2 scaling block, twist, flip,
-/// and one rotation out of the plane for each singular value.
-Matrix66 membrane_hessian_projected(data::Constitutive constitutive, const Matrix32& F,
-                                    const SheetLame& lame);
-
-/// `positive`: negative eigenvalues set to zero.
+/// Whether a Hessian is exact or has its negative eigenvalues set to zero.
 enum class Curvature { exact, positive };
 
-/// Energy, stress and (unless null) the Hessian from one singular value decomposition.
+/// Energy Psi per rest area [N/m], stress P = dPsi/dF (first Piola-Kirchhoff) and (unless null) the Hessian
+/// d vec(P) / d vec(F), from one singular value decomposition. The exact Hessian is undefined at s2 = 0 for
+/// tri_neohookean; the positive one is semi-definite at every F. The eigenvectors of an isotropic energy are
+/// known from the singular vectors of F (Smith, de Goes, Kim 2019, "Analytic eigensystems for isotropic
+/// distortion energies", sec. 4): a 2 x 2 scaling block, twist, flip, and one rotation out of the plane for
+/// each singular value.
 void membrane_response(data::Constitutive constitutive, const Matrix32& F, const SheetLame& lame,
                        double& energy, Matrix32& stress, Matrix66* response_hessian,
                        Curvature curvature = Curvature::positive);

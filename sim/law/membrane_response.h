@@ -111,9 +111,9 @@ FLASH_HOST_DEVICE inline SmoothArea<Real> smooth_area(const Real& area) {
           select(whole, zero, Real((1.5 / collapsed_share) * (1.0 - squared)))};
 }
 
-/// With lambda = 0 the ARAP sheet. s1 + s2 = sqrt(s1^2 + s2^2 + 2 J) has a kink where a triangle has become a
-/// line: J' in place of J takes it out, so that a sheet drawn so far that it becomes one there has an
-/// equilibrium with a stress.
+/// The corotated sheet; lambda = 0 gives the ARAP sheet. s1 + s2 = sqrt(s1^2 + s2^2 + 2 J) has a kink where a
+/// triangle has become a line: J' in place of J takes it out, so that a sheet drawn so far that it becomes
+/// one there has an equilibrium with a stress.
 struct Corotated {
   template <typename Real>
   FLASH_HOST_DEVICE static PrincipalResponse<Real> at(const Real& s1, const Real& s2, double mu,

@@ -12,6 +12,9 @@ using Eigen::Vector3d;
 
 namespace {
 
+constexpr double least_depth = 1e-12;  ///< to which a direction has to sink a vertex, above rounding [m]
+constexpr double least_inward = 1e-6;  ///< squared length of the part of a normal that is free
+
 Map<Matrix3d> block(BlockValues<double>& values, size_t k) { return Map<Matrix3d>(values.data() + 9 * k); }
 
 }  // namespace
@@ -24,9 +27,9 @@ void add_slip_stiffness(const ContactSet& contacts, BlockValues<double>& values)
 void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& values) {
   for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k)
     for (const Touch& touch : contacts.touches_of(k))
-      if (touch.holds && !touch.curved.isZero(0))
+      if (touch.holds && !touch.curvature_direction.isZero(0))
         block(values, contacts.constraints[k].vertex) -=
-            touch.normal_force * touch.curved * touch.curved.transpose();
+            touch.normal_force * touch.curvature_direction * touch.curvature_direction.transpose();
 }
 
 void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, BlockValues<double>& values) {
@@ -54,13 +57,13 @@ void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, Bl
 
 namespace {
 
-/// Frees a vertex from the touches that would have to pull. Returns whether from any.
+/// Frees a vertex from the touches that would have to pull. Returns whether any touch was released.
 bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touches) {
   const auto holds = [](const Touch& touch) { return touch.holds; };
   const auto held = std::count_if(touches.begin(), touches.end(), holds);
-  for (Touch& touch : touches) touch.let_go = touch.let_go || touch.holds;
+  for (Touch& touch : touches) touch.released = touch.released || touch.holds;
   share_force(touches, force, holds);
-  for (Touch& touch : touches) touch.let_go = touch.let_go && !touch.holds;
+  for (Touch& touch : touches) touch.released = touch.released && !touch.holds;
   const auto still_held = std::count_if(touches.begin(), touches.end(), holds);
   if (still_held == held) return false;
   c.hold = still_held > 0 ? Hold::slip : Hold::free;
@@ -69,15 +72,17 @@ bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touche
   return true;
 }
 
-/// Holds a vertex on the touches up to `reach` away that `step` drives it into. Returns whether on any.
+/// Holds a vertex on the touches up to `reach` away that `step` drives it into. Returns whether any touch was
+/// added.
 bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Touch> touches) {
   bool any = false;
   for (Touch& touch : touches) {
-    if (touch.holds || touch.let_go || touch.gap > reach || touch.gap + touch.normal.dot(step) >= -1e-12)
+    if (touch.holds || touch.released || touch.gap > reach ||
+        touch.gap + touch.normal.dot(step) >= -least_depth)
       continue;
-    // Within the surfaces that hold already, up to the edge.
+    // The correction stays within the surfaces that hold already.
     const Vector3d inward = c.free * touch.normal;
-    if (inward.squaredNorm() < 1e-6) continue;
+    if (inward.squaredNorm() < least_inward) continue;
     c.correction += (-touch.gap - touch.normal.dot(c.correction)) / inward.squaredNorm() * inward;
     touch.holds = true;
     c.hold = Hold::slip;
@@ -87,8 +92,9 @@ bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Tou
   return any;
 }
 
-/// The same for a vertex that nothing holds so far.
-bool hold_free(const LinearizedAt& iterate, const Vector3d& step, double reach, int i, ContactSet& contacts) {
+/// Holds a vertex that nothing holds so far. Returns whether it is held now.
+bool hold_free(const Linearization& iterate, const Vector3d& step, double reach, int i,
+               ContactSet& contacts) {
   const double clearance = contacts.clearance[i];
   if (clearance > reach || clearance > step.norm()) return false;
   const size_t first = contacts.touches.size();
@@ -103,7 +109,7 @@ bool hold_free(const LinearizedAt& iterate, const Vector3d& step, double reach, 
   return true;
 }
 
-bool hold_free_vertices(const LinearizedAt& iterate, const Points& direction, double reach,
+bool hold_free_vertices(const Linearization& iterate, const Points& direction, double reach,
                         ContactSet& contacts) {
   bool any = false;
   for (int i = 0; i < direction.rows(); ++i)
@@ -113,7 +119,7 @@ bool hold_free_vertices(const LinearizedAt& iterate, const Points& direction, do
 
 }  // namespace
 
-bool exchange_contacts(const LinearizedAt& iterate, const Points& direction, const Points& force,
+bool exchange_contacts(const Linearization& iterate, const Points& direction, const Points& force,
                        Points& gradient, ContactSet& contacts) {
   constexpr double any_reach = std::numeric_limits<double>::infinity();
   bool any = false;
@@ -131,7 +137,7 @@ bool exchange_contacts(const LinearizedAt& iterate, const Points& direction, con
   return hold_free_vertices(iterate, direction, any_reach, contacts) || any;
 }
 
-bool hold_touching(const LinearizedAt& iterate, const Points& direction, ContactSet& contacts) {
+bool hold_touching(const Linearization& iterate, const Points& direction, ContactSet& contacts) {
   bool any = false;
   for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
     VertexConstraint& c = contacts.constraints[k];

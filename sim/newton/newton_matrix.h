@@ -2,17 +2,17 @@
 #include <memory>
 #include <vector>
 
-#include "sim/cpu/sheet_product.h"
+#include "sim/newton/krylov.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/step/contact_set.h"
 
 namespace flash::sim {
 
-/// The matrix of a Newton iteration, its preconditioner and the solution of its linear problem by conjugate
-/// gradients, in elimination order.
+/// The matrix of a Newton iteration, its preconditioner and the solution of its linear problem.
 ///
-/// A direction needs a digit or two, so that single precision does, at half the traffic, as long as rounding
-/// the matrix changes its least eigenvalue by little: that of the mass, m / h^2, bounds it from below.
+/// A direction needs a digit or two, so single precision does, at half the traffic. The condition is that
+/// rounding the matrix changes its least eigenvalue by little: that of the mass, m / h^2, bounds it from
+/// below.
 class NewtonMatrix {
  public:
   explicit NewtonMatrix(std::shared_ptr<const SheetPlan> plan);
@@ -25,35 +25,35 @@ class NewtonMatrix {
   void assign(const BlockValues<double>& blocks, bool sparse, const BendingOperator& bending, double rigidity,
               double least_eigenvalue);
 
-  /// Adds to `direction` the solution of matrix * direction = -gradient over the free directions of the
-  /// constraints, whose corrections it makes, until the residual has fallen to `tolerance` [N] or a tenth, or
-  /// the matrix curves down (Steihaug 1983). Adds to `force` what the direction changes. Returns the number
-  /// of solves with the factor.
+  /// Sets `direction` to the solution of matrix * direction = -gradient over the free directions, and to the
+  /// constraints' corrections in the others. It is solved to a residual of `tolerance` [N] or a tenth of the
+  /// first. Adds to `force` what the direction changes. Returns the number of solves with the factor.
   int solve(const ContactSet& contacts, const data::Points& gradient, double tolerance,
             data::Points& direction, data::Points& force);
 
-  /// The same with friction forces that grow with the normal forces: of the matrix L A P, P the free
-  /// directions and L = P + C, with the `couplings` C of the first of the constraints (friction_couplings).
-  /// Not symmetric: by GMRES (Saad and Schultz 1986).
+  /// Solves likewise where friction grows with the normal forces. The matrix is L A P with the free
+  /// directions P, L = P + C and the `couplings` C of the constraints (friction_couplings). It is not
+  /// symmetric: GMRES.
   int solve_coupled(const ContactSet& contacts, const std::vector<Eigen::Matrix3d>& couplings,
                     const data::Points& gradient, double tolerance, data::Points& direction,
                     data::Points& force);
 
  private:
   template <typename Scalar>
-  int generalized_minimal_residual(SheetProduct<Scalar>& product, const ContactSet& contacts,
-                                   const std::vector<Eigen::Matrix3d>& couplings,
-                                   const data::Points& gradient, double tolerance, data::Points& direction,
-                                   data::Points& force);
-
+  RestrictedProblem<Scalar> restricted(SheetProduct<Scalar>& product, const ContactSet& contacts,
+                                       const data::Points& gradient, double tolerance);
   template <typename Scalar>
-  int conjugate_gradients(SheetProduct<Scalar>& product, const ContactSet& contacts,
-                          const data::Points& gradient, double tolerance, data::Points& direction,
-                          data::Points& force);
+  int take(const KrylovSolution<Scalar>& solution, data::Points& direction, data::Points& force) const;
+
+  /// Calls work(product) with the product of the precision that does.
+  template <typename Work>
+  auto with_product(const Work& work) {
+    return single_ ? work(single_product_) : work(double_product_);
+  }
 
   std::shared_ptr<const SheetPlan> plan_;
   BlockCholesky<float> factor_;
-  bool single_ = true;
+  bool single_ = true;  ///< whether single precision does
   SheetProduct<float> single_product_;
   SheetProduct<double> double_product_;
 };

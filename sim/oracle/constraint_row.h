@@ -62,8 +62,8 @@ FLASH_HOST_DEVICE inline ConstraintRow normal_row_minimum_map(double gap, double
 ///     E = (rho - t) / (u + r mu lambda_n - rho) r / h,  u = |c_t| / h,  t = r (mu lambda_n - |lambda_t|),
 ///     rho = sqrt(u^2 + t^2),  r = h W_tt [m/(N s)],
 ///
-/// frozen over one Newton step: E = 0 sticks; where Fischer-Burmeister of (u, t) vanishes h^2 E = |c_t| /
-/// |lambda_t|. The caller projects lambda_t on the disc after each step; multipliers outside count as on the
+/// frozen over one Newton step. E = 0 sticks; where Fischer-Burmeister of (u, t) vanishes, h^2 E = |c_t| /
+/// |lambda_t|. The caller projects lambda_t on the disc after each step. Multipliers outside count as on the
 /// rim, which keeps E >= 0. Without normal force (or mu = 0) the rows say lambda_t = 0. slip: c_t since the
 /// start of the step [m]; free_slip: the same with dlambda = 0.
 FLASH_HOST_DEVICE inline FrictionRows friction_rows(const double slip[2], const double free_slip[2],

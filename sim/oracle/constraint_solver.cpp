@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 double relative(const VectorXd& residual, double size) { return size > 0 ? residual.norm() / size : 0.0; }
 
 /// Conjugate gradients or conjugate residuals on P^-1 K x = P^-1 b, P diagonal. The recursion drifts from the
-/// true residual on badly scaled systems, so the true one decides, and the method starts again from where it
+/// true residual on badly scaled systems, so the true one decides. The method starts again from where it
 /// stands until a restart no longer gains.
 class Krylov {
  public:
@@ -67,7 +67,8 @@ class Krylov {
     }
   }
 
-  /// Stiefel 1955; in the P^-1 inner product, minimising |r|_{P^-1} over the Krylov space.
+  /// The conjugate residual method (Stiefel 1955) in the P^-1 inner product: minimizes |r|_{P^-1} over the
+  /// Krylov space.
   void conjugate_residual(VectorXd& x) {
     VectorXd r = b_ - apply(x);
     VectorXd z = r.cwiseQuotient(P_), p = z;

@@ -24,14 +24,14 @@ enum class DualSolver {
 /// The names scene files use: DENSE_CHOLESKY_EIGEN, DENSE_CG, DENSE_PCG_JACOBI, DENSE_CR, DENSE_PCR_JACOBI,
 /// MATRIX_FREE.
 const std::vector<std::string>& dual_solver_names();
-/// Throws data::InputError with the known names.
+/// Reads a solver's name; throws data::InputError with the known names.
 DualSolver dual_solver_from_name(std::string_view name);
 const std::string& name_of(DualSolver solver);
 
 struct DualSolverSettings {
   DualSolver solver = DualSolver::dense_cholesky_eigen;
   double tolerance = 1e-10;  ///< on |b - K x| / |b|; the Cholesky factor is refined once or twice to reach it
-  int max_iterations = 0;    ///< of the iterative solvers; 0: ten times the rows, plus 100
+  int max_iterations = 0;    ///< iterations of the iterative solvers; 0: ten times the rows, plus 100
   double regularization =
       1e-12;  ///< added to each diagonal entry, relative to it; K stays solvable where rows repeat
 };
@@ -49,7 +49,7 @@ using Operator = std::function<void(const Eigen::VectorXd& x, Eigen::VectorXd& y
 /// K x = b, K symmetric positive semi-definite. MATRIX_FREE on a given matrix is DENSE_PCR_JACOBI.
 DualSolution solve_symmetric(const Eigen::MatrixXd& K, const Eigen::VectorXd& b,
                              const DualSolverSettings& settings);
-/// The same with K as an operator and its diagonal: the Jacobi-preconditioned conjugate residual method.
+/// Solves with K as an operator and its diagonal: the Jacobi-preconditioned conjugate residual method.
 DualSolution solve_symmetric(const Operator& K, const Eigen::VectorXd& diagonal, const Eigen::VectorXd& b,
                              const DualSolverSettings& settings);
 

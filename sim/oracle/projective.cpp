@@ -214,7 +214,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
     if (!contacts.empty()) {
       const ContactProblem problem =
           contact_problem(contacts, system, settings, report.metric, force, multiplier);
-      // As exact as this iteration deserves: a part of the way that is still to go.
+      // The multipliers are solved as exactly as this iteration deserves: to a part of the way still to go.
       ConstraintSettings inner = settings.constraints;
       inner.tolerance = std::max(inner.tolerance, 1e-3 * free_motion.rowwise().norm().maxCoeff());
       if (problem.W.size() == 0) inner.linear.tolerance = std::max(inner.linear.tolerance, 1e-3);
@@ -257,7 +257,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   environment.state.time = time;
   const Points& v = environment.state.velocities;
   report.kinetic = 0.5 * (system.mass().asDiagonal() * v).cwiseProduct(v).sum();
-  report.potential = -(system.mass().transpose() * x * environment.gravity)(0);
+  report.gravitational = -(system.mass().transpose() * x * environment.gravity)(0);
   return report;
 }
 

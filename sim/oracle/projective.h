@@ -23,7 +23,7 @@ struct ProjectiveSettings {
   int acceleration = 5;  ///< depth of the Anderson acceleration, 0 for none
   ContactMetric metric = ContactMetric::automatic;
   int dense_contacts = 300;  ///< up to this number the named dense solver, above it the matrix-free one
-  double tangent_angle = 0;  ///< of the tangent basis about the normal [rad]; no result depends on it
+  double tangent_angle = 0;  ///< angle of the tangent basis about the normal [rad]; no result depends on it
   ConstraintSettings constraints{};
 };
 
@@ -35,15 +35,15 @@ struct ProjectiveReport : StepReport {
   std::string warning;                         ///< one line, empty where there is nothing to say
 };
 
-/// Steps environments of one Sheet by implicit Euler with projective dynamics: exact local steps
-/// p_e = F_e - P(F_e) / w, one global step with a constant prefactored A, contact and friction by the
-/// non-smooth Newton method on the multipliers within each iteration, grasps and supports as bilateral rows
+/// Steps environments of one Sheet by implicit Euler with projective dynamics. An iteration has exact local
+/// steps p_e = F_e - P(F_e) / w and one global step with a constant prefactored A. Within it the non-smooth
+/// Newton method on the multipliers solves contact and friction. Grasps and supports are bilateral rows,
 /// eliminated exactly.
 ///
 /// With these local steps the global step A x' = M s + h^2 sum w a G^T p + h^2 H^T lambda reads
-/// x' = x - A^-1 (h^2 r(x) - h^2 H^T lambda) with r the force residual: its fixed point is implicit Euler of
-/// the named energy, the one Solver finds by Newton's method, whatever A is. Bouaziz et al. 2014; Zeng et al.
-/// 2025.
+/// x' = x - A^-1 (h^2 r(x) - h^2 H^T lambda) with r the force residual. Whatever A is, its fixed point is
+/// implicit Euler of the named energy, which Solver finds by Newton's method. Bouaziz et al. 2014; Zeng et
+/// al. 2025.
 class ProjectiveSolver {
  public:
   ProjectiveSolver(const Sheet& sheet, const ProjectiveSettings& settings);

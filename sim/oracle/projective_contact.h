@@ -39,7 +39,7 @@ double contact_potential(const Environment& environment, double time, double tim
 /// W = H A^-1 H^T, dense.
 Eigen::MatrixXd full_metric(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system);
 
-/// Its diagonal alone.
+/// The diagonal of W alone.
 Eigen::VectorXd full_metric_diagonal(const std::vector<VertexContact>& contacts,
                                      const ProjectiveSystem& system);
 

@@ -14,8 +14,8 @@ namespace flash::sim {
 ///
 ///     A = M (1 + h air_drag) + (h^2 + h stiffness_damping) (sum_e w a_e G_e^T G_e + K_b)   [kg],
 ///
-/// with w = 2 mu + 2 max(lambda, 0), which bounds the corotational stress from above, and K_b a sparse
-/// stand-in for the bending stiffness: the plate's without its small entries, the isometric one for the
+/// with w = 2 mu + 2 max(lambda, 0), which bounds the corotational stress from above. K_b is a sparse
+/// stand-in for the bending stiffness: the plate's without its small entries, or the isometric one for
 /// hinges. Factored once a material; everything else here follows from it.
 class ProjectiveSystem {
  public:
@@ -49,7 +49,7 @@ class ProjectiveSystem {
   Eigen::SparseMatrix<double> matrix_;
   std::unique_ptr<Factor> factor_;
   std::array<Held, 3> held_;
-  mutable std::vector<Eigen::VectorXd> columns_;  ///< of A^-1, as far as asked for
+  mutable std::vector<Eigen::VectorXd> columns_;  ///< columns of A^-1, as far as asked for
 };
 
 }  // namespace flash::sim

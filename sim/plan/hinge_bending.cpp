@@ -86,13 +86,6 @@ double hinge_angle(const HingePositions& x) {
   return std::atan2(left.cross(right).dot((x.col(1) - x.col(0)).normalized()), left.dot(right));
 }
 
-double hinge_energy(const Hinge& hinge, const HingePositions& x) {
-  double energy;
-  HingePositions gradient;
-  hinge_response(hinge, x, energy, gradient, nullptr);
-  return energy;
-}
-
 void hinge_response(const Hinge& hinge, const HingePositions& x, double& energy, HingePositions& gradient,
                     Matrix12* hessian) {
   const Presence left = presence_of(0.5 * left_normal(x).norm(), hinge.rest_areas[0]),

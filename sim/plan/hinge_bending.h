@@ -29,14 +29,12 @@ using Matrix12 = Eigen::Matrix<double, 12, 12>;
 /// side.
 double hinge_angle(const HingePositions& x);
 
-/// Energy 1/2 s_0 s_1 weight (theta - rest_angle)^2 for D = 1, the difference taken the short way round
-/// (Grinspun et al. 2003, "Discrete shells"; derivatives after Tamstorf, Grinspun 2013). A triangle without
-/// area has no normal, so that the force of the angle alone would grow without bound: s = u^3 (10 - 15 u +
-/// 6 u^2) at u = area / (collapsed_share rest area) takes it out smoothly, and is 1 for u >= 1.
-double hinge_energy(const Hinge& hinge, const HingePositions& x);
-
-/// Energy, gradient by the four positions and (unless null) the Gauss-Newton Hessian s_0 s_1 weight
-/// (dtheta)(dtheta)^T by the stacked positions: positive semi-definite, exact at the rest angle.
+/// Energy 1/2 s_0 s_1 weight (theta - rest_angle)^2 for D = 1, the difference taken the short way round, and
+/// its gradient by the four positions (Grinspun et al. 2003, "Discrete shells"; Tamstorf, Grinspun 2013). The
+/// Hessian by the stacked positions (unless null) is Gauss-Newton's, s_0 s_1 weight (dtheta)(dtheta)^T:
+/// positive semi-definite, exact at the rest angle. A triangle without area has no normal, so that the force
+/// of the angle alone would grow without bound. So s = u^3 (10 - 15 u + 6 u^2) at u = area / (collapsed_share
+/// rest area) takes it out smoothly; s is 1 for u >= 1.
 void hinge_response(const Hinge& hinge, const HingePositions& x, double& energy, HingePositions& gradient,
                     Matrix12* hessian);
 

@@ -66,7 +66,7 @@ void solve_negative(const Eigen::SimplicialLDLT<Sparse>& factor, Block& x) {
 }
 
 // Rows of T = -ee^-1 ex, the normal derivative of the free edges in terms of the positions, without their
-// small entries: what is left of a row is moved by the least change that keeps its values for affine
+// small entries. What is left of a row is moved by the least change that keeps its values for affine
 // positions.
 Sparse slope_weights(const Sheet& sheet, const std::vector<Edge>& edges, const Eigen::Matrix2Xd& plane,
                      const Eigen::SimplicialLDLT<Sparse>& factor, const Sparse& ex, double drop_tolerance) {

@@ -20,9 +20,9 @@ struct MorleyPlate {
 
 /// Morley 1968; quadratic per triangle with constant curvature
 /// k = 1/A sum_e n (l_e n theta_e + t (x_b - x_a))^T, energy A/2 [nu |k11 + k22|^2 + (1 - nu) |k|^2].
-/// Where a clamp holds all vertices of stiff triangles, its border keeps its slope too; with the places of
-/// the vertices alone it would turn within a cell, an error of first order.
-/// Throws data::InputError unless the rest shape is flat to 1e-6 of its size and -1 < nu < 1.
+/// Where a clamp holds all vertices of stiff triangles, its border keeps its slope too. With the places of
+/// the vertices alone it would turn within a cell, an error of first order. Throws data::InputError unless
+/// the rest shape is flat to 1e-6 of its size and -1 < nu < 1.
 MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio);
 
 /// Prescribed derivative of the position along the outward normal n (see MorleyPlate) of the edge a - b; the
@@ -40,11 +40,11 @@ struct CondensedPlate {
 };
 
 /// The edge unknowns at their minimum theta = T x + (clamps), T = -ee^-1 ex, free edges natural. T decays by
-/// about a factor of three a cell: entries below sqrt(drop_tolerance) |e| / (A_left + A_right) are dropped
-/// and the rest moved so that affine positions keep their slopes. The stiffness stays positive semi-definite,
-/// zero on affine positions, and above the exact one by the square of what was dropped: at the default by at
-/// most 0.2 % on any mode up to nu = 0.3 and 0.8 % at nu = 0.45, with about 100 entries a row. drop_tolerance
-/// = 0 is exact.
+/// about a factor of three a cell. Entries below sqrt(drop_tolerance) |e| / (A_left + A_right) are dropped;
+/// the rest is moved so that affine positions keep their slopes. The stiffness stays positive semi-definite,
+/// zero on affine positions, and above the exact one by the square of what was dropped. At the default that
+/// is at most 0.2 % on any mode up to nu = 0.3 and 0.8 % at nu = 0.45, with about 100 entries a row.
+/// drop_tolerance = 0 is exact.
 CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
                                const std::vector<ClampedEdge>& clamped, double drop_tolerance = 1e-6);
 

@@ -52,14 +52,14 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   if (model == data::BendingModel::hinge) return bending;
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
-      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio, 1e-6)
-                                         : isometric;
+      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio) : isometric;
+  bending->largest_entry = stiffness.coeffs().abs().maxCoeff();
   std::vector<int> as_numbered(plan.pattern.size);
   std::iota(as_numbered.begin(), as_numbered.end(), 0);
   bending->stiffness = row_groups(stiffness, as_numbered);
-  bending->elimination_stiffness = row_groups(stiffness, elimination_position(*plan.symbolic));
+  bending->elimination_stiffness = row_groups(stiffness, plan.symbolic->position);
   // Against the plate the isometric stiffness has its eigenvalues between 0.5 and 4.6 (regular meshes, nu =
-  // 0.3): scaled, they lie around 1, where those of the membrane and the mass are.
+  // 0.3). Scaled, they lie around 1, where those of the membrane and the mass are.
   const double scale = model == data::BendingModel::plate ? 0.6 : 1.0;
   for (int i = 0; i < plan.pattern.size; ++i) bending->stand_in.push_back(scale * isometric.coeff(i, i));
   for (const auto& [row, column] : plan.pattern.pairs)
@@ -72,7 +72,6 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
 std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, InstructionLevel level) {
   auto plan = std::make_shared<SheetPlan>();
   plan->sheet = sheet;
-  plan->level = level;
   plan->kernels = &kernels_of(level);
   plan->hinges = sheet_hinges(sheet);
   plan->pattern.size = static_cast<int>(sheet.rest.vertices.rows());
@@ -90,7 +89,7 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, Instruction
                                  slot(v[3], v[1]), slot(v[3], v[2])});
   }
   plan->symbolic = analyze(plan->pattern);
-  const std::vector<int>& position = elimination_position(*plan->symbolic);
+  const std::vector<int>& position = plan->symbolic->position;
   plan->triangle_product = product_pattern(plan->pattern, plan->edge_count, position);
   plan->full_product = product_pattern(plan->pattern, plan->pattern.pairs.size(), position);
   return plan;

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "data/material.h"
-#include "sim/cpu/block_cholesky.h"
 #include "sim/cpu/instruction_level.h"
 #include "sim/cpu/sheet_product.h"
+#include "sim/cpu/symbolic_factor.h"
 #include "sim/cpu/triangle_group.h"
 #include "sim/plan/hinge_bending.h"
 #include "sim/scene/sheet.h"
@@ -18,8 +18,8 @@ namespace flash::sim {
 
 /// A 3 x 3 block of the system matrix between two vertices; stored once, for row > column.
 struct BlockSlot {
-  int block;       ///< index among the blocks of a BlockPattern, the diagonal ones first
-  bool transpose;  ///< the stored block is that of (column, row)
+  int block;        ///< index among the blocks of a BlockPattern, the diagonal ones first
+  bool transposed;  ///< the stored block is that of (column, row)
 };
 
 /// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
@@ -28,10 +28,11 @@ struct BendingOperator {
   const Kernels* kernels;           ///< as in the plan
   RowGroups stiffness;              ///< empty for the hinge model
   RowGroups elimination_stiffness;  ///< the same in elimination order
+  double largest_entry = 0;         ///< of the stiffness, in magnitude [1/m^2]
   std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 
-/// Those made so far, for all environments of a sheet.
+/// Bending operators made so far for a sheet, shared by its environments.
 struct BendingOperators {
   std::mutex mutex;
   std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
@@ -41,11 +42,10 @@ struct BendingOperators {
 /// the kernels that work on it.
 struct SheetPlan {
   Sheet sheet;
-  InstructionLevel level;
-  const Kernels* kernels;  ///< of that level
+  const Kernels* kernels;  ///< of the instruction level that was asked for
   std::vector<Hinge> hinges;
   BlockPattern pattern;   ///< neighbours over an edge, then those across a hinge
-  size_t edge_count = 0;  ///< of the pattern's pairs, those over an edge
+  size_t edge_count = 0;  ///< how many of the pattern's pairs lie over an edge
   std::shared_ptr<const SymbolicFactor> symbolic;
   ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
   std::vector<TriangleGroup> triangle_groups;
@@ -57,8 +57,8 @@ struct SheetPlan {
 std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet,
                                                  InstructionLevel level = highest_instruction_level());
 
-/// Made once for a sheet, model and, where it matters, Poisson's ratio, and kept with the plan; threads may
-/// ask at once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.
+/// The bending operator of a model, made once a Poisson's ratio and kept with the plan; threads may ask at
+/// once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
                                         double poissons_ratio);
 

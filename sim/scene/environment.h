@@ -37,8 +37,8 @@ struct Obstacle {
   double friction = -1.0;  ///< Coulomb coefficient; below zero: the material's
 };
 
-/// Vertices carried by a gripper while from <= t < to; released after. At activation each held vertex goes,
-/// over `closing_time`, from where it is to T_base_gripper(t) * target.
+/// Vertices that a gripper carries while from <= t < to. The gripper releases them after `to`. At activation
+/// each held vertex goes, over `closing_time`, from where it is to T_base_gripper(t) * target.
 struct Grasp {
   std::vector<int> vertices;
   data::Points targets;      ///< held positions in the gripper frame [m], one row a vertex;
@@ -53,7 +53,7 @@ struct Grasp {
 struct FixedVertex {
   int vertex;
   std::array<bool, 3> axes = {true, true, true};
-  Eigen::Vector3d position;  ///< of the held axes [m]
+  Eigen::Vector3d position;  ///< places of the held axes [m]
 };
 
 /// A constant force on a vertex.
@@ -67,7 +67,7 @@ struct State {
   data::Points positions;   ///< [m]
   data::Points velocities;  ///< [m/s]
   std::vector<data::Points>
-      grasp_offsets;  ///< of held vertices in the gripper frame [m], a grasp each; empty: open
+      grasp_offsets;  ///< held vertices in the gripper frame [m], a grasp each; empty: open
 };
 
 /// One simulated world: its own material, motion and state over a shared Sheet.

@@ -157,10 +157,12 @@ std::vector<SceneBody> scene_bodies(const data::Scene& scene, std::vector<std::s
   return bodies;
 }
 
+constexpr double time_rounding = 1e-9;  ///< of a time that is a sum of steps [s]
+
 void close_pending_grasps(SceneBody& body) {
   const State& state = body.environment.state;
   for (const SceneBody::PendingGrasp& pending : body.pending) {
-    if (state.time < pending.from - 1e-9) continue;
+    if (state.time < pending.from - time_rounding) continue;
     Grasp& grasp = body.environment.grasps[pending.grasp];
     const Eigen::Isometry3d base_to_effector = data::pose_at(grasp.gripper, state.time).inverse();
     double nearest = std::numeric_limits<double>::infinity();
@@ -178,7 +180,8 @@ void close_pending_grasps(SceneBody& body) {
                                   data::format_short(nearest) + " m away");
     if (pending.zero_length) grasp.targets = data::Points::Zero(Eigen::Index(grasp.vertices.size()), 3);
   }
-  std::erase_if(body.pending, [&](const auto& pending) { return state.time >= pending.from - 1e-9; });
+  std::erase_if(body.pending,
+                [&](const auto& pending) { return state.time >= pending.from - time_rounding; });
 }
 
 bool move_supports(SceneBody& body, double time) {

@@ -12,11 +12,13 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
+constexpr double least_facing = 0.1;  ///< cosine between a way and a surface that faces it: 84 degrees
+
 Gap gap_of(const Plane& plane, const ObstacleMotion&, const Vector3d& point) {
   return {plane.normal.dot(point - plane.point), plane.normal, Vector3d::Zero(), Vector3d::Zero()};
 }
 
-/// From the axis to the point, across the axis.
+/// Vector from the axis to the point, perpendicular to the axis.
 Vector3d radial_of(const Cylinder& cylinder, const Vector3d& point) {
   const Vector3d radial = point - cylinder.point;
   return radial - cylinder.axis * cylinder.axis.dot(radial);
@@ -37,7 +39,7 @@ Vector3d moved_by(const ObstacleMotion& motion, const Vector3d& point, const Vec
   return motion.moves ? Vector3d(point - motion.start * local) : Vector3d::Zero();
 }
 
-/// Against the face of a box across `axis`, on the side of `sign`.
+/// Gap to the face of a box across `axis`, on the side of `sign`.
 Gap gap_to_face(const Box& box, const ObstacleMotion& motion, const Vector3d& point, const Vector3d& local,
                 int axis, double sign) {
   return {sign * local[axis] - box.half_extents[axis], sign * motion.end.linear().col(axis),
@@ -70,7 +72,7 @@ Gap let_out(Gap gap, double depth, double time_step, const Exit& exit) {
 Vector3d side_facing(const Cylinder& cylinder, const Vector3d& way) {
   const Vector3d across = way - cylinder.axis * cylinder.axis.dot(way);
   const double length = across.norm();
-  return length > 0.1 ? Vector3d(across / length) : Vector3d::Zero();
+  return length > least_facing ? Vector3d(across / length) : Vector3d::Zero();
 }
 
 /// The face of a box that faces `way`, given in the frame of the box.
@@ -90,8 +92,7 @@ Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const 
                   const Exit& exit) {
   Gap gap = gap_of(cylinder, motion, point);
   const Vector3d from = radial_of(cylinder, start), to = radial_of(cylinder, point), way = to - from;
-  // Where the way enters the circle: |from + s way| = radius, the first of two; at once where it starts
-  // inside.
+  // The way enters the circle at the first s with from + s way on its rim, or at once where it starts inside.
   const double a = way.squaredNorm(), b = from.dot(way),
                c = from.squaredNorm() - cylinder.radius * cylinder.radius;
   double entry = 0;
@@ -105,14 +106,14 @@ Gap gap_after_way(const Cylinder& cylinder, const ObstacleMotion& motion, const 
     if (to.norm() >= cylinder.radius) return gap;
     gap.normal = side;
     gap.distance = side.dot(to) - cylinder.radius;
-    gap.curved.setZero();
+    gap.curvature_direction.setZero();
     return let_out(gap, cylinder.radius - side.dot(from), time_step, exit);
   }
   const Vector3d entered = from + entry * way;
   if (entered.norm() > 0 && entered.dot(to) <= 0) {
     gap.normal = entered.normalized();
     gap.distance = gap.normal.dot(to) - cylinder.radius;
-    gap.curved.setZero();
+    gap.curvature_direction.setZero();
   }
   return let_out(gap, cylinder.radius - from.norm(), time_step, exit);
 }
@@ -126,6 +127,7 @@ struct Passage {
 };
 
 /// What starts inside came in by the nearest face, or by the one that faces `way_out` where that is not zero.
+/// This direction is in the frame of the box at the start of the step, as in depth_along.
 Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to, const Vector3d& way_out) {
   Passage passage;
   const Vector3d excess = from.cwiseAbs() - box.half_extents;
@@ -150,7 +152,7 @@ Passage passage_through(const Box& box, const Vector3d& from, const Vector3d& to
     }
   }
   if (excess.maxCoeff() <= 0) {
-    // Starts inside, or on a face: that is where it came in.
+    // A way that starts inside or on a face came in there.
     excess.maxCoeff(&passage.entry_axis);
     passage.entry_sign = std::copysign(1.0, from[passage.entry_axis]);
     if (!way_out.isZero(0) && excess.maxCoeff() < -inside_depth)
@@ -255,7 +257,7 @@ Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const OtherObsta
   if (ends_at_grazed_face(box, way))
     return gap_to_face(box, motion, point, local, way.grazed_axis,
                        std::copysign(1.0, way.from[way.grazed_axis]));
-  const Vector3d way_out = motion.end.linear().transpose() * exit.way;
+  const Vector3d way_out = motion.start.linear().transpose() * exit.way;
   Passage passage = passage_beside(box, motion, others, way, way_out);
   if (!passage.enters && slid != point) {
     // Beyond the end of the surface that it slid along.
@@ -328,10 +330,6 @@ Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const V
   return gap_to(obstacle, still, point);
 }
 
-Gap gap_to(const Obstacle& obstacle, const Vector3d& point, double time, double time_step) {
-  return gap_to(obstacle, motion_of(obstacle, time - time_step, time), point);
-}
-
 bool OtherObstacles::cover(const Vector3d& point) const {
   if (obstacles == nullptr) return false;
   for (int k = 0; k < static_cast<int>(obstacles->size()); ++k)
@@ -360,7 +358,7 @@ double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const
                    const Vector3d& way) {
   constexpr double never = std::numeric_limits<double>::infinity();
   if (const auto* plane = std::get_if<Plane>(&obstacle.shape))
-    return way.dot(plane->normal) > 0.1 ? -plane->normal.dot(start - plane->point) : never;
+    return way.dot(plane->normal) > least_facing ? -plane->normal.dot(start - plane->point) : never;
   if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
     const Vector3d side = side_facing(*cylinder, way);
     return side.isZero(0) ? never : cylinder->radius - side.dot(start - cylinder->point);

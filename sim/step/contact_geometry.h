@@ -11,20 +11,15 @@ namespace flash::sim {
 /// Depth from which a vertex counts as inside an obstacle at the start of a step, above rounding [m].
 inline constexpr double inside_depth = 1e-9;
 
-/// Where a point stands against an obstacle.
+/// How a point stands against an obstacle.
 struct Gap {
   double distance;                ///< to the surface, negative inside [m]
   Eigen::Vector3d normal;         ///< unit, out of the obstacle
-  Eigen::Vector3d surface_moved;  ///< by the obstacle's material at the contact, over the step [m]
-  Eigen::Vector3d curved;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
-  bool starts_inside = false;  ///< the vertex, at the start of the step
+  Eigen::Vector3d surface_moved;  ///< motion of the obstacle's material at the contact over the step [m]
+  Eigen::Vector3d
+      curvature_direction;  ///< sqrt(curvature) times the direction in which the surface is curved [m^-1/2]
+  bool starts_inside = false;  ///< whether the vertex starts the step inside
   double sunk = 0;  ///< how far the surface that `distance` is to lies below the obstacle's own [m]
-};
-
-/// A vertex below the surface of an obstacle.
-struct Penetration {
-  double depth = 0;  ///< [m]; 0: there is none
-  int vertex = -1, obstacle = -1;
 };
 
 /// Where an obstacle stands at the start and at the end of a step.
@@ -35,8 +30,8 @@ struct ObstacleMotion {
 
 /// How vertices that start a step inside an obstacle come out of it.
 struct Exit {
-  double speed;  ///< at most [m/s]; 0: they may stay, no deeper
-  /// Unit: out on the side of each obstacle that faces it. Zero: each vertex on the side nearest to it.
+  double speed;  ///< greatest speed [m/s]; 0: vertices may stay, no deeper
+  /// Unit direction in which vertices leave each obstacle; zero: each leaves by the side nearest to it.
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
 };
 
@@ -48,9 +43,6 @@ Gap gap_to(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::
 
 /// Signed distance of `point` [m] to the obstacle where it stands at the start of the step.
 Gap gap_at_start(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& point);
-
-/// The same at `time` [s], the end of a step of `time_step`.
-Gap gap_to(const Obstacle& obstacle, const Eigen::Vector3d& point, double time, double time_step);
 
 /// The other obstacles of a step, as one of them sees them; none by default.
 struct OtherObstacles {
@@ -80,10 +72,9 @@ std::optional<MetSurface> met_surface(const Obstacle& obstacle, const ObstacleMo
 /// between them is straight, seen from the obstacle:
 /// - a point in a box, or behind it, stands against the face through which its way entered; one behind the
 ///   axis of a cylinder against the tangent plane where its way entered. So nothing passes through, however
-///   thin. A way that leaves a box by a face beside rounds its edge and is let go.
+///   thin. A way that leaves a box by a face beside rounds its edge and is released.
 /// - a way in the plane of a face, to within a micrometre, belongs to that face. Where another obstacle
-/// covers
-///   it, it is no surface: the way enters by the face that it crosses.
+///   covers it, it is no surface: the way enters by the face that it crosses.
 /// - a vertex that meets other surfaces before slides along them: `slid` is where its way would end so,
 ///   `point` where it meets none. That way decides which face of a box it meets, so that it slides over boxes
 ///   that stand flush.
@@ -93,13 +84,13 @@ Gap gap_after(const Obstacle& obstacle, const ObstacleMotion& motion, const Othe
               const Eigen::Vector3d& start, const Eigen::Vector3d& point, const Eigen::Vector3d& slid,
               double time_step, const Exit& exit);
 
-/// How far a vertex at `start` is from coming out of the obstacle on the side that faces `way`, at the start
-/// of the step; infinity where there is no such side [m].
+/// How far a vertex at `start` is inside the obstacle below the side that faces `way`, at the start of the
+/// step [m]. Infinity where there is no such side.
 double depth_along(const Obstacle& obstacle, const ObstacleMotion& motion, const Eigen::Vector3d& start,
                    const Eigen::Vector3d& way);
 
-/// Lowers distances[i] to that of gap_after for every vertex, where it is smaller: rows of `starts` and
-/// `points`, of vertices that meet no other obstacle.
+/// Lowers distances[i] to that of gap_after for every vertex, where it is smaller. `starts` and `points` have
+/// a row for each vertex; none of them meets another obstacle.
 void lower_to_gaps(const Obstacle& obstacle, const ObstacleMotion& motion, const data::Points& starts,
                    const data::Points& points, double time_step, const Exit& exit,
                    std::vector<double>& distances);

@@ -23,6 +23,10 @@ double friction_of(const Environment& environment, const Touch& touch) {
   return obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
 }
 
+double friction_bound_of(const Environment& environment, const Touch& touch) {
+  return friction_of(environment, touch) * touch.normal_force;
+}
+
 /// Length of a slip as friction takes it, smooth where it starts [m].
 double smooth_length(double length) { return std::sqrt(length * length + smoothing * smoothing); }
 
@@ -66,7 +70,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   int held = 0;
   for (const Touch& touch : touches) {
     if (!touch.holds) continue;
-    constraint.friction_bound += friction_of(step.environment, touch) * touch.normal_force;
+    constraint.friction_bound += friction_bound_of(step.environment, touch);
     constraint.slip_direction = touch.slip_direction;
     ++held;
   }
@@ -81,8 +85,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
     constraint.reaction = needed;
     for (Touch& touch : touches)
       if (touch.holds && bound > 0)
-        touch.friction =
-            friction_of(step.environment, touch) * touch.normal_force / bound * needed_tangential;
+        touch.friction = friction_bound_of(step.environment, touch) / bound * needed_tangential;
     return constraint;
   }
   constraint.hold = Hold::slip;
@@ -95,7 +98,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   }
   for (Touch& touch : touches) {
     if (!touch.holds) continue;
-    const double own_bound = friction_of(step.environment, touch) * touch.normal_force;
+    const double own_bound = friction_bound_of(step.environment, touch);
     const Vector3d& direction = slipped ? touch.slip_direction : constraint.slip_direction;
     touch.friction = -own_bound * direction;
     constraint.reaction += touch.normal_force * touch.normal + touch.friction;
@@ -230,7 +233,7 @@ void add_touches(const ContactStep& step, const Points& positions, int i, std::v
                        .gap = gap.distance,
                        .starts_inside = gap.starts_inside,
                        .normal = gap.normal,
-                       .curved = gap.curved,
+                       .curvature_direction = gap.curvature_direction,
                        .surface_moved = gap.surface_moved});
   }
 }
@@ -290,7 +293,7 @@ double friction_potential(const ContactStep& step, const ContactSet& contacts, c
       const Gap gap = step.gap(touch.obstacle, positions, constraint.vertex);
       const Vector3d moved = way_of(step, positions, constraint.vertex) - gap.surface_moved;
       const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
-      potential += friction_of(step.environment, touch) * touch.normal_force *
+      potential += friction_bound_of(step.environment, touch) *
                    (constraint.slip_stiffness.isZero(0) ? slip : smooth_length(slip));
     }
   }
@@ -301,12 +304,13 @@ Vector3d slip_of(const ContactStep& step, const Points& positions, int vertex,
                  std::span<const Touch> touches) {
   Vector3d surfaces_moved = Vector3d::Zero();
   double weights = 0;
+  constexpr double least_weight = 1e-300;  // surfaces without friction count alike
   std::array<Vector3d, 3> normals;
   size_t count = 0;
   for (const Touch& touch : touches) {
     if (!touch.holds) continue;
     const Gap gap = step.gap(touch.obstacle, positions, vertex);
-    const double weight = friction_of(step.environment, touch) * touch.normal_force + 1e-300;
+    const double weight = friction_bound_of(step.environment, touch) + least_weight;
     surfaces_moved += weight * gap.surface_moved;
     weights += weight;
     normals[count++] = gap.normal;

@@ -3,9 +3,9 @@
 #include <span>
 #include <vector>
 
-#include "sim/law/contact_law.h"
 #include "sim/scene/environment.h"
 #include "sim/step/contact_geometry.h"
+#include "sim/step/touch.h"
 
 namespace flash::sim {
 
@@ -18,7 +18,7 @@ struct ContactStep {
 
   const Environment& environment;
   double time, time_step;  ///< [s]
-  Exit exit;               ///< of vertices that start inside an obstacle
+  Exit exit;               ///< how vertices that start inside an obstacle leave it
   std::vector<ObstacleMotion> motions;
   bool several;  ///< whether a box stands beside another obstacle, so that one may continue the other
 
@@ -45,31 +45,30 @@ enum class Hold {
 struct VertexConstraint {
   int vertex = -1;
   Hold hold = Hold::free;
-  int grasp = -1;                                        ///< which grasp holds it
+  int grasp = -1;                                        ///< number of the grasp that holds it, -1 for none
   Eigen::Vector3d correction = Eigen::Vector3d::Zero();  ///< displacement that a held direction must make [m]
   Eigen::Matrix3d free = Eigen::Matrix3d::Identity();    ///< projector on the directions it may move in
   Eigen::Vector3d reaction = Eigen::Vector3d::Zero();    ///< force on the vertex, always admissible [N]
-  Eigen::Vector3d slip_direction =
-      Eigen::Vector3d::Zero();  ///< of the slip that is free to go on, over its length
-  double friction_bound = 0.0;  ///< sum of mu lambda_n [N]
+  Eigen::Vector3d slip_direction = Eigen::Vector3d::Zero();  ///< free part of the slip, divided by its length
+  double friction_bound = 0.0;                               ///< sum of mu lambda_n [N]
   /// How the friction force turns with the slip: the sum of mu lambda_n / |slip| across it [N/m].
   Eigen::Matrix3d slip_stiffness = Eigen::Matrix3d::Zero();
 };
 
-/// The vertices that something holds. Those that nothing holds are not in the list: of them there is only
-/// how far they are from the obstacles.
+/// The vertices that something holds. Those that nothing holds are not in the list: only their clearance is
+/// known.
 struct ContactSet {
   std::vector<VertexConstraint> constraints;
-  std::size_t fixed = 0;          ///< so many of them, the first, are held by supports and grippers
-  std::size_t obstacles = 0;      ///< touches of each of the others
-  std::vector<Touch> touches;     ///< against every obstacle, in the order of the constraints
-  std::vector<int> place;         ///< of each vertex in `constraints`; -1: nothing holds it
-  std::vector<double> clearance;  ///< of each vertex: to the nearest obstacle [m]
+  std::size_t fixed = 0;          ///< the first `fixed` constraints are supports and grippers
+  std::size_t obstacles = 0;      ///< number of touches of each other constraint
+  std::vector<Touch> touches;     ///< touches of each constraint with every obstacle
+  std::vector<int> place;         ///< index of each vertex in `constraints`; -1: nothing holds it
+  std::vector<double> clearance;  ///< distance of each vertex to the nearest obstacle [m]
 
   const VertexConstraint* find(int vertex) const {
     return place[vertex] < 0 ? nullptr : &constraints[place[vertex]];
   }
-  /// Of constraint k against every obstacle; empty where a support or a gripper holds it.
+  /// Touches of constraint k with every obstacle; none for supports and grippers.
   std::span<Touch> touches_of(std::size_t k) {
     return k < fixed ? std::span<Touch>() : std::span(touches).subspan((k - fixed) * obstacles, obstacles);
   }
@@ -91,23 +90,23 @@ void add_touches(const ContactStep& step, const data::Points& positions, int i, 
 
 /// Decides from the iterate alone what holds each vertex. `force` is what it needs from outside to obey its
 /// equation of motion [N]. A vertex on a surface is held while it needs a push. It sticks where it has not
-/// slipped in this step and needs a friction force inside the cone; else the force is on the rim, against the
-/// slip. Of several surfaces each rubs against its own slip, which enters the normal forces of the others;
-/// the vertex moves along the edge of two alone, and between three not at all.
+/// slipped in this step and needs a friction force inside the cone. Else the force is on the rim, against the
+/// slip. Of several surfaces each rubs against its own slip, which enters the normal forces of the others.
+/// Between two the vertex moves along their edge alone, between three not at all.
 void update_contacts(const ContactStep& step, const data::Points& positions, const data::Points& force,
                      ContactSet& contacts);
 
-/// How the friction forces of slipping vertices change with the force on them, a constraint each: the sum of
-/// mu_k d_k l_k^T, where d_k is the direction of slip and l_k . f the normal force of surface k under the
-/// force f. Zero for all others.
+/// How the friction forces of slipping vertices change with the force on them, a matrix for each constraint:
+/// the sum of mu_k d_k l_k^T. Here d_k is the direction of slip and l_k . f the normal force of surface k
+/// under the force f. The matrix is zero for all others.
 std::vector<Eigen::Matrix3d> friction_couplings(const ContactStep& step, const ContactSet& contacts);
 
 /// sum mu lambda_n |slip| of the held vertices at frozen normal forces: the potential of friction over the
 /// step [J].
 double friction_potential(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
 
-/// Displacement of a held vertex since the start of the step along the surfaces that hold it, against them:
-/// against their mean by mu lambda_n where there are several [m].
+/// Displacement of a held vertex since the start of the step along and against the surfaces that hold it [m].
+/// Where there are several, it is against their mean, weighted by mu lambda_n.
 Eigen::Vector3d slip_of(const ContactStep& step, const data::Points& positions, int vertex,
                         std::span<const Touch> touches);
 

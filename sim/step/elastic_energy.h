@@ -15,8 +15,8 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator&
                                    const data::SheetMaterial& material, const data::Points& positions,
                                    data::Points& gradient);
 
-/// Adds `scale` times the Hessian of the membrane and of hinges, of these the Gauss-Newton part. `positive`:
-/// the negative eigenvalues of each triangle set to zero.
+/// Adds `scale` times the Hessian of the membrane and the Gauss-Newton Hessian of hinges. `positive`: the
+/// negative eigenvalues of each triangle are set to zero.
 void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
                          const data::SheetMaterial& material, const data::Points& positions, double scale,
                          Curvature curvature, BlockValues<double>& values);
@@ -27,13 +27,5 @@ void add_bending_stand_in(const BendingOperator& bending, double rigidity, Block
 /// y += rigidity * stiffness * x: the Hessian itself of a quadratic bending model, for other models nothing.
 void add_bending_product(const BendingOperator& bending, double rigidity, const data::Points& x,
                          data::Points& y);
-
-/// Adds to `gradient` that of hinges with rigidity D [N m] and returns their energy [J].
-double add_hinge_gradient(const std::vector<Hinge>& hinges, double rigidity, const data::Points& positions,
-                          data::Points& gradient);
-
-/// Adds the Gauss-Newton part of the Hessian of the plan's hinges, with these rest angles.
-void add_hinge_hessian(const SheetPlan& plan, const std::vector<Hinge>& hinges, double rigidity,
-                       const data::Points& positions, BlockValues<double>& values);
 
 }  // namespace flash::sim

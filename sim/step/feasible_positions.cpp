@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sim/law/contact_law.h"
+
 namespace flash::sim {
 
 using data::Points;
@@ -9,11 +11,15 @@ using Eigen::Vector3d;
 
 namespace {
 
-/// Whether the vertex is to land on the surface that it held at the iterate: where the step is long enough to
-/// bring it down, and has not taken it beyond the end of that surface.
+constexpr double closed_share = 0.01;  ///< share of the gap at the iterate that counts as closed
+constexpr double same_surface = 0.5;   ///< cosine between the normals of a surface, before its end
+constexpr int projection_rounds = 40, slip_rounds = 10;
+
+/// Whether the vertex is to land on the surface that held it at the iterate. The step has to be long enough
+/// to bring it down, and must not have taken it beyond the end of that surface.
 bool lands(const Touch& touch, const Gap& gap) {
-  return touch.holds && gap.distance > 0 && (touch.touches() || gap.distance <= 0.01 * touch.gap) &&
-         gap.normal.dot(touch.normal) > 0.5;
+  return touch.holds && gap.distance > 0 && (touch.touches() || gap.distance <= closed_share * touch.gap) &&
+         gap.normal.dot(touch.normal) > same_surface;
 }
 
 bool stays(const ContactStep& step, std::span<const Touch> touches, const Points& positions, int i) {
@@ -31,7 +37,7 @@ void project_vertex(const ContactStep& step, std::span<const Touch> touches, Poi
   const size_t count = step.motions.size();
   std::vector<Vector3d> normals(count);
   std::vector<double> depths(count);
-  for (int round = 0; round < 40; ++round) {
+  for (int round = 0; round < projection_rounds; ++round) {
     double moved = 0;
     for (size_t k = 0; k < count; ++k) {
       const Gap gap = step.gap(static_cast<int>(k), positions, i);
@@ -48,7 +54,7 @@ void project_vertex(const ContactStep& step, std::span<const Touch> touches, Poi
     if (count == 1) {
       way = std::max(0.0, depths[0]) * normals[0];
     } else {
-      const std::vector<double> x = complementary(normals, normals, depths);
+      const std::vector<double> x = solve_lcp(normals, normals, depths);
       for (size_t k = 0; k < count; ++k) way += x[k] * normals[k];
     }
     positions.row(i) += way.transpose();
@@ -61,8 +67,8 @@ void stop_turned_slip(const ContactStep& step, std::span<const Touch> touches, c
                       Points& positions, int i) {
   Vector3d slip = slip_of(step, positions, i, touches);
   if (slip.dot(direction) >= 0) return;
-  // On a round surface the way back along it leaves it: back on it, and again.
-  for (int round = 0; round < 10 && slip.norm() > resting_slip; ++round) {
+  // The way back leaves a round surface: the vertex is projected on it, and the slip taken back again.
+  for (int round = 0; round < slip_rounds && slip.norm() > resting_slip; ++round) {
     positions.row(i) -= slip.transpose();
     project_vertex(step, touches, positions, i);
     slip = slip_of(step, positions, i, touches);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include "sim/step/hinge_energy.h"
 #include "sim/step/membrane_damping.h"
 #include "sim/step/rigid_turn.h"
 

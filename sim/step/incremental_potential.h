@@ -13,10 +13,10 @@ namespace flash::sim {
 ///   |x - s|^2_M / (2 h^2) + E(x) - f.x + a / (2 h) |x - x_0|^2_M + b / h E_0(x),   s = x_0 + h v_0 + h^2 g
 ///
 /// with the elastic energy E, loads f, `air_drag` a and `stiffness_damping` b. E_0 is the elastic energy of
-/// what changed since the start of the step: of strains, of the angles of hinges, and of a quadratic bending
-/// model's positions less what the sheet turned by as a whole. Its forces are b K v for small motions,
-/// without a torque on a sheet that turns rigidly, stressed or not (Kelvin-Voigt). The arguments of the
-/// constructor have to outlive the potential.
+/// what changed since the start of the step: strains, angles of hinges, and positions of a quadratic bending
+/// model, less the rotation of the sheet as a whole. Its forces are b K v for small motions (Kelvin-Voigt). A
+/// sheet that turns rigidly feels no torque from them, stressed or not. The arguments of the constructor have
+/// to outlive the potential.
 class IncrementalPotential {
  public:
   IncrementalPotential(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment,
@@ -32,8 +32,9 @@ class IncrementalPotential {
   /// Potential at the start of the step, where the energy of the sheet is `elastic` [J].
   double at_start(const ElasticEnergy& elastic) const;
 
-  /// Hessian of the potential, without the stiffness of a quadratic bending model.
-  /// `sparse`: over edges alone, which is all where no hinges bend.
+  /// Hessian of the potential, without the stiffness of a quadratic bending model. Of hinges it has the
+  /// Gauss-Newton part; of that model's damping it leaves out the derivative of the turn. `sparse`: only
+  /// blocks over edges are filled, which are all where no hinges bend.
   void assemble(const data::Points& positions, Curvature curvature, bool sparse,
                 BlockValues<double>& values) const;
 
@@ -54,7 +55,7 @@ class IncrementalPotential {
   double damping_share_;  ///< b / h
   Eigen::VectorXd mass_;
   data::Points target_, loads_;
-  // With damping: strains and angles at the start of the step.
+  // Strains and angles at the start of the step; kept with damping alone.
   std::vector<Eigen::Matrix2d> start_metrics_;
   std::vector<Hinge> start_hinges_;
 };

@@ -41,7 +41,7 @@ void for_each_triangle(const SheetPlan& plan, const Points& positions, const Use
     }
 }
 
-/// Half the second Piola-Kirchhoff stress's moduli on a strain: 2 mu E + lambda tr(E) I.
+/// Second Piola-Kirchhoff stress of a strain: 2 mu E + lambda tr(E) I.
 Matrix2d stress_of(const SheetLame& lame, const Matrix2d& strain) {
   return 2 * lame.mu * strain + lame.lambda * strain.trace() * Matrix2d::Identity();
 }

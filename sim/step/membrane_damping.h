@@ -16,12 +16,13 @@ std::vector<Eigen::Matrix2d> triangle_metrics(const SheetPlan& plan, const data:
 ///   sum A (mu |dE|^2 + lambda / 2 (tr dE)^2) [J],
 ///
 /// moduli `lame` already times b / h. Its stress is F (2 mu dE + lambda tr(dE) I): b times the material's
-/// stiffness times the rate of strain, and nothing where the sheet turns. Adds its gradient to `gradient`.
+/// stiffness times the rate of strain, and nothing where the sheet turns. Returns the potential and adds its
+/// gradient to `gradient`.
 double add_membrane_damping_gradient(const SheetPlan& plan, const std::vector<Eigen::Matrix2d>& start_metrics,
                                      const SheetLame& lame, const data::Points& positions,
                                      data::Points& gradient);
 
-/// Adds its Hessian; `positive`: without what compression takes away.
+/// Adds the Hessian of that potential; `positive` leaves out what compression takes away.
 void add_membrane_damping_hessian(const SheetPlan& plan, const std::vector<Eigen::Matrix2d>& start_metrics,
                                   const SheetLame& lame, const data::Points& positions, Curvature curvature,
                                   BlockValues<double>& values);

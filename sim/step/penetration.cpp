@@ -1,5 +1,7 @@
 #include "sim/step/penetration.h"
 
+#include "sim/step/contact_set.h"
+
 namespace flash::sim {
 
 Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, const data::Points& positions) {

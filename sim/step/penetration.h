@@ -1,16 +1,25 @@
 #pragma once
 #include <vector>
 
-#include "sim/step/contact_set.h"
+#include "data/mesh.h"
 
 namespace flash::sim {
 
-/// The deepest of the vertices that supports or grippers hold below an obstacle's surface at the end of the
-/// step, or took through it in the step: below the face through which the way came in.
+struct ContactStep;
+struct ContactSet;
+
+/// A vertex below the surface of an obstacle.
+struct Penetration {
+  double depth = 0;  ///< [m]; 0: there is none
+  int vertex = -1, obstacle = -1;
+};
+
+/// The deepest vertex that a support or a gripper holds below an obstacle's surface at the end of the step.
+/// Of one that was taken through the obstacle the surface is the face through which its way came in.
 Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
 
-/// Which vertices start the step inside each obstacle, those apart that supports or grippers hold: one list
-/// an obstacle, ascending.
+/// The vertices that start the step inside each obstacle, without those that supports or grippers hold: one
+/// list an obstacle, ascending.
 std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const ContactSet& contacts);
 
 /// The deepest of vertices that start the step inside an obstacle, as vertices_inside finds them.

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "data/error.h"
+#include "data/worst.h"
 #include "sysid/replay/motion_store.h"
 
 namespace flash::sysid {
@@ -28,8 +29,8 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
   std::vector<RegistrationProblem> problems;
   for (std::size_t r = 0; r < replays.size(); ++r) {
     result.converged = result.converged && results[r].converged;
-    result.residual_max = sim::worst(result.residual_max, results[r].residual_max);
-    result.penetration_max = sim::worst(result.penetration_max, results[r].penetration_max);
+    result.residual_max = data::worst(result.residual_max, results[r].residual_max);
+    result.penetration_max = data::worst(result.penetration_max, results[r].penetration_max);
     finite = finite && results[r].finite;
     problems.push_back(registration_problem(replays[r], results[r].motion));
   }

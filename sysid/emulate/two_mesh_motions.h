@@ -11,7 +11,7 @@
 
 namespace flash::sysid {
 
-/// Of a motion's steps those whose positions a keyframe reads; all where the clock is fitted.
+/// The steps of a motion whose positions a keyframe reads; all where the clock is fitted.
 std::vector<bool> steps_read(const Replay& replay, double start, double step, std::size_t count);
 
 /// a += share b, at the steps that a keeps.
@@ -39,10 +39,10 @@ class TwoMeshMotions {
         difference_(std::move(difference)),
         prolongation_(std::move(prolongation)) {}
 
-  /// At values, one an axis that is left.
+  /// The motion at `values`, one for each axis that is left.
   Motion at(const std::vector<double>& values, double share) const;
 
-  /// With the first axis held.
+  /// The motions with the first axis held at `value`.
   TwoMeshMotions slice(double value) const;
 
   /// A motion of the search's mesh on the mesh of the model.
@@ -63,7 +63,7 @@ struct ModelledReplay {
   TwoMeshMotions model;
 };
 
-/// As a source of motions.
+/// The models as a source of motions.
 MotionsAt motions_of(const std::vector<ModelledReplay>& models, double share);
 
 /// The motions at every point of `grid.axes`, from the store where it has them. Empty where one diverged.
@@ -71,7 +71,7 @@ std::optional<MotionInterpolant> motion_interpolant(const Replay& replay, const 
                                                     const MotionStore& store,
                                                     const std::function<void()>& told = {});
 
-/// Those motions with what they lack of a mesh of half the cell, which is simulated at the points of `axes`.
+/// `motions` with what they lack of a mesh of half the cell, which is simulated at the points of `axes`.
 /// Empty where one diverged, or where the sheet cannot be meshed anew.
 std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const MotionInterpolant& motions,
                                               const std::vector<Axis>& axes, const GridSettings& grid,

@@ -37,7 +37,7 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
 Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
             const GridSettings& settings, std::optional<double> repeatability, const TellWork& told = {});
 
-/// Of zoom over such axes: the points of all its grids, at most.
+/// The most scores that zoom takes over such axes: the points of all its grids.
 int most_scores(const std::vector<Axis>& axes);
 
 /// Values at which motions are simulated anew about an answer: `count` over the extent of an axis, evenly,

@@ -30,7 +30,7 @@ std::optional<Refined> refine(const GridResults& results, const GridVerdict& who
                               std::optional<double> repeatability, bool solver_check,
                               const TellWork& told = {});
 
-/// Of refine, at most. The motions of the grid itself are kept already and do not count.
+/// The most work that refine takes. The motions of the grid itself are kept already and do not count.
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check);
 
 }  // namespace flash::sysid

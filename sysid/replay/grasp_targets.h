@@ -8,10 +8,11 @@
 
 namespace flash::sysid {
 
-/// Of a grasp under the settings, which may replace the recording's.
+/// The shape of a grasp under the settings, which may replace the recording's.
 data::GraspShape shape_of(const data::RecordedGrasp& grasp, const ReplaySettings& settings);
 
-/// Of the gripper of a grasp. Throws data::InputError where the recording has none of that name.
+/// The trajectory of the gripper of a grasp. Throws data::InputError where the recording has none of that
+/// name.
 const data::Trajectory& trajectory_of(const data::Recording& recording, const data::RecordedGrasp& grasp);
 
 /// A grasp of the recording as it is simulated: its patch, when it closes and where it takes the vertices.

@@ -13,16 +13,17 @@ struct MemoryEstimate {
   double total() const { return program + simulation + kept; }
 };
 
-/// Of one position of one vertex [bytes].
+/// What one position of one vertex takes [bytes].
 inline constexpr double bytes_per_position = 3 * sizeof(double);
 
-/// Of the sheet that is simulated.
+/// Number of vertices of the sheet that is simulated.
 double vertices_of(const Replay& replay);
 
-/// Of what a batch holds of one candidate: positions at the scored steps, or at all, and how each step went.
+/// What a batch holds of one candidate [bytes]: positions at the scored steps, or at all, and how each step
+/// went.
 double motion_bytes(const Replay& replay, bool all_steps = false);
 
-/// Of `candidates` simulated together (`run`), all results kept.
+/// Memory for `candidates` simulated together (`run`), all results kept.
 MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t candidates,
                               bool all_steps = false);
 

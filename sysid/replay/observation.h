@@ -20,7 +20,7 @@ struct Observation {
 
   /// Whether there is anything to compare with.
   bool seen() const { return count() > 0; }
-  /// Of points, and one for a force.
+  /// Number of points, and one for a force.
   Eigen::Index count() const {
     return points.rows() + contour.rows() + markers.rows() + (force.has_value() ? 1 : 0);
   }

@@ -9,6 +9,7 @@
 #include "data/procedural_mesh.h"
 #include "data/scene.h"
 #include "data/text.h"
+#include "data/worst.h"
 #include "sysid/replay/grasp_targets.h"
 
 namespace flash::sysid {
@@ -217,8 +218,8 @@ ReplayResult result_of(const Replay& replay, const std::vector<int>& kept, const
   int missed = 0;
   for (const sim::StepStats& step : stats) {
     missed += !(step.converged && std::isfinite(step.residual));
-    result.residual_max = sim::worst(result.residual_max, step.residual);
-    result.penetration_max = sim::worst(result.penetration_max, step.penetration_max);
+    result.residual_max = data::worst(result.residual_max, step.residual);
+    result.penetration_max = data::worst(result.penetration_max, step.penetration_max);
   }
   result.converged = missed == 0;
   result.unconverged_share = stats.empty() ? 0 : missed / static_cast<double>(stats.size());

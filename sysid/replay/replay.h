@@ -92,7 +92,7 @@ sim::Environment make_environment(const Replay& replay, const ReplayCandidate& c
 /// as its clock may be off.
 std::vector<int> scored_steps(const Replay& replay);
 
-/// All of them.
+/// All steps of a replay.
 std::vector<int> every_step(const Replay& replay);
 
 /// Simulates the candidates, replay.settings.envs of them at once. Only positions at the steps `kept` are
@@ -100,7 +100,7 @@ std::vector<int> every_step(const Replay& replay);
 void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, const std::vector<int>& kept,
          const std::function<void(std::size_t, ReplayResult)>& finished);
 
-/// The same for the scored steps, all results together.
+/// Simulates the candidates, keeps positions at the scored steps, and returns all results together.
 std::vector<ReplayResult> run(const Replay& replay, const std::vector<ReplayCandidate>& candidates);
 
 }  // namespace flash::sysid

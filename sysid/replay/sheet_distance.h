@@ -14,7 +14,7 @@ class SheetDistance {
 
   void move(const data::Points& positions);
 
-  /// As SurfaceDistance::nearest.
+  /// Nearest point of the surface, as SurfaceDistance::nearest finds it.
   SurfacePoint nearest(const Eigen::Vector3d& query, int hint = -1) const {
     return surface_.nearest(query, hint);
   }

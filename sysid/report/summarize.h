@@ -17,7 +17,7 @@ namespace flash::sysid {
 Summary summarize(const GridResults& results, const Answer& answer, const std::vector<Replay>& replays,
                   const GridSettings& grid, const AnswerSettings& settings);
 
-/// The same without a solver check and horizons.
+/// The summary without a solver check and horizons.
 Summary summarize(const GridResults& results, const GridVerdict& verdict, const std::vector<Replay>& replays,
                   const GridSettings& settings);
 

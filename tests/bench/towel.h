@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "data/procedural_mesh.h"
+#include "sim/cpu/block_cholesky.h"
 #include "sim/step/elastic_energy.h"
 
 namespace flash::sim {

@@ -153,13 +153,9 @@ TEST(Batch, RefusesWhatDoesNotFit) {
   EXPECT_THROW(Batch(plan, {environment_of(small_sheet(5))}, {}), std::invalid_argument);
   EXPECT_THROW(Batch(plan, {one[0], lifted(sheet, 30)}, {}), std::invalid_argument);
   EXPECT_THROW(Batch(plan, one, {.steps = 5}).advance(6), std::invalid_argument);
-}
-
-TEST(Batch, TheWorstOfTwoIsNeverLostForNotBeingANumber) {
-  EXPECT_EQ(worst(1, 2), 2);
-  EXPECT_EQ(worst(2, 1), 2);
-  EXPECT_TRUE(std::isinf(worst(1, NAN)));
-  EXPECT_TRUE(std::isinf(worst(NAN, 1)));
+  const auto make = [&](std::size_t) { return one[0]; };
+  const auto ignore = [](std::size_t, const Batch&, int) {};
+  EXPECT_THROW(replay_in_batches(plan, 1, 0, {.steps = 1}, make, ignore), std::invalid_argument);
 }
 
 }  // namespace

@@ -250,7 +250,7 @@ double moved_energy(const Environment& environment, const StepReport& report) {
   double loads = 0;
   for (const Load& load : environment.loads)
     loads -= load.force.dot(environment.state.positions.row(load.vertex));
-  return report.kinetic + report.membrane + report.bending + report.potential + loads;
+  return report.kinetic + report.membrane + report.bending + report.gravitational + loads;
 }
 
 }  // namespace

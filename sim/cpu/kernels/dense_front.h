@@ -12,6 +12,13 @@ struct VectorOf {
   typedef Scalar type __attribute__((vector_size(vector_bytes), aligned(sizeof(Scalar))));
 };
 
+/// Calls work.template operator()<Width>() with the one of two widths that `width` is.
+template <int Wide, int Narrow, typename Work>
+[[gnu::always_inline]] inline auto with_width(int width, const Work& work) {
+  if (width == Wide) return work.template operator()<Wide>();
+  return work.template operator()<Narrow>();
+}
+
 /// C(i, j) -= sum_k A(i, k) B(j, k) for `Width` columns j and whole vectors of rows [first_row, end_row): 2 x
 /// Width register tiles, 2 loads and Width broadcasts for 2 Width multiply-adds.
 template <int Width, typename Scalar>
@@ -93,13 +100,12 @@ bool eliminate_columns(Scalar* front, int padded_rows, int columns) {
     const int width = columns - panel >= 6 ? 6 : 3;
     const int first = panel / lanes_of<Scalar> * lanes_of<Scalar>;
     Scalar* target = front + static_cast<long>(panel) * padded_rows;
-    if (width == 6) {
-      subtract_product<6>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
-      if (!eliminate_few_columns<6>(target, padded_rows, panel)) return false;
-    } else {
-      subtract_product<3>(target, padded_rows, front, front + panel, padded_rows, panel, first, padded_rows);
-      if (!eliminate_few_columns<3>(target, padded_rows, panel)) return false;
-    }
+    const bool positive = with_width<6, 3>(width, [&]<int Width>() {
+      subtract_product<Width>(target, padded_rows, front, front + panel, padded_rows, panel, first,
+                              padded_rows);
+      return eliminate_few_columns<Width>(target, padded_rows, panel);
+    });
+    if (!positive) return false;
     panel += width;
   }
   return true;
@@ -115,12 +121,10 @@ void subtract_outer_product(Scalar* update, int padded_update_rows, int rows, co
     const int width = rows - j >= 6 ? 6 : 3;
     const int first = j / lanes_of<Scalar> * lanes_of<Scalar>;
     Scalar* target = update + static_cast<long>(j) * padded_update_rows;
-    if (width == 6)
-      subtract_product<6>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
-                          padded_update_rows);
-    else
-      subtract_product<3>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
-                          padded_update_rows);
+    with_width<6, 3>(width, [&]<int Width>() {
+      subtract_product<Width>(target, padded_update_rows, below, below + j, padded_rows, columns, first,
+                              padded_update_rows);
+    });
     j += width;
   }
 }

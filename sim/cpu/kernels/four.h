@@ -4,7 +4,7 @@
 namespace flash::sim {
 inline namespace FLASH_LEVEL {
 
-/// Four numbers: those of a vertex, and one more.
+/// A vector of four numbers: a vertex's three and one more.
 template <typename Scalar>
 struct FourOf {
   typedef Scalar type __attribute__((vector_size(4 * sizeof(Scalar))));

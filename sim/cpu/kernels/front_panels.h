@@ -12,10 +12,10 @@ inline namespace FLASH_LEVEL {
 // with D = L_pp L_pp^T and W = L_rp L_pp^-1. Within a panel no number waits for another, as it would in a
 // substitution.
 
-/// Columns of the next panel, of `left` ones.
+/// Width of the next panel when `left` columns remain.
 constexpr int panel_width(int left) { return left >= 12 ? 12 : 3; }
 
-/// Numbers between the rows of an inverse.
+/// Row stride of a panel's inverse, in numbers.
 constexpr int inverse_stride(int width) { return width / 3 * 4; }
 
 /// Turns the panel at row `first` of a front's [L11; L21] into W, with zeros in its own rows; D^-1 goes to
@@ -81,7 +81,7 @@ void solve_panel_forward(const Stored<Scalar>* panel, int padded_rows, int first
   }
 }
 
-/// A vector's fourths, added.
+/// Sum of the vector's quarters.
 template <typename Scalar>
 [[gnu::always_inline]] inline typename FourOf<Scalar>::type fold(
     const typename VectorOf<Scalar>::type& vector) {
@@ -93,7 +93,7 @@ template <typename Scalar>
   return fours[0];
 }
 
-/// Their sums over the lanes.
+/// Sums over the lanes of four vectors.
 template <typename Scalar>
 [[gnu::always_inline]] inline typename FourOf<Scalar>::type sums_of_lanes(
     const typename VectorOf<Scalar>::type* vectors) {

@@ -31,12 +31,14 @@ void extend_add(const FrontTree& tree, const Front& child, const Front& parent, 
   for (int column = 0; column < child.row_count; ++column) {
     const int target_column = 3 * map[column];
     for (int c = 0; c < 3; ++c, source += child.padded_update_rows) {
-      Scalar* target =
-          target_column < own
-              ? columns + static_cast<long>(target_column + c) * parent.padded_rows
-              : update + static_cast<long>(target_column - own + c) * parent.padded_update_rows - own;
+      // An update matrix starts at the row below the parent's own.
+      const bool eliminated = target_column < own;
+      const long first_row = eliminated ? 0 : own;
+      Scalar* target = eliminated
+                           ? columns + static_cast<long>(target_column + c) * parent.padded_rows
+                           : update + static_cast<long>(target_column - own + c) * parent.padded_update_rows;
       for (int row = column; row < child.row_count; ++row) {
-        Scalar* entry = target + 3 * map[row];
+        Scalar* entry = target + (3L * map[row] - first_row);
         entry[0] += source[3 * row];
         entry[1] += source[3 * row + 1];
         entry[2] += source[3 * row + 2];
@@ -69,16 +71,15 @@ bool factorize(const FrontTree& tree, const double* values, Scalar* columns, Sca
       const long offset = static_cast<long>(first) * front.padded_rows;
       Scalar* inverse = inverses + inverse_size * (front.first_column + first / 3);
       Stored<Scalar>* panel = static_cast<Stored<Scalar>*>(factor) + front.columns_at + offset;
-      if (panel_width(count - first) == 12)
-        eliminate_panel<12>(columns + offset, front.padded_rows, first, inverse, panel);
-      else
-        eliminate_panel<3>(columns + offset, front.padded_rows, first, inverse, panel);
+      with_width<12, 3>(panel_width(count - first), [&]<int Width>() {
+        eliminate_panel<Width>(columns + offset, front.padded_rows, first, inverse, panel);
+      });
     }
   }
   return true;
 }
 
-/// Four numbers, of which a vertex has three: one move.
+/// Copies a vertex by one move of four numbers, of which it owns three.
 template <typename Scalar>
 void copy_vertex(const Scalar* from, Scalar* to) {
   memcpy(to, from, 4 * sizeof(Scalar));
@@ -103,10 +104,9 @@ void solve(const FrontTree& tree, const void* factor, const Scalar* inverses, Sc
     const Stored<Scalar>* panel = static_cast<const Stored<Scalar>*>(factor) + front.columns_at;
     for (int first = 0; first < columns;) {
       const int width = panel_width(columns - first);
-      if (width == 12)
-        solve_panel_forward<12, Scalar>(panel, front.padded_rows, first, numbers);
-      else
-        solve_panel_forward<3, Scalar>(panel, front.padded_rows, first, numbers);
+      with_width<12, 3>(width, [&]<int Width>() {
+        solve_panel_forward<Width, Scalar>(panel, front.padded_rows, first, numbers);
+      });
       panel += static_cast<long>(width) * front.padded_rows;
       first += width;
     }
@@ -119,17 +119,16 @@ void solve(const FrontTree& tree, const void* factor, const Scalar* inverses, Sc
     const Front& front = tree.fronts[f];
     const int columns = 3 * front.column_count;
     gather(tree, front, x, numbers);
-    // The narrow panels are the last.
+    // The narrow panels come last, so this loop meets them first.
     for (int first = columns; first > 0;) {
       const int width = first % 12 == 0 ? 12 : 3;
       first -= width;
       const Stored<Scalar>* panel = static_cast<const Stored<Scalar>*>(factor) + front.columns_at +
                                     static_cast<long>(first) * front.padded_rows;
       const Scalar* inverse = inverses + inverse_size * (front.first_column + first / 3);
-      if (width == 12)
-        solve_panel_backward<12, Scalar>(panel, front.padded_rows, first, inverse, numbers);
-      else
-        solve_panel_backward<3, Scalar>(panel, front.padded_rows, first, inverse, numbers);
+      with_width<12, 3>(width, [&]<int Width>() {
+        solve_panel_backward<Width, Scalar>(panel, front.padded_rows, first, inverse, numbers);
+      });
     }
     for (int c = 0; c < front.column_count; ++c) {
       Scalar* own = x + 4L * (front.first_column + c);

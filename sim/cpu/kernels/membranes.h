@@ -11,7 +11,7 @@ static_assert(triangle_group_size % lane_count == 0);
 
 using Triple = Vector3<Lanes>;
 
-/// Places of as many vertices.
+/// Positions of one vertex of each lane's triangle.
 inline Triple gather(const double* positions, const int* vertices) {
   alignas(64) double x[lane_count], y[lane_count], z[lane_count];
   for (int lane = 0; lane < lane_count; ++lane) {
@@ -23,7 +23,7 @@ inline Triple gather(const double* positions, const int* vertices) {
   return {load_lanes(x), load_lanes(y), load_lanes(z)};
 }
 
-/// The group's triangles from `first` on.
+/// Singular frames of the group's triangles from `first` on.
 inline SingularFrame<Lanes> frame_of(const TriangleGroup& group, int first, const double* positions) {
   const Triple x0 = gather(positions, group.vertices[0] + first);
   const Triple e1 = gather(positions, group.vertices[1] + first) - x0,
@@ -33,7 +33,7 @@ inline SingularFrame<Lanes> frame_of(const TriangleGroup& group, int first, cons
   return singular_frame(w10 * e1 + w20 * e2, w11 * e1 + w21 * e2);
 }
 
-/// Column after column.
+/// A 3 x 3 block for each lane, stored by columns.
 struct BlockLanes {
   Triple columns[3];
 };
@@ -50,7 +50,7 @@ inline BlockLanes transposed(const BlockLanes& a) {
   return {{{c[0].x, c[1].x, c[2].x}, {c[0].y, c[1].y, c[2].y}, {c[0].z, c[1].z, c[2].z}}};
 }
 
-/// Four lanes of four vectors become four vectors of four numbers.
+/// Turns four lanes of four vectors into four vectors of four numbers.
 inline void transpose(FourOf<double>::type (&rows)[4]) {
   using Four = FourOf<double>::type;
   const Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
@@ -63,7 +63,7 @@ inline void transpose(FourOf<double>::type (&rows)[4]) {
   rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-/// Adds lane after lane to the blocks it belongs to.
+/// Adds each lane of `block` to the matrix block that it belongs to.
 inline void scatter(const BlockLanes& block, const int* slots, int count, double* values) {
   const Triple* c = block.columns;
   const Lanes entries[9] = {c[0].x, c[0].y, c[0].z, c[1].x, c[1].y, c[1].z, c[2].x, c[2].y, c[2].z};
@@ -131,7 +131,7 @@ double add_gradient(const SheetLame& lame, const TriangleGroup* groups, long cou
       store_lanes(area * response.energy, energies + first);
     }
     for (int lane = group->count; lane < triangle_group_size; ++lane) energies[lane] = 0;
-    // In a fixed order: the same numbers have the same sum at every level.
+    // The order of the sum is fixed: the same numbers give the same sum at every level.
     energy += ((energies[0] + energies[1]) + (energies[2] + energies[3])) +
               ((energies[4] + energies[5]) + (energies[6] + energies[7]));
   }

@@ -10,10 +10,10 @@ namespace flash::sim {
 inline namespace FLASH_LEVEL {
 
 template <typename Scalar>
-void copy_blocks(int count, const int* sources, const char* turned, const double* from, Scalar* to) {
+void copy_blocks(int count, const int* sources, const char* transposed, const double* from, Scalar* to) {
   for (int k = 0; k < count; ++k, to += 12) {
     const double* block = from + 9L * sources[k];
-    if (turned[k]) {
+    if (transposed[k]) {
       for (int c = 0; c < 3; ++c)
         for (int r = 0; r < 3; ++r) to[4 * c + r] = static_cast<Scalar>(block[3 * r + c]);
     } else {
@@ -27,14 +27,14 @@ template <typename Scalar>
 void multiply_blocks(const BlockRows& rows, const Scalar* blocks, const Scalar* x, Scalar* y) {
   using Four = typename FourOf<Scalar>::type;
   for (int i = 0; i < rows.size; ++i) {
-    Four sum{}, even{}, odd{};
+    Four column_0{}, column_1{}, column_2{};
     for (int k = rows.starts[i]; k < rows.starts[i + 1]; ++k) {
       const Scalar *block = blocks + 12L * k, *from = x + 4L * rows.columns[k];
-      sum += load_four(block) * from[0];
-      even += load_four(block + 4) * from[1];
-      odd += load_four(block + 8) * from[2];
+      column_0 += load_four(block) * from[0];
+      column_1 += load_four(block + 4) * from[1];
+      column_2 += load_four(block + 8) * from[2];
     }
-    store_four<Scalar>(sum + (even + odd), y + 4L * i);
+    store_four<Scalar>(column_0 + (column_1 + column_2), y + 4L * i);
   }
 }
 
@@ -58,7 +58,7 @@ void sum_columns(const int* columns, const Scalar* values, int first, int end, c
 }
 
 #ifdef __AVX512F__
-/// In one vector for all four rows: two loads and a permutation for sixteen multiply-adds.
+/// One vector holds all four rows: two loads and a permutation serve sixteen multiply-adds.
 template <>
 inline void sum_columns(const int* columns, const float* values, int first, int end, const float* x,
                         float* sums) {
@@ -90,7 +90,7 @@ void add_rows(const FourRows& groups, const Scalar* values, Scalar scale, const 
   }
 }
 
-/// Sixteen sums, whatever the vector: the same order at every level.
+/// The dot product by sixteen partial sums, in the same order at every level.
 template <typename Scalar>
 Scalar dot(long size, const Scalar* x, const Scalar* y) {
   constexpr int width = 16;

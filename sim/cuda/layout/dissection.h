@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "data/mesh.h"
-#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/block_pattern.h"
 
 namespace flash::sim::cuda {
 

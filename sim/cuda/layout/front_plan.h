@@ -2,7 +2,7 @@
 #include <vector>
 
 #include "data/mesh.h"
-#include "sim/cpu/block_cholesky.h"
+#include "sim/cpu/block_pattern.h"
 #include "sim/cuda/layout/front_layout.h"
 
 namespace flash::sim::cuda {

@@ -10,6 +10,8 @@
 #include <random>
 #include <set>
 
+#include "tests/sim/cpu/solve_in_place.h"
+
 namespace flash::sim {
 namespace {
 
@@ -60,11 +62,12 @@ VectorXd residual_bound(const MatrixXd& A, const VectorXd& x, double epsilon, do
 
 template <typename Scalar>
 void expect_solved(const Kernels& kernels, const Example& example, double stored) {
-  BlockCholesky<Scalar> factor(analyze(example.pattern), kernels);
+  const auto symbolic = analyze(example.pattern);
+  BlockCholesky<Scalar> factor(symbolic, kernels);
   ASSERT_TRUE(factor.factorize(example.values));
   const VectorXd right = VectorXd::LinSpaced(example.dense.rows(), -1, 2);
   VectorXd x = right;
-  factor.solve_in_place(x.data());
+  solve_in_place(factor, symbolic->position, x.data());
   const VectorXd bound = residual_bound(example.dense, x, std::numeric_limits<Scalar>::epsilon(), stored);
   // In double precision the residual's own rounding counts too: n epsilon |A| |x|, below the bound.
   EXPECT_TRUE(((right - example.dense * x).array().abs() <= bound.array()).all()) << example.pattern.size;
@@ -83,13 +86,14 @@ TEST(BlockCholesky, SolvesToItsRoundingAtEveryLevel) {
 
 TEST(BlockCholesky, FactorizingAgainForgetsTheFirstMatrix) {
   Example example = random_example(50, 120, 9);
-  BlockCholesky<double> factor(analyze(example.pattern), kernels_of(highest_instruction_level()));
+  const auto symbolic = analyze(example.pattern);
+  BlockCholesky<double> factor(symbolic, kernels_of(highest_instruction_level()));
   ASSERT_TRUE(factor.factorize(example.values));
   for (double& value : example.values) value *= 2;
   ASSERT_TRUE(factor.factorize(example.values));
   VectorXd x = VectorXd::Ones(150);
   const VectorXd expected = (2 * example.dense).llt().solve(x);
-  factor.solve_in_place(x.data());
+  solve_in_place(factor, symbolic->position, x.data());
   EXPECT_LT((x - expected).norm(), 1e-13 * expected.norm());  // condition below 10, rounding 1e-16
 }
 
@@ -106,9 +110,9 @@ TEST(BlockCholesky, AnIndefiniteMatrixIsRefused) {
 TEST(BlockCholesky, TheOrderDependsOnThePatternAlone) {
   const Example example = random_example(90, 200, 5);
   std::srand(1);
-  const std::vector<int> position = elimination_position(*analyze(example.pattern));
+  const std::vector<int> position = analyze(example.pattern)->position;
   std::srand(2);
-  EXPECT_EQ(elimination_position(*analyze(example.pattern)), position);
+  EXPECT_EQ(analyze(example.pattern)->position, position);
   std::vector<int> sorted = position;
   std::sort(sorted.begin(), sorted.end());
   std::vector<int> all(90);

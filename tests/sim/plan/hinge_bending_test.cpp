@@ -11,6 +11,13 @@
 namespace flash::sim {
 namespace {
 
+double hinge_energy(const Hinge& hinge, const HingePositions& x) {
+  double energy;
+  HingePositions gradient;
+  hinge_response(hinge, x, energy, gradient, nullptr);
+  return energy;
+}
+
 HingePositions random_hinge(std::mt19937& rng) {
   std::normal_distribution<double> noise(0, 0.15);
   HingePositions x;

@@ -56,6 +56,23 @@ TEST(ElasticEnergy, GradientIsTheDerivativeOfTheEnergy) {
   }
 }
 
+TEST(ElasticEnergy, BendingIsTheSameFarFromTheOrigin) {
+  const Sheet sheet = small_sheet();
+  const auto plan = make_sheet_plan(sheet);
+  const Points x = sheet.rest.vertices + noise(sheet.rest.vertices.rows(), 2e-3, 6);
+  const Eigen::RowVector3d shift(10, -20, 5);
+  const Points far = x.rowwise() + shift;
+  const Points back = far.rowwise() - shift;  // what is left of the places at that distance, exactly
+  for (const BendingModel model : {BendingModel::plate, BendingModel::isometric}) {
+    const data::SheetMaterial material = material_of(Constitutive::tri_corotated, model);
+    const BendingOperator& bending = bending_operator(*plan, model, material.poissons_ratio);
+    Points unused = Points::Zero(x.rows(), 3);
+    const double here = add_elastic_gradient(*plan, bending, material, back, unused).bending;
+    const double there = add_elastic_gradient(*plan, bending, material, far, unused).bending;
+    EXPECT_EQ(there, here);  // differences of such places are exact
+  }
+}
+
 /// y += values * x, block by block.
 void add_block_product(const BlockPattern& pattern, const BlockValues<double>& values, const Points& x,
                        Points& y) {

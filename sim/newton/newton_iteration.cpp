@@ -1,0 +1,168 @@
+#include "sim/newton/newton_iteration.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sim/newton/active_set.h"
+#include "sim/step/feasible_positions.h"
+
+namespace flash::sim {
+namespace {
+
+constexpr int coupled_after = 20;   ///< iterations of a part after which friction follows the normal forces
+constexpr int linear_problems = 6;  ///< an iteration, each with the contacts that the one before asks for
+constexpr double linear_tolerance = 0.3;  ///< of a linear problem, as a share of the step's
+constexpr double armijo_share = 1e-4;     ///< of the decrease of the potential that the slope promises
+constexpr double residual_share = 0.1;    ///< of the decrease of the residual that a full step promises
+constexpr double least_length = 1e-3;     ///< down to which a step is halved
+constexpr int most_forced_moves = 6;      ///< a step: moves that neither criterion accepts
+constexpr double greatest_length = 30;    ///< up to which a step is lengthened
+constexpr double flat_slope = 0.2;        ///< share of the first slope from which on a line is flat
+constexpr double least_growth = 1.5, greatest_growth = 3.0;  ///< of a length at a time
+constexpr double residual_growth = 10;  ///< of the residual by a lengthened step, at most
+
+/// Friction at the normal forces of the iterate converges where these change little. In the parts of a step
+/// that could not be solved as one it goes round in circles at times. Then both are solved at once, guided by
+/// the residual.
+bool couples_friction(const StepProblem& problem, const SolverSettings& settings, const StepReport& report) {
+  return problem.contacts.time_step < settings.time_step && report.iterations > coupled_after;
+}
+
+/// Factorizes the positive Hessian at w.now. Returns false where it is not positive definite after all.
+bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
+  problem.potential.assemble(w.now.positions, Curvature::positive, false, w.values);
+  add_bending_stand_in(problem.bending, problem.potential.effective_rigidity(), w.values);
+  add_slip_stiffness(w.now.contacts, w.values);
+  restrict_matrix(w.plan->pattern, w.now.contacts, w.values);
+  return w.matrix.factorize(w.values);
+}
+
+/// Assembles the Hessian at w.now as the matrix of the linear problem: exact, or `positive`.
+void assemble_matrix(const StepProblem& problem, bool positive, NewtonWorkspace& w) {
+  const double h = problem.contacts.time_step;
+  const bool sparse = problem.bending.model != data::BendingModel::hinge;
+  problem.potential.assemble(w.now.positions, positive ? Curvature::positive : Curvature::exact, sparse,
+                             w.values);
+  add_slip_stiffness(w.now.contacts, w.values);
+  if (!positive) add_surface_curvature(w.now.contacts, w.values);
+  w.matrix.assign(w.values, sparse, problem.bending, problem.potential.effective_rigidity(),
+                  problem.potential.mass().minCoeff() / (h * h));
+}
+
+/// Finds w.direction and the contacts that go with it, w.linear: solves the linear problem and exchanges its
+/// contacts in turn. `stuck`: with the positive Hessian, whose direction leads down.
+void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWorkspace& w,
+                 StepReport& report) {
+  assemble_matrix(problem, stuck, w);
+  const Linearization iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
+  const double enough = linear_tolerance * w.settings.tolerance * problem.force_scale;
+  w.linear = w.now.contacts;
+  w.gradient = w.now.residual;
+  w.refactor = false;
+  for (int solved = 0; solved < linear_problems; ++solved) {
+    w.force = w.now.force;
+    const int solves = coupled
+                           ? w.matrix.solve_coupled(w.linear, friction_couplings(problem.contacts, w.linear),
+                                                    w.gradient, enough, w.direction, w.force)
+                           : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
+    report.solves += solves;
+    w.refactor = w.refactor || solves > w.settings.stale_factor_solves;
+    // What holds in the last one has to be what its direction was found with.
+    if (solved + 1 == linear_problems) return;
+    const bool changed = stuck ? hold_touching(iterate, w.direction, w.linear)
+                               : exchange_contacts(iterate, w.direction, w.force, w.gradient, w.linear);
+    if (!changed) return;
+  }
+}
+
+/// The way along w.direction from w.now.
+struct SearchLine {
+  const StepProblem& problem;
+  const NewtonWorkspace& w;
+  bool coupled;
+  double potential, slope;  ///< of the step with friction, at its start [J]
+};
+
+/// A point on a search line, `length` directions from its start.
+struct LinePoint {
+  double length, potential;
+};
+
+/// The potential with that of friction at the normal forces of the line's start.
+double potential_at(const StepProblem& problem, const Iterate& now, const Iterate& at) {
+  return at.incremental_potential + friction_potential(problem.contacts, now.contacts, at.positions);
+}
+
+/// Evaluates the feasible iterate nearest to the point at `length`.
+LinePoint move(const SearchLine& line, double length, Iterate& to) {
+  to.positions = line.w.now.positions + length * line.w.direction;
+  project_to_feasible(line.problem.contacts, line.w.linear, to.positions);
+  line.problem.evaluate(to);
+  return {length, potential_at(line.problem, line.w.now, to)};
+}
+
+/// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
+/// Near the solution it falls by less than its rounding. So a smaller residual does as well.
+bool acceptable(const SearchLine& line, const LinePoint& point, const Iterate& trial) {
+  return (!line.coupled && point.potential <= line.potential + armijo_share * point.length * line.slope) ||
+         trial.residual.norm() <= (1 - residual_share * point.length) * line.w.now.residual.norm();
+}
+
+/// Halves a whole step until it is acceptable or too short.
+LinePoint line_search(const SearchLine& line, Iterate& trial) {
+  LinePoint point = move(line, 1.0, trial);
+  while (!acceptable(line, point, trial) && point.length > least_length)
+    point = move(line, 0.5 * point.length, trial);
+  return point;
+}
+
+/// Goes on along the line, by secants, while the potential falls. A sheet about to buckle needs it: the
+/// matrix, made positive, is stiffer than the sheet, and steps are too short.
+void lengthen(const SearchLine& line, LinePoint point, Iterate& trial, Iterate& longer) {
+  while (point.length >= 1 && point.length < greatest_length) {
+    const double end_slope = trial.residual.cwiseProduct(line.w.direction).sum();
+    if (end_slope > flat_slope * line.slope) return;
+    const double growth = std::clamp(line.slope / (line.slope - end_slope), least_growth, greatest_growth);
+    const LinePoint further = move(line, point.length * growth, longer);
+    if (further.potential >= point.potential ||
+        !(longer.residual.norm() < residual_growth * line.w.now.residual.norm()))
+      return;
+    point = further;
+    std::swap(trial, longer);
+  }
+}
+
+}  // namespace
+
+void iterate_to_balance(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
+  w.longer.contacts = w.trial.contacts = w.now.contacts;
+  bool stuck = false;
+  int forced_moves = 0;
+  while (report.iterations < w.settings.max_iterations && !problem.balanced(w.now, w.settings.tolerance)) {
+    ++report.iterations;
+    if (w.refactor) {
+      if (!factorize(problem, w)) return;
+      ++report.factorizations;
+    }
+    const bool coupled = !stuck && couples_friction(problem, w.settings, report);
+    linear_step(problem, stuck, coupled, w, report);
+
+    const SearchLine line{problem, w, coupled, potential_at(problem, w.now, w.now),
+                          w.now.residual.cwiseProduct(w.direction).sum()};
+    const LinePoint point = line_search(line, w.trial);
+    if (!acceptable(line, point, w.trial)) {
+      if (!stuck) {
+        // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
+        stuck = w.refactor = true;
+        continue;
+      }
+      // A small step all the same lets the contacts decide anew.
+      if (++forced_moves > most_forced_moves || !std::isfinite(point.potential)) return;
+    }
+    stuck = false;
+    if (!coupled) lengthen(line, point, w.trial, w.longer);
+    std::swap(w.now, w.trial);
+  }
+}
+
+}  // namespace flash::sim

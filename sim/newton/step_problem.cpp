@@ -1,0 +1,42 @@
+#include "sim/newton/step_problem.h"
+
+#include <cmath>
+#include <limits>
+
+namespace flash::sim {
+
+StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
+                         const Exit& exit)
+    : bending(
+          bending_operator(plan, environment.material.bending_model, environment.material.poissons_ratio)),
+      potential(plan, bending, environment, time_step),
+      contacts(environment, time_step, exit),
+      gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81),
+      force_scale(potential.mass().norm() * gravity) {}
+
+void StepProblem::evaluate(Iterate& iterate) const {
+  iterate.material = contacts.environment.material;
+  iterate.incremental_potential = potential.evaluate(iterate.positions, iterate.force, iterate.elastic);
+  update_contacts(contacts, iterate.positions, iterate.force, iterate.contacts);
+  iterate.residual = iterate.force;
+  for (const VertexConstraint& constraint : iterate.contacts.constraints)
+    iterate.residual.row(constraint.vertex) -= constraint.reaction.transpose();
+}
+
+bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
+  constexpr double vertex_tolerance = 30;  ///< tolerance of a vertex as a multiple of the sheet's
+  double squared_rounding = 0;
+  for (int i = 0; i < iterate.residual.rows(); ++i) {
+    const VertexConstraint* c = iterate.contacts.find(i);
+    const double rounding = c == nullptr ? 0
+                                         : std::numeric_limits<double>::epsilon() *
+                                               iterate.positions.row(i).norm() * c->slip_stiffness.norm();
+    if (!(iterate.residual.row(i).norm() <=
+          vertex_tolerance * tolerance * potential.mass()[i] * gravity + rounding))
+      return false;
+    squared_rounding += rounding * rounding;
+  }
+  return iterate.residual.norm() <= tolerance * force_scale + std::sqrt(squared_rounding);
+}
+
+}  // namespace flash::sim

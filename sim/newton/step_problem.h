@@ -1,0 +1,38 @@
+#pragma once
+#include "sim/step/contact_set.h"
+#include "sim/step/incremental_potential.h"
+
+namespace flash::sim {
+
+/// A point on the way to the end of a step, always feasible.
+struct Iterate {
+  data::Points positions;  ///< [m]
+  data::Points force;      ///< what each vertex needs from outside [N]
+  data::Points residual;   ///< what the constraints leave of it [N]
+  ContactSet contacts;
+  data::SheetMaterial material;  ///< of `elastic`
+  ElasticEnergy elastic;
+  double incremental_potential = 0;  ///< [J]
+};
+
+/// One implicit Euler step as a problem: its potential, its contacts and the scale of its forces.
+struct StepProblem {
+  const BendingOperator& bending;
+  IncrementalPotential potential;
+  ContactStep contacts;
+  double gravity;      ///< [m/s^2]; 9.81 without
+  double force_scale;  ///< |M g| [N]
+
+  /// The arguments but `exit` have to outlive the problem.
+  StepProblem(const SheetPlan& plan, const Environment& environment, double time_step, const Exit& exit);
+
+  /// Fills in an iterate from its positions.
+  void evaluate(Iterate& iterate) const;
+
+  /// Whether |r| <= tolerance |M g|, and no vertex misses its weight by more than 30 times as much. The
+  /// rounding of positions turns the friction of a vertex that starts to slide: that much more may be
+  /// missing.
+  bool balanced(const Iterate& iterate, double tolerance) const;
+};
+
+}  // namespace flash::sim

@@ -1,0 +1,147 @@
+#include "sim/newton/step_report.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "data/worst.h"
+#include "sim/newton/step_problem.h"
+
+namespace flash::sim {
+
+using data::Points;
+using data::worst;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double energy_tolerance = 1e-2;  ///< gain of energy, as a share of the energy that can be converted
+
+}  // namespace
+
+void report_contacts(const StepProblem& problem, const Iterate& end, StepReport& report) {
+  const Environment& environment = problem.contacts.environment;
+  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
+  report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
+  for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
+    const VertexConstraint& c = end.contacts.constraints[k];
+    if (c.hold == Hold::fixed) {
+      if (c.grasp < 0) report.fixed_forces.push_back({c.vertex, c.reaction});
+      if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
+    }
+    for (const Touch& touch : end.contacts.touches_of(k)) {
+      if (!touch.holds) continue;
+      report.complementarity = worst(report.complementarity, touch.gap);
+      report.obstacle_forces[touch.obstacle] += touch.normal_force * touch.normal + touch.friction;
+    }
+  }
+  for (int i = 0; i < end.positions.rows(); ++i) {
+    const VertexConstraint* c = end.contacts.find(i);
+    // One that is held in some axes meets no obstacle in the others: such a step is not solved.
+    if (c != nullptr && c->hold == Hold::fixed && c->free.isZero(0)) continue;
+    for (size_t k = 0; k < environment.obstacles.size(); ++k) {
+      const Gap gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
+      const double depth =
+          gap.starts_inside
+              ? -gap_to(environment.obstacles[k], problem.contacts.motions[k], end.positions.row(i)).distance
+              : -gap.distance;
+      report.penetration_max = worst(report.penetration_max, depth);
+      // A vertex that leaves slowly may stay below the surface.
+      report.complementarity = worst(report.complementarity, -gap.distance);
+    }
+  }
+  report.held_penetration = deepest_held(problem.contacts, end.contacts, end.positions);
+  report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
+  report.start_penetration =
+      deepest_at_start(problem.contacts, vertices_inside(problem.contacts, end.contacts));
+}
+
+bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic_at_start, const Iterate& end,
+                        StepReport& report) {
+  const Environment& environment = problem.contacts.environment;
+  const State& start = environment.state;
+  const double h = problem.contacts.time_step;
+  const Eigen::VectorXd& mass = problem.potential.mass();
+  const Points moved = end.positions - start.positions;
+  const auto kinetic_of = [&](const Points& velocities) {
+    return 0.5 * (mass.asDiagonal() * velocities).cwiseProduct(velocities).sum();
+  };
+  report.kinetic = kinetic_of(moved / h);
+  report.membrane = end.elastic.membrane;
+  report.bending = end.elastic.bending;
+  double falls = 0, unbalanced = 0;
+  bool start_is_feasible = report.start_penetration.depth == 0;
+  for (int i = 0; i < mass.size(); ++i) {
+    const Vector3d way = moved.row(i);
+    report.gravitational -= mass[i] * environment.gravity.dot(end.positions.row(i));
+    falls += mass[i] * environment.gravity.dot(way);
+    unbalanced += std::abs(end.residual.row(i).dot(way));
+  }
+  for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
+    const VertexConstraint& c = end.contacts.constraints[k];
+    const Vector3d way = moved.row(c.vertex);
+    if (c.hold == Hold::fixed) {
+      report.work += c.reaction.dot(way);
+      start_is_feasible = start_is_feasible && ((Eigen::Matrix3d::Identity() - c.free) * way).isZero(0);
+    }
+    for (const Touch& touch : end.contacts.touches_of(k)) {
+      if (!touch.holds) continue;
+      const Vector3d force = touch.normal_force * touch.normal + touch.friction;
+      // The obstacle pushes out a vertex that starts inside, even where it stands still.
+      report.work += touch.starts_inside ? std::max(0.0, force.dot(way)) : force.dot(touch.surface_moved);
+    }
+  }
+  for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));
+  for (const ObstacleMotion& motion : problem.contacts.motions)
+    start_is_feasible = start_is_feasible && !motion.moves;
+
+  const double stored_at_start = elastic_at_start.membrane + elastic_at_start.bending,
+               stored_at_end = report.membrane + report.bending;
+  const double kinetic_at_start = kinetic_of(start.velocities);
+  const double gain =
+      report.kinetic - kinetic_at_start + stored_at_end - stored_at_start - falls - report.work;
+  const double there = kinetic_at_start + stored_at_start + std::max(0.0, falls) + std::max(0.0, report.work);
+  // The allowance covers the rounding of positions and the work of the weight over a nanometre.
+  const double rounding =
+      1e-9 * mass.sum() * problem.gravity +
+      1e-14 * environment.material.membrane_stiffness * mass.sum() / environment.material.areal_density;
+  if (!(gain <= energy_tolerance * there + unbalanced + rounding)) return false;
+  if (!start_is_feasible) return true;
+  return end.incremental_potential <=
+         problem.potential.at_start(elastic_at_start) + energy_tolerance * there + unbalanced + rounding;
+}
+
+void add_work(const StepReport& given_up, StepReport& report) {
+  report.iterations += given_up.iterations;
+  report.solves += given_up.solves;
+  report.factorizations += given_up.factorizations;
+}
+
+namespace {
+
+const Penetration& deeper(const Penetration& a, const Penetration& b) { return a.depth >= b.depth ? a : b; }
+
+}  // namespace
+
+StepReport joined(const StepReport& first, const StepReport& second) {
+  StepReport whole = second;
+  whole.residual = worst(first.residual, second.residual);
+  whole.iterations += first.iterations;
+  whole.solves += first.solves;
+  whole.factorizations += first.factorizations;
+  whole.substeps += first.substeps;
+  whole.converged = first.converged && second.converged;
+  whole.penetration_max = worst(first.penetration_max, second.penetration_max);
+  whole.held_penetration = deeper(first.held_penetration, second.held_penetration);
+  whole.start_penetration = first.start_penetration;
+  whole.complementarity = worst(first.complementarity, second.complementarity);
+  whole.work += first.work;
+  for (size_t k = 0; k < whole.grasp_forces.size(); ++k)
+    whole.grasp_forces[k] = 0.5 * (first.grasp_forces[k] + second.grasp_forces[k]);
+  for (size_t k = 0; k < whole.obstacle_forces.size(); ++k)
+    whole.obstacle_forces[k] = 0.5 * (first.obstacle_forces[k] + second.obstacle_forces[k]);
+  for (size_t k = 0; k < whole.fixed_forces.size(); ++k)
+    whole.fixed_forces[k].force = 0.5 * (first.fixed_forces[k].force + second.fixed_forces[k].force);
+  return whole;
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,51 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "sim/scene/environment.h"
+#include "sim/step/penetration.h"
+
+namespace flash::sim {
+
+/// How one step of one environment went.
+struct StepReport {
+  double residual = 0;  ///< |r| / |M g|; without gravity as if it were 9.81 m/s^2
+  int iterations = 0;   ///< of Newton's method
+  int solves = 0;       ///< solves with a factor: iterations of the linear solver
+  int factorizations = 0;
+  int substeps = 1;  ///< more where the step could not be solved as one
+  /// Force balance to the tolerance, as a whole and to 30 times of it at every vertex; gaps and
+  /// complementarity; no energy from nothing. Contact forces lie in the friction cone at every iterate.
+  bool converged = false;
+  double penetration_max = 0;     ///< deepest vertex below a surface, held ones too [m]
+  Penetration held_penetration;   ///< the deepest that a support or a gripper holds below a surface
+  Penetration start_penetration;  ///< the deepest other that started the step inside an obstacle
+  double complementarity = 0;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
+  double kinetic = 0, membrane = 0, bending = 0, gravitational = 0;  ///< energies [J]
+  double work = 0;  ///< work done on the sheet by supports, grippers and obstacles [J]
+  // Forces of a step in parts are their means over time.
+  std::vector<Eigen::Vector3d> grasp_forces;     ///< gripper on sheet, one a grasp [N]
+  std::vector<Eigen::Vector3d> obstacle_forces;  ///< obstacle on sheet, one an obstacle [N]
+  std::vector<Load> fixed_forces;                ///< support on sheet, one a fixed vertex
+};
+
+struct StepProblem;
+struct Iterate;
+struct ElasticEnergy;
+
+/// Fills in forces, contact and penetration at the end of a step.
+void report_contacts(const StepProblem& problem, const Iterate& end, StepReport& report);
+
+/// Fills in the energies at the end of a step, after report_contacts. Returns whether they came from
+/// somewhere: the potential of the step must not end above its start value. The energy must not end above
+/// that of the start and the work done.
+bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic_at_start, const Iterate& end,
+                        StepReport& report);
+
+/// Adds the work of an attempt that was given up.
+void add_work(const StepReport& given_up, StepReport& report);
+
+/// The report of a step from those of its halves.
+StepReport joined(const StepReport& first, const StepReport& second);
+
+}  // namespace flash::sim

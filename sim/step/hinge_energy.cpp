@@ -1,0 +1,56 @@
+#include "sim/step/hinge_energy.h"
+
+#include <array>
+#include <utility>
+
+namespace flash::sim {
+
+using data::Points;
+using Eigen::Matrix3d;
+
+namespace {
+
+void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& block) {
+  Eigen::Map<Matrix3d> target(values.data() + 9L * slot.block);
+  if (slot.transposed)
+    target += block.transpose();
+  else
+    target += block;
+}
+
+}  // namespace
+
+double add_hinge_gradient(const std::vector<Hinge>& hinges, double rigidity, const Points& positions,
+                          Points& gradient) {
+  double energy = 0;
+  for (const Hinge& hinge : hinges) {
+    HingePositions x, hinge_gradient;
+    for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);
+    double hinge_energy;
+    hinge_response(hinge, x, hinge_energy, hinge_gradient, nullptr);
+    energy += rigidity * hinge_energy;
+    for (int k = 0; k < 4; ++k)
+      gradient.row(hinge.vertices[k]) += rigidity * hinge_gradient.col(k).transpose();
+  }
+  return energy;
+}
+
+void add_hinge_hessian(const SheetPlan& plan, const std::vector<Hinge>& hinges, double rigidity,
+                       const Points& positions, BlockValues<double>& values) {
+  for (size_t e = 0; e < hinges.size(); ++e) {
+    const Hinge& hinge = hinges[e];
+    HingePositions x, hinge_gradient;
+    for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);
+    double hinge_energy;
+    Matrix12 hessian;
+    hinge_response(hinge, x, hinge_energy, hinge_gradient, &hessian);
+    for (int k = 0; k < 4; ++k)
+      add_block(values, {hinge.vertices[k], false}, rigidity * hessian.block<3, 3>(3 * k, 3 * k));
+    constexpr std::array<std::pair<int, int>, 6> blocks = {{{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}}};
+    for (int b = 0; b < 6; ++b)
+      add_block(values, plan.hinge_slots[e][b],
+                rigidity * hessian.block<3, 3>(3 * blocks[b].first, 3 * blocks[b].second));
+  }
+}
+
+}  // namespace flash::sim
