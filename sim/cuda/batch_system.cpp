@@ -20,7 +20,7 @@ namespace {
 
 /// Panels that fit on chip beside the rest of a factorization.
 FrontSettings fitting(FrontSettings settings) {
-  constexpr int rest = 4096;  // numbers
+  constexpr int rest = 16384;  // numbers
   int device = 0, bytes = 0;
   check(cudaGetDevice(&device));
   check(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));

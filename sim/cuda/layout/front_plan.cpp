@@ -10,8 +10,6 @@
 namespace flash::sim::cuda {
 namespace {
 
-int rounded_up(int number, int step) { return (number + step - 1) / step * step; }
-
 /// A front in the order of elimination, children before parents.
 struct Node {
   int first_column = 0, column_count = 0;
@@ -24,7 +22,8 @@ int below_at(const Node& node) { return rounded_up(3 * node.column_count, 4); }
 int leading(const Node& node) {
   return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), forward_rows);
 }
-int panel_size(const Node& node) { return (leading(node) + panel_padding) * 3 * node.column_count; }
+int below(const Node& node) { return 3 * static_cast<int>(node.rows.size()); }
+int panel_size(const Node& node) { return panel_numbers(3 * node.column_count, below(node)); }
 
 /// The dissection's nodes with what each touches below it.
 std::vector<Node> nodes_of(const std::vector<DissectionNode>& dissection,
@@ -130,6 +129,10 @@ class Places {
 /// The columns of the factor one after the other. What a front passes up lives until its parent is done.
 void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
   Places updates, vectors;
+  // Zeros, for the columns that a child lacks.
+  int longest = 0;
+  for (const Node& node : nodes) longest = std::max(longest, below(node));
+  updates.take(rounded_up(longest, 8));
   std::size_t front = 0;
   for (const FrontLevel& level : plan.levels) {
     const std::size_t end = level.first_front + level.front_count;
@@ -137,7 +140,7 @@ void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
       FrontLayout& layout = plan.fronts[f];
       layout.panel_at = plan.factor_size;
       plan.factor_size += 3L * layout.column_count * layout.leading;
-      layout.update_leading = rounded_up(3 * layout.row_count, 4);
+      layout.update_leading = rounded_up(3 * layout.row_count, 8);
       layout.update_at = updates.take(3L * layout.row_count * layout.update_leading);
       layout.vector_at = static_cast<int>(vectors.take(3L * layout.row_count));
     }
@@ -162,12 +165,13 @@ void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, F
       ++level.front_count;
       panel = std::max(panel, panel_size(nodes[first]));
       columns = std::max(columns, 3 * nodes[first].column_count);
-      if (nodes[first].height > 0) rows = std::max(rows, leading(nodes[first]));
+      if (nodes[first].height > 0)
+        rows = std::max(rows, mapped_rows(3 * nodes[first].column_count, below(nodes[first])));
     }
-    // As many groups as fronts, so that none is idle; each with a thread for every own column.
+    // As many groups as fronts, so that none is idle.
     level.groups = 1;
     while (2 * level.groups <= settings.most_groups && level.groups < level.front_count &&
-           2 * level.groups * panel <= settings.panel_capacity && 2 * level.groups * columns <= team_threads)
+           2 * level.groups * panel <= settings.panel_capacity)
       level.groups *= 2;
     plan.shared_panel = std::max(plan.shared_panel, level.groups * rounded_up(panel, 4));
     plan.shared_rows = std::max(plan.shared_rows, level.groups * rows);

@@ -1,0 +1,140 @@
+#pragma once
+#include "sim/cuda/front_tables.h"
+#include "sim/cuda/team.cuh"
+
+namespace flash::sim::cuda {
+
+/// The columns [A11; A21] of a front on chip: its own rows, padded to whole blocks of `panel_width` by those
+/// of the identity, then the rows below.
+struct Panel {
+  float* numbers;
+  int columns;    ///< own rows and columns
+  int own;        ///< padded
+  int below;      ///< rows below
+  int leading;    ///< panel_leading
+  Group group;
+
+  __device__ int height() const { return own + below; }
+  __device__ float& at(int row, int column) const { return numbers[column * leading + row]; }
+  __device__ void set_four(int row, int column, const float4& value) const {
+    *reinterpret_cast<float4*>(numbers + column * leading + row) = value;
+  }
+};
+
+__device__ inline float4 four_at(const float* numbers) { return *reinterpret_cast<const float4*>(numbers); }
+__device__ inline float2 two_at(const float* numbers) { return *reinterpret_cast<const float2*>(numbers); }
+
+/// Where the rows of a front stand in the update matrices of its children, on chip: a place and an offset add
+/// up to where a number is in the memory of updates. That begins with zeros, for columns that a child lacks.
+struct ChildRows {
+  int *places, *offsets;  ///< of one child after the other; places are -1 and offsets 0 where there is none
+  int stride;
+  bool any;  ///< whether there is a child
+
+  /// Of one child, the numbers of a row each lane in columns from `first` on: whole warps.
+  template <int count>
+  __device__ void gather(const float* updates, int child, int place, int first,
+                         float (&numbers)[count]) const {
+    const int* columns = offsets + child * stride + first;
+#pragma unroll
+    for (int j = 0; j < count; ++j) numbers[j] = 0;
+    if (!__any_sync(0xffffffffu, columns[lane() % count] != 0) || place < 0) return;
+    const float* from = updates + place;
+#pragma unroll
+    for (int j = 0; j < count; j += 4) {
+      const int4 four = *reinterpret_cast<const int4*>(columns + j);
+      numbers[j] = from[four.x];
+      numbers[j + 1] = from[four.y];
+      numbers[j + 2] = from[four.z];
+      numbers[j + 3] = from[four.w];
+    }
+  }
+};
+
+/// Fills in the rows of a front.
+__device__ inline void find_rows(const FrontTables& tables, const FrontLayout& front, const Panel& panel,
+                                 const ChildRows& rows) {
+  const int vertices = front.column_count + front.row_count;
+#pragma unroll
+  for (int k = 0; k < 2; ++k) {
+    const int child = front.children[k];
+    int update = 0, leading = 0;
+    if (child >= 0) {
+      update = static_cast<int>(tables.fronts[child].update_at);
+      leading = tables.fronts[child].update_leading;
+    }
+    for (int row = panel.group.rank; row < rows.stride; row += panel.group.size) {
+      const int below = row - panel.own, entry = below < 0 ? row : panel.columns + below, vertex = entry / 3;
+      int place = -1, offset = 0;
+      if (child >= 0 && (row < panel.columns || (below >= 0 && below < panel.below))) {
+        const int found = tables.child_rows[front.first_map + k * vertices + vertex];
+        if (found >= 0) {
+          place = 3 * found + entry - 3 * vertex;
+          offset = update + place * leading;
+        }
+      }
+      rows.places[k * rows.stride + row] = place;
+      rows.offsets[k * rows.stride + row] = offset;
+    }
+  }
+}
+
+/// What the children pass up to the columns of a panel. Zeros above the diagonal.
+__device__ inline void gather_columns(const Panel& panel, const ChildRows& rows, const float* updates) {
+  constexpr int together = panel_width;  // columns whose numbers are under way
+  const int height = panel.height();
+  for (int strip = panel.group.rank / 32; 32 * strip < height; strip += panel.group.size / 32) {
+    const int row = 32 * strip + lane();
+    const bool there = rows.any && row < height;
+    const int places[2] = {there ? rows.places[row] : -1, there ? rows.places[rows.stride + row] : -1};
+    float* to = panel.numbers + row;
+    for (int first = 0; first < panel.own; first += together, to += together * panel.leading) {
+      float numbers[2][together] = {};
+      if (rows.any) {
+        rows.gather(updates, 0, places[0], first, numbers[0]);
+        rows.gather(updates, 1, places[1], first, numbers[1]);
+      }
+      if (row >= height) continue;
+#pragma unroll
+      for (int j = 0; j < together; ++j) {
+        float sum = numbers[0][j] + numbers[1][j];
+        if (row < first + j) sum = 0;
+        if (row == first + j && row >= panel.columns) sum = 1;
+        to[j * panel.leading] = sum;
+      }
+    }
+  }
+}
+
+/// Adds the blocks of the matrix, a column of a block each thread, a few of them at a time.
+__device__ inline void add_blocks(const FrontTables& tables, const FrontLayout& front,
+                                  const float* __restrict__ blocks, const Panel& panel) {
+  constexpr int together = 4;
+  const int count = 3 * front.block_count;
+  for (int base = panel.group.rank; base < count; base += together * panel.group.size) {
+    BlockPlace places[together];
+    float numbers[together][3];
+#pragma unroll
+    for (int i = 0; i < together; ++i)
+      places[i] = tables.blocks[front.first_block + min(base + i * panel.group.size, count - 1) / 3];
+#pragma unroll
+    for (int i = 0; i < together; ++i) {
+      const int c = min(base + i * panel.group.size, count - 1) % 3;
+      const float* from = blocks + 9 * places[i].source + (places[i].transposed ? c : 3 * c);
+      const int step = places[i].transposed ? 3 : 1;
+#pragma unroll
+      for (int r = 0; r < 3; ++r) numbers[i][r] = from[r * step];
+    }
+#pragma unroll
+    for (int i = 0; i < together; ++i) {
+      const int e = base + i * panel.group.size, column = 3 * places[i].column + e % 3;
+      const int below = places[i].row - front.column_count,
+                row = below < 0 ? 3 * places[i].row : panel.own + 3 * below;
+#pragma unroll
+      for (int r = 0; r < 3; ++r)
+        if (e < count && row + r >= column) panel.at(row + r, column) += numbers[i][r];
+    }
+  }
+}
+
+}  // namespace flash::sim::cuda
