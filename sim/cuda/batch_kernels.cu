@@ -3,9 +3,10 @@
 #include <algorithm>
 
 #include "sim/cuda/conjugate_gradients.cuh"
+#include "sim/cuda/elastic_gradient.cuh"
 #include "sim/cuda/front_factor.cuh"
 #include "sim/cuda/launch.h"
-#include "sim/cuda/membrane.cuh"
+#include "sim/cuda/membrane_hessian.cuh"
 
 namespace flash::sim::cuda {
 namespace {
@@ -48,16 +49,15 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
 }
 
 template <bool Preconditioner>
-__global__ void __launch_bounds__(team_threads, dense_teams)
+__global__ void __launch_bounds__(team_threads, hessian_teams)
     assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
-  float* shares = batch.triangle_blocks + 54L * batch.sheet.triangle_count * blockIdx.x;
+  float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    triangle_blocks(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares,
-                    shared_memory<float>());
+    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares);
     __syncthreads();
     if constexpr (Preconditioner)
       assemble_blocks(batch.sheet, batch.environments[e], shares,
-                      batch.blocks + 9L * batch.sheet.block_count * e);
+                      batch.blocks + 9L * batch.sheet.block_count * e, shared_memory<float>());
     else
       assemble_block_rows(batch.sheet, batch.environments[e], shares,
                           batch.block_rows + batch.block_row_size * e);
@@ -140,7 +140,7 @@ Choice choice(BatchKernel kernel, const FrontTables& fronts) {
     case BatchKernel::evaluate:
       return {evaluate_kernel, team_warps * static_cast<int>(sizeof(double))};
     case BatchKernel::assemble_matrix:
-      return {assemble_kernel<false>, 9 * team_threads * number};
+      return {assemble_kernel<false>, 0};
     case BatchKernel::assemble_preconditioner:
       return {assemble_kernel<true>, 9 * team_threads * number};
     case BatchKernel::factorize:

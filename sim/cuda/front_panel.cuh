@@ -39,7 +39,7 @@ struct ChildRows {
 #pragma unroll
     for (int j = 0; j < count; ++j) numbers[j] = 0;
     if (!__any_sync(0xffffffffu, columns[lane() % count] != 0) || place < 0) return;
-    const float* from = updates + place;
+    const float* from = kept_whole(updates + place);
 #pragma unroll
     for (int j = 0; j < count; j += 4) {
       const int4 four = *reinterpret_cast<const int4*>(columns + j);

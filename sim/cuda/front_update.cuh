@@ -110,7 +110,7 @@ __device__ inline void make_update_tile(const FrontLayout& front, const Panel& p
     __syncwarp();
   }
   const int first = row + 4 * g;
-  float* update = updates + front.update_at;
+  float* update = kept_whole(updates + front.update_at + first);
 #pragma unroll
   for (int j = 0; j < 4; ++j) {
     const int to = column + 4 * t + j;
@@ -119,7 +119,7 @@ __device__ inline void make_update_tile(const FrontLayout& front, const Panel& p
     const float4 taken = product.rows(j);
     sum = {sum.x - taken.x, sum.y - taken.y, sum.z - taken.z, sum.w - taken.w};
     if (first < panel.below && to < panel.below)
-      *reinterpret_cast<float4*>(update + to * front.update_leading + first) = sum;
+      *reinterpret_cast<float4*>(update + to * front.update_leading) = sum;
   }
   __syncwarp();
 }

@@ -12,7 +12,7 @@ static_assert((team_threads & (team_threads - 1)) == 0);
 
 /// Teams that a processor of the device has registers for, at least: dense fronts and triangles need many,
 /// the rest of a linear problem needs many threads.
-inline constexpr int dense_teams = 2, sparse_teams = 4;
+inline constexpr int dense_teams = 2, hessian_teams = 3, sparse_teams = 4;
 
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;
