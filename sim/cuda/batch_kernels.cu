@@ -51,16 +51,18 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
 template <bool Preconditioner>
 __global__ void __launch_bounds__(team_threads, hessian_teams)
     assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
+  float* chip = shared_memory<float>();
   float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares);
+    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares,
+                 chip);
     __syncthreads();
     if constexpr (Preconditioner)
       assemble_blocks(batch.sheet, batch.environments[e], shares,
-                      batch.blocks + 9L * batch.sheet.block_count * e, shared_memory<float>());
+                      batch.blocks + 9L * batch.sheet.block_count * e, chip);
     else
       assemble_block_rows(batch.sheet, batch.environments[e], shares,
-                          batch.block_rows + batch.block_row_size * e);
+                          batch.block_rows + batch.block_row_size * e, chip);
     __syncthreads();
   }
 }
@@ -140,9 +142,9 @@ Choice choice(BatchKernel kernel, const FrontTables& fronts) {
     case BatchKernel::evaluate:
       return {evaluate_kernel, team_warps * static_cast<int>(sizeof(double))};
     case BatchKernel::assemble_matrix:
-      return {assemble_kernel<false>, 0};
+      return {assemble_kernel<false>, hessian_memory * number};
     case BatchKernel::assemble_preconditioner:
-      return {assemble_kernel<true>, 9 * team_threads * number};
+      return {assemble_kernel<true>, hessian_memory * number};
     case BatchKernel::factorize:
       return {factorize_kernel<Stored>, number * factor_memory(fronts.shared_panel, fronts.shared_rows)};
     case BatchKernel::multiply:

@@ -21,6 +21,7 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.fronts = upload(plan.fronts, fronts_);
   fronts.levels = upload(plan.levels, levels_);
   fronts.child_rows = upload(plan.child_rows, ints_);
+  fronts.panel_rows = upload(plan.panel_rows, ints_);
   fronts.entries = upload(plan.entries, ints_);
   fronts.blocks = upload(plan.blocks, places_);
   fronts.forward = upload(plan.forward, forward_);

@@ -44,7 +44,7 @@ __device__ bool factorize(const FrontTables& tables, const float* blocks, float*
       const ChildRows rows = {places, places + 2 * stride, stride,
                               front.children[0] >= 0 || front.children[1] >= 0};
       if (rows.any) {
-        find_rows(tables, front, panel, rows);
+        load_rows(tables, front, group, rows);
         group.synchronize();
       }
       gather_columns(panel, rows, updates);

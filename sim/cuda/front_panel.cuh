@@ -27,11 +27,13 @@ __device__ inline float2 two_at(const float* numbers) { return *reinterpret_cast
 /// Where the rows of a front stand in the update matrices of its children, on chip: a place and an offset add
 /// up to where a number is in the memory of updates. That begins with zeros, for columns that a child lacks.
 struct ChildRows {
-  int *places, *offsets;  ///< of one child after the other; places are -1 and offsets 0 where there is none
+  int *places, *offsets;  ///< of one child after the other (FrontPlan::panel_rows)
   int stride;
   bool any;  ///< whether there is a child
 
-  /// Of one child, the numbers of a row each lane in columns from `first` on: whole warps.
+  __device__ int place(int child, int row) const { return places[child * stride + row]; }
+
+  /// Of one child, the numbers of a row each lane, at `place`, in columns from `first` on: whole warps.
   template <int count>
   __device__ void gather(const float* updates, int child, int place, int first,
                          float (&numbers)[count]) const {
@@ -52,55 +54,45 @@ struct ChildRows {
 };
 
 /// Fills in the rows of a front.
-__device__ inline void find_rows(const FrontTables& tables, const FrontLayout& front, const Panel& panel,
+__device__ inline void load_rows(const FrontTables& tables, const FrontLayout& front, const Group& group,
                                  const ChildRows& rows) {
-  const int vertices = front.column_count + front.row_count;
-#pragma unroll
-  for (int k = 0; k < 2; ++k) {
-    const int child = front.children[k];
-    int update = 0, leading = 0;
-    if (child >= 0) {
-      update = static_cast<int>(tables.fronts[child].update_at);
-      leading = tables.fronts[child].update_leading;
-    }
-    for (int row = panel.group.rank; row < rows.stride; row += panel.group.size) {
-      const int below = row - panel.own, entry = below < 0 ? row : panel.columns + below, vertex = entry / 3;
-      int place = -1, offset = 0;
-      if (child >= 0 && (row < panel.columns || (below >= 0 && below < panel.below))) {
-        const int found = tables.child_rows[front.first_map + k * vertices + vertex];
-        if (found >= 0) {
-          place = 3 * found + entry - 3 * vertex;
-          offset = update + place * leading;
-        }
-      }
-      rows.places[k * rows.stride + row] = place;
-      rows.offsets[k * rows.stride + row] = offset;
-    }
-  }
+  const int4* from = reinterpret_cast<const int4*>(tables.panel_rows + front.first_panel_row);
+  int4* to = reinterpret_cast<int4*>(rows.places);
+  for (int i = group.rank; i < rows.stride; i += group.size) to[i] = from[i];
 }
 
 /// What the children pass up to the columns of a panel. Zeros above the diagonal.
 __device__ inline void gather_columns(const Panel& panel, const ChildRows& rows, const float* updates) {
-  constexpr int together = panel_width;  // columns whose numbers are under way
+  constexpr int together = 3;  // blocks of columns whose numbers are under way
   const int height = panel.height();
   for (int strip = panel.group.rank / 32; 32 * strip < height; strip += panel.group.size / 32) {
     const int row = 32 * strip + lane();
     const bool there = rows.any && row < height;
-    const int places[2] = {there ? rows.places[row] : -1, there ? rows.places[rows.stride + row] : -1};
-    float* to = panel.numbers + row;
-    for (int first = 0; first < panel.own; first += together, to += together * panel.leading) {
-      float numbers[2][together] = {};
+    const int places[2] = {there ? rows.place(0, row) : -1, there ? rows.place(1, row) : -1};
+    for (int base = 0; base < panel.own; base += together * panel_width) {
+      float numbers[together][2][panel_width] = {};
       if (rows.any) {
-        rows.gather(updates, 0, places[0], first, numbers[0]);
-        rows.gather(updates, 1, places[1], first, numbers[1]);
+#pragma unroll
+        for (int b = 0; b < together; ++b) {
+          const int first = base + b * panel_width;
+          if (first >= panel.own) break;
+          rows.gather(updates, 0, places[0], first, numbers[b][0]);
+          rows.gather(updates, 1, places[1], first, numbers[b][1]);
+        }
       }
       if (row >= height) continue;
 #pragma unroll
-      for (int j = 0; j < together; ++j) {
-        float sum = numbers[0][j] + numbers[1][j];
-        if (row < first + j) sum = 0;
-        if (row == first + j && row >= panel.columns) sum = 1;
-        to[j * panel.leading] = sum;
+      for (int b = 0; b < together; ++b) {
+        const int first = base + b * panel_width;
+        if (first >= panel.own) break;
+        float* to = &panel.at(row, first);
+#pragma unroll
+        for (int j = 0; j < panel_width; ++j) {
+          float sum = numbers[b][0][j] + numbers[b][1][j];
+          if (row < first + j) sum = 0;
+          if (row == first + j && row >= panel.columns) sum = 1;
+          to[j * panel.leading] = sum;
+        }
       }
     }
   }

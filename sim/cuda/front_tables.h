@@ -9,7 +9,7 @@ struct FrontTables {
   long factor_size, update_size;
   const FrontLayout* fronts;
   const FrontLevel* levels;
-  const int *child_rows, *entries;
+  const int *child_rows, *panel_rows, *entries;
   const BlockPlace* blocks;
   const ForwardTask* forward;
   const BackwardTask* backward;

@@ -82,59 +82,81 @@ __device__ void store_inverse(const FrontLayout& front, const Panel& panel, Stor
     }
 }
 
-/// A tile of what the front passes up: what its children do, less L21 L21^T. Where a tile crosses the
-/// diagonal anything stands above it. `chip`: tile_numbers of the warp.
-__device__ inline void make_update_tile(const FrontLayout& front, const Panel& panel, const ChildRows& rows,
-                                        int row, int column, float* updates, float* chip) {
-  const int g = lane() / 4, t = lane() % 4;
-  // A row each lane: what lies together is read together. It is on its way while the product is made.
-  float given[2][16];
-  if (rows.any) {
-    const int own = row + lane(), at = panel.own + own;
-#pragma unroll
-    for (int k = 0; k < 2; ++k)
-      rows.gather(updates, k, own < panel.below ? rows.places[k * rows.stride + at] : -1, panel.own + column,
-                  given[k]);
+/// Goes through the tiles of a lower triangle, those of a warp's own.
+struct TileWalk {
+  int row, column, step, below;
+
+  __device__ TileWalk(const Panel& panel)
+      : row(0), column(16 * (panel.group.rank / 32)), step(16 * (panel.group.size / 32)), below(panel.below) {
+    settle();
   }
-  TileProduct product;
-  const int left_row = clamped_rows(panel, row),
-            right_row = panel.own + min(column + 2 * g, (panel.below + 1) / 2 * 2 - 2);
-  const float *left = &panel.at(left_row, t), *right = &panel.at(right_row, t);
-  const int step = 4 * panel.leading;
-#pragma unroll 2
-  for (int k = 0; k < panel.own; k += 8, left += 2 * step, right += 2 * step)
-    product.add({four_at(left), four_at(left + step)}, {two_at(right), two_at(right + step)});
-  if (rows.any) {
-#pragma unroll
-    for (int j = 0; j < 16; ++j) chip[j * tile_leading + lane()] = given[0][j] + given[1][j];
-    __syncwarp();
+  __device__ bool there() const { return row < below; }
+  __device__ void advance() {
+    column += step;
+    settle();
   }
-  const int first = row + 4 * g;
-  float* update = kept_whole(updates + front.update_at + first);
-#pragma unroll
-  for (int j = 0; j < 4; ++j) {
-    const int to = column + 4 * t + j;
-    float4 sum = {0, 0, 0, 0};
-    if (rows.any) sum = *reinterpret_cast<const float4*>(chip + (4 * t + j) * tile_leading + 4 * g);
-    const float4 taken = product.rows(j);
-    sum = {sum.x - taken.x, sum.y - taken.y, sum.z - taken.z, sum.w - taken.w};
-    if (first < panel.below && to < panel.below)
-      *reinterpret_cast<float4*>(update + to * front.update_leading) = sum;
+
+ private:
+  /// A strip of 32 rows has the columns up to its diagonal.
+  __device__ void settle() {
+    while (there()) {
+      const int end = min(row + 32, (below + 15) / 16 * 16);
+      if (column < end) return;
+      column -= end;
+      row += 32;
+    }
   }
-  __syncwarp();
+};
+
+/// What the children pass up to a tile, a row each lane: what lies together is read together.
+__device__ inline void gather_tile(const Panel& panel, const ChildRows& rows, const TileWalk& tile,
+                                   const float* updates, float (&numbers)[2][16]) {
+  const int row = tile.row + lane();
+#pragma unroll
+  for (int k = 0; k < 2; ++k)
+    rows.gather(updates, k, row < panel.below ? rows.place(k, panel.own + row) : -1, panel.own + tile.column,
+                numbers[k]);
 }
 
-/// The tiles of the lower triangle.
+/// What the front passes up: what its children do, less L21 L21^T, by tiles of the lower triangle. Above the
+/// diagonal stands anything. `chip`: tile_numbers of the warp.
 __device__ inline void make_update(const FrontLayout& front, const Panel& panel, const ChildRows& rows,
                                    float* updates, float* chip) {
-  const int warps = panel.group.size / 32, strips = (panel.below + 31) / 32;
-  for (int strip = 0, column = panel.group.rank / 32; strip < strips; column += warps) {
-    while (column > 2 * strip + 1) {
-      column -= 2 * strip + 2;
-      ++strip;
+  const int g = lane() / 4, t = lane() % 4, step = 4 * panel.leading;
+  const int last_rows = (panel.below + 3) / 4 * 4 - 4, last_columns = (panel.below + 1) / 2 * 2 - 2;
+  const float* below = &panel.at(panel.own, t);
+  TileWalk tile(panel);
+  float given[2][16];
+  if (rows.any && tile.there()) gather_tile(panel, rows, tile, updates, given);
+  while (tile.there()) {
+    TileWalk next = tile;
+    next.advance();
+    if (rows.any) {
+#pragma unroll
+      for (int j = 0; j < 16; ++j) chip[j * tile_leading + lane()] = given[0][j] + given[1][j];
+      __syncwarp();
+      // The next tile's numbers are on their way while this one's product is made.
+      if (next.there()) gather_tile(panel, rows, next, updates, given);
     }
-    if (strip < strips && 16 * column < panel.below)
-      make_update_tile(front, panel, rows, 32 * strip, 16 * column, updates, chip);
+    TileProduct product;
+    const int first = tile.row + 4 * g;
+    const float *left = below + min(first, last_rows), *right = below + min(tile.column + 2 * g, last_columns);
+#pragma unroll 2
+    for (int k = 0; k < panel.own; k += 8, left += 2 * step, right += 2 * step)
+      product.add({four_at(left), four_at(left + step)}, {two_at(right), two_at(right + step)});
+    float* update = kept_whole(updates + front.update_at + first);
+#pragma unroll
+    for (int j = 0; j < 4; ++j) {
+      const int to = tile.column + 4 * t + j;
+      float4 sum = {0, 0, 0, 0};
+      if (rows.any) sum = four_at(chip + (4 * t + j) * tile_leading + 4 * g);
+      const float4 taken = product.rows(j);
+      sum = {sum.x - taken.x, sum.y - taken.y, sum.z - taken.z, sum.w - taken.w};
+      if (first < panel.below && to < panel.below)
+        *reinterpret_cast<float4*>(update + to * front.update_leading) = sum;
+    }
+    __syncwarp();
+    tile = next;
   }
 }
 

@@ -14,10 +14,17 @@ namespace flash::sim::cuda {
 /// Numbers from one block to the next: column after column, and three unused.
 inline constexpr int share_numbers = 12;
 
+/// Through these on chip a warp writes what its lanes have one after the other.
+inline constexpr int hessian_memory = team_threads * 3 * share_numbers;
+
 /// The blocks (1,0), (2,0), (2,1) of each triangle. `positive`: of the Hessian without negative eigenvalues.
+/// `chip`: hessian_memory.
 inline __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                    const Point* positions, bool positive, float* shares) {
-  for (int t = static_cast<int>(threadIdx.x); t < tables.triangle_count; t += team_threads) {
+                                    const Point* positions, bool positive, float* shares, float* chip) {
+  constexpr int fours = 3 * share_numbers / 4;
+  float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
+  for (int first = 32 * warp(); first < tables.triangle_count; first += team_threads) {
+    const int t = min(first + lane(), tables.triangle_count - 1);
     const TriangleFrame f = triangle_frame(tables, t, positions);
     PrincipalResponse<double> response = response_at(environment, f.frame.s1, f.frame.s2);
     if (positive) clamp(response);
@@ -51,11 +58,16 @@ inline __device__ void write_shares(const SheetTables& tables, const Environment
         for (int row = 0; row < 3; ++row)
           numbers[3 * column + row] = on_u * u[row] + on_v * v[row] + on_n * n[row];
       }
-      float4* to = reinterpret_cast<float4*>(shares) + share_numbers / 4 * (3 * t + b);
 #pragma unroll
-      for (int four = 0; four < share_numbers / 4; ++four)
-        to[four] = {numbers[4 * four], numbers[4 * four + 1], numbers[4 * four + 2], numbers[4 * four + 3]};
+      for (int k = 0; k < share_numbers / 4; ++k)
+        own_chip[fours * lane() + share_numbers / 4 * b + k] = {numbers[4 * k], numbers[4 * k + 1],
+                                                               numbers[4 * k + 2], numbers[4 * k + 3]};
     }
+    __syncwarp();
+    const int count = fours * min(32, tables.triangle_count - first);
+    float4* to = reinterpret_cast<float4*>(shares) + fours * first;
+    for (int i = lane(); i < count; i += 32) to[i] = own_chip[i];
+    __syncwarp();
   }
 }
 
@@ -104,7 +116,8 @@ __device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumb
     for (int e = 0; e < 9; ++e) diagonal.numbers[e] -= block.numbers[e];
     work(slot, block);
   }
-  const float inertia = static_cast<float>(environment.inertia_density * tables.vertex_area[vertex]);
+  const float inertia =
+      static_cast<float>(environment.inertia_density * tables.vertex_area[min(vertex, tables.size - 1)]);
   Block symmetric;
 #pragma unroll
   for (int e = 0; e < 9; ++e)
@@ -114,18 +127,24 @@ __device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumb
 }
 
 /// The Hessian of membrane and inertia as block rows (sheet_product.cuh). Hinges apart, these are all blocks.
+/// `chip`: nine numbers a thread, through which a warp, that has a slice, writes.
 inline __device__ void assemble_block_rows(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                           const float* shares, float* rows) {
+                                           const float* shares, float* rows, float* chip) {
+  static_assert(slice_size == 32);
+  float* own_chip = chip + slice_numbers * warp();
   const auto write = [&](int slot, const Block& block) {
-    float* to = rows + static_cast<long>(slot / slice_size) * slice_numbers + 3 * (slot % slice_size);
+    __syncwarp();
 #pragma unroll
-    for (int c = 0; c < 3; ++c)
+    for (int e = 0; e < 9; ++e) own_chip[3 * slice_size * (e / 3) + 3 * lane() + e % 3] = block.numbers[e];
+    __syncwarp();
+    float* to = rows + static_cast<long>(slot / slice_size) * slice_numbers + lane();
 #pragma unroll
-      for (int r = 0; r < 3; ++r) to[3 * slice_size * c + r] = block.numbers[3 * c + r];
+    for (int e = 0; e < 9; ++e) to[32 * e] = own_chip[32 * e + lane()];
   };
-  for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += team_threads) {
+  for (int slice = warp(); slice_size * slice < tables.size; slice += team_warps) {
+    const int vertex = slice_size * slice + lane();
     const Block diagonal = go_through_row(tables, environment, vertex, shares, write);
-    write(tables.slice_starts[vertex / slice_size] * slice_size + vertex % slice_size, diagonal);
+    write(tables.slice_starts[slice] * slice_size, diagonal);
   }
 }
 

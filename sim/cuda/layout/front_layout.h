@@ -28,6 +28,7 @@ struct FrontLayout {
   int first_map;                   ///< in FrontPlan::child_rows: one list a child, each over all its vertices
   int first_block, block_count;    ///< in FrontPlan::blocks
   int first_entry;                 ///< in FrontPlan::entries
+  int first_panel_row;             ///< in FrontPlan::panel_rows, with children
   int below_at, leading;           ///< rows; multiples of 4 and of 16
   int vector_at;                   ///< of what it passes up in a forward solve, three numbers a vertex below
   int children[2];                 ///< -1 for none

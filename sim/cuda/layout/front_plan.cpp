@@ -228,6 +228,27 @@ void add_layouts(const std::vector<Node>& nodes, FrontPlan& plan) {
   }
 }
 
+void add_panel_rows(FrontPlan& plan) {
+  for (FrontLayout& front : plan.fronts) {
+    if (front.children[0] < 0 && front.children[1] < 0) continue;
+    const int columns = 3 * front.column_count, below = 3 * front.row_count, own = padded_columns(columns),
+              rows = mapped_rows(columns, below), vertices = front.column_count + front.row_count;
+    front.first_panel_row = static_cast<int>(plan.panel_rows.size());
+    plan.panel_rows.insert(plan.panel_rows.end(), 2 * rows, -1);
+    plan.panel_rows.insert(plan.panel_rows.end(), 2 * rows, 0);
+    for (int k = 0; k < 2; ++k)
+      for (int entry = 0; entry < columns + below && front.children[k] >= 0; ++entry) {
+        const int found = plan.child_rows[front.first_map + k * vertices + entry / 3];
+        if (found < 0) continue;
+        const FrontLayout& child = plan.fronts[front.children[k]];
+        const int place = 3 * found + entry % 3, row = entry < columns ? entry : entry - columns + own;
+        int* const places = plan.panel_rows.data() + front.first_panel_row + k * rows;
+        places[row] = place;
+        places[row + 2 * rows] = static_cast<int>(child.update_at) + place * child.update_leading;
+      }
+  }
+}
+
 void add_blocks(const BlockPattern& pattern, const std::vector<Node>& nodes, FrontPlan& plan) {
   std::vector<int> owner(pattern.size);
   for (std::size_t n = 0; n < nodes.size(); ++n)
@@ -306,6 +327,7 @@ FrontPlan plan_fronts(const BlockPattern& pattern, const data::Points& places,
   add_layouts(nodes, plan);
   add_levels(nodes, settings, plan);
   place_memory(nodes, plan);
+  add_panel_rows(plan);
   add_blocks(pattern, nodes, plan);
   add_tasks(plan);
   return plan;
