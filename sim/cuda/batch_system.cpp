@@ -21,10 +21,8 @@ namespace {
 /// Panels that fit on chip beside the rest of a factorization.
 FrontSettings fitting(FrontSettings settings) {
   constexpr int rest = 16384;  // numbers
-  int device = 0, bytes = 0;
-  check(cudaGetDevice(&device));
-  check(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
-  settings.panel_capacity = std::min(settings.panel_capacity, bytes / static_cast<int>(sizeof(float)) - rest);
+  settings.panel_capacity =
+      std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
   return settings;
 }
 
@@ -91,6 +89,7 @@ struct BatchSystem::Memory {
                plan.sheet,
                count,
                layout.size,
+               1,
                environments.data(),
                positions.data(),
                vectors.data(),

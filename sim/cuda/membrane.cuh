@@ -17,11 +17,13 @@ struct TriangleFrame {
   double w10, w11, w20, w21, area;
 };
 
-__device__ inline TriangleFrame triangle_frame(const SheetTables& tables, int t, const Point* positions) {
+/// place(vertex): where it is.
+template <typename Places>
+__device__ TriangleFrame triangle_frame(const SheetTables& tables, int t, const Places& place) {
   const int count = tables.triangle_count;
-  const Triple x0 = triple(positions[tables.triangle_vertices[t]]);
-  const Triple e1 = triple(positions[tables.triangle_vertices[count + t]]) - x0,
-               e2 = triple(positions[tables.triangle_vertices[2 * count + t]]) - x0;
+  const Triple x0 = place(tables.triangle_vertices[t]);
+  const Triple e1 = place(tables.triangle_vertices[count + t]) - x0,
+               e2 = place(tables.triangle_vertices[2 * count + t]) - x0;
   TriangleFrame f;
   f.w10 = tables.gradients[t];
   f.w11 = tables.gradients[count + t];

@@ -25,7 +25,7 @@ inline __device__ void write_shares(const SheetTables& tables, const Environment
   float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
   for (int first = 32 * warp(); first < tables.triangle_count; first += team_threads) {
     const int t = min(first + lane(), tables.triangle_count - 1);
-    const TriangleFrame f = triangle_frame(tables, t, positions);
+    const TriangleFrame f = triangle_frame(tables, t, [&](int vertex) { return triple(positions[vertex]); });
     PrincipalResponse<double> response = response_at(environment, f.frame.s1, f.frame.s2);
     if (positive) clamp(response);
     const auto single = [](double x) { return static_cast<float>(x); };

@@ -28,7 +28,7 @@ void add_triangles(const SheetPlan& plan, const std::vector<int>& position, Shee
       for (int k = 0; k < 3; ++k) {
         const int vertex = group.vertices[k][lane];
         layout.triangle_vertices[k * count + t] = position[vertex];
-        corners[position[vertex]].push_back(k * count + t);
+        corners[position[vertex]].push_back(3 * k * count + t);
         layout.pair_sources[group.slots[k][lane] - plan.pattern.size].add(3 * t + k);
       }
       for (int k = 0; k < 4; ++k) layout.gradients[k * count + t] = group.gradients[k][lane];
