@@ -160,7 +160,7 @@ Choice choice(BatchKernel kernel, const FrontTables& fronts, int environment_cou
     case BatchKernel::assemble_preconditioner:
       return {assemble_kernel<true>, hessian_memory * number};
     case BatchKernel::factorize:
-      return {factorize_kernel<Stored>, number * factor_memory(fronts.shared_panel, fronts.shared_rows)};
+      return {factorize_kernel<Stored>, number * factor_memory(fronts.shared_panel)};
     case BatchKernel::multiply:
       return {multiply_kernel, 0};
     case BatchKernel::solve:

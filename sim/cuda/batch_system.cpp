@@ -20,7 +20,7 @@ namespace {
 
 /// Panels that fit on chip beside the rest of a factorization.
 FrontSettings fitting(FrontSettings settings) {
-  constexpr int rest = 16384;  // numbers
+  constexpr int rest = 8192 + 64;  // numbers
   settings.panel_capacity =
       std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
   return settings;

@@ -13,7 +13,6 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
-  fronts.shared_rows = plan.shared_rows;
   fronts.largest_columns = plan.largest_columns;
   fronts.vector_size = plan.vector_size;
   fronts.factor_size = plan.factor_size;

@@ -10,10 +10,10 @@ namespace flash::sim::cuda {
 // else are products, without a barrier between them: L21 = A21 X^T, -L21 X to the factor, and the update
 // matrix to memory, once. Bytes: blocks and factor once, lower update matrices out and in.
 
-/// On-chip numbers of a factorization: the panels of a level, where their rows stand in the children's update
-/// matrices, and a tile a warp.
-__host__ __device__ inline int factor_memory(int shared_panel, int shared_rows) {
-  return shared_panel + 4 * shared_rows + team_warps * tile_numbers;
+/// On-chip numbers of a factorization: the panels of a level, each with where its rows stand in the children's
+/// update matrices, and a tile a warp.
+__host__ __device__ inline int factor_memory(int shared_panel) {
+  return shared_panel + team_warps * tile_numbers;
 }
 
 /// The factor of the matrix `blocks`, nine numbers a block of the pattern, column-major. `updates`: memory
@@ -23,8 +23,7 @@ template <typename Stored>
 __device__ bool factorize(const FrontTables& tables, const float* blocks, float* updates, Stored* factor,
                           float* chip) {
   bool positive = true;
-  int* row_memory = reinterpret_cast<int*>(chip + tables.shared_panel);
-  float* tile = chip + tables.shared_panel + 4 * tables.shared_rows + warp() * tile_numbers;
+  float* tile = chip + tables.shared_panel + warp() * tile_numbers;
   for (int l = 0; l < tables.level_count; ++l) {
     __syncthreads();
     const FrontLevel level = tables.levels[l];
@@ -40,14 +39,16 @@ __device__ bool factorize(const FrontTables& tables, const float* blocks, float*
                            panel_leading(columns, below),
                            group};
       const int stride = mapped_rows(columns, below);
-      int* places = row_memory + group.index * (tables.shared_rows / level.groups / 4 * 4) * 4;
+      int* places = reinterpret_cast<int*>(panel.numbers + own * panel.leading);
       const ChildRows rows = {places, places + 2 * stride, stride,
                               front.children[0] >= 0 || front.children[1] >= 0};
       if (rows.any) {
         load_rows(tables, front, group, rows);
         group.synchronize();
+        gather_columns(panel, rows, updates);
+      } else {
+        clear_columns(panel);
       }
-      gather_columns(panel, rows, updates);
       group.synchronize();
       add_blocks(tables, front, blocks, panel);
       group.synchronize();

@@ -61,38 +61,33 @@ __device__ inline void load_rows(const FrontTables& tables, const FrontLayout& f
   for (int i = group.rank; i < rows.stride; i += group.size) to[i] = from[i];
 }
 
-/// What the children pass up to the columns of a panel. Zeros above the diagonal.
+/// Zeros, and the identity in the padding.
+__device__ inline void clear_columns(const Panel& panel) {
+  float4* to = reinterpret_cast<float4*>(panel.numbers);
+  for (int i = panel.group.rank; i < panel.own * panel.leading / 4; i += panel.group.size) to[i] = {0, 0, 0, 0};
+  panel.group.synchronize();
+  for (int i = panel.columns + panel.group.rank; i < panel.own; i += panel.group.size) panel.at(i, i) = 1;
+}
+
+/// What the children pass up to the columns of a panel; zeros above the diagonal, the identity in the padding.
 __device__ inline void gather_columns(const Panel& panel, const ChildRows& rows, const float* updates) {
-  constexpr int together = 3;  // blocks of columns whose numbers are under way
   const int height = panel.height();
   for (int strip = panel.group.rank / 32; 32 * strip < height; strip += panel.group.size / 32) {
     const int row = 32 * strip + lane();
-    const bool there = rows.any && row < height;
+    const bool there = row < height;
     const int places[2] = {there ? rows.place(0, row) : -1, there ? rows.place(1, row) : -1};
-    for (int base = 0; base < panel.own; base += together * panel_width) {
-      float numbers[together][2][panel_width] = {};
-      if (rows.any) {
+    float* to = panel.numbers + row;
+#pragma unroll 2
+    for (int first = 0; first < panel.own; first += panel_width) {
+      float numbers[2][panel_width];
+      rows.gather(updates, 0, places[0], first, numbers[0]);
+      rows.gather(updates, 1, places[1], first, numbers[1]);
 #pragma unroll
-        for (int b = 0; b < together; ++b) {
-          const int first = base + b * panel_width;
-          if (first >= panel.own) break;
-          rows.gather(updates, 0, places[0], first, numbers[b][0]);
-          rows.gather(updates, 1, places[1], first, numbers[b][1]);
-        }
-      }
-      if (row >= height) continue;
-#pragma unroll
-      for (int b = 0; b < together; ++b) {
-        const int first = base + b * panel_width;
-        if (first >= panel.own) break;
-        float* to = &panel.at(row, first);
-#pragma unroll
-        for (int j = 0; j < panel_width; ++j) {
-          float sum = numbers[b][0][j] + numbers[b][1][j];
-          if (row < first + j) sum = 0;
-          if (row == first + j && row >= panel.columns) sum = 1;
-          to[j * panel.leading] = sum;
-        }
+      for (int j = 0; j < panel_width; ++j, to += panel.leading) {
+        float sum = numbers[0][j] + numbers[1][j];
+        if (row < first + j) sum = 0;
+        if (row == first + j && row >= panel.columns) sum = 1;
+        if (there) *to = sum;
       }
     }
   }

@@ -5,7 +5,7 @@ namespace flash::sim::cuda {
 
 /// A FrontPlan in the memory of a device.
 struct FrontTables {
-  int size, level_count, shared_panel, shared_rows, largest_columns, vector_size;
+  int size, level_count, shared_panel, largest_columns, vector_size;
   long factor_size, update_size;
   const FrontLayout* fronts;
   const FrontLevel* levels;

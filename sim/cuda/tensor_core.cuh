@@ -80,37 +80,36 @@ __device__ inline void add_product(float (&sum)[4], const LeftFragment& left, co
   add_part_product(sum, left.high, right.high);
 }
 
-/// A product of 32 x 16 numbers, of which a lane has the rows 4 g to 4 g + 3: at(i, j) is row 4 g + i of
-/// the column that its right factor's order gives j (below).
-struct TileProduct {
-  float sum[2][2][4] = {};
+/// 32 rows of eight columns as two left factors, of which a lane has the rows 4 g to 4 g + 3: `near` in column t,
+/// `far` in column t + 4.
+struct LeftTile {
+  LeftFragment parts[2];
 
-  __device__ float at(int row, int column) const {
-    return sum[row / 2][column % 2][row % 2 * 2 + column / 2];
-  }
-  __device__ float4 rows(int column) const {
-    return {at(0, column), at(1, column), at(2, column), at(3, column)};
-  }
-
-  /// Adds eight columns times eight rows. `left[h]`: rows 4 g on in column t + 4 h; `right[h]`: two columns
-  /// in row t + 4 h. With the columns 2 g and 2 g + 1, at(., j) has column 4 t + j; with g and g + 8, column
-  /// 2 t + j / 2 + 8 (j % 2).
-  __device__ void add(const float4 (&left)[2], const float2 (&right)[2]) {
-    LeftFragment rows[2];
-    RightFragment columns[2];
+  __device__ LeftTile(const float4& near, const float4& far) {
+    const float4 columns[2] = {near, far};
 #pragma unroll
     for (int h = 0; h < 2; ++h) {
-      rows[0].set(2 * h, left[h].x);
-      rows[0].set(2 * h + 1, left[h].y);
-      rows[1].set(2 * h, left[h].z);
-      rows[1].set(2 * h + 1, left[h].w);
-      columns[0].set(h, right[h].x);
-      columns[1].set(h, right[h].y);
+      parts[0].set(2 * h, columns[h].x);
+      parts[0].set(2 * h + 1, columns[h].y);
+      parts[1].set(2 * h, columns[h].z);
+      parts[1].set(2 * h + 1, columns[h].w);
     }
-#pragma unroll
-    for (int i = 0; i < 2; ++i)
-#pragma unroll
-      for (int j = 0; j < 2; ++j) add_product(sum[i][j], rows[i], columns[j]);
+  }
+};
+
+/// A product of 32 x 8 numbers, of which a lane has the rows 4 g to 4 g + 3 of the columns 2 t and 2 t + 1.
+struct TileProduct {
+  float sum[2][4] = {};
+
+  __device__ void add(const LeftTile& left, float near, float far) {
+    RightFragment right;
+    right.set(0, near);
+    right.set(1, far);
+    add_product(sum[0], left.parts[0], right);
+    add_product(sum[1], left.parts[1], right);
+  }
+  __device__ float4 rows(int column) const {
+    return {sum[0][column], sum[0][2 + column], sum[1][column], sum[1][2 + column]};
   }
 };
 

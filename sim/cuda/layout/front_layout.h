@@ -72,12 +72,14 @@ FLASH_HOST_DEVICE inline int padded_columns(int columns) { return rounded_up(col
 FLASH_HOST_DEVICE inline int panel_leading(int columns, int below) {
   return (padded_columns(columns) + rounded_up(below, 4) + 7) / 16 * 16 + 8;
 }
-FLASH_HOST_DEVICE inline int panel_numbers(int columns, int below) {
-  return padded_columns(columns) * panel_leading(columns, below);
-}
 /// Its rows with padding for whole tiles.
 FLASH_HOST_DEVICE inline int mapped_rows(int columns, int below) {
-  return padded_columns(columns) + rounded_up(below, 16);
+  return padded_columns(columns) + rounded_up(below, 32);
+}
+/// Numbers, and four of each row to find it in the front's children.
+FLASH_HOST_DEVICE inline int panel_numbers(int columns, int below, bool has_children) {
+  return padded_columns(columns) * panel_leading(columns, below) +
+         (has_children ? 4 * mapped_rows(columns, below) : 0);
 }
 
 }  // namespace flash::sim::cuda

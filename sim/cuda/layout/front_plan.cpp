@@ -23,7 +23,9 @@ int leading(const Node& node) {
   return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), forward_rows);
 }
 int below(const Node& node) { return 3 * static_cast<int>(node.rows.size()); }
-int panel_size(const Node& node) { return panel_numbers(3 * node.column_count, below(node)); }
+int panel_size(const Node& node) {
+  return panel_numbers(3 * node.column_count, below(node), node.children[0] >= 0 || node.children[1] >= 0);
+}
 
 /// The dissection's nodes with what each touches below it.
 std::vector<Node> nodes_of(const std::vector<DissectionNode>& dissection,
@@ -160,13 +162,11 @@ void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, F
   for (std::size_t first = 0; first < nodes.size();) {
     FrontLevel level{};
     level.first_front = static_cast<int>(first);
-    int panel = 0, columns = 0, rows = 0;
+    int panel = 0, columns = 0;
     for (; first < nodes.size() && nodes[first].height == static_cast<int>(plan.levels.size()); ++first) {
       ++level.front_count;
       panel = std::max(panel, panel_size(nodes[first]));
       columns = std::max(columns, 3 * nodes[first].column_count);
-      if (nodes[first].height > 0)
-        rows = std::max(rows, mapped_rows(3 * nodes[first].column_count, below(nodes[first])));
     }
     // As many groups as fronts, so that none is idle.
     level.groups = 1;
@@ -174,7 +174,6 @@ void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, F
            2 * level.groups * panel <= settings.panel_capacity)
       level.groups *= 2;
     plan.shared_panel = std::max(plan.shared_panel, level.groups * rounded_up(panel, 4));
-    plan.shared_rows = std::max(plan.shared_rows, level.groups * rows);
     plan.largest_columns = std::max(plan.largest_columns, columns);
     plan.levels.push_back(level);
   }

@@ -27,7 +27,6 @@ struct FrontPlan {
   long update_size = 0;     ///< for update matrices
   int vector_size = 0;      ///< for what fronts pass up in a forward solve
   int shared_panel = 0;     ///< numbers of on-chip memory for the panels of a level
-  int shared_rows = 0;      ///< for the rows of its fronts that have children
   int largest_columns = 0;  ///< of a front
   long factor_entries = 0;  ///< that are not zero by structure
   double factor_flops = 0;  ///< additions and multiplications of a factorization with its inverses
@@ -35,7 +34,7 @@ struct FrontPlan {
 
 struct FrontSettings {
   int leaf_size = 8;             ///< vertices, at most, of a front without children
-  int panel_capacity = 20500;    ///< numbers of on-chip memory that a team has for panels
+  int panel_capacity = 20600;    ///< numbers of on-chip memory that a team has for panels
   int most_groups = team_warps;  ///< of a team in a factorization
 };
 
