@@ -14,26 +14,47 @@ void flatten(const std::vector<std::vector<int>>& lists, std::vector<int>& start
   }
 }
 
+/// A triangle among those of a SheetPlan.
+struct TriangleAt {
+  const TriangleGroup* group;
+  int lane;
+  int place;  ///< the lowest of its vertices
+};
+
+/// In the order of their places, so that what vertices next to each other need lies together.
+std::vector<TriangleAt> triangles_by_place(const SheetPlan& plan, const std::vector<int>& position) {
+  std::vector<TriangleAt> triangles;
+  for (const TriangleGroup& group : plan.triangle_groups)
+    for (int lane = 0; lane < group.count; ++lane) {
+      int place = position[group.vertices[0][lane]];
+      for (const auto& vertices : group.vertices) place = std::min(place, position[vertices[lane]]);
+      triangles.push_back({&group, lane, place});
+    }
+  std::stable_sort(triangles.begin(), triangles.end(),
+                   [](const TriangleAt& a, const TriangleAt& b) { return a.place < b.place; });
+  return triangles;
+}
+
 void add_triangles(const SheetPlan& plan, const std::vector<int>& position, SheetLayout& layout) {
-  layout.triangle_count = static_cast<int>(plan.sheet.triangles.size());
+  const std::vector<TriangleAt> triangles = triangles_by_place(plan, position);
+  layout.triangle_count = static_cast<int>(triangles.size());
   const int count = layout.triangle_count;
   layout.triangle_vertices.resize(3L * count);
   layout.gradients.resize(4L * count);
   layout.areas.resize(count);
   std::vector<std::vector<int>> corners(layout.size);
   layout.pair_sources.resize(plan.pattern.pairs.size());
-  int t = 0;
-  for (const TriangleGroup& group : plan.triangle_groups) {
-    for (int lane = 0; lane < group.count; ++lane, ++t) {
-      for (int k = 0; k < 3; ++k) {
-        const int vertex = group.vertices[k][lane];
-        layout.triangle_vertices[k * count + t] = position[vertex];
-        corners[position[vertex]].push_back(3 * k * count + t);
-        layout.pair_sources[group.slots[k][lane] - plan.pattern.size].add(3 * t + k);
-      }
-      for (int k = 0; k < 4; ++k) layout.gradients[k * count + t] = group.gradients[k][lane];
-      layout.areas[t] = group.area[lane];
+  for (int t = 0; t < count; ++t) {
+    const TriangleGroup& group = *triangles[t].group;
+    const int lane = triangles[t].lane;
+    for (int k = 0; k < 3; ++k) {
+      const int place = position[group.vertices[k][lane]];
+      layout.triangle_vertices[k * count + t] = place;
+      corners[place].push_back(3 * k * count + t);
+      layout.pair_sources[group.slots[k][lane] - plan.pattern.size].add(3 * t + k);
     }
+    for (int k = 0; k < 4; ++k) layout.gradients[k * count + t] = group.gradients[k][lane];
+    layout.areas[t] = group.area[lane];
   }
   flatten(corners, layout.corner_starts, layout.corners);
 }
