@@ -42,8 +42,6 @@ __device__ bool factorize(const FrontTables& tables, const float* blocks, float*
       int* places = reinterpret_cast<int*>(panel.numbers + own * panel.leading);
       const ChildRows rows = {places, places + 2 * stride, stride,
                               front.children[0] >= 0 || front.children[1] >= 0};
-      BlockBatch batch;
-      batch.load(tables, front, blocks, group.rank, group.size);
       if (rows.any) {
         load_rows(tables, front, group, rows);
         group.synchronize();
@@ -52,12 +50,7 @@ __device__ bool factorize(const FrontTables& tables, const float* blocks, float*
         clear_columns(panel);
       }
       group.synchronize();
-      for (int base = group.rank;;) {
-        batch.add(front, panel, base, group.size);
-        base += BlockBatch::size * group.size;
-        if (base >= 3 * front.block_count) break;
-        batch.load(tables, front, blocks, base, group.size);
-      }
+      add_blocks(tables, front, blocks, panel);
       group.synchronize();
       positive = invert_own_block(panel) && positive;
       Stored* to = factor + front.panel_at;

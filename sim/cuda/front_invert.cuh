@@ -9,22 +9,10 @@ namespace flash::sim::cuda {
 // `panel_width` columns after block: what turns A11 into L^T turns I into X. A column of blocks k has L below
 // its diagonal and X^T above it, and both take the same steps: times X_kk^T, then off the columns behind.
 
-/// 1 / sqrt(x) to two units in the last place, of a normal number.
-__device__ inline float inverse_root(float x) {
-#ifdef __CUDA_ARCH__
-  float root;
-  asm("rsqrt.approx.ftz.f32 %0, %1;" : "=f"(root) : "f"(x));
-  return root;
-#else
-  return rsqrtf(x);
-#endif
-}
-
 /// The diagonal block at `first`, by one warp: X_kk^T, zeros below its diagonal. Returns false at a pivot
 /// that is not positive, in whose place stands 1.
 __device__ inline bool invert_diagonal_block(const Panel& panel, int first) {
   constexpr unsigned all = 0xffffffffu;
-  constexpr float smallest = 1.17549435e-38f;  // normal number
   // Eight lanes have a column of the block each, the next eight one of the identity.
   const int column = lane() % panel_width;
   const bool right = lane() & panel_width;
@@ -38,11 +26,11 @@ __device__ inline bool invert_diagonal_block(const Panel& panel, int first) {
 #pragma unroll
   for (int k = 0; k < panel_width; ++k) {
     float pivot = __shfl_sync(all, numbers[k], k);
-    if (!(pivot >= smallest)) {
+    if (!(pivot > 0)) {
       positive = false;
       pivot = 1;
     }
-    const float scale = inverse_root(pivot);
+    const float scale = rsqrtf(pivot);
     numbers[k] *= scale;
 #pragma unroll
     for (int i = k + 1; i < panel_width; ++i)

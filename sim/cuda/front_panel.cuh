@@ -33,24 +33,22 @@ struct ChildRows {
 
   __device__ int place(int child, int row) const { return places[child * stride + row]; }
 
-  /// Whether the child has any of `count` columns from `first` on: whole warps.
+  /// Of one child, the numbers of a row each lane, at `place`, in columns from `first` on: whole warps.
   template <int count>
-  __device__ bool has_columns(int child, int first) const {
-    return __any_sync(0xffffffffu, offsets[child * stride + first + lane() % count] != 0);
-  }
-
-  /// work(j, where) for columns from `first` on: where their numbers of the row at `place` are, if it is there.
-  template <int count, typename Work>
-  __device__ void for_columns(const float* updates, int child, int place, int first, const Work& work) const {
+  __device__ void gather(const float* updates, int child, int place, int first,
+                         float (&numbers)[count]) const {
     const int* columns = offsets + child * stride + first;
-    const float* from = kept_whole(updates + max(place, 0));
+#pragma unroll
+    for (int j = 0; j < count; ++j) numbers[j] = 0;
+    if (!__any_sync(0xffffffffu, columns[lane() % count] != 0) || place < 0) return;
+    const float* from = kept_whole(updates + place);
 #pragma unroll
     for (int j = 0; j < count; j += 4) {
       const int4 four = *reinterpret_cast<const int4*>(columns + j);
-      work(j, from + four.x);
-      work(j + 1, from + four.y);
-      work(j + 2, from + four.z);
-      work(j + 3, from + four.w);
+      numbers[j] = from[four.x];
+      numbers[j + 1] = from[four.y];
+      numbers[j + 2] = from[four.z];
+      numbers[j + 3] = from[four.w];
     }
   }
 };
@@ -72,92 +70,58 @@ __device__ inline void clear_columns(const Panel& panel) {
 }
 
 /// What the children pass up to the columns of a panel; zeros above the diagonal, the identity in the padding.
-/// The first child's numbers are copied to their places while the second's, which are added, are on their way.
 __device__ inline void gather_columns(const Panel& panel, const ChildRows& rows, const float* updates) {
-  constexpr int together = 3;  // blocks of columns whose numbers are on their way to be added
-  const int strips = (panel.height() + 31) / 32, blocks = panel.own / panel_width;
-  const int own_warp = panel.group.rank / 32, warps = panel.group.size / 32;
-  // A warp takes some of the blocks of each strip.
-  const int first_block = own_warp % blocks, step = max(min(warps, blocks), 1);
-  const int first_strip = own_warp / blocks, strip_step = max(warps / blocks, 1);
-  if (own_warp >= step * strip_step) return;
-  for (int strip = first_strip; strip < strips; strip += strip_step) {
+  const int height = panel.height();
+  for (int strip = panel.group.rank / 32; 32 * strip < height; strip += panel.group.size / 32) {
     const int row = 32 * strip + lane();
-    if (row >= panel.height()) break;
-    const int place = rows.place(0, row);
-    for (int block = first_block; block < blocks; block += step) {
-      const int first = panel_width * block;
-      float* to = &panel.at(row, first);
-      rows.for_columns<panel_width>(updates, 0, place, first, [&](int j, const float* from) {
-        const bool unit = row == first + j && row >= panel.columns;
-        if (unit)
-          to[j * panel.leading] = 1;
-        else
-          copy_later(to + j * panel.leading, from, place >= 0 && row >= first + j);
-      });
-    }
-  }
-  for (int strip = first_strip; strip < strips; strip += strip_step) {
-    const int row = 32 * strip + lane(), place = row < panel.height() ? rows.place(1, row) : -1;
-    for (int base = first_block; base < blocks; base += together * step) {
-      float numbers[together][panel_width];
-      bool there[together];
+    const bool there = row < height;
+    const int places[2] = {there ? rows.place(0, row) : -1, there ? rows.place(1, row) : -1};
+    float* to = panel.numbers + row;
+#pragma unroll 2
+    for (int first = 0; first < panel.own; first += panel_width) {
+      float numbers[2][panel_width];
+      rows.gather(updates, 0, places[0], first, numbers[0]);
+      rows.gather(updates, 1, places[1], first, numbers[1]);
 #pragma unroll
-      for (int b = 0; b < together; ++b) {
-        const int block = min(base + b * step, blocks - 1), first = panel_width * block;
-        there[b] = rows.has_columns<panel_width>(1, first) && place >= 0 && base + b * step < blocks;
-        if (there[b])
-          rows.for_columns<panel_width>(updates, 1, place, first,
-                                        [&](int j, const float* from) { numbers[b][j] = *from; });
-      }
-      wait_for_copies();
-#pragma unroll
-      for (int b = 0; b < together; ++b) {
-        if (!there[b]) continue;
-        const int first = panel_width * (base + b * step);
-        float* to = &panel.at(row, first);
-#pragma unroll
-        for (int j = 0; j < panel_width; ++j)
-          if (row >= first + j) to[j * panel.leading] += numbers[b][j];
+      for (int j = 0; j < panel_width; ++j, to += panel.leading) {
+        float sum = numbers[0][j] + numbers[1][j];
+        if (row < first + j) sum = 0;
+        if (row == first + j && row >= panel.columns) sum = 1;
+        if (there) *to = sum;
       }
     }
   }
-  wait_for_copies();
 }
 
-/// Blocks of the matrix on their way to a panel: columns of a block, a few each thread.
-struct BlockBatch {
-  static constexpr int size = 4;
-  BlockPlace places[size];
-  float numbers[size][3];
-
-  __device__ void load(const FrontTables& tables, const FrontLayout& front, const float* __restrict__ blocks,
-                       int base, int step) {
-    const int count = 3 * front.block_count;
+/// Adds the blocks of the matrix, a column of a block each thread, a few of them at a time.
+__device__ inline void add_blocks(const FrontTables& tables, const FrontLayout& front,
+                                  const float* __restrict__ blocks, const Panel& panel) {
+  constexpr int together = 4;
+  const int count = 3 * front.block_count;
+  for (int base = panel.group.rank; base < count; base += together * panel.group.size) {
+    BlockPlace places[together];
+    float numbers[together][3];
 #pragma unroll
-    for (int i = 0; i < size; ++i)
-      places[i] = tables.blocks[front.first_block + min(base + i * step, count - 1) / 3];
+    for (int i = 0; i < together; ++i)
+      places[i] = tables.blocks[front.first_block + min(base + i * panel.group.size, count - 1) / 3];
 #pragma unroll
-    for (int i = 0; i < size; ++i) {
-      const int c = min(base + i * step, count - 1) % 3;
+    for (int i = 0; i < together; ++i) {
+      const int c = min(base + i * panel.group.size, count - 1) % 3;
       const float* from = blocks + 9 * places[i].source + (places[i].transposed ? c : 3 * c);
-      const int apart = places[i].transposed ? 3 : 1;
+      const int step = places[i].transposed ? 3 : 1;
 #pragma unroll
-      for (int r = 0; r < 3; ++r) numbers[i][r] = from[r * apart];
+      for (int r = 0; r < 3; ++r) numbers[i][r] = from[r * step];
     }
-  }
-  __device__ void add(const FrontLayout& front, const Panel& panel, int base, int step) const {
 #pragma unroll
-    for (int i = 0; i < size; ++i) {
-      const int e = base + i * step, column = 3 * places[i].column + e % 3;
-      if (e >= 3 * front.block_count) continue;
+    for (int i = 0; i < together; ++i) {
+      const int e = base + i * panel.group.size, column = 3 * places[i].column + e % 3;
       const int below = places[i].row - front.column_count,
                 row = below < 0 ? 3 * places[i].row : panel.own + 3 * below;
 #pragma unroll
       for (int r = 0; r < 3; ++r)
-        if (row + r >= column) panel.at(row + r, column) += numbers[i][r];
+        if (e < count && row + r >= column) panel.at(row + r, column) += numbers[i][r];
     }
   }
-};
+}
 
 }  // namespace flash::sim::cuda

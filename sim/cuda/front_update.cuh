@@ -127,27 +127,32 @@ __device__ void store_inverse(const FrontLayout& front, const Panel& panel, Stor
     }
 }
 
-/// A tile of what the front passes up. What its children pass up is on its way while the product is made, a row
-/// each lane, so that what lies together is read together: the first's to `chip`, tile_numbers of the warp, where
-/// the second's is added.
+/// What the children pass up to a tile, on chip; a row each lane, so that what lies together is read together.
+__device__ inline void gather_tile(const Panel& panel, const ChildRows& rows, int row, int column,
+                                   const float* updates, float* chip) {
+  constexpr int together = 16;
+  const int own = row + lane();
+  const int places[2] = {own < panel.below ? rows.place(0, panel.own + own) : -1,
+                         own < panel.below ? rows.place(1, panel.own + own) : -1};
+  const int four_rows = lane() / 4, rest = lane() % 4;
+#pragma unroll
+  for (int first = 0; first < tile_size; first += together) {
+    float numbers[2][together];
+#pragma unroll
+    for (int k = 0; k < 2; ++k)
+      rows.gather(updates, k, places[k], panel.own + column + first, numbers[k]);
+#pragma unroll
+    for (int j = 0; j < together; ++j)
+      chip[tile_place(first + j, four_rows) + rest] = numbers[0][j] + numbers[1][j];
+  }
+}
+
+/// A tile of what the front passes up. `chip`: tile_numbers of the warp.
 __device__ inline void make_update_tile(const FrontLayout& front, const Panel& panel, const ChildRows& rows,
                                         int row, int column, float* updates, float* chip) {
   constexpr int blocks = tile_size / 8;
   const int g = lane() / 4, t = lane() % 4;
-  const int own = row + lane(), at = panel.own + own;
-  const int places[2] = {rows.any && own < panel.below ? rows.place(0, at) : -1,
-                         rows.any && own < panel.below ? rows.place(1, at) : -1};
-  float numbers[tile_size];
-  bool second = false;
-  if (rows.any) {
-    rows.for_columns<tile_size>(updates, 0, places[0], panel.own + column, [&](int j, const float* from) {
-      copy_later(chip + tile_place(j, lane() / 4) + lane() % 4, from, places[0] >= 0);
-    });
-    second = rows.has_columns<tile_size>(1, panel.own + column) && places[1] >= 0;
-    if (second)
-      rows.for_columns<tile_size>(updates, 1, places[1], panel.own + column,
-                                  [&](int j, const float* from) { numbers[j] = *from; });
-  }
+  if (rows.any) gather_tile(panel, rows, row, column, updates, chip);
   TileProduct products[blocks];
   const float* left = &panel.at(clamped_rows(panel, row), t);
   const float* right[blocks];
@@ -162,11 +167,6 @@ __device__ inline void make_update_tile(const FrontLayout& front, const Panel& p
 #pragma unroll
     for (int b = 0; b < blocks; ++b, right[b - 1] += 2 * step)
       products[b].add(rows_of_tile, right[b][0], right[b][step]);
-  }
-  wait_for_copies();
-  if (second) {
-#pragma unroll
-    for (int j = 0; j < tile_size; ++j) chip[tile_place(j, lane() / 4) + lane() % 4] += numbers[j];
   }
   __syncwarp();
   const int first = row + 4 * g;

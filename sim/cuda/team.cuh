@@ -24,24 +24,6 @@ __device__ inline Number* kept_whole(Number* pointer) {
   return pointer;
 }
 
-/// Copies a number to memory on chip, or zero if it is not `there`. Until wait_for_copies it is on its way, and
-/// then there for the thread that asked.
-__device__ inline void copy_later(float* to, const float* from, bool there) {
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 800
-  asm volatile("cp.async.ca.shared.global [%0], [%1], 4, %2;" ::"r"(
-                   static_cast<unsigned>(__cvta_generic_to_shared(to))),
-               "l"(from), "r"(there ? 4 : 0)
-               : "memory");
-#else
-  *to = there ? *from : 0.0f;
-#endif
-}
-__device__ inline void wait_for_copies() {
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 800
-  asm volatile("cp.async.wait_all;" ::: "memory");
-#endif
-}
-
 __device__ inline int lane() { return static_cast<int>(threadIdx.x % 32); }
 __device__ inline int warp() { return static_cast<int>(threadIdx.x / 32); }
 
