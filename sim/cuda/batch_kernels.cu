@@ -37,16 +37,16 @@ __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
   for (int e = static_cast<int>(blockIdx.x); e < (batch).environment_count; e += static_cast<int>(gridDim.x))
 
 template <bool places_on_chip>
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+__global__ void __launch_bounds__(team_threads, dense_teams)
     evaluate_kernel(const __grid_constant__ BatchNumbers batch, float) {
-  const int together = batch.together;
-  for (int e = together * static_cast<int>(blockIdx.x); e < batch.environment_count;
-       e += together * static_cast<int>(gridDim.x))
-    elastic_gradients<places_on_chip>(
-        batch.sheet,
-        {together, e, batch.environment_count - 1, batch.environments, batch.positions, batch.gradients,
-         batch.energies, batch.triangle_gradients + 9L * batch.sheet.triangle_count * blockIdx.x},
-        shared_memory<double>());
+  const int triangles = batch.sheet.triangle_count;
+  FOR_OWN_ENVIRONMENTS(batch, e) {
+    const ElasticEnergies energy = elastic_gradient<places_on_chip>(
+        batch.sheet, batch.environments[e], places_of(batch, e), batch.gradients + 3L * batch.sheet.size * e,
+        batch.triangle_gradients + 9L * triangles * blockIdx.x, shared_memory<double>());
+    if (threadIdx.x == 0) batch.energies[e] = energy;
+    __syncthreads();
+  }
 }
 
 template <bool Preconditioner>
@@ -130,31 +130,26 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
   }
 }
 
-/// A kernel, the on-chip memory of a team [bytes], and environments that a team takes at a time.
+/// A kernel and the on-chip memory of a team [bytes].
 struct Choice {
   void (*kernel)(BatchNumbers, float);
   int bytes;
-  int together = 1;
 };
 
-/// Two at a time where the device has not enough teams for all, and places on chip where two teams find room.
-Choice evaluation(int size, int environment_count) {
-  const auto choice = [size](int together) {
-    const int near = gradient_memory(size, together, true);
-    return 2 * (near + 1024) <= most_memory() ? Choice{evaluate_kernel<true>, near, together}
-                                              : Choice{evaluate_kernel<false>,
-                                                       gradient_memory(size, together, false), together};
-  };
-  const Choice one = choice(1);
-  return environment_count > resident_teams(one.kernel, one.bytes) ? choice(2) : one;
+/// Places on chip where all teams find room.
+Choice evaluation(int size) {
+  const int near = gradient_memory(size, true);
+  return dense_teams * (near + 1024) <= most_memory()
+             ? Choice{evaluate_kernel<true>, near}
+             : Choice{evaluate_kernel<false>, gradient_memory(size, false)};
 }
 
 template <typename Stored>
-Choice choice(BatchKernel kernel, const FrontTables& fronts, int environment_count) {
+Choice choice(BatchKernel kernel, const FrontTables& fronts) {
   const int number = sizeof(float), solve_bytes = number * solve_memory(fronts.largest_columns);
   switch (kernel) {
     case BatchKernel::evaluate:
-      return evaluation(fronts.size, environment_count);
+      return evaluation(fronts.size);
     case BatchKernel::assemble_matrix:
       return {assemble_kernel<false>, hessian_memory * number};
     case BatchKernel::assemble_preconditioner:
@@ -171,26 +166,22 @@ Choice choice(BatchKernel kernel, const FrontTables& fronts, int environment_cou
   return {find_directions_kernel<Stored>, solve_bytes + number * team_warps};
 }
 
-Choice choice(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts,
-              int environment_count) {
-  return precision == FactorPrecision::half ? choice<__half>(kernel, fronts, environment_count)
-                                            : choice<float>(kernel, fronts, environment_count);
+Choice choice(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts) {
+  return precision == FactorPrecision::half ? choice<__half>(kernel, fronts) : choice<float>(kernel, fronts);
 }
 
 }  // namespace
 
 int resident_teams(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts) {
-  const Choice chosen = choice(kernel, precision, fronts, 1);
+  const Choice chosen = choice(kernel, precision, fronts);
   return resident_teams(chosen.kernel, chosen.bytes);
 }
 
 void run(BatchKernel kernel, FactorPrecision precision, const BatchNumbers& numbers, int teams,
          float tolerance, cudaStream_t stream) {
-  const Choice chosen = choice(kernel, precision, numbers.fronts, numbers.environment_count);
-  BatchNumbers own = numbers;
-  own.together = chosen.together;
-  launch(chosen.kernel, std::min(teams, resident_teams(chosen.kernel, chosen.bytes)), chosen.bytes, stream, own,
-         tolerance);
+  const Choice chosen = choice(kernel, precision, numbers.fronts);
+  launch(chosen.kernel, std::min(teams, resident_teams(chosen.kernel, chosen.bytes)), chosen.bytes, stream,
+         numbers, tolerance);
 }
 
 }  // namespace flash::sim::cuda

@@ -14,7 +14,6 @@ struct BatchNumbers {
   FrontTables fronts;
   SheetTables sheet;
   int environment_count, restrictions_each;
-  int together;  ///< environments that a team evaluates at a time
   const EnvironmentNumbers* environments;
   const Point* positions;
   const float* vectors;

@@ -89,7 +89,6 @@ struct BatchSystem::Memory {
                plan.sheet,
                count,
                layout.size,
-               1,
                environments.data(),
                positions.data(),
                vectors.data(),

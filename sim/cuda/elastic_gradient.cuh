@@ -5,27 +5,14 @@
 
 namespace flash::sim::cuda {
 
-// Energies and gradients of one environment or two, which then share what is read of the plan: a megabyte of
-// bending values for 1,024 vertices, by far the most. A thread takes a triangle and writes what it gives to
-// memory of its own; then a thread takes a vertex, and adds up its triangles in a fixed order.
+// A thread takes a triangle and writes what it gives to memory of its own; then a thread takes a vertex, and adds
+// up its triangles in a fixed order. Most of what is read are the values of bending, a megabyte for 1,024 vertices,
+// and most of the time goes by until they are there: so many are on their way at a time.
 
 /// Bytes on chip: places, where they fit, and a number a warp.
-__host__ __device__ inline int gradient_memory(int size, int together, bool places_on_chip) {
-  return static_cast<int>(sizeof(double)) * (team_warps + (places_on_chip ? 3 * size * together : 0));
+__host__ __device__ inline int gradient_memory(int size, bool places_on_chip) {
+  return static_cast<int>(sizeof(double)) * (team_warps + (places_on_chip ? 3 * size : 0));
 }
-
-/// The environments of a team and its memory.
-struct GradientTask {
-  int together, first, last;  ///< the team's environments from `first` on; no more than `last` there are
-  const EnvironmentNumbers* environments;
-  const Point* positions;
-  double* gradients;
-  ElasticEnergies* energies;
-  double* shares;  ///< nine numbers a triangle
-
-  /// Where a second environment is missing, the last one stands for it.
-  __device__ int environment(int e) const { return min(first + e, last); }
-};
 
 /// What the triangles of one environment give to `shares`. Returns the energy of the thread's own.
 template <typename Places>
@@ -63,7 +50,7 @@ __device__ double add_up_gradient(const SheetTables& tables, const Places& place
     const Triple p = place(vertex), bent = {own[0], own[1], own[2]};
     bending += dot(bent, p);
     Triple sum = {0, 0, 0};
-#pragma unroll 2
+#pragma unroll 6
     for (int k = tables.corner_starts[vertex]; k < tables.corner_starts[vertex + 1]; ++k) {
       const double* share = shares + tables.corners[k];
       sum = sum + Triple{share[0], share[tables.triangle_count], share[2 * tables.triangle_count]};
@@ -75,49 +62,35 @@ __device__ double add_up_gradient(const SheetTables& tables, const Places& place
   return bending;
 }
 
-/// Membrane and bending energy [J], and the gradient of both [N], three numbers a vertex. `chip`:
-/// gradient_memory.
+/// Membrane and bending energy [J], to all threads, and the gradient of both [N], three numbers a vertex.
+/// `shares`: memory for nine numbers a triangle; `chip`: gradient_memory.
 template <bool places_on_chip>
-__device__ void elastic_gradients(const SheetTables& tables, const GradientTask& task, double* chip) {
-  const int size = tables.size;
+__device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                            const Point* positions, double* gradient, double* shares,
+                                            double* chip) {
   double *partial = chip, *near = chip + team_warps;
-  const auto positions = [&](int e) { return task.positions + static_cast<long>(size) * task.environment(e); };
-  const auto gradient = [&](int e) { return task.gradients + 3L * size * task.environment(e); };
-  const auto place = [&](int e, int vertex) -> Triple {
-    if constexpr (places_on_chip) {
-      const double* own = near + 3 * (e * size + vertex);
-      return {own[0], own[1], own[2]};
-    }
-    return triple(positions(e)[vertex]);
+  const auto place = [&](int vertex) -> Triple {
+    if constexpr (places_on_chip)
+      return {near[3 * vertex], near[3 * vertex + 1], near[3 * vertex + 2]};
+    else
+      return triple(positions[vertex]);
   };
   if constexpr (places_on_chip) {
-    for (int e = 0; e < task.together; ++e)
-      for (int vertex = static_cast<int>(threadIdx.x); vertex < size; vertex += team_threads) {
-        const Point& p = positions(e)[vertex];
-        double* own = near + 3 * (e * size + vertex);
-        own[0] = p.x;
-        own[1] = p.y;
-        own[2] = p.z;
-      }
+    for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += team_threads) {
+      const Point p = positions[vertex];
+      near[3 * vertex] = p.x;
+      near[3 * vertex + 1] = p.y;
+      near[3 * vertex + 2] = p.z;
+    }
     __syncthreads();
   }
-  multiply_scalar_rows(tables, tables.group_values, task.together, place,
-                       [&](int e, int row, int c, double sum) {
-                         if (task.first + e > task.last) return;
-                         gradient(e)[3 * row + c] = task.environments[task.environment(e)].rigidity * sum;
-                       });
-#pragma unroll 1
-  for (int e = 0; e < task.together && task.first + e <= task.last; ++e) {
-    const auto own_place = [&](int vertex) { return place(e, vertex); };
-    const double membrane =
-        triangle_gradients(tables, task.environments[task.environment(e)], own_place, task.shares);
-    __syncthreads();
-    const double bending = add_up_gradient(tables, own_place, task.shares, gradient(e));
-    const ElasticEnergies energies = {sum_over_team(membrane, partial),
-                                      0.5 * sum_over_team(bending, partial)};
-    if (threadIdx.x == 0) task.energies[task.environment(e)] = energies;
-    __syncthreads();
-  }
+  multiply_scalar_rows(tables, tables.group_values, place, [&](int row, int c, double sum) {
+    gradient[3 * row + c] = environment.rigidity * sum;
+  });
+  const double membrane = triangle_gradients(tables, environment, place, shares);
+  __syncthreads();
+  const double bending = add_up_gradient(tables, place, shares, gradient);
+  return {sum_over_team(membrane, partial), 0.5 * sum_over_team(bending, partial)};
 }
 
 }  // namespace flash::sim::cuda

@@ -71,23 +71,31 @@ __device__ inline void clear_columns(const Panel& panel) {
 
 /// What the children pass up to the columns of a panel; zeros above the diagonal, the identity in the padding.
 __device__ inline void gather_columns(const Panel& panel, const ChildRows& rows, const float* updates) {
+  constexpr int together = 2;  // blocks of columns whose numbers are on their way
   const int height = panel.height();
   for (int strip = panel.group.rank / 32; 32 * strip < height; strip += panel.group.size / 32) {
     const int row = 32 * strip + lane();
     const bool there = row < height;
     const int places[2] = {there ? rows.place(0, row) : -1, there ? rows.place(1, row) : -1};
-    float* to = panel.numbers + row;
-#pragma unroll 2
-    for (int first = 0; first < panel.own; first += panel_width) {
-      float numbers[2][panel_width];
-      rows.gather(updates, 0, places[0], first, numbers[0]);
-      rows.gather(updates, 1, places[1], first, numbers[1]);
+    for (int base = 0; base < panel.own; base += together * panel_width) {
+      float numbers[together][2][panel_width];
 #pragma unroll
-      for (int j = 0; j < panel_width; ++j, to += panel.leading) {
-        float sum = numbers[0][j] + numbers[1][j];
-        if (row < first + j) sum = 0;
-        if (row == first + j && row >= panel.columns) sum = 1;
-        if (there) *to = sum;
+      for (int b = 0; b < together; ++b) {
+        const int first = min(base + b * panel_width, panel.own - panel_width);
+        rows.gather(updates, 0, places[0], first, numbers[b][0]);
+        rows.gather(updates, 1, places[1], first, numbers[b][1]);
+      }
+#pragma unroll
+      for (int b = 0; b < together; ++b) {
+        const int first = base + b * panel_width;
+        float* to = &panel.at(row, first);
+#pragma unroll
+        for (int j = 0; j < panel_width; ++j) {
+          float sum = numbers[b][0][j] + numbers[b][1][j];
+          if (row < first + j) sum = 0;
+          if (row == first + j && row >= panel.columns) sum = 1;
+          if (there && first < panel.own) to[j * panel.leading] = sum;
+        }
       }
     }
   }

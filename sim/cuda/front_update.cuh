@@ -130,21 +130,14 @@ __device__ void store_inverse(const FrontLayout& front, const Panel& panel, Stor
 /// What the children pass up to a tile, on chip; a row each lane, so that what lies together is read together.
 __device__ inline void gather_tile(const Panel& panel, const ChildRows& rows, int row, int column,
                                    const float* updates, float* chip) {
-  constexpr int together = 16;
-  const int own = row + lane();
-  const int places[2] = {own < panel.below ? rows.place(0, panel.own + own) : -1,
-                         own < panel.below ? rows.place(1, panel.own + own) : -1};
+  const int own = row + lane(), at = panel.own + own;
   const int four_rows = lane() / 4, rest = lane() % 4;
+  float numbers[2][tile_size];
 #pragma unroll
-  for (int first = 0; first < tile_size; first += together) {
-    float numbers[2][together];
+  for (int k = 0; k < 2; ++k)
+    rows.gather(updates, k, own < panel.below ? rows.place(k, at) : -1, panel.own + column, numbers[k]);
 #pragma unroll
-    for (int k = 0; k < 2; ++k)
-      rows.gather(updates, k, places[k], panel.own + column + first, numbers[k]);
-#pragma unroll
-    for (int j = 0; j < together; ++j)
-      chip[tile_place(first + j, four_rows) + rest] = numbers[0][j] + numbers[1][j];
-  }
+  for (int j = 0; j < tile_size; ++j) chip[tile_place(j, four_rows) + rest] = numbers[0][j] + numbers[1][j];
 }
 
 /// A tile of what the front passes up. `chip`: tile_numbers of the warp.

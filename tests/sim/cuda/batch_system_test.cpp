@@ -409,7 +409,7 @@ TEST(BatchSystem, ABatchEqualsAloneBitwiseRunAfterRun) {
   }
 }
 
-// More environments than the device has teams for, which then take two at a time.
+// More environments than the device has teams for, which then take one after the other.
 TEST(BatchSystem, ManyEnvironmentsAreEvaluatedAsEachAlone) {
   SKIP_WITHOUT_DEVICE();
   const auto plan = small_plans()[1].second;
