@@ -55,8 +55,7 @@ __global__ void __launch_bounds__(team_threads, hessian_teams)
   float* chip = shared_memory<float>();
   float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares,
-                 chip);
+    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares, chip);
     __syncthreads();
     if constexpr (Preconditioner)
       assemble_blocks(batch.sheet, batch.environments[e], shares,

@@ -5,9 +5,9 @@
 
 namespace flash::sim::cuda {
 
-// A thread takes a triangle and writes what it gives to memory of its own; then a thread takes a vertex, and adds
-// up its triangles in a fixed order. Most of what is read are the values of bending, a megabyte for 1,024 vertices,
-// and most of the time goes by until they are there: so many are on their way at a time.
+// A thread takes a triangle and writes what it gives to memory of its own; then a thread takes a vertex, and
+// adds up its triangles in a fixed order. Most of what is read are the values of bending, a megabyte for
+// 1,024 vertices, and most of the time goes by until they are there: so many are on their way at a time.
 
 /// Bytes on chip: places, where they fit, and a number a warp.
 __host__ __device__ inline int gradient_memory(int size, bool places_on_chip) {

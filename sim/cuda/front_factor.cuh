@@ -10,8 +10,8 @@ namespace flash::sim::cuda {
 // else are products, without a barrier between them: L21 = A21 X^T, -L21 X to the factor, and the update
 // matrix to memory, once. Bytes: blocks and factor once, lower update matrices out and in.
 
-/// On-chip numbers of a factorization: the panels of a level, each with where its rows stand in the children's
-/// update matrices, and a tile a warp.
+/// On-chip numbers of a factorization: the panels of a level, each with where its rows stand in the
+/// children's update matrices, and a tile a warp.
 __host__ __device__ inline int factor_memory(int shared_panel) {
   return shared_panel + team_warps * tile_numbers;
 }

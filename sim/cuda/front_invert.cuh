@@ -78,8 +78,8 @@ __device__ inline void scale_columns(const Panel& panel, int first) {
   }
 }
 
-/// Takes the columns of blocks at `first` off 16 rows of a column of blocks behind: L from the row `lower` on,
-/// X^T up to the block at `first`.
+/// Takes the columns of blocks at `first` off 16 rows of a column of blocks behind: L from the row `lower`
+/// on, X^T up to the block at `first`.
 __device__ inline void take_off(const Panel& panel, int first, int row, int column, int lower) {
   const int g = lane() / 4, t = lane() % 4;
   RightFragment right;
@@ -97,8 +97,8 @@ __device__ inline void take_off(const Panel& panel, int first, int row, int colu
   }
 }
 
-/// The same for all columns behind. The first warp goes ahead to the next diagonal block and inverts it, which
-/// nothing else can hide. Returns, to that warp, whether its pivots were positive.
+/// The same for all columns behind. The first warp goes ahead to the next diagonal block and inverts it,
+/// which nothing else can hide. Returns, to that warp, whether its pivots were positive.
 __device__ inline bool take_off_all(const Panel& panel, int first) {
   const int next = first + panel_width, own_warp = panel.group.rank / 32, warps = panel.group.size / 32;
   bool positive = true;

@@ -8,10 +8,10 @@ namespace flash::sim::cuda {
 /// of the identity, then the rows below.
 struct Panel {
   float* numbers;
-  int columns;    ///< own rows and columns
-  int own;        ///< padded
-  int below;      ///< rows below
-  int leading;    ///< panel_leading
+  int columns;  ///< own rows and columns
+  int own;      ///< padded
+  int below;    ///< rows below
+  int leading;  ///< panel_leading
   Group group;
 
   __device__ int height() const { return own + below; }
@@ -64,12 +64,14 @@ __device__ inline void load_rows(const FrontTables& tables, const FrontLayout& f
 /// Zeros, and the identity in the padding.
 __device__ inline void clear_columns(const Panel& panel) {
   float4* to = reinterpret_cast<float4*>(panel.numbers);
-  for (int i = panel.group.rank; i < panel.own * panel.leading / 4; i += panel.group.size) to[i] = {0, 0, 0, 0};
+  for (int i = panel.group.rank; i < panel.own * panel.leading / 4; i += panel.group.size)
+    to[i] = {0, 0, 0, 0};
   panel.group.synchronize();
   for (int i = panel.columns + panel.group.rank; i < panel.own; i += panel.group.size) panel.at(i, i) = 1;
 }
 
-/// What the children pass up to the columns of a panel; zeros above the diagonal, the identity in the padding.
+/// What the children pass up to the columns of a panel; zeros above the diagonal, the identity in the
+/// padding.
 __device__ inline void gather_columns(const Panel& panel, const ChildRows& rows, const float* updates) {
   constexpr int together = 2;  // blocks of columns whose numbers are on their way
   const int height = panel.height();

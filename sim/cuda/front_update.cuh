@@ -5,9 +5,9 @@
 
 namespace flash::sim::cuda {
 
-// What follows from A21 and X = L11^-1, by tiles of 32 rows, a warp each: L21 = A21 X^T in place, the factor's
-// -L21 X, and the update matrix, less L21 L21^T. Products are without branches: columns behind the last stand for
-// it, and nothing is made of them.
+// What follows from A21 and X = L11^-1, by tiles of 32 rows, a warp each: L21 = A21 X^T in place, the
+// factor's -L21 X, and the update matrix, less L21 L21^T. Products are without branches: columns behind the
+// last stand for it, and nothing is made of them.
 
 /// Columns of a tile of L21, in blocks of eight, and of the update matrix.
 inline constexpr int strip_blocks = 3, strip_columns = 8 * strip_blocks, tile_size = 32;
@@ -38,8 +38,7 @@ __device__ inline void make_strip(const Panel& panel, int strip) {
     TileProduct products[strip_blocks];
     const float* across[strip_blocks];  // a column of X^T
 #pragma unroll
-    for (int b = 0; b < strip_blocks; ++b)
-      across[b] = &panel.at(t, min(first + 8 * b, panel.own - 8) + g);
+    for (int b = 0; b < strip_blocks; ++b) across[b] = &panel.at(t, min(first + 8 * b, panel.own - 8) + g);
 #pragma unroll 1
     for (int k = 0; k < first; k += 8) {
       const LeftTile left = left_tile(panel, row, k);
@@ -70,17 +69,18 @@ template <typename Stored>
 __device__ void store_strip(const FrontLayout& front, const Panel& panel, int strip, Stored* factor) {
   const int g = lane() / 4, t = lane() % 4, row = clamped_rows(panel, 32 * strip);
   const int first_row = 32 * strip + 4 * g, step = 4 * panel.leading;
+  // A strip of padding alone has nothing to read, least of all what another warp is at.
+  const int depth = 32 * strip < panel.below ? panel.own : 0;
   Stored* to = kept_whole(factor + front.below_at + first_row);
   for (int first = 0; first < panel.columns; first += strip_columns) {
     TileProduct products[strip_blocks];
     const float* across[strip_blocks];  // a row of X^T
 #pragma unroll
-    for (int b = 0; b < strip_blocks; ++b)
-      across[b] = &panel.at(min(first + 8 * b, panel.own - 8) + g, t);
+    for (int b = 0; b < strip_blocks; ++b) across[b] = &panel.at(min(first + 8 * b, panel.own - 8) + g, t);
 #pragma unroll
     for (int d = 0; d < strip_blocks; ++d) {
       const int k = first + 8 * d;
-      if (k >= panel.own) break;
+      if (k >= depth) break;
       const LeftTile left = left_tile(panel, row, k);
 #pragma unroll
       for (int b = 0; b <= d; ++b) {
@@ -89,7 +89,7 @@ __device__ void store_strip(const FrontLayout& front, const Panel& panel, int st
       }
     }
 #pragma unroll 1
-    for (int k = first + strip_columns; k < panel.own; k += 8) {
+    for (int k = first + strip_columns; k < depth; k += 8) {
       const LeftTile left = left_tile(panel, row, k);
 #pragma unroll
       for (int b = 0; b < strip_blocks; ++b) {
@@ -104,9 +104,9 @@ __device__ void store_strip(const FrontLayout& front, const Panel& panel, int st
       for (int j = 0; j < 2; ++j) {
         const int column = first + 8 * b + 2 * t + j;
         const float4 sum = products[b].rows(j);
-        const float4 result = {
-            first_row < panel.below ? -sum.x : 0, first_row + 1 < panel.below ? -sum.y : 0,
-            first_row + 2 < panel.below ? -sum.z : 0, first_row + 3 < panel.below ? -sum.w : 0};
+        const float4 result = {first_row < panel.below ? -sum.x : 0, first_row + 1 < panel.below ? -sum.y : 0,
+                               first_row + 2 < panel.below ? -sum.z : 0,
+                               first_row + 3 < panel.below ? -sum.w : 0};
         if (column < panel.columns) store_four(result, to + column * front.leading);
       }
   }
@@ -127,7 +127,8 @@ __device__ void store_inverse(const FrontLayout& front, const Panel& panel, Stor
     }
 }
 
-/// What the children pass up to a tile, on chip; a row each lane, so that what lies together is read together.
+/// What the children pass up to a tile, on chip; a row each lane, so that what lies together is read
+/// together.
 __device__ inline void gather_tile(const Panel& panel, const ChildRows& rows, int row, int column,
                                    const float* updates, float* chip) {
   const int own = row + lane(), at = panel.own + own;

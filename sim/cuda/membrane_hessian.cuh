@@ -61,7 +61,7 @@ inline __device__ void write_shares(const SheetTables& tables, const Environment
 #pragma unroll
       for (int k = 0; k < share_numbers / 4; ++k)
         own_chip[fours * lane() + share_numbers / 4 * b + k] = {numbers[4 * k], numbers[4 * k + 1],
-                                                               numbers[4 * k + 2], numbers[4 * k + 3]};
+                                                                numbers[4 * k + 2], numbers[4 * k + 3]};
     }
     __syncwarp();
     const int count = fours * min(32, tables.triangle_count - first);
@@ -148,8 +148,8 @@ inline __device__ void assemble_block_rows(const SheetTables& tables, const Envi
   }
 }
 
-/// The same with the stand-in for bending, as blocks of the pattern: what is factorized. `chip`: nine numbers a
-/// thread, through which a warp writes its blocks one after the other.
+/// The same with the stand-in for bending, as blocks of the pattern: what is factorized. `chip`: nine numbers
+/// a thread, through which a warp writes its blocks one after the other.
 inline __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumbers& environment,
                                        const float* shares, float* blocks, float* chip) {
   float* own_chip = chip + 9 * 32 * warp();

@@ -5,8 +5,9 @@
 
 namespace flash::sim::cuda {
 
-/// S x over the vertices: x(vertex) has x, y and z, and write(row, c, number) takes coordinate c of a row. S, shared
-/// by all environments, comes from the second-level cache; four lanes share the columns of a group of four rows.
+/// S x over the vertices: x(vertex) has x, y and z, and write(row, c, number) takes coordinate c of a row. S,
+/// shared by all environments, comes from the second-level cache; four lanes share the columns of a group of
+/// four rows.
 template <typename Number, typename Places, typename Write>
 __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* values, const Places& x,
                                      const Write& write) {
@@ -31,7 +32,7 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
         sums[row][2] += rows[row] * vertex.z;
       }
     }
-  Number own[3] = {};
+    Number own[3] = {};
 #pragma unroll
     for (int row = 0; row < 4; ++row)
 #pragma unroll

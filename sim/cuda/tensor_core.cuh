@@ -6,8 +6,8 @@ namespace flash::sim::cuda {
 // Matrix products by tensor cores, as exact as single precision: each number is split into two of eleven
 // significant bits, and of the four products of such parts all are added up but the smallest. A warp holds a
 // matrix in fragments, g = lane / 4 and t = lane % 4: of a left factor of 16 x 8 the rows g and g + 8 in the
-// columns t and t + 4, of a right factor of 8 x 8 the column g in the rows t and t + 4, of a product of 16 x 8
-// the rows g and g + 8 in the columns 2 t and 2 t + 1.
+// columns t and t + 4, of a right factor of 8 x 8 the column g in the rows t and t + 4, of a product of 16 x
+// 8 the rows g and g + 8 in the columns 2 t and 2 t + 1.
 
 #if defined(__CUDACC__) && (!defined(__CUDA_ARCH__) || __CUDA_ARCH__ >= 800)
 #define FLASH_TENSOR_CORES
@@ -80,8 +80,8 @@ __device__ inline void add_product(float (&sum)[4], const LeftFragment& left, co
   add_part_product(sum, left.high, right.high);
 }
 
-/// 32 rows of eight columns as two left factors, of which a lane has the rows 4 g to 4 g + 3: `near` in column t,
-/// `far` in column t + 4.
+/// 32 rows of eight columns as two left factors, of which a lane has the rows 4 g to 4 g + 3: `near` in
+/// column t, `far` in column t + 4.
 struct LeftTile {
   LeftFragment parts[2];
 

@@ -33,7 +33,7 @@ struct FrontLayout {
   int vector_at;                   ///< of what it passes up in a forward solve, three numbers a vertex below
   int children[2];                 ///< -1 for none
   long panel_at;                   ///< of its columns in the factor
-  long update_at;                  ///< of its update matrix: columns of `update_leading` numbers, behind zeros
+  long update_at;  ///< of its update matrix: columns of `update_leading` numbers, behind zeros
   int update_leading;
 };
 

@@ -16,10 +16,11 @@ struct FrontPlan {
   std::vector<FrontLevel> levels;
   std::vector<int> rows;        ///< positions, ascending in each front
   std::vector<int> child_rows;  ///< place of a front's vertex below those of its child, -1 where it is none
-  /// Of each front with children four lists over its mapped_rows on chip: the row's place in the update matrix
-  /// of each child, -1 where it has none, and where the column of that place begins, 0 where it has none.
+  /// Of each front with children four lists over its mapped_rows on chip: the row's place in the update
+  /// matrix of each child, -1 where it has none, and where the column of that place begins, 0 where it has
+  /// none.
   std::vector<int> panel_rows;
-  std::vector<int> entries;     ///< of each row of a front: number of its entry in a vector, 0 in padding
+  std::vector<int> entries;  ///< of each row of a front: number of its entry in a vector, 0 in padding
   std::vector<BlockPlace> blocks;
   std::vector<ForwardTask> forward;
   std::vector<BackwardTask> backward;

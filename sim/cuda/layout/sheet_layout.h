@@ -16,8 +16,8 @@ struct SheetLayout {
   std::vector<int> triangle_vertices;  ///< three times triangle_count
   std::vector<double> gradients;       ///< four times, as in TriangleGroup
   std::vector<double> areas;
-  /// What of the triangles enters each vertex: 3 * corner * triangle_count + triangle, where the first of three
-  /// numbers is, triangle_count apart.
+  /// What of the triangles enters each vertex: 3 * corner * triangle_count + triangle, where the first of
+  /// three numbers is, triangle_count apart.
   std::vector<int> corner_starts, corners;
 
   // Blocks of the pattern.
