@@ -22,6 +22,7 @@ int below_at(const Node& node) { return rounded_up(3 * node.column_count, 4); }
 int leading(const Node& node) {
   return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), forward_rows);
 }
+int factor_size(const Node& node) { return 3 * node.column_count * leading(node); }
 int below(const Node& node) { return 3 * static_cast<int>(node.rows.size()); }
 int panel_size(const Node& node) {
   return panel_numbers(3 * node.column_count, below(node), node.children[0] >= 0 || node.children[1] >= 0);
@@ -92,7 +93,7 @@ std::vector<Node> by_height(std::vector<Node> nodes) {
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     if (nodes[a].height != nodes[b].height) return nodes[a].height < nodes[b].height;
-    return panel_size(nodes[a]) > panel_size(nodes[b]);
+    return factor_size(nodes[a]) > factor_size(nodes[b]);
   });
   for (std::size_t n = 0; n < order.size(); ++n) place[order[n]] = static_cast<int>(n);
   std::vector<Node> sorted;
