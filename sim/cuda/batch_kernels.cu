@@ -3,9 +3,10 @@
 #include <algorithm>
 
 #include "sim/cuda/conjugate_gradients.cuh"
+#include "sim/cuda/elastic_gradient.cuh"
 #include "sim/cuda/front_factor.cuh"
 #include "sim/cuda/launch.h"
-#include "sim/cuda/membrane.cuh"
+#include "sim/cuda/membrane_hessian.cuh"
 
 namespace flash::sim::cuda {
 namespace {
@@ -35,11 +36,12 @@ __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
 #define FOR_OWN_ENVIRONMENTS(batch, e) \
   for (int e = static_cast<int>(blockIdx.x); e < (batch).environment_count; e += static_cast<int>(gridDim.x))
 
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+template <bool places_on_chip>
+__global__ void __launch_bounds__(team_threads, dense_teams)
     evaluate_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int triangles = batch.sheet.triangle_count;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    const ElasticEnergies energy = elastic_gradient(
+    const ElasticEnergies energy = elastic_gradient<places_on_chip>(
         batch.sheet, batch.environments[e], places_of(batch, e), batch.gradients + 3L * batch.sheet.size * e,
         batch.triangle_gradients + 9L * triangles * blockIdx.x, shared_memory<double>());
     if (threadIdx.x == 0) batch.energies[e] = energy;
@@ -48,19 +50,19 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
 }
 
 template <bool Preconditioner>
-__global__ void __launch_bounds__(team_threads, dense_teams)
+__global__ void __launch_bounds__(team_threads, hessian_teams)
     assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
-  float* shares = batch.triangle_blocks + 54L * batch.sheet.triangle_count * blockIdx.x;
+  float* chip = shared_memory<float>();
+  float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    triangle_blocks(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares,
-                    shared_memory<float>());
+    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares, chip);
     __syncthreads();
     if constexpr (Preconditioner)
       assemble_blocks(batch.sheet, batch.environments[e], shares,
-                      batch.blocks + 9L * batch.sheet.block_count * e);
+                      batch.blocks + 9L * batch.sheet.block_count * e, chip);
     else
       assemble_block_rows(batch.sheet, batch.environments[e], shares,
-                          batch.block_rows + batch.block_row_size * e);
+                          batch.block_rows + batch.block_row_size * e, chip);
     __syncthreads();
   }
 }
@@ -133,18 +135,26 @@ struct Choice {
   int bytes;
 };
 
+/// Places on chip where all teams find room.
+Choice evaluation(int size) {
+  const int near = gradient_memory(size, true);
+  return dense_teams * (near + 1024) <= most_memory()
+             ? Choice{evaluate_kernel<true>, near}
+             : Choice{evaluate_kernel<false>, gradient_memory(size, false)};
+}
+
 template <typename Stored>
 Choice choice(BatchKernel kernel, const FrontTables& fronts) {
   const int number = sizeof(float), solve_bytes = number * solve_memory(fronts.largest_columns);
   switch (kernel) {
     case BatchKernel::evaluate:
-      return {evaluate_kernel, team_warps * static_cast<int>(sizeof(double))};
+      return evaluation(fronts.size);
     case BatchKernel::assemble_matrix:
-      return {assemble_kernel<false>, 9 * team_threads * number};
+      return {assemble_kernel<false>, hessian_memory * number};
     case BatchKernel::assemble_preconditioner:
-      return {assemble_kernel<true>, 9 * team_threads * number};
+      return {assemble_kernel<true>, hessian_memory * number};
     case BatchKernel::factorize:
-      return {factorize_kernel<Stored>, number * factor_memory(fronts.shared_panel, fronts.shared_rows)};
+      return {factorize_kernel<Stored>, number * factor_memory(fronts.shared_panel)};
     case BatchKernel::multiply:
       return {multiply_kernel, 0};
     case BatchKernel::solve:

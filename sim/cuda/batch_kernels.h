@@ -28,7 +28,7 @@ struct BatchNumbers {
   int *positive, *solves;
   // Of a team.
   double* triangle_gradients;
-  float *triangle_blocks, *updates, *passed, *forward, *residuals, *images;
+  float *shares, *updates, *passed, *forward, *residuals, *images;
   Four<float>* searches;
 };
 

@@ -20,11 +20,9 @@ namespace {
 
 /// Panels that fit on chip beside the rest of a factorization.
 FrontSettings fitting(FrontSettings settings) {
-  constexpr int rest = 4096;  // numbers
-  int device = 0, bytes = 0;
-  check(cudaGetDevice(&device));
-  check(cudaDeviceGetAttribute(&bytes, cudaDevAttrMaxSharedMemoryPerBlockOptin, device));
-  settings.panel_capacity = std::min(settings.panel_capacity, bytes / static_cast<int>(sizeof(float)) - rest);
+  constexpr int rest = 8192 + 64;  // numbers
+  settings.panel_capacity =
+      std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
   return settings;
 }
 
@@ -45,7 +43,7 @@ struct BatchSystem::Memory {
   DeviceArray<double> gradients, triangle_gradients;
   DeviceArray<ElasticEnergies> energies;
   DeviceArray<int> restriction_counts, positive, solves;
-  DeviceArray<float> triangle_blocks, updates, passed, forward, residuals, images;
+  DeviceArray<float> shares, updates, passed, forward, residuals, images;
   DeviceArray<Four<float>> searches;
   int teams;
   BatchNumbers numbers{};
@@ -72,7 +70,7 @@ struct BatchSystem::Memory {
     gradients = DeviceArray<double>(environment_count * 3 * size);
     energies = DeviceArray<ElasticEnergies>(environment_count);
     block_rows = DeviceArray<float>(environment_count * row_size);
-    blocks = DeviceArray<float>(environment_count * 9 * layout.blocks.size());
+    blocks = DeviceArray<float>(environment_count * 9 * static_cast<size_t>(layout.block_count));
     factors = DeviceArray<float>(environment_count *
                                  (precision == FactorPrecision::half ? (factor_size + 1) / 2 : factor_size));
     restrictions = DeviceArray<VertexRestriction>(environment_count * size);
@@ -80,7 +78,7 @@ struct BatchSystem::Memory {
     positive = DeviceArray<int>(environment_count);
     solves = DeviceArray<int>(environment_count);
     triangle_gradients = DeviceArray<double>(team_count * 9 * triangles);
-    triangle_blocks = DeviceArray<float>(team_count * 54 * triangles);
+    shares = DeviceArray<float>(team_count * 36 * triangles);
     updates = DeviceArray<float>(team_count * static_cast<size_t>(front_plan.update_size));
     passed = DeviceArray<float>(team_count * static_cast<size_t>(front_plan.vector_size));
     forward = DeviceArray<float>(team_count * 6 * size);
@@ -107,7 +105,7 @@ struct BatchSystem::Memory {
                positive.data(),
                solves.data(),
                triangle_gradients.data(),
-               triangle_blocks.data(),
+               shares.data(),
                updates.data(),
                passed.data(),
                forward.data(),

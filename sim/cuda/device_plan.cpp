@@ -13,7 +13,6 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
-  fronts.shared_rows = plan.shared_rows;
   fronts.largest_columns = plan.largest_columns;
   fronts.vector_size = plan.vector_size;
   fronts.factor_size = plan.factor_size;
@@ -21,6 +20,7 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.fronts = upload(plan.fronts, fronts_);
   fronts.levels = upload(plan.levels, levels_);
   fronts.child_rows = upload(plan.child_rows, ints_);
+  fronts.panel_rows = upload(plan.panel_rows, ints_);
   fronts.entries = upload(plan.entries, ints_);
   fronts.blocks = upload(plan.blocks, places_);
   fronts.forward = upload(plan.forward, forward_);
@@ -28,15 +28,15 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
 
   sheet.size = layout.size;
   sheet.triangle_count = layout.triangle_count;
-  sheet.block_count = static_cast<int>(layout.blocks.size());
+  sheet.block_count = layout.block_count;
   sheet.group_count = static_cast<int>(layout.group_rows.size()) / 4;
   sheet.triangle_vertices = upload(layout.triangle_vertices, ints_);
   sheet.gradients = upload(layout.gradients, doubles_);
   sheet.areas = upload(layout.areas, doubles_);
   sheet.corner_starts = upload(layout.corner_starts, ints_);
   sheet.corners = upload(layout.corners, ints_);
-  sheet.blocks = upload(layout.blocks, blocks_);
-  sheet.block_sources = upload(layout.block_sources, ints_);
+  sheet.pair_sources = upload(layout.pair_sources, sources_);
+  sheet.slice_sources = upload(layout.slice_sources, sources_);
   sheet.block_vertex = upload(layout.block_vertex, ints_);
   sheet.slice_starts = upload(layout.slice_starts, ints_);
   sheet.slice_columns = upload(layout.slice_columns, ints_);

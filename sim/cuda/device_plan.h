@@ -26,7 +26,7 @@ class DevicePlan {
   std::vector<DeviceArray<BlockPlace>> places_;
   std::vector<DeviceArray<ForwardTask>> forward_;
   std::vector<DeviceArray<BackwardTask>> backward_;
-  std::vector<DeviceArray<BlockSources>> blocks_;
+  std::vector<DeviceArray<EdgeSources>> sources_;
 };
 
 }  // namespace flash::sim::cuda

@@ -5,11 +5,11 @@ namespace flash::sim::cuda {
 
 /// A FrontPlan in the memory of a device.
 struct FrontTables {
-  int size, level_count, shared_panel, shared_rows, largest_columns, vector_size;
+  int size, level_count, shared_panel, largest_columns, vector_size;
   long factor_size, update_size;
   const FrontLayout* fronts;
   const FrontLevel* levels;
-  const int *child_rows, *entries;
+  const int *child_rows, *panel_rows, *entries;
   const BlockPlace* blocks;
   const ForwardTask* forward;
   const BackwardTask* backward;

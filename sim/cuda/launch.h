@@ -8,6 +8,9 @@ namespace flash::sim::cuda {
 /// Throws std::runtime_error with the device's message.
 void check(cudaError_t status);
 
+/// On-chip memory that a block may ask for [bytes].
+int most_memory();
+
 /// Blocks of a team each that run at the same time with `bytes` of on-chip memory.
 template <typename Kernel>
 int resident_teams(Kernel* kernel, int bytes) {

@@ -5,23 +5,24 @@
 
 namespace flash::sim::cuda {
 
-/// y = scale S x over the vertices. S, shared by all environments, comes from the second-level cache; four
-/// lanes share the columns of a group of four rows.
-template <typename Number>
-__device__ void multiply_scalar_rows(const SheetTables& tables, const Number* values, Number scale,
-                                     const Four<Number>* x, Number* y) {
+/// S x over the vertices: x(vertex) has x, y and z, and write(row, c, number) takes coordinate c of a row. S,
+/// shared by all environments, comes from the second-level cache; four lanes share the columns of a group of
+/// four rows.
+template <typename Number, typename Places, typename Write>
+__device__ void multiply_scalar_rows(const SheetTables& tables, const Number* values, const Places& x,
+                                     const Write& write) {
   for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size && tables.group_count == 0;
        i += team_threads)
-    y[i] = 0;
+    write(i / 3, i % 3, Number{});
   const int part = lane() % 4;
   // Whole warps stay in the loop: their lanes exchange sums.
   for (int first = 8 * warp(); first < tables.group_count; first += 8 * team_warps) {
-    const int group = min(first + lane() / 4, tables.group_count - 1);
+    const int wanted = first + lane() / 4, group = min(wanted, tables.group_count - 1);
     const int end = tables.group_starts[group + 1];
     Number sums[4][3] = {};
-#pragma unroll 2
+#pragma unroll 4
     for (int k = tables.group_starts[group] + part; k < end; k += 4) {
-      const Four<Number> vertex = x[tables.group_columns[k]];
+      const auto vertex = x(tables.group_columns[k]);
       const Four<Number> value = reinterpret_cast<const Four<Number>*>(values)[k];
       const Number rows[4] = {value.x, value.y, value.z, value.w};
 #pragma unroll
@@ -42,8 +43,8 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
         if (row == part) own[c] = sum;
       }
     const int row = tables.group_rows[4 * group + part];
-    if (row >= 0 && first + lane() / 4 < tables.group_count)
-      for (int c = 0; c < 3; ++c) y[3 * row + c] = scale * own[c];
+    if (row >= 0 && wanted < tables.group_count)
+      for (int c = 0; c < 3; ++c) write(row, c, own[c]);
   }
 }
 
@@ -67,7 +68,9 @@ inline __device__ void add_block_rows(const SheetTables& tables, const float* bl
 /// own rows i, i + team_threads, ...
 inline __device__ void multiply(const SheetTables& tables, const float* blocks, float scale,
                                 const Four<float>* x, float* y) {
-  multiply_scalar_rows(tables, tables.single_group_values, scale, x, y);
+  multiply_scalar_rows(
+      tables, tables.single_group_values, [&](int vertex) { return x[vertex]; },
+      [&](int row, int c, float sum) { y[3 * row + c] = scale * sum; });
   __syncthreads();
   add_block_rows(tables, blocks, x, y);
 }

@@ -1,5 +1,5 @@
 #pragma once
-#include "sim/cuda/layout/block_sources.h"
+#include "sim/cuda/layout/edge_sources.h"
 
 namespace flash::sim::cuda {
 
@@ -9,8 +9,8 @@ struct SheetTables {
   const int* triangle_vertices;
   const double *gradients, *areas;
   const int *corner_starts, *corners;
-  const BlockSources* blocks;
-  const int *block_sources, *block_vertex;
+  const EdgeSources *pair_sources, *slice_sources;
+  const int* block_vertex;
   const int *slice_starts, *slice_columns;
   const int *group_rows, *group_starts, *group_columns;
   const double* group_values;

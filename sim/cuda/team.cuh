@@ -13,6 +13,17 @@ __device__ Number* shared_memory() {
   return reinterpret_cast<Number*>(block_memory);
 }
 
+/// The same pointer into the device's memory, which the compiler does not take apart into base and offset
+/// again: so the address of each number behind it takes one multiply-add.
+template <typename Number>
+__device__ inline Number* kept_whole(Number* pointer) {
+#ifdef __CUDA_ARCH__
+  asm("" : "+l"(pointer));
+  __builtin_assume(__isGlobal(pointer));
+#endif
+  return pointer;
+}
+
 __device__ inline int lane() { return static_cast<int>(threadIdx.x % 32); }
 __device__ inline int warp() { return static_cast<int>(threadIdx.x / 32); }
 

@@ -39,7 +39,7 @@ std::vector<Part> parts_of(const Towel& towel, FactorPrecision precision) {
   const SheetLayout layout = lay_out(*towel.plan, towel.bending(), fronts);
   const double stored = precision == FactorPrecision::half ? 2 : 4, vertices = layout.size,
                triangles = layout.triangle_count, entries = static_cast<double>(fronts.factor_entries),
-               blocks = static_cast<double>(layout.blocks.size()),
+               blocks = static_cast<double>(layout.block_count),
                edge_blocks = 2.0 * static_cast<double>(towel.plan->edge_count) + vertices,
                columns = static_cast<double>(layout.group_columns.size());
   const double scalar_flops = 24 * columns, block_flops = 18 * edge_blocks;

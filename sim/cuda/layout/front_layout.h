@@ -1,4 +1,5 @@
 #pragma once
+#include "sim/law/host_device.h"
 
 namespace flash::sim::cuda {
 
@@ -11,10 +12,10 @@ static_assert((team_threads & (team_threads - 1)) == 0);
 
 /// Teams that a processor of the device has registers for, at least: dense fronts and triangles need many,
 /// the rest of a linear problem needs many threads.
-inline constexpr int dense_teams = 2, sparse_teams = 4;
+inline constexpr int dense_teams = 2, hessian_teams = 3, sparse_teams = 4;
 
-/// Columns that are eliminated between two barriers.
-inline constexpr int panel_width = 12;
+/// Columns of a block on the diagonal of a front, inverted by a warp at a time.
+inline constexpr int panel_width = 8;
 
 /// Rows that a warp takes in one sweep of a forward task, and columns of a backward task.
 inline constexpr int forward_rows = 16, backward_columns = 8;
@@ -27,11 +28,12 @@ struct FrontLayout {
   int first_map;                   ///< in FrontPlan::child_rows: one list a child, each over all its vertices
   int first_block, block_count;    ///< in FrontPlan::blocks
   int first_entry;                 ///< in FrontPlan::entries
+  int first_panel_row;             ///< in FrontPlan::panel_rows, with children
   int below_at, leading;           ///< rows; multiples of 4 and of 16
   int vector_at;                   ///< of what it passes up in a forward solve, three numbers a vertex below
   int children[2];                 ///< -1 for none
   long panel_at;                   ///< of its columns in the factor
-  long update_at;                  ///< of its update matrix: columns of `update_leading` numbers
+  long update_at;  ///< of its update matrix: columns of `update_leading` numbers, behind zeros
   int update_leading;
 };
 
@@ -61,7 +63,23 @@ struct FrontLevel {
   int groups;
 };
 
-/// Between the columns of a panel on chip, so that consecutive ones start in different banks.
-inline constexpr int panel_padding = 4;
+FLASH_HOST_DEVICE inline int rounded_up(int number, int step) { return (number + step - 1) / step * step; }
+
+// A front on chip: its `columns`, padded to whole blocks, each with as many own rows and then those `below`.
+
+FLASH_HOST_DEVICE inline int padded_columns(int columns) { return rounded_up(columns, panel_width); }
+/// From one column to the next: 8 or 24 modulo 32, so that eight rows of four columns lie in different banks.
+FLASH_HOST_DEVICE inline int panel_leading(int columns, int below) {
+  return (padded_columns(columns) + rounded_up(below, 4) + 7) / 16 * 16 + 8;
+}
+/// Its rows with padding for whole tiles.
+FLASH_HOST_DEVICE inline int mapped_rows(int columns, int below) {
+  return padded_columns(columns) + rounded_up(below, 32);
+}
+/// Numbers, and four of each row to find it in the front's children.
+FLASH_HOST_DEVICE inline int panel_numbers(int columns, int below, bool has_children) {
+  return padded_columns(columns) * panel_leading(columns, below) +
+         (has_children ? 4 * mapped_rows(columns, below) : 0);
+}
 
 }  // namespace flash::sim::cuda

@@ -10,8 +10,6 @@
 namespace flash::sim::cuda {
 namespace {
 
-int rounded_up(int number, int step) { return (number + step - 1) / step * step; }
-
 /// A front in the order of elimination, children before parents.
 struct Node {
   int first_column = 0, column_count = 0;
@@ -24,7 +22,11 @@ int below_at(const Node& node) { return rounded_up(3 * node.column_count, 4); }
 int leading(const Node& node) {
   return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), forward_rows);
 }
-int panel_size(const Node& node) { return (leading(node) + panel_padding) * 3 * node.column_count; }
+int factor_size(const Node& node) { return 3 * node.column_count * leading(node); }
+int below(const Node& node) { return 3 * static_cast<int>(node.rows.size()); }
+int panel_size(const Node& node) {
+  return panel_numbers(3 * node.column_count, below(node), node.children[0] >= 0 || node.children[1] >= 0);
+}
 
 /// The dissection's nodes with what each touches below it.
 std::vector<Node> nodes_of(const std::vector<DissectionNode>& dissection,
@@ -91,7 +93,7 @@ std::vector<Node> by_height(std::vector<Node> nodes) {
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     if (nodes[a].height != nodes[b].height) return nodes[a].height < nodes[b].height;
-    return panel_size(nodes[a]) > panel_size(nodes[b]);
+    return factor_size(nodes[a]) > factor_size(nodes[b]);
   });
   for (std::size_t n = 0; n < order.size(); ++n) place[order[n]] = static_cast<int>(n);
   std::vector<Node> sorted;
@@ -130,6 +132,10 @@ class Places {
 /// The columns of the factor one after the other. What a front passes up lives until its parent is done.
 void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
   Places updates, vectors;
+  // Zeros, for the columns that a child lacks.
+  int longest = 0;
+  for (const Node& node : nodes) longest = std::max(longest, below(node));
+  updates.take(rounded_up(longest, 8));
   std::size_t front = 0;
   for (const FrontLevel& level : plan.levels) {
     const std::size_t end = level.first_front + level.front_count;
@@ -137,7 +143,7 @@ void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
       FrontLayout& layout = plan.fronts[f];
       layout.panel_at = plan.factor_size;
       plan.factor_size += 3L * layout.column_count * layout.leading;
-      layout.update_leading = rounded_up(3 * layout.row_count, 4);
+      layout.update_leading = rounded_up(3 * layout.row_count, 8);
       layout.update_at = updates.take(3L * layout.row_count * layout.update_leading);
       layout.vector_at = static_cast<int>(vectors.take(3L * layout.row_count));
     }
@@ -157,20 +163,18 @@ void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, F
   for (std::size_t first = 0; first < nodes.size();) {
     FrontLevel level{};
     level.first_front = static_cast<int>(first);
-    int panel = 0, columns = 0, rows = 0;
+    int panel = 0, columns = 0;
     for (; first < nodes.size() && nodes[first].height == static_cast<int>(plan.levels.size()); ++first) {
       ++level.front_count;
       panel = std::max(panel, panel_size(nodes[first]));
       columns = std::max(columns, 3 * nodes[first].column_count);
-      if (nodes[first].height > 0) rows = std::max(rows, leading(nodes[first]));
     }
-    // As many groups as fronts, so that none is idle; each with a thread for every own column.
+    // As many groups as fronts, so that none is idle.
     level.groups = 1;
     while (2 * level.groups <= settings.most_groups && level.groups < level.front_count &&
-           2 * level.groups * panel <= settings.panel_capacity && 2 * level.groups * columns <= team_threads)
+           2 * level.groups * panel <= settings.panel_capacity)
       level.groups *= 2;
     plan.shared_panel = std::max(plan.shared_panel, level.groups * rounded_up(panel, 4));
-    plan.shared_rows = std::max(plan.shared_rows, level.groups * rows);
     plan.largest_columns = std::max(plan.largest_columns, columns);
     plan.levels.push_back(level);
   }
@@ -221,6 +225,27 @@ void add_layouts(const std::vector<Node>& nodes, FrontPlan& plan) {
     // Cholesky, columns below, update; then the inverse and its product with what is below.
     plan.factor_flops += (c * c * c / 3 + c * c * r + c * r * r) + (c * c * c / 3 + c * c * r);
     plan.fronts.push_back(layout);
+  }
+}
+
+void add_panel_rows(FrontPlan& plan) {
+  for (FrontLayout& front : plan.fronts) {
+    if (front.children[0] < 0 && front.children[1] < 0) continue;
+    const int columns = 3 * front.column_count, below = 3 * front.row_count, own = padded_columns(columns),
+              rows = mapped_rows(columns, below), vertices = front.column_count + front.row_count;
+    front.first_panel_row = static_cast<int>(plan.panel_rows.size());
+    plan.panel_rows.insert(plan.panel_rows.end(), 2 * rows, -1);
+    plan.panel_rows.insert(plan.panel_rows.end(), 2 * rows, 0);
+    for (int k = 0; k < 2; ++k)
+      for (int entry = 0; entry < columns + below && front.children[k] >= 0; ++entry) {
+        const int found = plan.child_rows[front.first_map + k * vertices + entry / 3];
+        if (found < 0) continue;
+        const FrontLayout& child = plan.fronts[front.children[k]];
+        const int place = 3 * found + entry % 3, row = entry < columns ? entry : entry - columns + own;
+        int* const places = plan.panel_rows.data() + front.first_panel_row + k * rows;
+        places[row] = place;
+        places[row + 2 * rows] = static_cast<int>(child.update_at) + place * child.update_leading;
+      }
   }
 }
 
@@ -302,6 +327,7 @@ FrontPlan plan_fronts(const BlockPattern& pattern, const data::Points& places,
   add_layouts(nodes, plan);
   add_levels(nodes, settings, plan);
   place_memory(nodes, plan);
+  add_panel_rows(plan);
   add_blocks(pattern, nodes, plan);
   add_tasks(plan);
   return plan;

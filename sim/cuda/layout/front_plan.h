@@ -16,7 +16,11 @@ struct FrontPlan {
   std::vector<FrontLevel> levels;
   std::vector<int> rows;        ///< positions, ascending in each front
   std::vector<int> child_rows;  ///< place of a front's vertex below those of its child, -1 where it is none
-  std::vector<int> entries;     ///< of each row of a front: number of its entry in a vector, 0 in padding
+  /// Of each front with children four lists over its mapped_rows on chip: the row's place in the update
+  /// matrix of each child, -1 where it has none, and where the column of that place begins, 0 where it has
+  /// none.
+  std::vector<int> panel_rows;
+  std::vector<int> entries;  ///< of each row of a front: number of its entry in a vector, 0 in padding
   std::vector<BlockPlace> blocks;
   std::vector<ForwardTask> forward;
   std::vector<BackwardTask> backward;
@@ -24,7 +28,6 @@ struct FrontPlan {
   long update_size = 0;     ///< for update matrices
   int vector_size = 0;      ///< for what fronts pass up in a forward solve
   int shared_panel = 0;     ///< numbers of on-chip memory for the panels of a level
-  int shared_rows = 0;      ///< for the rows of its fronts that have children
   int largest_columns = 0;  ///< of a front
   long factor_entries = 0;  ///< that are not zero by structure
   double factor_flops = 0;  ///< additions and multiplications of a factorization with its inverses
@@ -32,7 +35,7 @@ struct FrontPlan {
 
 struct FrontSettings {
   int leaf_size = 8;             ///< vertices, at most, of a front without children
-  int panel_capacity = 22000;    ///< numbers of on-chip memory that a team has for panels
+  int panel_capacity = 20600;    ///< numbers of on-chip memory that a team has for panels
   int most_groups = team_warps;  ///< of a team in a factorization
 };
 

@@ -14,63 +14,78 @@ void flatten(const std::vector<std::vector<int>>& lists, std::vector<int>& start
   }
 }
 
+/// A triangle among those of a SheetPlan.
+struct TriangleAt {
+  const TriangleGroup* group;
+  int lane;
+  int place;  ///< the lowest of its vertices
+};
+
+/// In the order of their places, so that what vertices next to each other need lies together.
+std::vector<TriangleAt> triangles_by_place(const SheetPlan& plan, const std::vector<int>& position) {
+  std::vector<TriangleAt> triangles;
+  for (const TriangleGroup& group : plan.triangle_groups)
+    for (int lane = 0; lane < group.count; ++lane) {
+      int place = position[group.vertices[0][lane]];
+      for (const auto& vertices : group.vertices) place = std::min(place, position[vertices[lane]]);
+      triangles.push_back({&group, lane, place});
+    }
+  std::stable_sort(triangles.begin(), triangles.end(),
+                   [](const TriangleAt& a, const TriangleAt& b) { return a.place < b.place; });
+  return triangles;
+}
+
 void add_triangles(const SheetPlan& plan, const std::vector<int>& position, SheetLayout& layout) {
-  layout.triangle_count = static_cast<int>(plan.sheet.triangles.size());
+  const std::vector<TriangleAt> triangles = triangles_by_place(plan, position);
+  layout.triangle_count = static_cast<int>(triangles.size());
   const int count = layout.triangle_count;
   layout.triangle_vertices.resize(3L * count);
   layout.gradients.resize(4L * count);
   layout.areas.resize(count);
-  std::vector<std::vector<int>> corners(layout.size), sources(plan.pattern.size + plan.pattern.pairs.size());
-  int t = 0;
-  for (const TriangleGroup& group : plan.triangle_groups) {
-    for (int lane = 0; lane < group.count; ++lane, ++t) {
-      for (int k = 0; k < 3; ++k) {
-        const int vertex = group.vertices[k][lane];
-        layout.triangle_vertices[k * count + t] = position[vertex];
-        corners[position[vertex]].push_back(k * count + t);
-        sources[vertex].push_back(k * count + t);
-        sources[group.slots[k][lane]].push_back((3 + k) * count + t);
-      }
-      for (int k = 0; k < 4; ++k) layout.gradients[k * count + t] = group.gradients[k][lane];
-      layout.areas[t] = group.area[lane];
+  std::vector<std::vector<int>> corners(layout.size);
+  layout.pair_sources.resize(plan.pattern.pairs.size());
+  for (int t = 0; t < count; ++t) {
+    const TriangleGroup& group = *triangles[t].group;
+    const int lane = triangles[t].lane;
+    for (int k = 0; k < 3; ++k) {
+      const int place = position[group.vertices[k][lane]];
+      layout.triangle_vertices[k * count + t] = place;
+      corners[place].push_back(3 * k * count + t);
+      layout.pair_sources[group.slots[k][lane] - plan.pattern.size].add(3 * t + k);
     }
+    for (int k = 0; k < 4; ++k) layout.gradients[k * count + t] = group.gradients[k][lane];
+    layout.areas[t] = group.area[lane];
   }
   flatten(corners, layout.corner_starts, layout.corners);
-  std::vector<int> starts;
-  flatten(sources, starts, layout.block_sources);
-  for (std::size_t block = 0; block < sources.size(); ++block)
-    layout.blocks.push_back({starts[block], starts[block + 1] - starts[block], -1, -1});
 }
 
 void add_block_rows(const SheetPlan& plan, const std::vector<int>& position, SheetLayout& layout) {
   struct Entry {
-    int column, block;
-    bool turned;
+    int column;
+    EdgeSources sources;
   };
   std::vector<std::vector<Entry>> rows(layout.size);
   for (int vertex = 0; vertex < layout.size; ++vertex)
-    rows[position[vertex]].push_back({position[vertex], vertex, false});
+    rows[position[vertex]].push_back({position[vertex], {}});
   for (std::size_t k = 0; k < plan.edge_count; ++k) {
     const int row = position[plan.pattern.pairs[k].first], column = position[plan.pattern.pairs[k].second];
-    const int block = plan.pattern.size + static_cast<int>(k);
-    rows[row].push_back({column, block, false});
-    rows[column].push_back({row, block, true});
+    EdgeSources sources = layout.pair_sources[k];
+    rows[row].push_back({column, sources});
+    sources.turned = 1;
+    rows[column].push_back({row, sources});
   }
   layout.slice_starts.assign(1, 0);
   for (int first = 0; first < layout.size; first += slice_size) {
-    const int end = std::min(first + slice_size, layout.size), start = layout.slice_starts.back();
+    const int end = std::min(first + slice_size, layout.size);
     std::size_t most = 0;
     for (int row = first; row < end; ++row) most = std::max(most, rows[row].size());
     for (std::size_t k = 0; k < most; ++k)
       for (int row = first; row < first + slice_size; ++row) {
         const bool there = row < end && k < rows[row].size();
         layout.slice_columns.push_back(there ? rows[row][k].column : std::min(row, layout.size - 1));
-        if (!there) continue;
-        const int place = (start + static_cast<int>(k)) * slice_numbers + 3 * (row - first);
-        BlockSources& block = layout.blocks[rows[row][k].block];
-        (rows[row][k].turned ? block.turned_place : block.place) = place;
+        layout.slice_sources.push_back(there ? rows[row][k].sources : EdgeSources{});
       }
-    layout.slice_starts.push_back(start + static_cast<int>(most));
+    layout.slice_starts.push_back(layout.slice_starts.back() + static_cast<int>(most));
   }
 }
 
@@ -91,7 +106,8 @@ SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const
   layout.size = plan.pattern.size;
   layout.order.resize(layout.size);
   layout.vertex_area.resize(layout.size);
-  layout.block_vertex.assign(plan.pattern.size + plan.pattern.pairs.size(), -1);
+  layout.block_vertex.resize(layout.size);
+  layout.block_count = layout.size + static_cast<int>(plan.pattern.pairs.size());
   for (int vertex = 0; vertex < layout.size; ++vertex) {
     layout.order[fronts.position[vertex]] = vertex;
     layout.vertex_area[fronts.position[vertex]] = plan.sheet.vertex_area[vertex];

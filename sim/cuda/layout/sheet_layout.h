@@ -1,7 +1,7 @@
 #pragma once
 #include <vector>
 
-#include "sim/cuda/layout/block_sources.h"
+#include "sim/cuda/layout/edge_sources.h"
 #include "sim/cuda/layout/front_plan.h"
 #include "sim/plan/sheet_plan.h"
 
@@ -16,17 +16,20 @@ struct SheetLayout {
   std::vector<int> triangle_vertices;  ///< three times triangle_count
   std::vector<double> gradients;       ///< four times, as in TriangleGroup
   std::vector<double> areas;
-  /// What of the triangles enters each vertex: corner * triangle_count + triangle.
+  /// What of the triangles enters each vertex: 3 * corner * triangle_count + triangle, where the first of
+  /// three numbers is, triangle_count apart.
   std::vector<int> corner_starts, corners;
 
-  // Blocks of the pattern. A triangle has six, (0,0), (1,1), (2,2), (1,0), (2,0), (2,1).
-  std::vector<BlockSources> blocks;
-  std::vector<int> block_sources;  ///< block * triangle_count + triangle
-  std::vector<int> block_vertex;   ///< place of the vertex of a diagonal block, -1 for others
+  // Blocks of the pattern.
+  std::vector<EdgeSources> pair_sources;  ///< of each pair; those over no edge have none
+  std::vector<int> block_vertex;          ///< place of the vertex of each block on the diagonal
+  int block_count = 0;
 
-  // Block rows, in slices of vertices (sliced ELLPACK): as many blocks a vertex as the fullest of its slice.
-  std::vector<int> slice_starts;   ///< of each slice, in blocks a vertex, and their end
-  std::vector<int> slice_columns;  ///< slice_size a block; the vertex itself where there is none
+  // Block rows, in slices of vertices (sliced ELLPACK): as many blocks a vertex as the fullest of its slice,
+  // that on the diagonal first.
+  std::vector<int> slice_starts;           ///< of each slice, in blocks a vertex, and their end
+  std::vector<int> slice_columns;          ///< slice_size a block; the vertex itself where there is none
+  std::vector<EdgeSources> slice_sources;  ///< likewise, none on the diagonal
 
   // The scalar rows, four at a time: as in RowGroups. Empty for hinges.
   std::vector<int> group_rows, group_starts, group_columns;

@@ -409,6 +409,23 @@ TEST(BatchSystem, ABatchEqualsAloneBitwiseRunAfterRun) {
   }
 }
 
+// More environments than the device has teams for, which then take one after the other.
+TEST(BatchSystem, ManyEnvironmentsAreEvaluatedAsEachAlone) {
+  SKIP_WITHOUT_DEVICE();
+  const auto plan = small_plans()[1].second;
+  constexpr int count = 2401, step = 300;
+  Bench together(plan, count);
+  together.batch.evaluate();
+  const std::vector<ElasticEnergies> energies = together.batch.energies();
+  for (int e = 0; e < count; e += step) {
+    Bench alone(plan, 1, FactorPrecision::single, e);
+    alone.batch.evaluate();
+    EXPECT_EQ(alone.batch.gradient(0), together.batch.gradient(e));
+    EXPECT_EQ(alone.batch.energies()[0].membrane, energies[e].membrane);
+    EXPECT_EQ(alone.batch.energies()[0].bending, energies[e].bending);
+  }
+}
+
 }  // namespace
 }  // namespace flash::sim::cuda
 #endif

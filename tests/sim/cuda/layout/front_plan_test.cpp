@@ -143,9 +143,9 @@ TEST(FrontPlan, TasksCoverAllRowsAndColumnsAndPanelsFitOnChip) {
         EXPECT_LE(level.groups, team_warps);
         for (int f = level.first_front; f < level.first_front + level.front_count; ++f) {
           const FrontLayout& front = plan.fronts[f];
-          // A thread for each own column; all panels of a level at a time.
-          EXPECT_LE(3 * front.column_count, team_threads / level.groups);
-          EXPECT_LE(level.groups * 3 * front.column_count * (front.leading + panel_padding),
+          // All panels of a level at a time.
+          EXPECT_LE(level.groups * panel_numbers(3 * front.column_count, 3 * front.row_count,
+                                                 front.children[0] >= 0 || front.children[1] >= 0),
                     plan.shared_panel);
         }
       }

@@ -1,0 +1,173 @@
+#pragma once
+#include "sim/cuda/membrane.cuh"
+#include "sim/cuda/team.cuh"
+
+namespace flash::sim::cuda {
+
+// The Hessian of the membrane. What a triangle's corners i and j share is
+//   b_ij = area sum_ab q_ia q_jb B_ab,  q_i = (w_i . v_1, w_i . v_2),
+// with B_ab as at hessian_of (sim/law/membrane_response.h): five products of u1, u2 and n. A thread takes a
+// triangle: singular values in double precision, where differences of places and of singular values cancel,
+// the rest in single. It writes its three blocks off the diagonal; since a move of the whole sheet costs
+// nothing, blocks on the diagonal are what the others of their row lack to zero. Then a thread takes a row.
+
+/// Numbers from one block to the next: column after column, and three unused.
+inline constexpr int share_numbers = 12;
+
+/// Through these on chip a warp writes what its lanes have one after the other.
+inline constexpr int hessian_memory = team_threads * 3 * share_numbers;
+
+/// The blocks (1,0), (2,0), (2,1) of each triangle. `positive`: of the Hessian without negative eigenvalues.
+/// `chip`: hessian_memory.
+inline __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                    const Point* positions, bool positive, float* shares, float* chip) {
+  constexpr int fours = 3 * share_numbers / 4;
+  float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
+  for (int first = 32 * warp(); first < tables.triangle_count; first += team_threads) {
+    const int t = min(first + lane(), tables.triangle_count - 1);
+    const TriangleFrame f = triangle_frame(tables, t, [&](int vertex) { return triple(positions[vertex]); });
+    PrincipalResponse<double> response = response_at(environment, f.frame.s1, f.frame.s2);
+    if (positive) clamp(response);
+    const auto single = [](double x) { return static_cast<float>(x); };
+    const auto moduli = [&](double x) { return static_cast<float>(f.area * x); };
+    const float u[3] = {single(f.frame.u1.x), single(f.frame.u1.y), single(f.frame.u1.z)},
+                v[3] = {single(f.frame.u2.x), single(f.frame.u2.y), single(f.frame.u2.z)},
+                n[3] = {single(f.frame.n.x), single(f.frame.n.y), single(f.frame.n.z)};
+    const float p11 = moduli(response.p11), p12 = moduli(response.p12), p22 = moduli(response.p22),
+                m = moduli(0.5 * (response.flip + response.twist)),
+                k = moduli(0.5 * (response.flip - response.twist)), bend1 = moduli(response.bend1),
+                bend2 = moduli(response.bend2);
+    const double c = f.frame.c, s = f.frame.s;
+    float q[3][2] = {{},
+                     {single(c * f.w10 + s * f.w11), single(c * f.w11 - s * f.w10)},
+                     {single(c * f.w20 + s * f.w21), single(c * f.w21 - s * f.w20)}};
+    q[0][0] = -(q[1][0] + q[2][0]);
+    q[0][1] = -(q[1][1] + q[2][1]);
+#pragma unroll
+    for (int b = 0; b < 3; ++b) {
+      const float *i = q[b == 0 ? 1 : 2], *j = q[b == 2 ? 1 : 0];
+      const float ones = i[0] * j[0], twos = i[1] * j[1], rising = i[0] * j[1], falling = i[1] * j[0];
+      const float uu = ones * p11 + twos * m, vv = ones * m + twos * p22, nn = ones * bend1 + twos * bend2,
+                  uv = rising * p12 + falling * k, vu = rising * k + falling * p12;
+      float numbers[share_numbers] = {};
+#pragma unroll
+      for (int column = 0; column < 3; ++column) {
+        const float on_u = uu * u[column] + uv * v[column], on_v = vu * u[column] + vv * v[column],
+                    on_n = nn * n[column];
+#pragma unroll
+        for (int row = 0; row < 3; ++row)
+          numbers[3 * column + row] = on_u * u[row] + on_v * v[row] + on_n * n[row];
+      }
+#pragma unroll
+      for (int k = 0; k < share_numbers / 4; ++k)
+        own_chip[fours * lane() + share_numbers / 4 * b + k] = {numbers[4 * k], numbers[4 * k + 1],
+                                                                numbers[4 * k + 2], numbers[4 * k + 3]};
+    }
+    __syncwarp();
+    const int count = fours * min(32, tables.triangle_count - first);
+    float4* to = reinterpret_cast<float4*>(shares) + fours * first;
+    for (int i = lane(); i < count; i += 32) to[i] = own_chip[i];
+    __syncwarp();
+  }
+}
+
+/// Three by three numbers, column after column.
+struct Block {
+  float numbers[9];
+};
+
+/// What the triangles at an edge give.
+inline __device__ Block sum_of_shares(const EdgeSources& sources, const float* shares) {
+  const auto share = [&](int source) {
+    float4 fours[3] = {};
+    if (source >= 0) {
+      const float4* from = reinterpret_cast<const float4*>(shares) + share_numbers / 4 * source;
+#pragma unroll
+      for (int k = 0; k < 3; ++k) fours[k] = from[k];
+    }
+    return Block{{fours[0].x, fours[0].y, fours[0].z, fours[0].w, fours[1].x, fours[1].y, fours[1].z,
+                  fours[1].w, fours[2].x}};
+  };
+  Block sum = share(sources.first);
+  const Block other = share(sources.second);
+#pragma unroll
+  for (int k = 0; k < 9; ++k) sum.numbers[k] += other.numbers[k];
+  return sum;
+}
+
+/// Goes through the blocks of a row off its diagonal, work(slot, block), and returns that on it with the
+/// inertia. `slot`: in SheetTables::slice_columns.
+template <typename Work>
+__device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumbers& environment, int vertex,
+                                const float* shares, const Work& work) {
+  const int slice = vertex / slice_size, end = tables.slice_starts[slice + 1];
+  Block diagonal = {};
+#pragma unroll 2
+  for (int k = tables.slice_starts[slice] + 1; k < end; ++k) {
+    const int slot = k * slice_size + vertex % slice_size;
+    const EdgeSources sources = tables.slice_sources[slot];
+    Block block = sum_of_shares(sources, shares);
+    if (sources.turned) {
+      const Block as_stored = block;
+#pragma unroll
+      for (int e = 0; e < 9; ++e) block.numbers[e] = as_stored.numbers[e % 3 * 3 + e / 3];
+    }
+#pragma unroll
+    for (int e = 0; e < 9; ++e) diagonal.numbers[e] -= block.numbers[e];
+    work(slot, block);
+  }
+  const float inertia =
+      static_cast<float>(environment.inertia_density * tables.vertex_area[min(vertex, tables.size - 1)]);
+  Block symmetric;
+#pragma unroll
+  for (int e = 0; e < 9; ++e)
+    symmetric.numbers[e] =
+        0.5f * (diagonal.numbers[e] + diagonal.numbers[e % 3 * 3 + e / 3]) + (e % 4 == 0 ? inertia : 0.0f);
+  return symmetric;
+}
+
+/// The Hessian of membrane and inertia as block rows (sheet_product.cuh). Hinges apart, these are all blocks.
+/// `chip`: nine numbers a thread, through which a warp, that has a slice, writes.
+inline __device__ void assemble_block_rows(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                           const float* shares, float* rows, float* chip) {
+  static_assert(slice_size == 32);
+  float* own_chip = chip + slice_numbers * warp();
+  const auto write = [&](int slot, const Block& block) {
+    __syncwarp();
+#pragma unroll
+    for (int e = 0; e < 9; ++e) own_chip[3 * slice_size * (e / 3) + 3 * lane() + e % 3] = block.numbers[e];
+    __syncwarp();
+    float* to = rows + static_cast<long>(slot / slice_size) * slice_numbers + lane();
+#pragma unroll
+    for (int e = 0; e < 9; ++e) to[32 * e] = own_chip[32 * e + lane()];
+  };
+  for (int slice = warp(); slice_size * slice < tables.size; slice += team_warps) {
+    const int vertex = slice_size * slice + lane();
+    const Block diagonal = go_through_row(tables, environment, vertex, shares, write);
+    write(tables.slice_starts[slice] * slice_size, diagonal);
+  }
+}
+
+/// The same with the stand-in for bending, as blocks of the pattern: what is factorized. `chip`: nine numbers
+/// a thread, through which a warp writes its blocks one after the other.
+inline __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                       const float* shares, float* blocks, float* chip) {
+  float* own_chip = chip + 9 * 32 * warp();
+  for (int first = 32 * warp(); first < tables.block_count; first += team_threads) {
+    const int b = min(first + lane(), tables.block_count - 1);
+    Block block = b < tables.size
+                      ? go_through_row(tables, environment, tables.block_vertex[b], shares, [](int, Block) {})
+                      : sum_of_shares(tables.pair_sources[b - tables.size], shares);
+    if (tables.stand_in != nullptr) {
+      const float bending = static_cast<float>(environment.rigidity) * tables.stand_in[b];
+      for (int e = 0; e < 9; e += 4) block.numbers[e] += bending;
+    }
+    for (int e = 0; e < 9; ++e) own_chip[9 * lane() + e] = block.numbers[e];
+    __syncwarp();
+    const int count = 9 * min(32, tables.block_count - first);
+    for (int i = lane(); i < count; i += 32) blocks[9L * first + i] = own_chip[i];
+    __syncwarp();
+  }
+}
+
+}  // namespace flash::sim::cuda
