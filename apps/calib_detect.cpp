@@ -8,6 +8,7 @@
 #include "apps/command_line.h"
 #include "data/atomic_file.h"
 #include "data/json_reader.h"
+#include "data/writable.h"
 
 namespace flash {
 namespace {
@@ -65,7 +66,7 @@ void print_table(const std::vector<calib::Detection>& detections) {
 }
 
 int run_detect(const DetectOptions& options) {
-  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   const calib::Dataset dataset = load_dataset(options.dataset, false);
   const calib::Target target = target_of(options.dataset, dataset);
   CalibCommonOptions without_warnings = options.common;  // the table says the same

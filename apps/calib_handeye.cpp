@@ -138,10 +138,8 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
 
 int run_handeye(const HandEyeOptions& options) {
   const std::string report = report_path(options);
-  for (const std::string& path : {options.out, report})
-    if (!path.empty()) check_calib_output(path, options.common);
-  for (const std::string& path : {options.ros, options.urdf, options.easy_handeye2})
-    if (!path.empty()) data::check_file_writable(path);
+  for (const std::string& path : {options.out, report, options.ros, options.urdf, options.easy_handeye2})
+    if (!path.empty()) data::check_file_free(path, options.common.force);
   Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
   phases.end("reading");

@@ -12,6 +12,7 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
+#include "data/writable.h"
 
 namespace flash {
 namespace {
@@ -60,7 +61,7 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
 
 // Corners are found twice: the lens must be known for places at which straight things are straight.
 int run_intrinsics(const IntrinsicsOptions& options) {
-  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   calib::Dataset dataset = load_dataset(options.dataset, false, false);
   const calib::Target target = target_of(options.dataset, dataset);
   dataset.camera.reset();

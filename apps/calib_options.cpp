@@ -10,7 +10,6 @@
 #include "data/error.h"
 #include "data/message_line.h"
 #include "data/text.h"
-#include "data/writable.h"
 
 namespace flash {
 
@@ -98,19 +97,6 @@ void say(const CalibCommonOptions& options, const std::string& line) {
 
 void warn_calib(const std::string& line) {
   std::cerr << "flash-calib: warning: " << data::message_line(line) << '\n';
-}
-
-void check_calib_output(const std::string& path, const CalibCommonOptions& options) {
-  if (!options.force && std::filesystem::exists(path) && !std::filesystem::is_directory(path))
-    throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
-  data::check_file_writable(path);
-}
-
-void check_calib_folder(const std::string& path, const CalibCommonOptions& options) {
-  if (!options.force && std::filesystem::exists(path) &&
-      !(std::filesystem::is_directory(path) && std::filesystem::is_empty(path)))
-    throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
-  data::check_folder_writable(path);
 }
 
 }  // namespace flash

@@ -53,10 +53,4 @@ std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const ca
 void say(const CalibCommonOptions& options, const std::string& line);
 void warn_calib(const std::string& line);
 
-/// Throws data::InputError where the file exists already and --force is not given, or cannot be written.
-void check_calib_output(const std::string& path, const CalibCommonOptions& options);
-
-/// The same of a folder with something in it.
-void check_calib_folder(const std::string& path, const CalibCommonOptions& options);
-
 }  // namespace flash

@@ -15,6 +15,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/writable.h"
 
 namespace flash {
 namespace {
@@ -61,7 +62,7 @@ void print(const calib::Plan& plan) {
 }
 
 int run_plan(const PlanOptions& options) {
-  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   const calib::Dataset dataset = load_dataset(options.dataset);
   if (options.setup.empty() && !dataset.setup)
     throw data::InputError(dataset.source +

@@ -16,6 +16,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/writable.h"
 
 namespace flash {
 namespace {
@@ -183,7 +184,7 @@ int run_register(const RegisterOptions& options) {
         "register: expected either two or more extrinsics files or --cameras with datasets");
   if (options.calibrations.size() + options.cameras.size() < 2)
     throw data::InputError("register: found one calibration, expected two or more");
-  if (!options.out.empty()) check_calib_output(options.out, options.common);
+  if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   Doubts doubts;
   calib::Cell cell =
       options.cameras.empty() ? cell_of_arms(options, doubts) : cell_of_cameras(options, doubts);

@@ -14,6 +14,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/writable.h"
 
 namespace flash {
 namespace {
@@ -136,7 +137,7 @@ void print_table(const calib::ProjectionCheck& check, const std::optional<calib:
 }
 
 int run_validate(const ValidateOptions& options) {
-  if (!options.out.empty()) check_calib_folder(options.out, options.common);
+  if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.common.force);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::Dataset dataset = load_dataset(options.dataset);

@@ -210,6 +210,7 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
   std::snprintf(ended_line.data(), ended_line.size(), "\n%s: stopped before the end\n",
                 app.get_name().c_str());
   handle_signals(ask_to_stop);
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is told by write, as a full disk is
   return run_tool(app.get_name().c_str(), [&] {
     check_verb(app, argc, argv);
     if (CLI::Option* const config = app.get_config_ptr()) config->check(check_config);

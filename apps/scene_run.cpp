@@ -255,7 +255,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   std::string holder;
   const data::TriangleMesh at_start = merged(bodies);
   const auto begin_writing = [&] {
-    fs::remove_all(fs::path(output_dir) / "frames");
+    // Of a former run; its tables first, so that they never stand beside frames of this one.
+    for (const char* old : {"log.csv", "forces.csv", "frames"}) fs::remove_all(fs::path(output_dir) / old);
     if (frames.count(0)) write_frame(0, at_start);
   };
   try {

@@ -39,9 +39,10 @@ struct SceneRun {
 /// Runs a scene and writes, into output_dir: frames/%06d.ply (number: the step; all objects in one mesh),
 /// log.csv (step, t, residual, iterations, penetration_max_m, complementarity, kinetic_J, elastic_J,
 /// potential_J, converged, membrane_J, bending_J, substeps) and forces.csv (t, body, fx, fy, fz: of the body
-/// on the objects [N]). The last step of a quasistatic run is always a frame. frames/ of an earlier run goes.
-/// What was done is kept when the run stops early; nothing is written before the first step is done. Throws
-/// data::InputError, too, where the scene needs more memory than there is.
+/// on the objects [N]). The last step of a quasistatic run is always a frame. What was
+/// done is kept when the run stops early; nothing is written before the first step is done, and then frames
+/// and tables of an earlier run go first. Throws data::InputError, too, where the scene needs more memory
+/// than there is.
 SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std::string& output_dir);
 
 }  // namespace flash::sim

@@ -120,10 +120,7 @@ int run(const RunOptions& options) {
   if (options.device == "cuda")
     throw data::InputError("--device cuda: this program has no CUDA backend; use --device cpu or auto");
   namespace fs = std::filesystem;
-  if (!options.force && fs::exists(options.out) &&
-      !(fs::is_directory(options.out) && fs::is_empty(options.out)))
-    throw data::InputError(options.out + ": exists already; choose another -o, or --force to overwrite");
-  data::check_folder_writable(options.out);
+  data::check_folder_free(options.out, options.force);
   std::optional<SaidWhenSlow> phase;
   const auto begin = [&](const std::string& what) {
     if (!options.quiet) phase.emplace(what + " ...");

@@ -10,6 +10,7 @@
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sim/scene/sheet.h"
 #include "sysid/report/export_asset.h"
 #include "sysid/report/search_folder.h"
@@ -28,7 +29,7 @@ struct ExportOptions {
 int run_export(const ExportOptions& options) {
   const sysid::Summary summary = sysid::load_search_folder(options.run).summary;
   const data::Asset base = data::load_asset(options.asset.empty() ? summary.asset : options.asset);
-  check_output_file(options.out, options.common);
+  data::check_file_free(options.out, options.common.force);
   const data::Asset tuned = sysid::tuned_asset(base, summary);
   std::vector<std::string> notices;
   const data::TriangleMesh mesh = data::load_asset_mesh(tuned);

@@ -19,6 +19,7 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sysid/infer/fit/fit.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/parameter_label.h"
@@ -163,7 +164,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   sysid::check_job(
       replays, static_cast<double>(batch) * (options.iterations + static_cast<double>(options.generations)),
       sysid::estimate_batch(replays, batch));
-  check_output(options.out, options.common);
+  data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
 
   const std::vector<sysid::Axis>& axes = settings.grid.axes;

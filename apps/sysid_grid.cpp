@@ -123,6 +123,16 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
   std::printf("%s\n%s\n", (fs::path(out) / "summary.json").c_str(), (fs::path(out) / "report.html").c_str());
 }
 
+/// A search that goes on keeps the order of its recordings: its tables stand in it, and the first one names
+/// the asset. Others come last.
+void order_as(const std::vector<std::string>& names, std::vector<data::Recording>& recordings) {
+  const auto place = [&](const data::Recording& recording) {
+    return std::find(names.begin(), names.end(), recording.name);
+  };
+  std::stable_sort(recordings.begin(), recordings.end(),
+                   [&](const auto& a, const auto& b) { return place(a) < place(b); });
+}
+
 std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& recordings,
                                         const sysid::ReplaySettings& settings, const CommonOptions& options) {
   std::vector<sysid::Replay> replays;
@@ -227,7 +237,10 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   check_options(options);
   const auto begin = std::chrono::steady_clock::now();
   const std::string device = choose_device(options.common);
-  const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
+  const std::string grid_file = (fs::path(options.out) / "grid.json").string();
+  const bool goes_on = options.resume && fs::exists(grid_file);
+  std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
+  if (goes_on) order_as(sysid::load_grid_file(grid_file).recordings, recordings);
   const data::Asset asset = load_asset_for(options.asset, recordings.front());
   const int threads = thread_count(options.common);
   std::vector<sysid::Replay> replays =
@@ -245,13 +258,13 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   const sysid::MemoryEstimate memory = sysid::estimate_memory(replays, settings, !options.no_solver_check);
   sysid::check_job(replays, sysid::count_candidates(settings.axes), memory);
   end_after_signal();
-  if (options.resume && !fs::exists(fs::path(options.out) / "grid.json"))
-    say(options.common, options.out + ": holds no search yet, --resume begins one");
   sysid::ResultsStore store(options.out, settings.axes, names_of(recordings),
                             sysid::fingerprint(replays, settings),
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace
                                                    : sysid::Existing::refuse);
+  if (options.resume && !goes_on)
+    say(options.common, options.out + ": holds no search yet, --resume begins one");
   for (const std::string& notice : notices) say(options.common, notice);
   say(options.common,
       data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) + " candidates, " +

@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
 #include <thread>
 
 #include "apps/command_line.h"
@@ -18,7 +18,6 @@
 #include "data/message_line.h"
 #include "data/recording_digest.h"
 #include "data/text.h"
-#include "data/writable.h"
 #include "sim/scene/sheet.h"
 #include "sysid/report/recording_names.h"
 
@@ -212,7 +211,12 @@ void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& mea
 
 std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed) {
   std::vector<sysid::Axis> axes;
-  for (const auto& [option, text] : fixed) axes.push_back(sysid::parse_fixed(text, option));
+  std::set<std::string> names;
+  for (const auto& [option, text] : fixed) {
+    axes.push_back(sysid::parse_fixed(text, option));
+    if (!names.insert(axes.back().name).second)
+      throw data::InputError(option + " " + axes.back().name + ": given twice, expected one value");
+  }
   return axes;
 }
 
@@ -239,19 +243,6 @@ std::string choose_device(const CommonOptions& options) {
   if (options.device == "cuda")
     throw data::InputError("--device cuda: this program has no CUDA backend; use --device cpu or auto");
   return "cpu";
-}
-
-void check_output(const std::string& path, const CommonOptions& options) {
-  if (!options.force && std::filesystem::exists(path) &&
-      !(std::filesystem::is_directory(path) && std::filesystem::is_empty(path)))
-    throw data::InputError(path + ": exists already; choose another -o, or --force to overwrite");
-  data::check_folder_writable(path);
-}
-
-void check_output_file(const std::string& path, const CommonOptions& options) {
-  if (!options.force && std::filesystem::exists(path) && !std::filesystem::is_directory(path))
-    throw data::InputError(path + ": exists already; choose another name, or --force to overwrite");
-  data::check_file_writable(path);
 }
 
 std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,

@@ -56,6 +56,7 @@ using FixedTexts = std::vector<std::pair<std::string, std::string>>;
 
 /// --fix NAME=VALUE; --set, which some verbs called it, is taken as well.
 void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& meaning);
+/// Throws data::InputError where a name is given twice.
 std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed);
 
 /// What a verb says to people, on stderr, unless --quiet.
@@ -70,13 +71,6 @@ int thread_count(const CommonOptions& options);
 /// The device a search runs on. Throws data::InputError for cuda where the program has none; auto takes the
 /// CPU.
 std::string choose_device(const CommonOptions& options);
-
-/// Throws data::InputError where the folder holds something already and --force is not given, or where it
-/// cannot be written.
-void check_output(const std::string& path, const CommonOptions& options);
-
-/// The same of a file that exists already.
-void check_output_file(const std::string& path, const CommonOptions& options);
 
 /// The recordings in the folders, told apart by name (a warning says where one was renamed). Throws
 /// data::InputError where two of them are the same.

@@ -13,6 +13,7 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sysid/design/plan.h"
 #include "sysid/design/usual_ranges.h"
 #include "sysid/design/virtual_experiment.h"
@@ -88,7 +89,7 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   settings.error = options.error;
   settings.keyframes = options.keyframes;
   settings.at = sysid::values_in_range(settings.grid.base, settings.grid.axes);
-  check_output_file(options.out, options.common);
+  data::check_file_free(options.out, options.common.force);
   // Refused before anything is simulated.
   sysid::steps_in(sysid::longest_virtual_experiment, options.replay.time_step);
 

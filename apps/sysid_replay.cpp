@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <regex>
 
 #include "apps/command_line.h"
 #include "apps/sysid_options.h"
@@ -11,6 +12,7 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sim/newton/accepted.h"
 #include "sysid/observe/registration_parameter.h"
 #include "sysid/replay/memory_estimate.h"
@@ -82,6 +84,22 @@ data::Picture draw_sequence(const sysid::Overlay& overlay, const std::vector<int
   return sequence;
 }
 
+// What a former replay left, killed or whole, the table first; no other folder is searched for it.
+void remove_former(const std::string& folder) {
+  static const std::regex name(R"(\d{3,}(_mesh\.ply|_cloud\.ply|\.png)|sequence\.png)");
+  const fs::path first = fs::path(folder) / "000_mesh.ply";
+  if (!fs::exists(first)) return;
+  data::remove_leftovers(folder);
+  fs::remove(fs::path(folder) / "overlay.csv");
+  fs::remove_all(fs::path(folder) / "steps");
+  std::vector<fs::path> old;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (std::regex_match(entry.path().filename().string(), name) && entry.path() != first)
+      old.push_back(entry.path());
+  old.push_back(first);  // last: till then it is known as a replay's
+  for (const fs::path& path : old) fs::remove(path);
+}
+
 // While the folder is filled a signal leaves what is there.
 void end_half_written(const std::string& folder) {
   if (stop_on_signals())
@@ -136,7 +154,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
   sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1, options.every_step));
-  check_output(options.out, options.common);
+  data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
 
   const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
@@ -155,8 +173,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
       throw data::InputError("--frames: " + std::to_string(k) + " is not a keyframe; expected 0 to " +
                              std::to_string(overlay.frames.size() - 1));
   end_after_signal();
-  // What a replay that was killed left; no other folder is searched for it.
-  if (fs::exists(fs::path(options.out) / "000_mesh.ply")) data::remove_leftovers(options.out);
+  remove_former(options.out);
   sysid::save_overlay(overlay, options.out);
   if (options.every_step)
     for (std::size_t k = 0; k < motion.motion.positions.size(); ++k) {

@@ -8,6 +8,7 @@
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
+#include "data/writable.h"
 #include "sysid/report/recording_names.h"
 #include "sysid/report/report.h"
 #include "sysid/report/search_folder.h"
@@ -44,7 +45,7 @@ int run_report(const ReportOptions& options) {
   // Its own report.html is the run's to replace; any other file is not.
   const std::string out =
       options.out.empty() ? (fs::path(options.run) / "report.html").string() : options.out;
-  if (!options.out.empty()) check_output_file(out, options.common);
+  if (!options.out.empty()) data::check_file_free(out, options.common.force);
   sysid::write_report(summary, results, overlays, settings, out);
   if (options.common.json) {
     std::cout << nlohmann::ordered_json{{"report", out}}.dump(2) << '\n';

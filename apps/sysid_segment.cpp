@@ -14,6 +14,7 @@
 #include "data/error.h"
 #include "data/frame_files.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sysid/capture/segment/segment_folder.h"
 
 namespace flash {
@@ -116,7 +117,7 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
     settings.gripper_path = options.trajectory;
     for (const std::string& jumps : data::find_jumps(*settings.gripper, options.trajectory)) warn(jumps);
   }
-  check_output(options.out, options.common);
+  data::check_folder_free(options.out, options.common.force);
   check_places(views, options.out);
   const sysid::SegmentedFolder segmented =
       sysid::segment_folder(views, times_of(options, views.front().files.size()), settings, options.out);

@@ -14,6 +14,7 @@
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "data/text.h"
+#include "data/writable.h"
 #include "sim/newton/accepted.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
@@ -98,8 +99,8 @@ int run_synth(SynthOptions options) {
   const sysid::MaterialBase base = material_base(asset, mesh, notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
-  check_output(options.out, options.common);
-  if (!options.truth.empty()) check_output_file(options.truth, options.common);
+  data::check_folder_free(options.out, options.common.force);
+  if (!options.truth.empty()) data::check_file_free(options.truth, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
 
   sysid::SynthSettings& settings = options.synth;
@@ -116,7 +117,9 @@ int run_synth(SynthOptions options) {
   options.solver.stop = &stop_on_signals();
   sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
   end_after_signal();
-  if (options.common.force) fs::remove_all(fs::path(options.out) / "frames");
+  if (options.common.force)  // what makes a folder a recording goes first
+    for (const char* old : {"recording.json", "truth.json", "camera_info.yaml", "frames"})
+      fs::remove_all(fs::path(options.out) / old);
   sysid::save_synthetic(synthetic, options.out);
   const std::string truth =
       options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;

@@ -15,6 +15,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
+InputError exists_already(const std::string& path) {
+  return InputError(path + ": exists already; choose another name, or --force to overwrite");
+}
+
 InputError refusal(const std::string& path, const std::string& reason) {
   return InputError(path + ": cannot be written: " + reason);
 }
@@ -47,6 +51,27 @@ void check_file_writable(const std::string& path) {
   if (fs::exists(status) && !fs::is_regular_file(status))
     throw refusal(path, "it is a device, a pipe or a socket");
   check_place(fs::absolute(path).parent_path(), path);
+}
+
+void check_folder_free(const std::string& path, bool overwrite) {
+  const fs::file_status status = status_of(path, path);
+  if (!overwrite && fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(path)))
+    throw exists_already(path);
+  check_folder_writable(path);
+}
+
+void check_file_free(const std::string& path, bool overwrite) {
+  const fs::file_status status = status_of(path, path);
+  if (!overwrite && fs::exists(status) && !fs::is_directory(status)) throw exists_already(path);
+  check_file_writable(path);
+}
+
+void check_names_free(const std::string& folder, const std::vector<std::string>& names, bool overwrite) {
+  for (const std::string& name : names) {
+    const std::string path = (fs::path(folder) / name).string();
+    if (!overwrite && fs::exists(status_of(path, path))) throw exists_already(path);
+  }
+  check_folder_writable(folder);
 }
 
 }  // namespace flash::data

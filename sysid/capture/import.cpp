@@ -221,9 +221,11 @@ void copy_files(const fs::path& out, data::Recording& recording) {
 data::Recording import_recording(const ImportSettings& settings) {
   const fs::path out(settings.out);
   const std::string path = (out / "recording.json").string();
-  if (fs::exists(path) && !settings.overwrite)
-    throw data::InputError(path + ": exists already; choose another folder or --force");
-  data::check_folder_writable(settings.out);
+  std::vector<std::string> names = {"recording.json", "frames",           "depth",
+                                    "mask",           "camera_info.yaml", "gripper.tum"};
+  if (!data::is_mesh_spec(settings.mesh_spec))
+    names.push_back(fs::path(settings.mesh_spec).filename().string());
+  data::check_names_free(settings.out, names, settings.overwrite);
 
   data::Recording recording;
   recording.source = "import";

@@ -50,25 +50,65 @@ void append_text(const std::string& path, std::string_view text) {
   if (!done) throw std::runtime_error(path + ": cannot be written: " + std::strerror(reason));
 }
 
+struct NamedHeader {
+  const char* table;
+  std::string header;
+};
+
+/// In the order of result_tables.
+std::vector<NamedHeader> headers(const std::vector<Axis>& axes) {
+  return {{"results.csv", header_of(results_columns(axes))},
+          {"registrations.csv", header_of(registrations_columns())},
+          {"keyframes.csv", header_of(keyframes_columns())}};
+}
+
 /// Leaves of a file the header and the whole lines whose id is one of `ids`.
-void keep_lines_of(const std::string& path, const std::set<int>& ids) {
+void keep_lines_of(const std::string& path, const std::string& header, const std::set<int>& ids) {
   const std::string text = data::read_file(path);
   std::string kept;
   data::LineReader lines(std::string_view(text).substr(0, text.rfind('\n') + 1));
   std::string_view line;
   while (lines.next(line)) {
     const std::optional<long> id = data::parse_integer(line.substr(0, line.find(',')));
-    const bool header = lines.number() == 1;
-    if (header || (id && ids.count(data::to_index(static_cast<double>(*id))) > 0))
+    const bool is_header = lines.number() == 1;
+    if (is_header || (id && ids.count(data::to_index(static_cast<double>(*id))) > 0))
       kept += std::string(line) + '\n';
   }
+  if (kept.empty()) kept = header;
   if (kept != text) data::write_atomically(path, kept);
 }
 
+/// Beside grid.json and the tables.
+constexpr const char* kAnswers[] = {"summary.json", "report.html", "best"};
+
+/// Throws where the folder holds what a search would write over. A table without lines does not count: a
+/// search that was killed before its grid.json was written leaves it.
+void check_holds_nothing(const std::string& folder, const std::vector<Axis>& axes) {
+  const auto expect_none = [&](const char* name, const std::string& without_lines) {
+    const std::string path = path_of(folder, name);
+    if (!fs::exists(path)) return;
+    if (!without_lines.empty() && fs::is_regular_file(path)) {
+      const std::string text = data::read_file(path);
+      if (text.empty() || text == without_lines) return;
+    }
+    throw data::InputError(folder + ": found " + name +
+                           " without the grid.json of its search, expected a folder without results; name "
+                           "another folder, or --force to overwrite");
+  };
+  for (const auto& [table, header] : headers(axes)) expect_none(table, header);
+  for (const char* name : kAnswers) expect_none(name, "");
+}
+
 void remove_results(const std::string& folder) {
-  for (const char* file : {"grid.json", "summary.json", "report.html"}) fs::remove(fs::path(folder) / file);
+  fs::remove(fs::path(folder) / "grid.json");
   for (const char* table : result_tables) fs::remove(fs::path(folder) / table);
-  fs::remove_all(fs::path(folder) / "best");
+  for (const char* name : kAnswers) fs::remove_all(fs::path(folder) / name);
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
 }
 
 }  // namespace
@@ -77,6 +117,8 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
                            const std::vector<std::string>& recordings, const Fingerprint& fingerprint,
                            Existing existing)
     : folder_(folder) {
+  const bool holds_search = fs::exists(path_of(folder, "grid.json"));
+  if (!holds_search && existing != Existing::replace) check_holds_nothing(folder, axes);
   fs::create_directories(folder);
   lock_ = ::open(path_of(folder, ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (lock_ < 0) throw std::runtime_error(folder + ": cannot be written: " + std::strerror(errno));
@@ -88,7 +130,7 @@ ResultsStore::ResultsStore(const std::string& folder, const std::vector<Axis>& a
     if (!fs::exists(path_of(folder, "grid.json")))
       begin(axes, recordings, fingerprint);
     else if (existing == Existing::resume)
-      go_on(fingerprint);
+      go_on(axes, recordings, fingerprint);
     else
       throw data::InputError(folder + ": holds results already; go on with --resume, or name another folder");
   } catch (...) {
@@ -103,15 +145,14 @@ void ResultsStore::begin(const std::vector<Axis>& axes, const std::vector<std::s
                          const Fingerprint& fingerprint) {
   results_.axes = axes;
   results_.recordings = recordings;
-  data::write_atomically(path_of(folder_, "registrations.csv"), header_of(registrations_columns()));
-  data::write_atomically(path_of(folder_, "keyframes.csv"), header_of(keyframes_columns()));
-  data::write_atomically(path_of(folder_, "results.csv"), header_of(results_columns(axes)));
+  for (const auto& [table, header] : headers(axes)) data::write_atomically(path_of(folder_, table), header);
   const GridFile grid{axes, recordings, fingerprint};
   search_ = search_digest(grid);
   save_grid_file(grid, path_of(folder_, "grid.json"));  // last: all is there
 }
 
-void ResultsStore::go_on(const Fingerprint& fingerprint) {
+void ResultsStore::go_on(const std::vector<Axis>& axes, const std::vector<std::string>& recordings,
+                         const Fingerprint& fingerprint) {
   const GridFile grid = load_grid_file(path_of(folder_, "grid.json"));
   const std::string changed = grid.fingerprint ? difference(*grid.fingerprint, fingerprint)
                                                : "they come from another version of the program";
@@ -119,11 +160,14 @@ void ResultsStore::go_on(const Fingerprint& fingerprint) {
     throw data::InputError(folder_ + ": --resume: these are not the inputs and settings of its results: " +
                            changed + "; name another folder, or repeat the first command");
   }
+  if (recordings != grid.recordings)
+    throw data::InputError(folder_ + ": --resume: found the recordings " + listed(recordings) +
+                           ", expected " + listed(grid.recordings) + ", in the order of its results");
   search_ = search_digest(grid);
   results_ = load_grid_results(folder_, Incomplete::leave_out);
   std::set<int> ids;
   for (const CandidateResult& result : results_.candidates) ids.insert(result.id);
-  for (const char* table : result_tables) keep_lines_of(path_of(folder_, table), ids);
+  for (const auto& [table, header] : headers(axes)) keep_lines_of(path_of(folder_, table), header, ids);
 }
 
 void ResultsStore::append(const std::vector<CandidateResult>& batch) {

@@ -26,8 +26,9 @@ enum class Existing {
 class ResultsStore {
  public:
   /// Creates `folder`, or treats what it holds as `existing` says. Throws data::InputError, with nothing
-  /// changed, where another process writes to it, where it holds results that are to be refused, and where it
-  /// is to go on with results of another fingerprint (naming what differs).
+  /// changed, where another process writes to it; where it holds results that are to be refused; where it is
+  /// to go on with results of another fingerprint (naming what differs) or of recordings in another order;
+  /// and, unless they are to be replaced, where it holds results without grid.json.
   ResultsStore(const std::string& folder, const std::vector<Axis>& axes,
                const std::vector<std::string>& recordings, const Fingerprint& fingerprint, Existing existing);
   ~ResultsStore();
@@ -42,7 +43,8 @@ class ResultsStore {
  private:
   void begin(const std::vector<Axis>& axes, const std::vector<std::string>& recordings,
              const Fingerprint& fingerprint);
-  void go_on(const Fingerprint& fingerprint);
+  void go_on(const std::vector<Axis>& axes, const std::vector<std::string>& recordings,
+             const Fingerprint& fingerprint);
 
   std::string folder_;
   std::string search_;  ///< search_digest

@@ -121,10 +121,12 @@ void Row::expect(const std::string& name, const std::string& value, const std::s
 Table::Table(std::string path, std::vector<std::string> columns, CutLine cut)
     : path_(std::move(path)), text_(whole_lines(path_, cut)), lines_(text_), names_(std::move(columns)) {
   std::string_view header;
-  if (!lines_.next(header))
+  if (!lines_.next(header)) {
+    if (cut == CutLine::leave_out) return;
     throw data::input_error(
         path_, "header",
-        "found an empty file, expected the names of the columns; grid --force searches anew");
+        "found an empty file, expected the names of the columns; grid --resume finds its lines again");
+  }
   check_header(path_, fields_of(header), names_);
   next();
 }

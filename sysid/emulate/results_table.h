@@ -41,7 +41,8 @@ class Row {
   std::string place_;
 };
 
-/// What becomes of a last line without its end, which a search that was killed leaves.
+/// What becomes of a last line without its end, which a search that was killed leaves, and of a file without
+/// a header, which a disk that lost its power can leave: it counts as one without lines.
 enum class CutLine { refuse, leave_out };
 
 /// The lines of a file of comma-separated values one by one, after a header with the names of the columns.

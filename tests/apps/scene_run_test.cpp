@@ -212,6 +212,25 @@ TEST_F(SceneRunTest, StoppedRunKeepsWhatItDid) {
   EXPECT_EQ(data::load_triangle_mesh(out() + "/frames/000003.ply").vertices.rows(), 72);
 }
 
+// Its frames and its tables are of one run at every moment.
+TEST_F(SceneRunTest, FirstFrameOfARunFindsNothingOfAFormerOne) {
+  const std::string scene = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5,
+    "gravity": [0, 0, -9.81], "objects": {"cloth": "cloth.json"}})");
+  run_scene(data::load_scene(scene), {}, out());
+  EXPECT_EQ(column("log.csv", "step").size(), 5u);
+  int looked = 0;
+  SceneRun again;
+  again.progress = [&](int done, int) {
+    if (done == 5) return true;
+    ++looked;  // the first step may refuse the scene, and then nothing is lost
+    for (const char* file : {"log.csv", "forces.csv", "frames/000005.ply"})
+      EXPECT_EQ(fs::exists(fs::path(out()) / file), done == 0) << file << " after step " << done;
+    return true;
+  };
+  run_scene(data::load_scene(scene), again, out());
+  EXPECT_EQ(looked, 5);
+}
+
 TEST_F(SceneRunTest, BadInputIsNamed) {
   const auto message = [&](const std::string& text) -> std::string {
     try {

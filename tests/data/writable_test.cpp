@@ -40,5 +40,34 @@ TEST(Writable, OthersAreRefusedWithTheReason) {
   EXPECT_NE(input_error_of([] { check_folder_writable("/proc/out"); }), "");  // even for root
 }
 
+TEST(Writable, FreeIsAnEmptyFolderOrNoneAndNoFile) {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("full/file.json", "mine");
+  std::filesystem::create_directories(folder / "empty");
+  const std::string said = ": exists already; choose another name, or --force to overwrite";
+  for (const char* place : {"new", "empty"}) EXPECT_NO_THROW(check_folder_free(folder / place, false));
+  for (const std::string& path : {folder / "full", file}) {
+    EXPECT_EQ(input_error_of([&] { check_folder_free(path, false); }), path + said);
+  }
+  EXPECT_NO_THROW(check_folder_free(folder / "full", true));
+  EXPECT_EQ(input_error_of([&] { check_folder_free(file, true); }),
+            file + ": cannot be written: Not a directory");
+  EXPECT_NO_THROW(check_file_free(folder / "full/new", false));
+  EXPECT_EQ(input_error_of([&] { check_file_free(file, false); }), file + said);
+  EXPECT_NO_THROW(check_file_free(file, true));
+}
+
+TEST(Writable, NamesAreFreeBesideOtherFiles) {
+  const TemporaryFolder folder;
+  const std::string file = folder.write("full/file.json", "mine"), full = folder / "full";
+  EXPECT_NO_THROW(check_names_free(full, {"a", "b"}, false));
+  EXPECT_NO_THROW(check_names_free(folder / "new", {"file.json"}, false));
+  EXPECT_EQ(input_error_of([&] {
+              check_names_free(full, {"a", "file.json"}, false);
+            }),
+            file + ": exists already; choose another name, or --force to overwrite");
+  EXPECT_NO_THROW(check_names_free(full, {"file.json"}, true));
+}
+
 }  // namespace
 }  // namespace flash::data

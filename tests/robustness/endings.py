@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import pathlib
+import resource
 import signal
 import subprocess
 import sys
@@ -92,6 +93,7 @@ def refusals(sim, sysid, calib):
         ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "above 0"]),
         ([*bench, "--young-min", "5", "--young-max", "3"], ["--young-max", "found 3", "at least the 5"]),
         ([*synth, "--set", "foo=1"], ["--set foo", "unknown parameter"]),
+        ([*synth, "--fix", "friction=0.3", "--fix", "friction=0.4"], ["--fix friction", "given twice"]),
         ([*synth, "--set", "friction=1e300"], ["--set friction", "0 to 10"]),
         ([*grid, "--envs", "-1"], ["--envs", "found \"-1\"", "from 1 to 100,000"]),
         ([*grid, "--bending", "1e-5:1e-3:3000000"], ["--bending", "3000000", "from 1 to 1,000,000"]),
@@ -221,6 +223,49 @@ def check_resume(options, folder):
            f"--resume --time-step: exit code {done.returncode}: {done.stderr}")
 
 
+def check_order(options, folder):
+    """A search goes on in the order of its recordings, in whatever order they are named: to the same files."""
+    second = folder / "second"
+    program.must(options.sysid, "synth", "--asset", folder / "asset.json", "--mesh", "sheet:0.2x0.2:0.05", "--duration",
+                 "0.6", "--seed", "2", "--noise", "0.003", "--quiet", "-o", second)
+    words = ["--asset", folder / "asset.json", "--bending", "1e-5,1e-4,2e-4", "--envs", "1", "--no-solver-check",
+             "--no-horizon", "--quiet"]
+    tables = ("results.csv", "registrations.csv", "keyframes.csv", "grid.json")
+    run = folder / "ordered"
+    done = program.call(options.sysid, "grid", folder / "recording", second, *words, "-o", run)
+    yield done.returncode in (0, 3), f"grid of two: {done.stderr}"
+    alone = {name: (run / name).read_bytes() for name in tables}
+    lines = alone["results.csv"].splitlines(keepends=True)
+    (run / "results.csv").write_bytes(b"".join(lines[:2]))  # of three candidates
+    done = program.call(options.sysid, "grid", second, folder / "recording", *words, "--resume", "-o", run)
+    yield done.returncode in (0, 3), f"--resume in another order: {done.stderr}"
+    for name in tables:
+        yield (run / name).read_bytes() == alone[name], f"--resume in another order: {name} differs"
+    for more in ([], ["--resume"]):
+        (run / "grid.json").unlink(missing_ok=True)
+        before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+        done = program.call(options.sysid, "grid", folder / "recording", second, *words, *more, "-o", run)
+        yield done.returncode == REFUSED and done.stderr.count("\n") == 1, f"without grid.json {more}: {done.stderr}"
+        yield "found results.csv without the grid.json" in done.stderr, f"without grid.json {more}: {done.stderr}"
+        after = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+        yield after == before, f"without grid.json {more}: the folder has changed"
+
+
+def check_file_limit(options, folder):
+    """A file that may not grow is told as a full disk is: one line, and no signal."""
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
+    grid = ["--bending", "1e-4", "--no-solver-check", "--no-horizon"]
+    inputs = [folder / "recording", "--asset", folder / "asset.json"]
+    for words in ([options.sim, "run", folder / "default.json", "--steps", "20"],
+                  [options.sysid, "synth", "--asset", folder / "asset.json", "--duration", "0.2"],
+                  [options.sysid, "replay", *inputs], [options.sysid, "grid", *inputs, *grid]):
+        done = program.call(*words, "--quiet", "-o", folder / f"limited_{words[1]}", preexec_fn=limit)
+        yield done.returncode == FAILED, f"{words[1]}, files of 1 KB: exit code {done.returncode}: {done.stderr}"
+        yield ("File too large" in done.stderr and done.stderr.count("\n") == 1,
+               f"{words[1]}, files of 1 KB: {done.stderr}")
+
+
 def check_fixed(options, folder):
     """What is said to be understood is what is simulated: a constant of the command line, not the asset's."""
     words = ["--asset", folder / "asset.json", "--fix", "areal_density=0.25", "-o", folder / "fixed", "--force"]
@@ -232,11 +277,15 @@ def check_fixed(options, folder):
 
 
 def check_killed_replay(options, folder):
-    """What a replay that was killed leaves beside its pictures is gone after the next."""
+    """What a replay that was killed leaves beside its pictures is gone after the next, and pictures of other frames."""
     replay = [options.sysid, "replay", folder / "recording", "--asset", folder / "asset.json", "--quiet", "-o", folder / "replayed"]
     program.must(*replay)
     (folder / "replayed" / "002.png.12345-6.tmp").write_bytes(b"half")
+    for name in ("099.png", "099_mesh.ply", "notes.txt"):
+        (folder / "replayed" / name).write_bytes(b"old")
     program.must(*replay, "--force")
+    for name, stays in (("099.png", False), ("099_mesh.ply", False), ("notes.txt", True), ("overlay.csv", True)):
+        yield (folder / "replayed" / name).exists() == stays, f"replay --force, {name}: there is {not stays}"
     left = [path.name for path in (folder / "replayed").iterdir() if path.suffix == ".tmp"]
     yield not left, f"replay --force keeps {left}"
 
@@ -268,7 +317,7 @@ def main():
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
         for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume,
-                      check_fixed, check_killed_replay, *([check_fit] if options.calib else [])):
+                      check_order, check_file_limit, check_fixed, check_killed_replay, *([check_fit] if options.calib else [])):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds

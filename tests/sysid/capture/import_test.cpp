@@ -277,6 +277,18 @@ TEST_F(ImportFiles, WhatFailsItsCheckLeavesNothing) {
   EXPECT_TRUE(std::filesystem::exists(folder_ / "lift/frames/notes.txt"));
 }
 
+// Without recording.json, too: they may be the only copy of what was seen.
+TEST_F(ImportFiles, FramesThatStandInTheFolderAreNotWrittenOver) {
+  const std::string own = folder_.write("lift/frames/000000.ply", "mine");
+  EXPECT_EQ(data::input_error_of([&] { import_recording(settings_); }),
+            (folder_ / "lift/frames") + ": exists already; choose another name, or --force to overwrite");
+  EXPECT_EQ(data::read_file(own), "mine");
+  std::filesystem::remove_all(folder_ / "lift/frames");
+  folder_.write("lift/notes.txt", "mine");
+  import_recording(settings_);
+  EXPECT_EQ(data::read_file(folder_ / "lift/notes.txt"), "mine");
+}
+
 class ImportedClip : public testing::TestWithParam<const char*> {};
 
 /// The shared recordings were written by hand; the import has to find the same sheet within what is fitted

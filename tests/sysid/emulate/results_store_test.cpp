@@ -130,6 +130,81 @@ TEST_F(Results, AreNeverMixedWithOthers) {
   EXPECT_NO_THROW(ResultsStore(folder, kAxes, {"a"}, kPrint, Existing::resume));
 }
 
+// Their lines stand in it, and results.csv repeats the registration of the first.
+TEST_F(Results, OfRecordingsInAnotherOrderAreNotGoneOnWith) {
+  { ResultsStore(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse); }
+  EXPECT_EQ(data::input_error_of([&] {
+              ResultsStore(folder, kAxes, {"b", "a"}, kPrint, Existing::resume);
+            }),
+            folder + ": --resume: found the recordings b, a, expected a, b, in the order of its results");
+  EXPECT_NO_THROW(ResultsStore(folder, kAxes, {"a", "b"}, kPrint, Existing::resume));
+}
+
+TEST_F(Results, WithoutTheirGridFileAreLeftAsTheyAre) {
+  {
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse);
+    store.append(result_of(0, 0.005));
+  }
+  const std::string whole = folder + "/whole";
+  fs::create_directories(whole);
+  for (const char* table : {"results.csv", "registrations.csv", "keyframes.csv"})
+    fs::rename(folder + "/" + table, whole + "/" + table);
+  for (const char* file : {"summary.json", "report.html", "best"}) std::ofstream(whole + "/" + file) << "{}";
+  fs::remove(folder + "/grid.json");
+  for (const char* file :
+       {"results.csv", "registrations.csv", "keyframes.csv", "summary.json", "report.html", "best"}) {
+    const std::string there = folder + "/there/";
+    fs::create_directories(there);
+    fs::copy(whole + "/" + file, there);
+    for (const Existing existing : {Existing::refuse, Existing::resume})
+      EXPECT_EQ(data::input_error_of([&] {
+                  ResultsStore(there, kAxes, {"a", "b"}, kPrint, existing);
+                }),
+                there + ": found " + file +
+                    " without the grid.json of its search, expected a folder without results; name another "
+                    "folder, or --force to overwrite");
+    EXPECT_EQ(std::distance(fs::directory_iterator(there), {}), 1) << file;  // not even .lock
+    EXPECT_EQ(data::read_file(there + file), data::read_file(whole + "/" + file));
+    EXPECT_NO_THROW(ResultsStore(there, kAxes, {"a", "b"}, kPrint, Existing::replace));
+    fs::remove_all(there);
+  }
+}
+
+// grid.json is written last.
+TEST_F(Results, OfASearchThatWasKilledAtItsBeginningAreBegunAgain) {
+  { ResultsStore(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse); }
+  std::ofstream(folder + "/results.csv", std::ios::trunc).flush();
+  fs::remove(folder + "/grid.json");
+  for (const Existing existing : {Existing::refuse, Existing::resume}) {
+    ResultsStore(folder, kAxes, {"a", "b"}, kPrint, existing).append(result_of(0, 0.005));
+    EXPECT_EQ(load_grid_results(folder).candidates.size(), 1u);
+    { ResultsStore(folder, kAxes, {"a", "b"}, kPrint, Existing::replace); }
+    fs::remove(folder + "/grid.json");
+  }
+}
+
+// A rename that a power cut has cut short.
+TEST_F(Results, WithAnEmptyTableGoOnFromTheBeginning) {
+  const auto text = [&](const char* file) { return data::read_file(folder + "/" + file); };
+  { ResultsStore(folder, kAxes, {"a", "b"}, kPrint, Existing::refuse).append(result_of(0, 0.005)); }
+  const char* const files[] = {"results.csv", "registrations.csv", "keyframes.csv"};
+  std::vector<std::string> whole;
+  for (const char* file : files) whole.push_back(text(file));
+  for (const char* empty : files) {
+    std::ofstream(folder + "/" + empty, std::ios::trunc).flush();
+    EXPECT_EQ(data::input_error_of([&] { load_grid_results(folder); }),
+              folder + "/" + empty +
+                  ": header: found an empty file, expected the names of the columns; grid --resume finds its "
+                  "lines again");
+    ResultsStore store(folder, kAxes, {"a", "b"}, kPrint, Existing::resume);
+    EXPECT_FALSE(store.contains(0)) << empty;
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_EQ(text(files[i]), whole[i].substr(0, whole[i].find('\n') + 1)) << files[i];
+    store.append(result_of(0, 0.005));
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(text(files[i]), whole[i]) << files[i];
+  }
+}
+
 // What is left when the program ends between the lines of a batch, or within one.
 TEST_F(Results, LinesThatBelongToNoResultAreCutOffAndTheRestStaysAsItWas) {
   {
