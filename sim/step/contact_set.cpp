@@ -131,7 +131,7 @@ Gap ContactStep::gap(int obstacle, const Points& positions, int i) const {
   const Obstacle& own = environment.obstacles[obstacle];
   if (!several || !is_box(own))
     return gap_after(own, motions[obstacle], {}, start, point, point, time_step, exit);
-  if (!within_reach(obstacle, start, point)) return gap_to(own, motions[obstacle], point);
+  if (far_gap(obstacle, start, point) > 0) return gap_to(own, motions[obstacle], point);
   // A vertex that starts inside goes straight out.
   if (gap_at_start(own, motions[obstacle], start).distance < -inside_depth)
     return gap_after(own, motions[obstacle], {}, start, point, point, time_step, exit);
@@ -139,12 +139,15 @@ Gap ContactStep::gap(int obstacle, const Points& positions, int i) const {
                    slid(obstacle, start, point), time_step, exit);
 }
 
-bool ContactStep::within_reach(int obstacle, const Vector3d& start, const Vector3d& point) const {
+double ContactStep::far_gap(int obstacle, const Vector3d& start, const Vector3d& point) const {
+  const Box* box = std::get_if<Box>(&environment.obstacles[obstacle].shape);
+  if (box == nullptr) return 0;
   const ObstacleMotion& motion = motions[obstacle];
   const Vector3d carried =
       motion.moves ? Vector3d(motion.end * (motion.start.inverse(Eigen::Isometry) * start)) : start;
-  return gap_to(environment.obstacles[obstacle], motion, point).distance <=
-         2 * (point - carried).norm() + touching_gap;
+  const double radius = box->half_extents.norm();
+  if ((carried - motion.end.translation()).norm() <= radius + (point - carried).norm()) return 0;
+  return (point - motion.end.translation()).norm() - radius;
 }
 
 Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& point) const {
@@ -155,7 +158,7 @@ Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& 
   Vector3d end = point;
   std::vector<int> others;
   for (int k = 0; k < static_cast<int>(motions.size()); ++k)
-    if (k != obstacle && within_reach(k, start, point)) others.push_back(k);
+    if (k != obstacle && far_gap(k, start, point) == 0) others.push_back(k);
   while (true) {
     const std::optional<MetSurface> own = surface_of(obstacle, end);
     std::optional<MetSurface> first;
@@ -218,7 +221,8 @@ void find_clearance(const ContactStep& step, const Points& positions, std::vecto
   for (size_t k = 0; k < step.motions.size(); ++k) {
     if (step.several) {
       for (int i = 0; i < positions.rows(); ++i)
-        clearance[i] = std::min(clearance[i], step.gap(int(k), positions, i).distance);
+        if (clearance[i] > step.far_gap(int(k), step.environment.state.positions.row(i), positions.row(i)))
+          clearance[i] = std::min(clearance[i], step.gap(int(k), positions, i).distance);
       continue;
     }
     lower_to_gaps(step.environment.obstacles[k], step.motions[k], step.environment.state.positions, positions,

@@ -25,8 +25,9 @@ struct ContactStep {
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
   Gap gap(int obstacle, const data::Points& positions, int i) const;
 
-  /// Whether the way of a vertex from `start` to `point`, or one that slides as far, can meet an obstacle.
-  bool within_reach(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
+  /// A lower bound of the gap to a box that the way of a vertex from `start` to `point`, or one that slides
+  /// as far, cannot meet: by the sphere around it [m]. 0: it may meet the obstacle.
+  double far_gap(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
 
   /// Where the way of a vertex from `start` to `point` would end along the surfaces of other obstacles that
   /// it meets before this one.

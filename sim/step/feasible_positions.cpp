@@ -24,6 +24,9 @@ bool lands(const Touch& touch, const Gap& gap) {
 
 bool stays(const ContactStep& step, std::span<const Touch> touches, const Points& positions, int i) {
   for (size_t k = 0; k < step.motions.size(); ++k) {
+    if (step.several && (touches.empty() || !touches[k].holds) &&
+        step.far_gap(int(k), step.environment.state.positions.row(i), positions.row(i)) > 0)
+      continue;
     const Gap gap = step.gap(static_cast<int>(k), positions, i);
     if (!(gap.distance >= 0) || (!touches.empty() && lands(touches[k], gap))) return false;
   }
