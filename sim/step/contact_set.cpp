@@ -141,12 +141,13 @@ Gap ContactStep::gap(int obstacle, const Points& positions, int i) const {
 
 double ContactStep::far_gap(int obstacle, const Vector3d& start, const Vector3d& point) const {
   const Box* box = std::get_if<Box>(&environment.obstacles[obstacle].shape);
-  if (box == nullptr) return 0;
+  constexpr double may_meet = -std::numeric_limits<double>::infinity();
+  if (box == nullptr) return may_meet;
   const ObstacleMotion& motion = motions[obstacle];
   const Vector3d carried =
       motion.moves ? Vector3d(motion.end * (motion.start.inverse(Eigen::Isometry) * start)) : start;
   const double radius = box->half_extents.norm();
-  if ((carried - motion.end.translation()).norm() <= radius + (point - carried).norm()) return 0;
+  if ((carried - motion.end.translation()).norm() <= radius + (point - carried).norm()) return may_meet;
   return (point - motion.end.translation()).norm() - radius;
 }
 
@@ -158,7 +159,7 @@ Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& 
   Vector3d end = point;
   std::vector<int> others;
   for (int k = 0; k < static_cast<int>(motions.size()); ++k)
-    if (k != obstacle && far_gap(k, start, point) == 0) others.push_back(k);
+    if (k != obstacle && far_gap(k, start, point) < 0) others.push_back(k);
   while (true) {
     const std::optional<MetSurface> own = surface_of(obstacle, end);
     std::optional<MetSurface> first;

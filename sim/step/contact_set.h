@@ -26,7 +26,7 @@ struct ContactStep {
   Gap gap(int obstacle, const data::Points& positions, int i) const;
 
   /// A lower bound of the gap to a box that the way of a vertex from `start` to `point`, or one that slides
-  /// as far, cannot meet: by the sphere around it [m]. 0: it may meet the obstacle.
+  /// as far, cannot meet: by the sphere around it [m]; minus infinity where it may meet the obstacle.
   double far_gap(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
 
   /// Where the way of a vertex from `start` to `point` would end along the surfaces of other obstacles that
