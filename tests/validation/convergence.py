@@ -98,7 +98,7 @@ def tables(sim, out, table):
     study = Study(sim, out)
     return {"convergence_solver": table(
                 ["experiment", "tolerance", "iterations at most", "worst residual", "steps that missed it", "warned",
-                 "positions change mm", "iterations a step"],
+                 "positions change mm", "iterations per step"],
                 [row for name in EXPERIMENTS for row in solver_rows(study, name)]),
             "convergence_resolution": table(
                 ["experiment", "halved again and again", *(f"change {k} mm" for k in (1, 2, 3, 4)), "order"],

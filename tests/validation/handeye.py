@@ -226,7 +226,7 @@ def protocol_table(rows, table):
                            f"{sum(held)} of {len(blocks)}", f"{mean[7]:.3f} / {mean[8]:.4f} / {mean[9]:.3f}"])
     return table(["setup", "robot noise", "Park deg / mm", "bundle", "errors in variables", "baseline", "ratio",
                   "NEES", f"in {low:.2f} to {high:.2f}", "estimated px / deg / mm"],
-                 shown_rows) + f"\nRows in the band, of six, block by block: {' '.join(map(str, inside))}.\n"
+                 shown_rows) + f"\nThe number of the six rows in the band is, block by block: {' '.join(map(str, inside))}.\n"
 
 
 def models_table(rows, table):
