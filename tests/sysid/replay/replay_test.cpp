@@ -169,7 +169,8 @@ TEST(Replay, StampsOfAnyClockGiveTheSameStepsAndScore) {
     folder.write("lift/recording.json", moved.dump());
     const Replay replay = make_replay(data::load_recording(folder / "lift"), zero.settings);
     EXPECT_EQ(replay.steps, zero.steps);
-    EXPECT_DOUBLE_EQ(score_of(replay), expected);
+    // Stamps of today are resolved to 2.4e-7 s; the gripper moves at less than 0.4 m/s.
+    EXPECT_NEAR(score_of(replay), expected, 1e-7);
   }
 }
 
