@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sim/scene/environment.h"
-#include "sim/step/contact_geometry.h"
+#include "sim/step/contact_way.h"
 #include "sim/step/touch.h"
 
 namespace flash::sim {

@@ -1,4 +1,4 @@
-#include "sim/step/contact_geometry.h"
+#include "sim/step/contact_way.h"
 
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@ Isometry3d random_pose() {
                     Eigen::AngleAxisd(3 * Vector3d::Random().x(), Vector3d::Random().normalized()));
 }
 
-TEST(ContactGeometry, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
+TEST(ContactWay, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
   int through = 0;
   for (int sample = 0; sample < 20000; ++sample) {
     const Box box{.half_extents = 0.02 * Vector3d::Ones() + 0.3 * Vector3d::Random().cwiseAbs()};
@@ -62,7 +62,7 @@ TEST(ContactGeometry, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
   EXPECT_GT(through, 500);
 }
 
-TEST(ContactGeometry, NoWayPassesThroughACylinder) {
+TEST(ContactWay, NoWayPassesThroughACylinder) {
   int through = 0;
   for (int sample = 0; sample < 20000; ++sample) {
     const Cylinder cylinder{Vector3d::Zero(), Vector3d::UnitY(), 0.3};
@@ -86,7 +86,7 @@ TEST(ContactGeometry, NoWayPassesThroughACylinder) {
   EXPECT_GT(through, 1000);
 }
 
-TEST(ContactGeometry, WhatStartsInsideMayStayThereForItsWayOut) {
+TEST(ContactWay, WhatStartsInsideMayStayThereForItsWayOut) {
   Box box{.half_extents = {0.1, 0.1, 0.05}};
   const Obstacle obstacles[] = {
       {Plane{Vector3d(0, 0, 0.05)}}, {box}, {Cylinder{Vector3d::Zero(), Vector3d::UnitY(), 0.05}}};
