@@ -138,11 +138,13 @@ bool face_is_covered(const Box& box, const ObstacleMotion& motion, const OtherOb
 }
 
 /// A way in the plane of an open face is taken out of the box there. One that comes from beside a covered
-/// face is taken to the middle of the box, where that face does not count.
+/// face is taken to the middle of the box, where that face does not count. Of two covered faces one counts:
+/// the way lies in their edge, not in the box.
 LocalWay local_way(const Box& box, const ObstacleMotion& motion, const OtherObstacles& others,
                    const Vector3d& start, const Vector3d& end) {
   LocalWay way{motion.start.inverse(Eigen::Isometry) * start, motion.end.inverse(Eigen::Isometry) * end};
   const LocalWay straight = way;
+  bool covered = false;
   const Vector3d excess = way.from.cwiseAbs() - box.half_extents;
   for (int axis = 0; axis < 3; ++axis) {
     const double side = std::copysign(1.0, straight.from[axis]), half = box.half_extents[axis];
@@ -150,7 +152,8 @@ LocalWay local_way(const Box& box, const ObstacleMotion& motion, const OtherObst
         std::abs(side * straight.to[axis] - half) > grazing)
       continue;
     const bool from_beside = std::max(excess[(axis + 1) % 3], excess[(axis + 2) % 3]) >= -grazing;
-    if (from_beside && face_is_covered(box, motion, others, straight, axis)) {
+    if (!covered && from_beside && face_is_covered(box, motion, others, straight, axis)) {
+      covered = true;
       way.from[axis] = way.to[axis] = 0;
     } else {
       way.grazed_axis = axis;
@@ -175,7 +178,9 @@ Passage passage_beside(const Box& box, const ObstacleMotion& motion, const Other
   if (others.obstacles == nullptr) return passage_through(box, way.from, way.to, way_out);
   // A way along the surface of a neighbour ends on the box, not above it by rounding.
   const Box reached{.half_extents = box.half_extents.array() + 0.5 * grazing};
-  Passage passage = passage_through(reached, way.from, way.to, way_out);
+  const bool starts_inside = (way.from.cwiseAbs() - box.half_extents).maxCoeff() < -inside_depth;
+  Passage passage =
+      passage_through(reached, way.from, way.to, starts_inside ? way_out : Vector3d(Vector3d::Zero()));
   if (!passage.enters) return passage;
   const Vector3d entered = way.from + passage.entry * (way.to - way.from);
   for (int axis = 0; axis < 3; ++axis) {
@@ -206,8 +211,12 @@ Gap gap_after_way(const Box& box, const ObstacleMotion& motion, const OtherObsta
                   const Exit& exit) {
   const Vector3d local = motion.end.inverse(Eigen::Isometry) * point;
   LocalWay way = local_way(box, motion, others, start, slid);
-  if (ends_at_grazed_face(box, way))
-    return gap_to_face(box, motion, point, way.grazed_axis, std::copysign(1.0, way.from[way.grazed_axis]));
+  if (ends_at_grazed_face(box, way)) {
+    const double side = std::copysign(1.0, way.from[way.grazed_axis]);
+    const Vector3d from = motion.start.inverse(Eigen::Isometry) * start;
+    return let_out(gap_to_face(box, motion, point, way.grazed_axis, side),
+                   box.half_extents[way.grazed_axis] - side * from[way.grazed_axis], time_step, exit);
+  }
   const Vector3d way_out = motion.start.linear().transpose() * exit.way;
   Passage passage = passage_beside(box, motion, others, way, way_out);
   if (!passage.enters && slid != point) {

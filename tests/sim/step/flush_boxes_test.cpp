@@ -107,5 +107,36 @@ TEST(FlushBoxes, ASheetThatCatchesAtAStepStaysOnTop) {
   }
 }
 
+Obstacle box_between(const Vector3d& low, const Vector3d& high) {
+  Box box{.half_extents = 0.5 * (high - low)};
+  box.pose = Eigen::Translation3d(0.5 * (low + high));
+  return {box};
+}
+
+/// A sheet that lies on a table at z = 0, under or beside what else is there, stays where it is.
+TEST(FlushBoxes, ASheetAtRestStaysOnItsTable) {
+  const Sheet sheet = small_sheet(6, 0.2);
+  const Obstacle table = box_between({-0.5, -0.5, -0.1}, {0.5, 0.5, 0});
+  const std::vector<std::vector<Obstacle>> scenes = {
+      // A board pierces the table: what starts in the board leaves it, and nothing else moves.
+      {table, box_between({0.08, -0.5, -0.25e-3}, {0.13, 0.5, 0.5e-3})},
+      // Two blocks that overlap stand on it; a vertex lies at the edge of one, under the other.
+      {table, box_between({0.04, 0.04, 0}, {0.12, 0.1, 0.06}),
+       box_between({0.08, 0.02, 0}, {0.16, 0.14, 0.05})},
+      // A box in a plane stands proud of it by half a micrometre.
+      {{Plane{}}, box_between({0.05, 0.05, -0.1}, {0.13, 0.13, 0.5e-6})},
+  };
+  for (std::size_t k = 0; k < scenes.size(); ++k)
+    for (const double h : {0.005, 0.01}) {
+      Environment environment = environment_of(sheet);
+      environment.obstacles = scenes[k];
+      Solver solver(sheet, {.time_step = h});
+      for (int n = 0; n < 20; ++n) EXPECT_TRUE(solver.step(environment).converged) << k << " step " << n;
+      const auto z = environment.state.positions.col(2);
+      EXPECT_GT(z.minCoeff(), -1e-9) << k;
+      EXPECT_LT(z.maxCoeff(), 2e-3) << k;
+    }
+}
+
 }  // namespace
 }  // namespace flash::sim
