@@ -133,7 +133,7 @@ bool face_is_covered(const Box& box, const ObstacleMotion& motion, const OtherOb
   const Vector3d first = way.from.cwiseMax(-inner).cwiseMin(inner),
                  last = way.to.cwiseMax(-inner).cwiseMin(inner);
   Vector3d beyond = first + 1e-3 * (last - first);
-  beyond[axis] = std::copysign(box.half_extents[axis] + 2 * grazing, way.from[axis]);
+  beyond[axis] = std::copysign(box.half_extents[axis] + grazing, way.from[axis]);
   return others.cover(motion.end * beyond);
 }
 
