@@ -27,7 +27,8 @@ TEST(RandomScenes, AreSolvedOrSaidNotToBe) {
 /// Scenes that once had eight and ten unsolved steps: a sheet so soft that its triangles become lines, and a
 /// stiff one that slides under ten million times its weight.
 TEST(RandomScenes, DrawnAndPressedSheetsAreSolved) {
-  for (const unsigned long seed : {90645, 80180}) EXPECT_LE(observe(random_scene(seed)).unconverged, 1) << seed;
+  for (const unsigned long seed : {90645, 80180})
+    EXPECT_LE(observe(random_scene(seed)).unconverged, 1) << seed;
 }
 
 /// Five of the sheets of `make deep-starts`, stiff ones that each vertex's own way out tore in two: they came
