@@ -45,7 +45,8 @@ data::Trajectory lift_of(const Eigen::Vector3d& corner) {
   return trajectory;
 }
 
-Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet, int index) {
+Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
+                             const std::shared_ptr<const Schedule>& schedule, int index) {
   Environment environment;
   data::SheetMaterial& material = environment.material;
   material.membrane_stiffness = between(benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max,
@@ -58,11 +59,11 @@ Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
   environment.obstacles.push_back({Plane{}, -1.0});
   environment.state.positions = sheet.rest.vertices;
   environment.state.velocities = data::Points::Zero(sheet.rest.vertices.rows(), 3);
-  Grasp grasp;
+  Hold corner{.name = "gripper", .frame = 0};
   for (int i = 0; i < int(sheet.rest.vertices.rows()); ++i)
-    if (sheet.rest.vertices.row(i).head<2>().minCoeff() > side - 0.02) grasp.vertices.push_back(i);
-  grasp.gripper = lift_of(Eigen::Vector3d(side, side, 0));
-  environment.grasps.push_back(grasp);
+    if (sheet.rest.vertices.row(i).head<2>().minCoeff() > side - 0.02) corner.vertices.push_back(i);
+  environment.holds.push_back(corner);
+  environment.schedule = schedule;
   return environment;
 }
 
@@ -121,10 +122,12 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   std::vector<Counts> counts(benchmark.environments);
   const std::size_t middle = counts.size() / 2;
   data::Points x;  // of the environment in the middle, halfway
+  const std::vector<data::Trajectory> gripper = {lift_of(Eigen::Vector3d(side, side, 0))};
+  const auto schedule = make_schedule(gripper, 0.0, benchmark.time_step, settings.steps);
   const auto start = std::chrono::steady_clock::now();
   replay_in_batches(
       plan, counts.size(), environments_at_once, settings,
-      [&](std::size_t i) { return lift_environment(benchmark, plan->sheet, static_cast<int>(i)); },
+      [&](std::size_t i) { return lift_environment(benchmark, plan->sheet, schedule, static_cast<int>(i)); },
       [&](std::size_t i, const Batch& batch, int e) {
         for (const StepStats& step : batch.stats(e)) {
           counts[i].iterations += step.iterations;
@@ -153,7 +156,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   if (total < 1) return result;
 
   const data::SheetMaterial material =
-      lift_environment(benchmark, plan->sheet, benchmark.environments / 2).material;
+      lift_environment(benchmark, plan->sheet, schedule, benchmark.environments / 2).material;
   const BendingOperator& bending = bending_operator(*plan, material.bending_model, material.poissons_ratio);
   data::Points y = data::Points::Zero(x.rows(), 3);
   BlockValues<double> values;

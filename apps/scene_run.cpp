@@ -128,15 +128,11 @@ std::string force_rows(double time, const std::vector<SceneBody>& bodies,
     forces.try_emplace(body, Vector3d::Zero()).first->second += force;
   };
   for (std::size_t b = 0; b < bodies.size(); ++b) {
-    for (std::size_t k = 0; k < reports[b].grasp_forces.size(); ++k)
-      add(bodies[b].grasp_names[k], reports[b].grasp_forces[k]);
-    for (std::size_t k = 0; k < reports[b].obstacle_forces.size(); ++k)
-      add(bodies[b].obstacle_names[k], reports[b].obstacle_forces[k]);
-    for (const Load& support : reports[b].fixed_forces)
-      for (int axis = 0; axis < 3; ++axis) {
-        const std::string& name = bodies[b].support_names.at(support.vertex)[axis];
-        if (!name.empty()) add(name, support.force[axis] * Vector3d::Unit(axis));
-      }
+    const Environment& environment = bodies[b].environment;
+    for (std::size_t k = 0; k < environment.holds.size(); ++k)
+      add(environment.holds[k].name, reports[b].hold_forces[k]);
+    for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
+      add(environment.obstacles[k].name, reports[b].obstacle_forces[k]);
   }
   std::string rows;
   for (const auto& [body, force] : forces) {
@@ -160,7 +156,7 @@ struct Deepest {
     const SceneBody& in = bodies[body];
     return in.name + ": vertex " + std::to_string(penetration.vertex) + " is " +
            data::format_short(1e3 * penetration.depth) + " mm inside " +
-           in.obstacle_names[static_cast<std::size_t>(penetration.obstacle)] + " at " +
+           in.environment.obstacles[static_cast<std::size_t>(penetration.obstacle)].name + " at " +
            data::format_short(time) + " s";
   }
 };
@@ -168,13 +164,12 @@ struct Deepest {
 constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
 
 /// Who holds a vertex: an end effector, or a support.
-std::string holder_of(const SceneBody& body, int vertex) {
-  const auto& grasps = body.environment.grasps;
-  for (std::size_t k = 0; k < grasps.size(); ++k)
-    if (body.environment.state.grasp_offsets.size() > k &&
-        body.environment.state.grasp_offsets[k].rows() > 0 &&
-        std::count(grasps[k].vertices.begin(), grasps[k].vertices.end(), vertex) > 0)
-      return body.grasp_names[k];
+std::string holder_of(const Environment& environment, int vertex) {
+  for (std::size_t k = 0; k < environment.holds.size(); ++k) {
+    const std::vector<int>& held = environment.state.held[k].vertices;
+    if (environment.holds[k].frame != base_frame && std::count(held.begin(), held.end(), vertex) > 0)
+      return environment.holds[k].name;
+  }
   return "a support";
 }
 
@@ -207,7 +202,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   namespace fs = std::filesystem;
   SceneSummary summary;
   summary.notices = scene.notices;
-  std::vector<SceneBody> bodies = scene_bodies(scene, summary.notices);
+  const int steps = run.steps >= 0 ? run.steps : scene.steps;
+  std::vector<SceneBody> bodies = scene_bodies(scene, steps, summary.notices);
   check_memory(scene, bodies);
   if (scene.steps_by_default && run.steps < 0)
     summary.notices.push_back(scene.source + ": names no length: " + std::to_string(scene.steps) +
@@ -223,7 +219,6 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   std::vector<Stepper> steppers;
   for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
 
-  const int steps = run.steps >= 0 ? run.steps : scene.steps;
   const std::set<int> frames = frames_to_write(scene, steps);
   const auto write_frame = [&](int step, const data::TriangleMesh& mesh) {
     char name[32];
@@ -265,11 +260,6 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     bool done = false;
     begins("solving the first step of " + size);
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
-      bool arrived = true;
-      for (SceneBody& body : bodies) {
-        close_pending_grasps(body);
-        arrived = move_supports(body, body.environment.state.time + scene.time_step) && arrived;
-      }
       std::vector<std::future<void>> pending;
       const auto advance = [&](std::size_t b) { reports[b] = steppers[b](bodies[b].environment); };
       for (std::size_t b = 0; b < bodies.size(); ++b)
@@ -292,7 +282,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         started.see(report.start_penetration, b, time - scene.time_step);
         inside_at_end = std::max(inside_at_end, report.start_penetration.depth);
         if (report.held_penetration.depth > held.penetration.depth)
-          holder = holder_of(bodies[b], report.held_penetration.vertex);
+          holder = holder_of(bodies[b].environment, report.held_penetration.vertex);
         held.see(report.held_penetration, b, time);
         summary.residual_max = data::worst(summary.residual_max, report.residual);
         summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
@@ -303,6 +293,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       summary.steps = step;
       if (scene.rest_motion) {
         summary.last_motion = scene.time_step * stop_motion(bodies);
+        const bool arrived = std::all_of(bodies.begin(), bodies.end(),
+                                         [](const SceneBody& body) { return all_arrived(body.environment); });
         done = summary.at_rest = arrived && summary.last_motion <= *scene.rest_motion;
       }
       if (frames.count(step) || (scene.rest_motion && (done || step == steps)))

@@ -62,20 +62,24 @@ Eigen::Isometry3d from_vector(const Eigen::Matrix<double, 7, 1>& pose) {
   return result;
 }
 
+Eigen::Isometry3d pose_between(const Eigen::Isometry3d& before, const Eigen::Isometry3d& after,
+                               double share) {
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.translation() = (1 - share) * before.translation() + share * after.translation();
+  const Eigen::Quaterniond q =
+      Eigen::Quaterniond(before.linear()).slerp(share, Eigen::Quaterniond(after.linear())).normalized();
+  pose.linear() = q.toRotationMatrix();
+  return pose;
+}
+
 Eigen::Isometry3d pose_at(const Trajectory& trajectory, double t) {
   if (trajectory.times.empty()) return Eigen::Isometry3d::Identity();
   const auto after = std::upper_bound(trajectory.times.begin(), trajectory.times.end(), t);
   if (after == trajectory.times.begin()) return trajectory.poses.front();
   if (after == trajectory.times.end()) return trajectory.poses.back();
   const std::size_t i = static_cast<std::size_t>(after - trajectory.times.begin());
-  const Eigen::Isometry3d &before = trajectory.poses[i - 1], &next = trajectory.poses[i];
   const double s = (t - trajectory.times[i - 1]) / (trajectory.times[i] - trajectory.times[i - 1]);
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() = (1 - s) * before.translation() + s * next.translation();
-  const Eigen::Quaterniond q =
-      Eigen::Quaterniond(before.linear()).slerp(s, Eigen::Quaterniond(next.linear())).normalized();
-  pose.linear() = q.toRotationMatrix();
-  return pose;
+  return pose_between(trajectory.poses[i - 1], trajectory.poses[i], s);
 }
 
 Trajectory load_tum(const std::string& path) {

@@ -11,6 +11,9 @@ struct Trajectory {
   std::vector<Eigen::Isometry3d> poses;
 };
 
+/// The pose that has gone `share` of the way: linear in translation, slerp in rotation.
+Eigen::Isometry3d pose_between(const Eigen::Isometry3d& before, const Eigen::Isometry3d& after, double share);
+
 /// Pose at time t [s]: linear in translation, slerp in rotation, held constant outside the recorded span.
 Eigen::Isometry3d pose_at(const Trajectory& trajectory, double t);
 

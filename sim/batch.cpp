@@ -18,8 +18,8 @@ struct Batch::Storage {
   BatchSettings settings;
   std::vector<std::optional<Solver>> solvers;  ///< of environments under way
   int step = 0;
-  std::ptrdiff_t vertices = 0, grasps = 0;
-  std::vector<double> positions, velocities, kept, grasp_forces;
+  std::ptrdiff_t vertices = 0, holds = 0;
+  std::vector<double> positions, velocities, kept, hold_forces;
   std::vector<StepStats> stats;
 
   std::ptrdiff_t steps() const { return settings.steps - settings.first_step; }
@@ -54,14 +54,26 @@ struct Batch::Storage {
     const std::ptrdiff_t place = e * steps() + before - settings.first_step;
     stats[place] = {report.residual,       report.penetration_max, report.iterations, report.solves,
                     report.factorizations, report.substeps,        report.converged};
-    for (std::ptrdiff_t k = 0; k < grasps; ++k)
-      std::copy(report.grasp_forces[k].data(), report.grasp_forces[k].data() + 3,
-                grasp_forces.data() + (place * grasps + k) * 3);
+    for (std::ptrdiff_t k = 0; k < holds; ++k)
+      std::copy(report.hold_forces[k].data(), report.hold_forces[k].data() + 3,
+                hold_forces.data() + (place * holds + k) * 3);
     keep(e, before + 1);
   }
 };
 
 namespace {
+
+bool frames_exist(const Environment& environment) {
+  const int frames = environment.schedule ? static_cast<int>(environment.schedule->frames.size()) : 0;
+  const auto exists = [&](int frame) { return frame >= base_frame && frame < frames; };
+  const auto has_frame = [&](const Obstacle& obstacle) {
+    const Box* box = std::get_if<Box>(&obstacle.shape);
+    return box == nullptr || exists(box->frame);
+  };
+  return std::all_of(environment.holds.begin(), environment.holds.end(),
+                     [&](const Hold& hold) { return exists(hold.frame); }) &&
+         std::all_of(environment.obstacles.begin(), environment.obstacles.end(), has_frame);
+}
 
 void check(const SheetPlan& plan, const std::vector<Environment>& environments,
            const BatchSettings& settings) {
@@ -79,8 +91,10 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
     require(environment.state.positions.rows() == plan.pattern.size &&
                 environment.state.velocities.rows() == plan.pattern.size,
             "batch: every environment needs a position and a velocity for each vertex of the plan");
-    require(environment.grasps.size() == environments.front().grasps.size(),
-            "batch: all environments need the same number of grasps");
+    require(environment.holds.size() == environments.front().holds.size(),
+            "batch: all environments need the same number of holds");
+    require(frames_exist(environment),
+            "batch: a hold or a box names a frame that the schedule does not have");
   }
 }
 
@@ -106,13 +120,13 @@ Batch::Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> env
   s.step = s.settings.first_step;
   s.vertices = s.plan->pattern.size;
   const std::size_t count = s.environments.size(), numbers = count * 3 * s.vertices;
-  s.grasps = count > 0 ? static_cast<std::ptrdiff_t>(s.environments.front().grasps.size()) : 0;
+  s.holds = count > 0 ? static_cast<std::ptrdiff_t>(s.environments.front().holds.size()) : 0;
   s.solvers.resize(count);
   s.positions.resize(numbers);
   s.velocities.resize(numbers);
   s.kept.resize(numbers * s.settings.kept_steps.size());
   s.stats.resize(count * s.steps());
-  s.grasp_forces.resize(3 * s.grasps * s.stats.size());
+  s.hold_forces.resize(3 * s.holds * s.stats.size());
   for (int e = 0; e < size(); ++e) {
     s.keep(e, s.step);
     s.show(e);
@@ -163,9 +177,9 @@ View<double> Batch::kept_positions() const {
   return dense(s.kept, {size(), std::ssize(s.settings.kept_steps), s.vertices, 3});
 }
 
-View<double> Batch::grasp_forces() const {
+View<double> Batch::hold_forces() const {
   const Storage& s = *storage_;
-  return dense(s.grasp_forces, {size(), s.steps(), s.grasps, 3});
+  return dense(s.hold_forces, {size(), s.steps(), s.holds, 3});
 }
 
 std::span<const StepStats> Batch::stats(int environment) const {

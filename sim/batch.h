@@ -43,7 +43,7 @@ inline constexpr int restart_interval = 50;
 class Batch {
  public:
   /// Throws std::invalid_argument where the environments do not have the plan's vertices and the same number
-  /// of grasps, or the steps do not ascend from first_step to `steps`.
+  /// of holds, where a frame is not in the schedule, or the steps do not ascend from first_step to `steps`.
   Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments, BatchSettings settings);
   ~Batch();
   Batch(Batch&&) noexcept;
@@ -63,7 +63,7 @@ class Batch {
   View<double> positions() const;       ///< environments x vertices x 3 [m]
   View<double> velocities() const;      ///< environments x vertices x 3 [m/s]
   View<double> kept_positions() const;  ///< environments x kept steps x vertices x 3 [m]
-  View<double> grasp_forces() const;    ///< gripper on sheet: environments x steps x grasps x 3 [N]
+  View<double> hold_forces() const;     ///< hold on sheet: environments x steps x holds x 3 [N]
   std::span<const StepStats> stats(int environment) const;  ///< a step each, from first_step on
 
   /// Positions of one environment at the kept step `index` of settings.kept_steps [m].

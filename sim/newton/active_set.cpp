@@ -21,11 +21,11 @@ Map<Matrix3d> block(BlockValues<double>& values, size_t k) { return Map<Matrix3d
 
 void add_slip_stiffness(const ContactSet& contacts, BlockValues<double>& values) {
   for (const VertexConstraint& c : contacts.constraints)
-    if (c.hold == Hold::slip) block(values, c.vertex) += c.free * c.slip_stiffness * c.free;
+    if (c.freedom == Freedom::slip) block(values, c.vertex) += c.free * c.slip_stiffness * c.free;
 }
 
 void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& values) {
-  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k)
+  for (size_t k = contacts.held; k < contacts.constraints.size(); ++k)
     for (const Touch& touch : contacts.touches_of(k))
       if (touch.holds && !touch.curvature_direction.isZero(0))
         block(values, contacts.constraints[k].vertex) -=
@@ -34,7 +34,7 @@ void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& valu
 
 void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, BlockValues<double>& values) {
   for (const VertexConstraint& c : contacts.constraints) {
-    if (c.hold == Hold::free) continue;
+    if (c.freedom == Freedom::free) continue;
     auto own = block(values, c.vertex);
     own = c.free * own * c.free + own.trace() / 3 * (Matrix3d::Identity() - c.free);
   }
@@ -44,8 +44,8 @@ void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, Bl
     auto between = block(values, pattern.size + k);
     for (const bool left : {true, false}) {
       const VertexConstraint* c = contacts.find(left ? row : column);
-      if (c == nullptr || c->hold == Hold::free) continue;
-      if (c->hold == Hold::stick)
+      if (c == nullptr || c->freedom == Freedom::free) continue;
+      if (c->freedom == Freedom::stick)
         between.setZero();
       else if (left)
         between = c->free * between;
@@ -66,7 +66,7 @@ bool release(const Vector3d& force, VertexConstraint& c, std::span<Touch> touche
   for (Touch& touch : touches) touch.released = touch.released && !touch.holds;
   const auto still_held = std::count_if(touches.begin(), touches.end(), holds);
   if (still_held == held) return false;
-  c.hold = still_held > 0 ? Hold::slip : Hold::free;
+  c.freedom = still_held > 0 ? Freedom::slip : Freedom::free;
   c.free = along_surfaces(touches);
   c.correction -= c.free * c.correction;
   return true;
@@ -85,7 +85,7 @@ bool hold(const Vector3d& step, double reach, VertexConstraint& c, std::span<Tou
     if (inward.squaredNorm() < least_inward) continue;
     c.correction += (-touch.gap - touch.normal.dot(c.correction)) / inward.squaredNorm() * inward;
     touch.holds = true;
-    c.hold = Hold::slip;
+    c.freedom = Freedom::slip;
     c.free = along_surfaces(touches);
     any = true;
   }
@@ -123,14 +123,14 @@ bool exchange_contacts(const Linearization& iterate, const Points& direction, co
                        Points& gradient, ContactSet& contacts) {
   constexpr double any_reach = std::numeric_limits<double>::infinity();
   bool any = false;
-  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
+  for (size_t k = contacts.held; k < contacts.constraints.size(); ++k) {
     VertexConstraint& c = contacts.constraints[k];
     const std::span<Touch> touches = contacts.touches_of(k);
     const int i = c.vertex;
-    if (c.hold != Hold::free && release(force.row(i), c, touches)) {
-      gradient.row(i) = c.hold == Hold::free ? iterate.force.row(i) : iterate.residual.row(i);
+    if (c.freedom != Freedom::free && release(force.row(i), c, touches)) {
+      gradient.row(i) = c.freedom == Freedom::free ? iterate.force.row(i) : iterate.residual.row(i);
       any = true;
-    } else if (c.hold != Hold::stick && hold(direction.row(i), any_reach, c, touches)) {
+    } else if (c.freedom != Freedom::stick && hold(direction.row(i), any_reach, c, touches)) {
       any = true;
     }
   }
@@ -139,9 +139,9 @@ bool exchange_contacts(const Linearization& iterate, const Points& direction, co
 
 bool hold_touching(const Linearization& iterate, const Points& direction, ContactSet& contacts) {
   bool any = false;
-  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
+  for (size_t k = contacts.held; k < contacts.constraints.size(); ++k) {
     VertexConstraint& c = contacts.constraints[k];
-    if (c.hold == Hold::free || c.hold == Hold::slip)
+    if (c.freedom == Freedom::free || c.freedom == Freedom::slip)
       any = hold(direction.row(c.vertex), touching_gap, c, contacts.touches_of(k)) || any;
   }
   return hold_free_vertices(iterate, direction, touching_gap, contacts) || any;

@@ -22,7 +22,7 @@ std::vector<VertexMatrix<Scalar>> vertex_matrices(const ContactSet& contacts,
   std::vector<VertexMatrix<Scalar>> matrices;
   for (size_t k = 0; k < contacts.constraints.size(); ++k) {
     const VertexConstraint& constraint = contacts.constraints[k];
-    if (constraint.hold == Hold::free) continue;
+    if (constraint.freedom == Freedom::free) continue;
     const Eigen::Matrix3d coupling = k < couplings.size() ? couplings[k] : Eigen::Matrix3d::Zero();
     matrices.emplace_back(position[constraint.vertex], constraint.free + coupling);
   }
@@ -65,7 +65,7 @@ RestrictedProblem<Scalar> NewtonMatrix::restricted(SheetProduct<Scalar>& product
   for (int i = 0; i < gradient.rows(); ++i)
     problem.right.template segment<3>(4L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
   for (const VertexConstraint& constraint : contacts.constraints)
-    if (constraint.hold != Hold::free)
+    if (constraint.freedom != Freedom::free)
       problem.start.template segment<3>(4L * position[constraint.vertex]) =
           constraint.correction.cast<Scalar>();
   return problem;

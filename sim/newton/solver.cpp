@@ -5,14 +5,12 @@
 #include <utility>
 
 #include "sim/newton/newton_iteration.h"
-#include "sim/scene/grasp.h"
 #include "sim/step/exits.h"
 #include "sim/step/feasible_positions.h"
 
 namespace flash::sim {
 
 using data::Points;
-using Eigen::Vector3d;
 
 namespace {
 
@@ -91,14 +89,7 @@ StepReport advance(Environment& environment, double h, int halvings, NewtonWorks
   const bool stopped = w.settings.stop != nullptr && *w.settings.stop;
   if (halvings <= 0 || stopped) return report;
   const State whole = std::exchange(environment.state, start);
-  // Supports go half the way in each half.
-  std::vector<Vector3d> targets;
-  for (FixedVertex& support : environment.fixed) {
-    targets.push_back(support.position);
-    support.position = 0.5 * (support.position + start.positions.row(support.vertex).transpose());
-  }
   const StepReport first = advance(environment, 0.5 * h, halvings - 1, w);
-  for (size_t k = 0; k < targets.size(); ++k) environment.fixed[k].position = targets[k];
   StepReport parts = joined(first, advance(environment, 0.5 * h, first.converged ? halvings - 1 : 0, w));
   environment.state.time = whole.time;
   add_work(report, parts);
@@ -117,7 +108,7 @@ Solver::Solver(Solver&&) noexcept = default;
 StepReport Solver::step(Environment& environment) {
   NewtonWorkspace& w = *workspace_;
   const double h = w.settings.time_step;
-  update_grasps(environment, environment.state.time + h);
+  update_holds(environment, environment.state.time + h);
   return advance(environment, h, w.settings.halvings, w);
 }
 

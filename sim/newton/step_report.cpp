@@ -20,14 +20,11 @@ constexpr double energy_tolerance = 1e-2;  ///< gain of energy, as a share of th
 
 void report_contacts(const StepProblem& problem, const Iterate& end, StepReport& report) {
   const Environment& environment = problem.contacts.environment;
-  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
+  report.hold_forces.assign(environment.holds.size(), Vector3d::Zero());
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
   for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
     const VertexConstraint& c = end.contacts.constraints[k];
-    if (c.hold == Hold::fixed) {
-      if (c.grasp < 0) report.fixed_forces.push_back({c.vertex, c.reaction});
-      if (c.grasp >= 0) report.grasp_forces[c.grasp] += c.reaction;
-    }
+    add_hold_forces(c, c.reaction, report.hold_forces);
     for (const Touch& touch : end.contacts.touches_of(k)) {
       if (!touch.holds) continue;
       report.complementarity = worst(report.complementarity, touch.gap);
@@ -37,7 +34,7 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
   for (int i = 0; i < end.positions.rows(); ++i) {
     const VertexConstraint* c = end.contacts.find(i);
     // One that is held in some axes meets no obstacle in the others: such a step is not solved.
-    if (c != nullptr && c->hold == Hold::fixed && c->free.isZero(0)) continue;
+    if (c != nullptr && c->freedom == Freedom::held && c->free.isZero(0)) continue;
     for (size_t k = 0; k < environment.obstacles.size(); ++k) {
       const Gap gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
       const double depth =
@@ -79,7 +76,7 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
   for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
     const VertexConstraint& c = end.contacts.constraints[k];
     const Vector3d way = moved.row(c.vertex);
-    if (c.hold == Hold::fixed) {
+    if (c.freedom == Freedom::held) {
       report.work += c.reaction.dot(way);
       start_is_feasible = start_is_feasible && ((Eigen::Matrix3d::Identity() - c.free) * way).isZero(0);
     }
@@ -135,12 +132,10 @@ StepReport joined(const StepReport& first, const StepReport& second) {
   whole.start_penetration = first.start_penetration;
   whole.complementarity = worst(first.complementarity, second.complementarity);
   whole.work += first.work;
-  for (size_t k = 0; k < whole.grasp_forces.size(); ++k)
-    whole.grasp_forces[k] = 0.5 * (first.grasp_forces[k] + second.grasp_forces[k]);
+  for (size_t k = 0; k < whole.hold_forces.size(); ++k)
+    whole.hold_forces[k] = 0.5 * (first.hold_forces[k] + second.hold_forces[k]);
   for (size_t k = 0; k < whole.obstacle_forces.size(); ++k)
     whole.obstacle_forces[k] = 0.5 * (first.obstacle_forces[k] + second.obstacle_forces[k]);
-  for (size_t k = 0; k < whole.fixed_forces.size(); ++k)
-    whole.fixed_forces[k].force = 0.5 * (first.fixed_forces[k].force + second.fixed_forces[k].force);
   return whole;
 }
 

@@ -18,15 +18,14 @@ struct StepReport {
   /// complementarity; no energy from nothing. Contact forces lie in the friction cone at every iterate.
   bool converged = false;
   double penetration_max = 0;     ///< deepest vertex below a surface, held ones too [m]
-  Penetration held_penetration;   ///< the deepest that a support or a gripper holds below a surface
+  Penetration held_penetration;   ///< the deepest that a hold carries below a surface
   Penetration start_penetration;  ///< the deepest other that started the step inside an obstacle
   double complementarity = 0;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
   double kinetic = 0, membrane = 0, bending = 0, gravitational = 0;  ///< energies [J]
-  double work = 0;  ///< work done on the sheet by supports, grippers and obstacles [J]
+  double work = 0;  ///< work done on the sheet by holds and obstacles [J]
   // Forces of a step in parts are their means over time.
-  std::vector<Eigen::Vector3d> grasp_forces;     ///< gripper on sheet, one a grasp [N]
+  std::vector<Eigen::Vector3d> hold_forces;      ///< hold on sheet, one a hold of the environment [N]
   std::vector<Eigen::Vector3d> obstacle_forces;  ///< obstacle on sheet, one an obstacle [N]
-  std::vector<Load> fixed_forces;                ///< support on sheet, one a fixed vertex
 };
 
 struct StepProblem;

@@ -9,7 +9,6 @@
 
 #include "sim/oracle/anderson.h"
 #include "sim/oracle/projective_contact.h"
-#include "sim/scene/grasp.h"
 #include "sim/step/feasible_positions.h"
 #include "sim/step/incremental_potential.h"
 
@@ -106,20 +105,14 @@ std::string inertia_warning(double carried, double gravity, const ProjectiveSett
   return text;
 }
 
-/// Forces of grasps, supports and obstacles, and how well the contacts are met. `needed`: from grasps and
-/// supports [N].
+/// Forces of holds and obstacles, and how well the contacts are met. `needed`: from the holds [N].
 void report_forces(const Environment& environment, const ProjectiveSettings& settings,
                    const ContactSet& holds, const std::vector<VertexContact>& contacts,
                    const VectorXd& multiplier, const Points& needed, ProjectiveReport& report) {
-  report.grasp_forces.assign(environment.grasps.size(), Vector3d::Zero());
+  report.hold_forces.assign(environment.holds.size(), Vector3d::Zero());
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
-  for (const VertexConstraint& hold : holds.constraints) {
-    const Vector3d force = needed.row(hold.vertex), held = force - hold.free * force;
-    if (hold.grasp >= 0)
-      report.grasp_forces[hold.grasp] += held;
-    else
-      report.fixed_forces.push_back({hold.vertex, held});
-  }
+  for (const VertexConstraint& held : holds.constraints)
+    add_hold_forces(held, needed.row(held.vertex), report.hold_forces);
   std::size_t loaded = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const VertexContact& contact = contacts[k];
@@ -155,7 +148,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   const BendingOperator& bending =
       bending_operator(*w.plan, environment.material.bending_model, environment.material.poissons_ratio);
   ProjectiveSystem& system = w.system_of(environment.material);
-  update_grasps(environment, time);
+  update_holds(environment, time);
   const IncrementalPotential step(*w.plan, bending, environment, h);
 
   Points x = environment.state.positions + h * environment.state.velocities;

@@ -1,14 +1,15 @@
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <array>
-#include <limits>
+#include <memory>
+#include <string>
 #include <variant>
 #include <vector>
 
 #include "data/material.h"
 #include "data/mesh.h"
-#include "data/trajectory.h"
+#include "sim/scene/hold.h"
+#include "sim/scene/schedule.h"
 
 namespace flash::sim {
 
@@ -18,11 +19,11 @@ struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, out of the solid
 };
 
-/// Box with half extents [m], moved by a trajectory T_base_box (an empty trajectory stays at `pose`).
+/// Box with half extents [m] at `pose` in its frame.
 struct Box {
   Eigen::Vector3d half_extents = Eigen::Vector3d::Constant(0.01);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  data::Trajectory trajectory = {};
+  int frame = base_frame;  ///< of the schedule, which moves the box
 };
 
 /// Solid cylinder without ends: a peg or a rail.
@@ -33,27 +34,9 @@ struct Cylinder {
 };
 
 struct Obstacle {
-  std::variant<Plane, Box, Cylinder> shape;
+  std::variant<Plane, Box, Cylinder> shape = {};
   double friction = -1.0;  ///< Coulomb coefficient; below zero: the material's
-};
-
-/// Vertices that a gripper carries while from <= t < to. The gripper releases them after `to`. At activation
-/// each held vertex goes, over `closing_time`, from where it is to T_base_gripper(t) * target.
-struct Grasp {
-  std::vector<int> vertices;
-  data::Points targets;      ///< held positions in the gripper frame [m], one row a vertex;
-                             ///< empty: the offsets found at activation are kept
-  data::Trajectory gripper;  ///< T_base_gripper
-  double from = 0.0;         ///< [s]
-  double to = std::numeric_limits<double>::infinity();  ///< [s]
-  double closing_time = 0.0;                            ///< [s]
-};
-
-/// A vertex held in some axes.
-struct FixedVertex {
-  int vertex;
-  std::array<bool, 3> axes = {true, true, true};
-  Eigen::Vector3d position;  ///< places of the held axes [m]
+  std::string name = {};   ///< under which the force is told
 };
 
 /// A constant force on a vertex.
@@ -63,11 +46,10 @@ struct Load {
 };
 
 struct State {
-  double time = 0.0;        ///< [s]
-  data::Points positions;   ///< [m]
-  data::Points velocities;  ///< [m/s]
-  std::vector<data::Points>
-      grasp_offsets;  ///< held vertices in the gripper frame [m], a grasp each; empty: open
+  double time = 0.0;               ///< [s]
+  data::Points positions;          ///< [m]
+  data::Points velocities;         ///< [m/s]
+  std::vector<HeldVertices> held;  ///< by each hold of the environment
 };
 
 /// One simulated world: its own material, motion and state over a shared Sheet.
@@ -75,10 +57,21 @@ struct Environment {
   data::SheetMaterial material;
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
   std::vector<Obstacle> obstacles;
-  std::vector<Grasp> grasps;
-  std::vector<FixedVertex> fixed;
+  std::vector<Hold> holds;
   std::vector<Load> loads;
+  std::shared_ptr<const Schedule> schedule;  ///< of the frames that holds and boxes name; none: all at rest
   State state;
 };
+
+/// Pose of a frame of the environment's schedule at `time` [s]; that of the base frame is the identity.
+Eigen::Isometry3d frame_pose(const Environment& environment, int frame, double time);
+
+/// Closes and opens the holds for the step that ends at `time` [s]. A hold that closes stores in
+/// environment.state.held which vertices it takes and where they are in its frame; one that opens forgets
+/// them. Throws data::InputError where a reach has no vertex in it, with the distance of the nearest.
+void update_holds(Environment& environment, double time);
+
+/// Whether every hold has its vertices at their targets.
+bool all_arrived(const Environment& environment);
 
 }  // namespace flash::sim

@@ -1,23 +1,40 @@
 #include "sim/scene/grasp.h"
 
+#include <Eigen/Geometry>
+
 namespace flash::sim {
 
-void update_grasps(Environment& environment, double time) {
-  constexpr double rounding = 1e-9;  // of a time that is a sum of steps [s]
-  auto& offsets = environment.state.grasp_offsets;
-  offsets.resize(environment.grasps.size());
-  for (std::size_t k = 0; k < environment.grasps.size(); ++k) {
-    const Grasp& grasp = environment.grasps[k];
-    const bool closed = environment.state.time >= grasp.from - rounding && time <= grasp.to + rounding;
-    if (!closed) {
-      offsets[k].resize(0, 3);
-    } else if (offsets[k].rows() == 0) {
-      const Eigen::Isometry3d gripper = data::pose_at(grasp.gripper, environment.state.time).inverse();
-      offsets[k].resize(static_cast<Eigen::Index>(grasp.vertices.size()), 3);
-      for (std::size_t v = 0; v < grasp.vertices.size(); ++v)
-        offsets[k].row(v) = gripper * environment.state.positions.row(grasp.vertices[v]).transpose();
-    }
+using data::Points;
+using Eigen::Vector3d;
+
+Vector3d towards_middle(const Points& positions, const std::vector<int>& patch, const Vector3d& up) {
+  Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
+  for (const int vertex : patch) centre += positions.row(vertex);
+  centre /= static_cast<double>(patch.size());
+  Vector3d direction = (positions.colwise().mean() - centre).transpose();
+  direction -= direction.dot(up) * up;
+  return direction.norm() > 1e-9 ? Vector3d(direction.normalized()) : up.unitOrthogonal();
+}
+
+Points pinch_targets(const Points& flat, const Vector3d& ridge, const Vector3d& up,
+                           double pitch) {
+  const Vector3d centre = flat.colwise().mean();
+  const Vector3d across = up.cross(ridge).normalized();
+  const Vector3d along = across.cross(up);
+  const Eigen::VectorXd b = ((flat.rowwise() - centre.transpose()) * across).cwiseAbs();
+  const double height = b.maxCoeff();
+  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(pitch, across).toRotationMatrix();
+  Points targets(flat.rows(), 3);
+  for (Eigen::Index i = 0; i < flat.rows(); ++i) {
+    const double a = (flat.row(i).transpose() - centre).dot(along);
+    targets.row(i) = (centre + tilt * (a * along + (height - b[i]) * up)).transpose();
   }
+  return targets;
+}
+
+void raise_above(const Vector3d& point, const Vector3d& normal, Points& targets) {
+  const double deepest = ((targets.rowwise() - point.transpose()) * normal).minCoeff();
+  if (deepest < 0) targets.rowwise() -= deepest * normal.transpose();
 }
 
 }  // namespace flash::sim

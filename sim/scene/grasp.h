@@ -1,10 +1,25 @@
 #pragma once
-#include "sim/scene/environment.h"
+#include <Eigen/Core>
+#include <vector>
+
+#include "data/mesh.h"
 
 namespace flash::sim {
 
-/// Closes and opens the grasps for the step that ends at `time` [s]. A grasp that closes stores where its
-/// vertices are in the gripper, in environment.state.grasp_offsets; one that opens forgets it.
-void update_grasps(Environment& environment, double time);
+/// Unit vector along the table from a patch of the sheet towards its middle: the diagonal at a corner. `up`:
+/// unit, out of the table.
+Eigen::Vector3d towards_middle(const data::Points& positions, const std::vector<int>& patch,
+                               const Eigen::Vector3d& up);
+
+/// Where two fingers hold a patch that lay `flat` [m]: folded about the line through its centre along
+/// `ridge` and standing on the table. A vertex at (a, b) along and across the ridge is held at
+/// m + a ridge + (max|b| - |b|) up. The whole is then tilted by `pitch` [rad] about the axis across the ridge
+/// through m.
+data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridge, const Eigen::Vector3d& up,
+                           double pitch);
+
+/// Raises `targets` as a whole along `normal` until none lies below the plane through `point`: fingers do not
+/// push the sheet into the table.
+void raise_above(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, data::Points& targets);
 
 }  // namespace flash::sim

@@ -1,11 +1,7 @@
 #include "sim/scene/scene.h"
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <limits>
-#include <map>
-#include <utility>
 
 #include "data/asset.h"
 #include "data/error.h"
@@ -15,15 +11,30 @@
 namespace flash::sim {
 namespace {
 
-using Eigen::Vector3d;
+/// The trajectories of a scene, each a frame of its schedule.
+struct Timeline {
+  std::vector<const data::Trajectory*> trajectories;
 
-Obstacle obstacle_of(const data::Scene& scene, const std::string& object, const data::SceneObstacle& other) {
+  /// The frame that follows a trajectory of the scene; the base frame where it is empty.
+  int frame_of(const data::Trajectory& trajectory) {
+    if (trajectory.times.empty()) return base_frame;
+    const auto known = std::find(trajectories.begin(), trajectories.end(), &trajectory);
+    const auto frame = known - trajectories.begin();
+    if (known == trajectories.end()) trajectories.push_back(&trajectory);
+    return static_cast<int>(frame);
+  }
+};
+
+Obstacle obstacle_of(const data::Scene& scene, const std::string& object, const data::SceneObstacle& other,
+                     int frame) {
   Obstacle obstacle;
+  obstacle.name = other.name;
   obstacle.friction = data::friction_between(scene, object, other.name).value_or(-1.0);
   if (const auto* plane = std::get_if<data::ScenePlane>(&other.shape))
     obstacle.shape = Plane{plane->point, plane->normal};
   else if (const auto* box = std::get_if<data::SceneBox>(&other.shape))
-    obstacle.shape = Box{0.5 * box->size, box->pose, box->trajectory};
+    obstacle.shape =
+        Box{0.5 * box->size, frame == base_frame ? box->pose : Eigen::Isometry3d::Identity(), frame};
   else if (const auto* cylinder = std::get_if<data::SceneCylinder>(&other.shape))
     obstacle.shape = Cylinder{cylinder->point, cylinder->axis, cylinder->radius};
   return obstacle;
@@ -51,23 +62,26 @@ data::Points start_positions(const data::Scene& scene, const data::SceneObject& 
   return start;
 }
 
-void add_supports(const data::Scene& scene, const data::SceneObject& object, SceneBody& body) {
-  Environment& environment = body.environment;
+Hold support_of(const data::SceneFixed& fixed, const data::Points& start) {
+  Hold hold{.name = fixed.name, .vertices = fixed.vertices, .axes = fixed.axes};
+  if (fixed.all)
+    for (int i = 0; i < int(start.rows()); ++i) hold.vertices.push_back(i);
+  hold.targets =
+      fixed.positions.rows() > 0 ? fixed.positions : data::Points(start(hold.vertices, Eigen::all));
+  if (fixed.over > 0) {
+    hold.from = 0;
+    hold.closing_time = fixed.over;
+    hold.closing = Closing::even;
+  }
+  return hold;
+}
+
+void add_supports(const data::Scene& scene, const data::SceneObject& object, Timeline& timeline,
+                  Environment& environment) {
   const data::Points& start = environment.state.positions;
   for (const data::SceneFixed& fixed : object.fixed) {
     check_vertices(scene, object, "fixed", fixed.vertices, start.rows());
-    std::vector<int> vertices = fixed.vertices;
-    if (fixed.all)
-      for (int i = 0; i < int(start.rows()); ++i) vertices.push_back(i);
-    for (std::size_t i = 0; i < vertices.size(); ++i) {
-      const bool given = fixed.positions.rows() > 0;
-      const Vector3d from = start.row(vertices[i]);
-      const Vector3d to = given ? Vector3d(fixed.positions.row(Eigen::Index(i))) : from;
-      if (fixed.over > 0) body.moving.push_back({int(environment.fixed.size()), from, to, fixed.over});
-      environment.fixed.push_back({vertices[i], fixed.axes, to});
-      for (std::size_t axis = 0; axis < 3; ++axis)
-        if (fixed.axes[axis]) body.support_names[vertices[i]][axis] = fixed.name;
-    }
+    environment.holds.push_back(support_of(fixed, start));
   }
   for (const data::SceneLoad& load : object.loads) {
     check_vertices(scene, object, "loads", load.vertices, start.rows());
@@ -75,43 +89,38 @@ void add_supports(const data::Scene& scene, const data::SceneObject& object, Sce
   }
   for (const data::ScenePrescribed& prescribed : object.prescribed) {
     check_vertices(scene, object, "prescribed", prescribed.vertices, start.rows());
-    Grasp grasp;
-    grasp.vertices = prescribed.vertices;
-    grasp.gripper = prescribed.trajectory;
-    grasp.from = prescribed.from;
-    grasp.to = prescribed.to;
-    environment.grasps.push_back(grasp);
-    body.grasp_names.push_back(prescribed.name);
+    environment.holds.push_back({.name = prescribed.name,
+                                 .vertices = prescribed.vertices,
+                                 .frame = timeline.frame_of(prescribed.trajectory),
+                                 .from = prescribed.from,
+                                 .to = prescribed.to});
   }
 }
 
-void add_end_effectors(const data::Scene& scene, const std::string& object, SceneBody& body) {
+void add_end_effectors(const data::Scene& scene, const std::string& object, Timeline& timeline,
+                       Environment& environment) {
   for (const data::SceneEndEffector& effector : scene.end_effectors) {
+    const int frame = timeline.frame_of(effector.trajectory);
     if (effector.collides) {
-      const Eigen::Isometry3d pose = data::pose_at(effector.trajectory, 0.0);
-      const data::SceneObstacle box{effector.name, data::SceneBox{effector.size, pose, effector.trajectory},
+      const data::SceneObstacle box{effector.name, data::SceneBox{effector.size, {}, effector.trajectory},
                                     effector.friction};
-      body.environment.obstacles.push_back(obstacle_of(scene, object, box));
-      body.obstacle_names.push_back(effector.name);
+      environment.obstacles.push_back(obstacle_of(scene, object, box, frame));
     }
-    for (const data::SceneGrasp& wanted : effector.grasps) {
-      if (wanted.object != object) continue;
-      Grasp grasp;
-      grasp.gripper = effector.trajectory;
-      grasp.from = wanted.from;
-      grasp.to = wanted.to;
-      grasp.closing_time = wanted.zero_length ? wanted.closing_time : 0.0;
-      body.pending.push_back({int(body.environment.grasps.size()), wanted.from, wanted.threshold,
-                              0.5 * effector.size, wanted.zero_length});
-      body.environment.grasps.push_back(grasp);
-      body.grasp_names.push_back(effector.name);
-    }
+    for (const data::SceneGrasp& grasp : effector.grasps)
+      if (grasp.object == object)
+        environment.holds.push_back({.name = effector.name,
+                                     .frame = frame,
+                                     .at_origin = grasp.zero_length,
+                                     .from = grasp.from,
+                                     .to = grasp.to,
+                                     .closing_time = grasp.zero_length ? grasp.closing_time : 0.0,
+                                     .reach = Reach{0.5 * effector.size, grasp.threshold}});
   }
 }
 
 double total_area(const Sheet& sheet) { return sheet.vertex_area.sum(); }
 
-SceneBody make_body(const data::Scene& scene, const data::SceneObject& object,
+SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, Timeline& timeline,
                     std::vector<std::string>& notices) {
   const data::Asset asset = data::load_asset(object.asset);
   if (asset.element_type != data::ElementType::triangle)
@@ -132,66 +141,32 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object,
   environment.state.velocities =
       object.start_velocity.transpose().replicate(environment.state.positions.rows(), 1);
   for (const data::SceneObstacle& other : scene.obstacles) {
-    environment.obstacles.push_back(obstacle_of(scene, object.name, other));
-    body.obstacle_names.push_back(other.name);
+    const auto* box = std::get_if<data::SceneBox>(&other.shape);
+    const int frame = box == nullptr ? base_frame : timeline.frame_of(box->trajectory);
+    environment.obstacles.push_back(obstacle_of(scene, object.name, other, frame));
   }
-  add_supports(scene, object, body);
-  add_end_effectors(scene, object.name, body);
+  add_supports(scene, object, timeline, environment);
+  add_end_effectors(scene, object.name, timeline, environment);
   return body;
-}
-
-double distance_to_box(const Vector3d& half_extents, const Vector3d& point) {
-  return (point.cwiseAbs() - half_extents).cwiseMax(0.0).norm();
 }
 
 }  // namespace
 
-std::vector<SceneBody> scene_bodies(const data::Scene& scene, std::vector<std::string>& notices) {
+std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::vector<std::string>& notices) {
   std::vector<SceneBody> bodies;
-  for (const data::SceneObject& object : scene.objects) bodies.push_back(make_body(scene, object, notices));
+  Timeline timeline;
+  for (const data::SceneObject& object : scene.objects)
+    bodies.push_back(make_body(scene, object, timeline, notices));
+  std::vector<data::Trajectory> trajectories;
+  for (const data::Trajectory* trajectory : timeline.trajectories) trajectories.push_back(*trajectory);
+  const auto schedule = make_schedule(trajectories, 0.0, scene.time_step, steps);
+  for (SceneBody& body : bodies) body.environment.schedule = schedule;
   if (bodies.size() > 1) notices.push_back("the objects of this scene do not touch each other");
   if (scene.solver.integrator == "newton" && scene.solver.constraint_solver.starts_with("Lite"))
     notices.push_back(
         "contacts are met exactly by the newton integrator; solver.type projective has the inertia metric");
   if (data::asks_for_cuda(scene.solver)) notices.push_back("no CUDA backend here: running on the CPU");
   return bodies;
-}
-
-constexpr double time_rounding = 1e-9;  ///< of a time that is a sum of steps [s]
-
-void close_pending_grasps(SceneBody& body) {
-  const State& state = body.environment.state;
-  for (const SceneBody::PendingGrasp& pending : body.pending) {
-    if (state.time < pending.from - time_rounding) continue;
-    Grasp& grasp = body.environment.grasps[pending.grasp];
-    const Eigen::Isometry3d base_to_effector = data::pose_at(grasp.gripper, state.time).inverse();
-    double nearest = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < int(state.positions.rows()); ++i) {
-      const double distance =
-          distance_to_box(pending.half_extents, base_to_effector * Vector3d(state.positions.row(i)));
-      nearest = std::min(nearest, distance);
-      if (distance <= pending.threshold) grasp.vertices.push_back(i);
-    }
-    if (grasp.vertices.empty())
-      throw data::input_error("end effector " + body.grasp_names[pending.grasp], "grasps",
-                              "no vertex of " + body.name + " within " +
-                                  data::format_short(pending.threshold) + " m of its box at " +
-                                  data::format_short(state.time) + " s; the nearest is " +
-                                  data::format_short(nearest) + " m away");
-    if (pending.zero_length) grasp.targets = data::Points::Zero(Eigen::Index(grasp.vertices.size()), 3);
-  }
-  std::erase_if(body.pending,
-                [&](const auto& pending) { return state.time >= pending.from - time_rounding; });
-}
-
-bool move_supports(SceneBody& body, double time) {
-  bool arrived = true;
-  for (const SceneBody::MovingSupport& support : body.moving) {
-    const double share = std::min(1.0, time / support.over);
-    body.environment.fixed[support.fixed].position = support.start + share * (support.end - support.start);
-    arrived = arrived && share >= 1;
-  }
-  return arrived;
 }
 
 }  // namespace flash::sim

@@ -13,13 +13,13 @@ Vector3d moved_by(const ObstacleMotion& motion, const Vector3d& point, const Vec
   return motion.moves ? Vector3d(point - motion.start * local) : Vector3d::Zero();
 }
 
-ObstacleMotion motion_of(const Obstacle& obstacle, double start, double end) {
+ObstacleMotion motion_of(const Environment& environment, const Obstacle& obstacle, double start, double end) {
   ObstacleMotion motion;
   const Box* box = std::get_if<Box>(&obstacle.shape);
   if (box == nullptr) return motion;
-  motion.moves = !box->trajectory.times.empty();
-  motion.start = motion.moves ? data::pose_at(box->trajectory, start) : box->pose;
-  motion.end = motion.moves ? data::pose_at(box->trajectory, end) : box->pose;
+  motion.moves = box->frame != base_frame;
+  motion.start = frame_pose(environment, box->frame, start) * box->pose;
+  motion.end = frame_pose(environment, box->frame, end) * box->pose;
   return motion;
 }
 
@@ -66,7 +66,8 @@ Gap gap_to(const Box& box, const ObstacleMotion& motion, const Vector3d& point) 
 
 std::vector<ObstacleMotion> obstacle_motions(const Environment& environment, double start, double end) {
   std::vector<ObstacleMotion> motions;
-  for (const Obstacle& obstacle : environment.obstacles) motions.push_back(motion_of(obstacle, start, end));
+  for (const Obstacle& obstacle : environment.obstacles)
+    motions.push_back(motion_of(environment, obstacle, start, end));
   return motions;
 }
 

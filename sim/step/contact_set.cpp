@@ -80,7 +80,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   const Matrix3d along = along_surfaces(touches);
   const Vector3d needed_tangential = along * needed;
   if (!slipped && needed_tangential.norm() <= bound) {
-    constraint.hold = Hold::stick;
+    constraint.freedom = Freedom::stick;
     constraint.free.setZero();
     constraint.reaction = needed;
     for (Touch& touch : touches)
@@ -88,7 +88,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
         touch.friction = friction_bound_of(step.environment, touch) / bound * needed_tangential;
     return constraint;
   }
-  constraint.hold = Hold::slip;
+  constraint.freedom = Freedom::slip;
   constraint.free = along;
   if (!slipped) {
     constraint.slip_direction = -needed_tangential / needed_tangential.norm();
@@ -181,40 +181,39 @@ ContactSet begin_step(const ContactStep& step, Points& positions) {
   ContactSet contacts;
   contacts.obstacles = environment.obstacles.size();
   contacts.place.assign(positions.rows(), -1);
-  const auto hold = [&](int vertex) -> VertexConstraint& {
+  const auto constraint_of_held = [&](int vertex) -> VertexConstraint& {
     if (contacts.place[vertex] < 0) {
       contacts.place[vertex] = static_cast<int>(contacts.constraints.size());
-      contacts.constraints.push_back({.vertex = vertex, .hold = Hold::fixed});
+      contacts.constraints.push_back({.vertex = vertex, .freedom = Freedom::held});
     }
     return contacts.constraints[contacts.place[vertex]];
   };
-  for (const FixedVertex& support : environment.fixed) {
-    VertexConstraint& constraint = hold(support.vertex);
-    for (int axis = 0; axis < 3; ++axis) {
-      if (!support.axes[axis]) continue;
-      constraint.free(axis, axis) = 0;
-      positions(support.vertex, axis) = support.position[axis];
+  for (size_t k = 0; k < environment.holds.size(); ++k) {
+    const Hold& hold = environment.holds[k];
+    const HeldVertices& held = environment.state.held[k];
+    if (held.vertices.empty()) continue;
+    const Eigen::Isometry3d frame = frame_pose(environment, hold.frame, step.time);
+    const Points places = held_places(hold, held, step.time);
+    for (size_t v = 0; v < held.vertices.size(); ++v) {
+      const int vertex = held.vertices[v];
+      const Vector3d place = frame * places.row(v).transpose();
+      VertexConstraint& constraint = constraint_of_held(vertex);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!hold.axes[axis]) continue;
+        constraint.free(axis, axis) = 0;
+        constraint.holds[axis] = static_cast<int>(k);
+        positions(vertex, axis) = place[axis];
+      }
     }
   }
-  for (size_t k = 0; k < environment.grasps.size(); ++k) {
-    const Grasp& grasp = environment.grasps[k];
-    const Points& offsets = environment.state.grasp_offsets[k];
-    if (offsets.rows() == 0) continue;
-    const Eigen::Isometry3d pose = data::pose_at(grasp.gripper, step.time);
-    const double closed =
-        grasp.closing_time > 0 ? std::clamp((step.time - grasp.from) / grasp.closing_time, 0.0, 1.0) : 1.0;
-    const double blend = closed * closed * (3 - 2 * closed);
-    for (size_t v = 0; v < grasp.vertices.size(); ++v) {
-      Vector3d offset = offsets.row(v);
-      if (grasp.targets.rows() > 0) offset += blend * (grasp.targets.row(v).transpose() - offset);
-      VertexConstraint& constraint = hold(grasp.vertices[v]);
-      constraint.grasp = static_cast<int>(k);
-      constraint.free.setZero();
-      positions.row(grasp.vertices[v]) = pose * offset;
-    }
-  }
-  contacts.fixed = contacts.constraints.size();
+  contacts.held = contacts.constraints.size();
   return contacts;
+}
+
+void add_hold_forces(const VertexConstraint& constraint, const Vector3d& reaction,
+                     std::vector<Vector3d>& forces) {
+  for (int axis = 0; axis < 3; ++axis)
+    if (constraint.holds[axis] >= 0) forces[constraint.holds[axis]][axis] += reaction[axis];
 }
 
 void find_clearance(const ContactStep& step, const Points& positions, std::vector<double>& clearance) {
@@ -245,9 +244,9 @@ void add_touches(const ContactStep& step, const Points& positions, int i, std::v
 
 void update_contacts(const ContactStep& step, const Points& positions, const Points& force,
                      ContactSet& contacts) {
-  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k)
+  for (size_t k = contacts.held; k < contacts.constraints.size(); ++k)
     contacts.place[contacts.constraints[k].vertex] = -1;
-  contacts.constraints.resize(contacts.fixed);
+  contacts.constraints.resize(contacts.held);
   contacts.touches.clear();
   for (VertexConstraint& constraint : contacts.constraints) {
     const Vector3d needed = force.row(constraint.vertex);
@@ -260,7 +259,7 @@ void update_contacts(const ContactStep& step, const Points& positions, const Poi
     add_touches(step, positions, i, contacts.touches);
     VertexConstraint constraint =
         constraint_of(step, positions, force.row(i), i, std::span(contacts.touches).subspan(first));
-    if (constraint.hold == Hold::free) {
+    if (constraint.freedom == Freedom::free) {
       contacts.touches.resize(first);
       continue;
     }
@@ -274,7 +273,7 @@ std::vector<Matrix3d> friction_couplings(const ContactStep& step, const ContactS
   for (size_t k = 0; k < contacts.constraints.size(); ++k) {
     Matrix3d normals = Matrix3d::Zero(), rubs = Matrix3d::Zero(), gram = Matrix3d::Identity();
     int count = 0;
-    if (contacts.constraints[k].hold == Hold::slip) {
+    if (contacts.constraints[k].freedom == Freedom::slip) {
       for (const Touch& touch : contacts.touches_of(k)) {
         if (!touch.holds) continue;
         normals.col(count) = touch.normal;
@@ -290,7 +289,7 @@ std::vector<Matrix3d> friction_couplings(const ContactStep& step, const ContactS
 
 double friction_potential(const ContactStep& step, const ContactSet& contacts, const Points& positions) {
   double potential = 0;
-  for (size_t k = contacts.fixed; k < contacts.constraints.size(); ++k) {
+  for (size_t k = contacts.held; k < contacts.constraints.size(); ++k) {
     const VertexConstraint& constraint = contacts.constraints[k];
     if (constraint.friction_bound == 0) continue;
     for (const Touch& touch : contacts.touches_of(k)) {

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <vector>
 
@@ -35,9 +36,9 @@ struct ContactStep {
 };
 
 /// What a vertex may do at the current iterate of a step.
-enum class Hold {
+enum class Freedom {
   free,
-  fixed,  ///< some axes held, by a support or a gripper
+  held,   ///< some axes obey a hold
   slip,   ///< on a surface, the friction force on the rim of its cone
   stick,  ///< on a surface, at rest against it
 };
@@ -45,8 +46,8 @@ enum class Hold {
 /// What holds a vertex at the current iterate of a step.
 struct VertexConstraint {
   int vertex = -1;
-  Hold hold = Hold::free;
-  int grasp = -1;                                        ///< number of the grasp that holds it, -1 for none
+  Freedom freedom = Freedom::free;
+  std::array<int, 3> holds = {-1, -1, -1};  ///< number of the hold that it obeys in each axis, -1 for none
   Eigen::Vector3d correction = Eigen::Vector3d::Zero();  ///< displacement that a held direction must make [m]
   Eigen::Matrix3d free = Eigen::Matrix3d::Identity();    ///< projector on the directions it may move in
   Eigen::Vector3d reaction = Eigen::Vector3d::Zero();    ///< force on the vertex, always admissible [N]
@@ -60,7 +61,7 @@ struct VertexConstraint {
 /// known.
 struct ContactSet {
   std::vector<VertexConstraint> constraints;
-  std::size_t fixed = 0;          ///< the first `fixed` constraints are supports and grippers
+  std::size_t held = 0;           ///< the first `held` constraints are vertices that holds carry
   std::size_t obstacles = 0;      ///< number of touches of each other constraint
   std::vector<Touch> touches;     ///< touches of each constraint with every obstacle
   std::vector<int> place;         ///< index of each vertex in `constraints`; -1: nothing holds it
@@ -69,19 +70,23 @@ struct ContactSet {
   const VertexConstraint* find(int vertex) const {
     return place[vertex] < 0 ? nullptr : &constraints[place[vertex]];
   }
-  /// Touches of constraint k with every obstacle; none for supports and grippers.
+  /// Touches of constraint k with every obstacle; none for held vertices.
   std::span<Touch> touches_of(std::size_t k) {
-    return k < fixed ? std::span<Touch>() : std::span(touches).subspan((k - fixed) * obstacles, obstacles);
+    return k < held ? std::span<Touch>() : std::span(touches).subspan((k - held) * obstacles, obstacles);
   }
   std::span<const Touch> touches_of(std::size_t k) const {
-    return k < fixed ? std::span<const Touch>()
-                     : std::span(touches).subspan((k - fixed) * obstacles, obstacles);
+    return k < held ? std::span<const Touch>()
+                    : std::span(touches).subspan((k - held) * obstacles, obstacles);
   }
 };
 
-/// Vertices that the environment's supports and grasps hold at the end of the step; moves them to where they
-/// have to be.
+/// The vertices that the environment's holds carry; moves them to where they have to be at the end of the
+/// step.
 ContactSet begin_step(const ContactStep& step, data::Points& positions);
+
+/// Adds what holds exert on a vertex under `reaction` [N] to the forces of the holds that it obeys.
+void add_hold_forces(const VertexConstraint& constraint, const Eigen::Vector3d& reaction,
+                     std::vector<Eigen::Vector3d>& forces);
 
 /// Sets `clearance` to the smallest gap of each vertex, infinity without obstacles [m].
 void find_clearance(const ContactStep& step, const data::Points& positions, std::vector<double>& clearance);

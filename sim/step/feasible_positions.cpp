@@ -90,10 +90,10 @@ void project_to_feasible(const ContactStep& step, const ContactSet& contacts, Po
       continue;
     }
     const VertexConstraint& constraint = contacts.constraints[k];
-    if (constraint.hold == Hold::fixed) continue;
+    if (constraint.freedom == Freedom::held) continue;
     const std::span<const Touch> touches = contacts.touches_of(k);
     project_vertex(step, touches, positions, i);
-    if (constraint.hold == Hold::slip)
+    if (constraint.freedom == Freedom::slip)
       stop_turned_slip(step, touches, constraint.slip_direction, positions, i);
   }
 }

@@ -8,7 +8,7 @@
 
 namespace flash::sim {
 
-/// What one implicit Euler step of length h from `environment.state` minimizes, contact and grasps apart:
+/// What one implicit Euler step of length h from `environment.state` minimizes, contact and holds apart:
 ///
 ///   |x - s|^2_M / (2 h^2) + E(x) - f.x + a / (2 h) |x - x_0|^2_M + b / h E_0(x),   s = x_0 + h v_0 + h^2 g
 ///

@@ -6,7 +6,7 @@ namespace flash::sim {
 
 Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, const data::Points& positions) {
   Penetration deepest;
-  for (size_t j = 0; j < contacts.fixed; ++j) {
+  for (size_t j = 0; j < contacts.held; ++j) {
     const int i = contacts.constraints[j].vertex;
     for (int k = 0; k < static_cast<int>(step.motions.size()); ++k) {
       const Gap gap = step.gap(k, positions, i);
@@ -22,7 +22,7 @@ std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const Con
   std::vector<std::vector<int>> inside(step.motions.size());
   for (int i = 0; i < environment.state.positions.rows(); ++i) {
     const VertexConstraint* constraint = contacts.find(i);
-    if (constraint != nullptr && constraint->hold == Hold::fixed) continue;
+    if (constraint != nullptr && constraint->freedom == Freedom::held) continue;
     for (size_t k = 0; k < step.motions.size(); ++k)
       if (gap_at_start(environment.obstacles[k], step.motions[k], environment.state.positions.row(i))
               .distance < -inside_depth)

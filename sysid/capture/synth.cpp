@@ -16,8 +16,8 @@
 #include "data/mesh_io.h"
 #include "data/text.h"
 #include "sysid/capture/render_depth.h"
-#include "sysid/replay/grasp_targets.h"
 #include "sysid/replay/memory_estimate.h"
+#include "sysid/replay/recorded_grasp.h"
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {
@@ -243,6 +243,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
   replay.plan = sim::make_sheet_plan(sheet);
   replay.steps = steps_in(settings.duration + settings.rest, solver.time_step);
+  replay.schedule = gripper_schedule(replay);
   for (const data::RecordedKeyframe& keyframe : synthetic.recording.keyframes)
     replay.observations.push_back({.t = keyframe.time + settings.time_offset});
   check_job({replay}, 1, estimate_batch({replay}, 1));

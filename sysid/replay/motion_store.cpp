@@ -103,14 +103,12 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
     bytes.add(value);
   bytes.add_matrix(replay.recording.table_point);
   bytes.add_matrix(replay.recording.table_normal);
-  for (const sim::Grasp& grasp : world.grasps) {
-    for (const int vertex : grasp.vertices) bytes.add(vertex);
-    for (const double value : {grasp.from, grasp.to, grasp.closing_time}) bytes.add(value);
-    bytes.add_matrix(grasp.targets);
-    for (std::size_t i = 0; i < grasp.gripper.times.size(); ++i) {
-      bytes.add(grasp.gripper.times[i]);
-      bytes.add_matrix(grasp.gripper.poses[i].matrix());
-    }
+  for (const sim::Hold& hold : world.holds) {
+    for (const int vertex : hold.vertices) bytes.add(vertex);
+    for (const double value : {hold.from, hold.to, hold.closing_time}) bytes.add(value);
+    bytes.add_matrix(hold.targets);
+    for (const Eigen::Isometry3d& pose : world.schedule->frames[static_cast<std::size_t>(hold.frame)])
+      bytes.add_matrix(pose.matrix());
   }
   for (const sim::RestTriangle& triangle : replay.sheet().triangles)
     if (triangle.stiff) bytes.add_matrix(triangle.vertices);

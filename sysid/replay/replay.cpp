@@ -10,7 +10,7 @@
 #include "data/scene.h"
 #include "data/text.h"
 #include "data/worst.h"
-#include "sysid/replay/grasp_targets.h"
+#include "sysid/replay/recorded_grasp.h"
 
 namespace flash::sysid {
 namespace {
@@ -145,6 +145,7 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   const double step = settings.solver.time_step;
   replay.start = replay.beginning - steps_in(pre_roll, step) * step;
   replay.steps = count_steps(recording, replay.start, step);
+  replay.schedule = gripper_schedule(replay);
 
   if (recording.grasps.empty()) {
     replay.pivot = replay.recording.start.colwise().mean().transpose();
@@ -172,8 +173,9 @@ sim::Environment make_environment(const Replay& replay, const ReplayCandidate& c
     environment.obstacles.push_back(
         {sim::Plane{.point = recording.table_point + raise.transpose(), .normal = recording.table_normal}});
   }
-  for (const data::RecordedGrasp& grasp : recording.grasps)
-    environment.grasps.push_back(make_grasp(replay, grasp, nuisance, flat));
+  for (std::size_t k = 0; k < recording.grasps.size(); ++k)
+    environment.holds.push_back(make_hold(replay, recording.grasps[k], static_cast<int>(k), nuisance, flat));
+  environment.schedule = replay.schedule;
   return environment;
 }
 
@@ -224,7 +226,7 @@ ReplayResult result_of(const Replay& replay, const std::vector<int>& kept, const
   result.converged = missed == 0;
   result.unconverged_share = stats.empty() ? 0 : missed / static_cast<double>(stats.size());
 
-  const sim::View<double> forces = batch.grasp_forces();
+  const sim::View<double> forces = batch.hold_forces();
   motion.forces.assign(stats.size(), Eigen::Vector3d::Zero());
   if (forces.shape[2] == 0) return result;
   const double* last =

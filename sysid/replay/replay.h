@@ -61,8 +61,9 @@ struct Replay {
   data::Recording recording;
   std::string
       object_mesh;  ///< mesh specification or file of the recording itself, whatever settings.mesh says
-  std::shared_ptr<const sim::SheetPlan> plan;    ///< of the sheet that is simulated
-  std::shared_ptr<const SheetDistance> queries;  ///< of the sheet at rest
+  std::shared_ptr<const sim::SheetPlan> plan;     ///< of the sheet that is simulated
+  std::shared_ptr<const sim::Schedule> schedule;  ///< of the grippers, a frame for each grasp
+  std::shared_ptr<const SheetDistance> queries;   ///< of the sheet at rest
   ReplaySettings settings;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity; the table normal without gravity
   Eigen::Vector3d pivot =

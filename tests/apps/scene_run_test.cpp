@@ -182,7 +182,7 @@ TEST_F(SceneRunTest, PublishedSceneRunsAsItStands) {
     "planecollisions": {"point": [0, 0, 0], "normal": [0, 1, 0], "friction": 0.5}, "objects": {"cloth": "published.json"}})");
   const data::Scene scene = data::load_scene(path);
   std::vector<std::string> notices;
-  const std::vector<SceneBody> bodies = scene_bodies(scene, notices);
+  const std::vector<SceneBody> bodies = scene_bodies(scene, 2, notices);
   ASSERT_EQ(bodies.size(), 1u);
   const Environment& environment = bodies[0].environment;
   EXPECT_EQ(environment.material.constitutive, data::Constitutive::tri_arap);

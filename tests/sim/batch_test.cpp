@@ -17,14 +17,13 @@ Environment lifted(const Sheet& sheet, double stiffness) {
   environment.material.membrane_stiffness = stiffness;
   environment.material.friction = 0.2;
   environment.obstacles.push_back({Plane{}});
-  Grasp grasp;
-  grasp.vertices = {0, 1};
+  data::Trajectory gripper;
   for (int k = 0; k <= 2; ++k) {
-    grasp.gripper.times.push_back(0.7 * k);
-    grasp.gripper.poses.push_back(
+    gripper.times.push_back(0.7 * k);
+    gripper.poses.push_back(
         Eigen::Isometry3d(Eigen::Translation3d(0.02 * k, 0.01 * k, 0.04 * k * (2 - 0.7 * k))));
   }
-  environment.grasps.push_back(grasp);
+  environment.holds = {gripped(environment, {0, 1}, gripper)};
   return environment;
 }
 
@@ -92,7 +91,7 @@ TEST(Batch, KeepsTheStepsThatAreWanted) {
   std::vector<int> finished(3, 0);
   batch.advance(20, [&](int e) { ++finished[e]; });
   EXPECT_EQ(finished, std::vector<int>(3, 1));
-  const View<double> kept = batch.kept_positions(), now = batch.positions(), forces = batch.grasp_forces();
+  const View<double> kept = batch.kept_positions(), now = batch.positions(), forces = batch.hold_forces();
   EXPECT_EQ(kept.shape, (std::vector<std::ptrdiff_t>{3, 3, sheet.rest.vertices.rows(), 3}));
   EXPECT_EQ(forces.shape, (std::vector<std::ptrdiff_t>{3, 20, 1, 3}));
   for (int e = 0; e < 3; ++e) {
@@ -107,7 +106,7 @@ TEST(Batch, KeepsTheStepsThatAreWanted) {
       }
       for (int axis = 0; axis < 3; ++axis)
         EXPECT_EQ(forces.data[e * forces.strides[0] + (k - 1) * forces.strides[1] + axis],
-                  report.grasp_forces[0][axis]);
+                  report.hold_forces[0][axis]);
       EXPECT_EQ(batch.stats(e)[k - 1].iterations, report.iterations);
     }
     EXPECT_EQ(batch.kept_positions(e, 2), environment.state.positions);

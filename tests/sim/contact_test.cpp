@@ -152,13 +152,15 @@ TEST(Contact, AMovingBoxCarriesTheSheet) {
   Environment environment = environment_of(sheet);
   environment.material.friction = 0.5;
   Box tray{.half_extents = {0.1, 0.1, 0.01}};
+  data::Trajectory path;
   for (int k = 0; k <= 100; ++k) {
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     // 1 m/s^2 along x: below mu g, the sheet keeps up.
     pose.translation() = Vector3d(0.5 * 1.0 * std::pow(k * 0.01, 2), 0.03, -0.01);
-    tray.trajectory.times.push_back(k * 0.01);
-    tray.trajectory.poses.push_back(pose);
+    path.times.push_back(k * 0.01);
+    path.poses.push_back(pose);
   }
+  tray.frame = add_frame(environment, path);
   environment.obstacles.push_back({tray});
   Solver solver(sheet, {.tolerance = 1e-8});
   for (int n = 0; n < 50; ++n) solver.step(environment);
@@ -171,11 +173,8 @@ Environment pushed_by_a_box(const Sheet& sheet, double height) {
   Environment environment = environment_of(sheet);
   environment.obstacles.push_back({Plane{}});
   Box box{.half_extents = {0.02, 0.1, 0.5 * height}};
-  for (int k = 0; k <= 100; ++k) {
-    box.trajectory.times.push_back(0.01 * k);
-    box.trajectory.poses.push_back(
-        Eigen::Isometry3d(Eigen::Translation3d(-0.05 + 0.002 * k, 0.03, 0.5 * height)));
-  }
+  const Vector3d start(-0.05, 0.03, 0.5 * height);
+  box.frame = add_frame(environment, straight_path(start, start + 0.2 * Vector3d::UnitX(), 1));
   environment.obstacles.push_back({box});
   return environment;
 }
@@ -197,7 +196,7 @@ TEST(Contact, AVertexOnRollersIsSeenBelowATable) {
   Environment environment = environment_of(sheet);
   environment.obstacles.push_back({Plane{Vector3d(0, 0, 0.002), Vector3d::UnitZ()}});
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
-    environment.fixed.push_back({i, {false, true, true}, Vector3d(0, sheet.rest.vertices(i, 1), 0)});
+    environment.holds.push_back(support(i, {false, true, true}, Vector3d(0, sheet.rest.vertices(i, 1), 0)));
   EXPECT_NEAR(Solver(sheet, {}).step(environment).penetration_max, 0.002, 1e-12);
 }
 
@@ -290,10 +289,8 @@ TEST(Contact, AFastPlateTakesTheSheetAlong) {
   Environment environment = environment_of(sheet);
   environment.gravity.setZero();
   Box plate{.half_extents = {0.1, 0.1, 0.0005}};
-  for (const double t : {0.0, 1.0}) {
-    plate.trajectory.times.push_back(t);
-    plate.trajectory.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(0.03, 0.03, 10 * t - 0.02)));
-  }
+  plate.frame =
+      add_frame(environment, straight_path(Vector3d(0.03, 0.03, -0.02), Vector3d(0.03, 0.03, 9.98), 1));
   environment.obstacles = {{plate}};
   Solver solver(sheet, {});
   for (int n = 1; n <= 5; ++n) {
@@ -306,13 +303,8 @@ TEST(Contact, AHandBelowTheTableIsReported) {
   const Sheet sheet = small_sheet(6, 0.12);
   Environment environment = environment_of(sheet);
   environment.obstacles = {{Plane{}}};
-  Grasp grasp;
-  grasp.vertices = {0, 1};
-  for (const double t : {0.0, 0.1}) {
-    grasp.gripper.times.push_back(t);
-    grasp.gripper.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(0, 0, -0.8 * t)));
-  }
-  environment.grasps = {grasp};
+  environment.holds = {
+      gripped(environment, {0, 1}, straight_path(Vector3d::Zero(), Vector3d(0, 0, -0.08), 0.1))};
   Solver solver(sheet, {});
   StepReport report;
   for (int n = 0; n < 10; ++n) report = solver.step(environment);
@@ -328,13 +320,8 @@ TEST(Contact, AHandThatGoesThroughAWallInOneStepIsReported) {
   environment.gravity.setZero();
   environment.obstacles = {
       {Box{.half_extents = {0.001, 1, 1}, .pose = Eigen::Isometry3d(Eigen::Translation3d(-0.01, 0, 0))}}};
-  Grasp grasp;
-  grasp.vertices = {0};
-  for (const double t : {0.0, 0.1}) {
-    grasp.gripper.times.push_back(t);
-    grasp.gripper.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(-1.5 * t, 0, 0)));
-  }
-  environment.grasps = {grasp};
+  environment.holds = {
+      gripped(environment, {0}, straight_path(Vector3d::Zero(), Vector3d(-0.15, 0, 0), 0.1))};
   Solver solver(sheet, {});
   double deepest = 0;
   for (int n = 0; n < 3; ++n) deepest = std::max(deepest, solver.step(environment).held_penetration.depth);

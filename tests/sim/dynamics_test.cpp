@@ -132,7 +132,7 @@ TEST(Dynamics, InternalForcesNeitherPushNorTurn) {
 TEST(Dynamics, AnUnconvergedStepSaysSo) {
   const Sheet sheet = small_sheet();
   Environment environment = environment_of(sheet);
-  environment.fixed.push_back({0, {true, true, true}, sheet.rest.vertices.row(0)});
+  environment.holds.push_back(support(0, {true, true, true}, sheet.rest.vertices.row(0)));
   environment.state.velocities.setRandom();
   Solver solver(sheet, {.max_iterations = 1, .tolerance = 1e-12});
   EXPECT_FALSE(solver.step(environment).converged);

@@ -5,13 +5,14 @@ namespace flash::sim {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-double depth_in(const Obstacle& obstacle, const Vector3d& point, double time) {
+double depth_in(const Environment& environment, const Obstacle& obstacle, const Vector3d& point,
+                double time) {
   if (const auto* plane = std::get_if<Plane>(&obstacle.shape))
     return -plane->normal.dot(point - plane->point);
   if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape))
     return cylinder->radius - (point - cylinder->point).cross(cylinder->axis).norm();
   const Box& box = std::get<Box>(obstacle.shape);
-  const Isometry3d pose = box.trajectory.times.empty() ? box.pose : data::pose_at(box.trajectory, time);
+  const Isometry3d pose = frame_pose(environment, box.frame, time) * box.pose;
   return (box.half_extents - (pose.inverse() * point).cwiseAbs()).minCoeff();
 }
 

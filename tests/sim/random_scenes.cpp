@@ -7,6 +7,7 @@
 
 #include "data/procedural_mesh.h"
 #include "tests/sim/obstacle_depth.h"
+#include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
 namespace {
@@ -92,14 +93,13 @@ void move(Environment& environment, const Isometry3d& pose) {
 double lowest(const Environment& environment) { return environment.state.positions.col(2).minCoeff(); }
 
 /// The vertices within `reach` of a corner of the sheet, held from the start.
-Grasp grasp_corner(const Environment& environment, int corner, double reach,
-                   const data::Trajectory& gripper) {
-  Grasp grasp;
+Hold grasp_corner(Environment& environment, int corner, double reach, const data::Trajectory& gripper,
+                  double time_step) {
+  std::vector<int> vertices;
   const auto row = environment.state.positions.row(corner);
   for (int i = 0; i < environment.state.positions.rows(); ++i)
-    if ((environment.state.positions.row(i) - row).norm() <= reach) grasp.vertices.push_back(i);
-  grasp.gripper = gripper;
-  return grasp;
+    if ((environment.state.positions.row(i) - row).norm() <= reach) vertices.push_back(i);
+  return gripped(environment, vertices, gripper, time_step);
 }
 
 Obstacle draw_support(Lot& lot, double side) {
@@ -125,7 +125,7 @@ void raise_above(Environment& environment, double top, double height) {
 
 void draw_scene(Lot& lot, double side, RandomScene& scene) {
   Environment& environment = scene.environment;
-  const double seconds = scene.steps * scene.settings.time_step;
+  const double h = scene.settings.time_step, seconds = scene.steps * h;
   const Obstacle table{Plane{}};
   const auto throw_at = [&](double fastest) {
     const double y = lot.uniform(-0.3, 0.3), x = lot.uniform(-0.3, 0.3);
@@ -159,15 +159,15 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
     case SceneKind::lift: {
       environment.obstacles = {table};
       const Vector3d at = environment.state.positions.row(corner);
-      environment.grasps = {
-          grasp_corner(environment, corner, 0.15 * side, draw_path(lot, at, seconds, 3, false))};
+      environment.holds = {
+          grasp_corner(environment, corner, 0.15 * side, draw_path(lot, at, seconds, 3, false), h)};
       return;
     }
     case SceneKind::drag: {
       environment.obstacles = {table};
       const Vector3d at = environment.state.positions.row(corner);
-      environment.grasps = {
-          grasp_corner(environment, corner, 0.15 * side, draw_path(lot, at, seconds, 2, true))};
+      environment.holds = {
+          grasp_corner(environment, corner, 0.15 * side, draw_path(lot, at, seconds, 2, true), h)};
       if (lot.chance(0.5)) environment.obstacles.push_back({Plane{Vector3d(-0.01, 0, 0), Vector3d::UnitX()}});
       return;
     }
@@ -188,11 +188,10 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
     case SceneKind::pusher: {
       Box pusher{.half_extents = {0.02, lot.uniform(0.02, 0.3), 0.02}};
       const double speed = lot.log_uniform(0.05, 2);
-      for (const double t : {0.0, seconds + 1}) {
-        pusher.trajectory.times.push_back(t);
-        pusher.trajectory.poses.push_back(
-            Isometry3d(Eigen::Translation3d(-0.021 + speed * t, 0.2 * side, 0.0205)));
-      }
+      const Vector3d start(-0.021, 0.2 * side, 0.0205);
+      const double until = seconds + 1;
+      pusher.frame =
+          add_frame(environment, straight_path(start, start + speed * until * Vector3d::UnitX(), until), h);
       environment.obstacles = {table, {pusher}};
       if (lot.chance(0.3)) {
         const Vector3d away = Vector3d(side + 0.02, 0, 0);
@@ -212,26 +211,27 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
 
 /// Whether the straight way from `from` to `to`, seen from the obstacle as it moves, goes through it: in by
 /// one face of a box and out by the one behind, or past the axis of a cylinder.
-bool goes_through(const Obstacle& obstacle, const Vector3d& from, const Vector3d& to, double from_time,
-                  double to_time) {
+bool goes_through(const Environment& environment, const Obstacle& obstacle, const Vector3d& from,
+                  const Vector3d& to, double from_time, double to_time) {
   bool inside = false;
   for (int k = 0; k <= 400; ++k) {
     const double share = k / 400.0;
-    inside = inside ||
-             depth_in(obstacle, from + share * (to - from), from_time + share * (to_time - from_time)) > 1e-6;
+    inside = inside || depth_in(environment, obstacle, from + share * (to - from),
+                                from_time + share * (to_time - from_time)) > 1e-6;
   }
   if (!inside) return false;
   if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
     const auto radial = [&](const Vector3d& x) {
       return Vector3d((x - cylinder->point) - cylinder->axis * cylinder->axis.dot(x - cylinder->point));
     };
-    return depth_in(obstacle, to, to_time) < 0 && radial(from).dot(radial(to)) < 0;
+    return depth_in(environment, obstacle, to, to_time) < 0 && radial(from).dot(radial(to)) < 0;
   }
   const auto* box = std::get_if<Box>(&obstacle.shape);
   if (box == nullptr) return false;
-  const bool moves = !box->trajectory.times.empty();
-  const Vector3d start = (moves ? data::pose_at(box->trajectory, from_time) : box->pose).inverse() * from,
-                 end = (moves ? data::pose_at(box->trajectory, to_time) : box->pose).inverse() * to;
+  const auto seen_from_box = [&](const Vector3d& x, double time) {
+    return Vector3d((frame_pose(environment, box->frame, time) * box->pose).inverse() * x);
+  };
+  const Vector3d start = seen_from_box(from, from_time), end = seen_from_box(to, to_time);
   for (int axis = 0; axis < 3; ++axis) {
     const double half = box->half_extents[axis];
     // Where it stands beside the box at the start or at the end, it went round an edge.
@@ -314,13 +314,14 @@ SceneFindings observe(RandomScene scene) {
   found.steps = scene.steps;
   Solver solver(scene.sheet, scene.settings);
   std::vector<bool> held(static_cast<std::size_t>(environment.state.positions.rows()), false);
-  for (const Grasp& grasp : environment.grasps)
-    for (const int vertex : grasp.vertices) held[static_cast<std::size_t>(vertex)] = true;
+  for (const Hold& hold : environment.holds)
+    for (const int vertex : hold.vertices) held[static_cast<std::size_t>(vertex)] = true;
   // Vertices that began inside and are not out yet.
   std::vector<std::vector<bool>> inside(environment.obstacles.size(), std::vector<bool>(held.size(), false));
   for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
     for (std::size_t i = 0; i < held.size(); ++i)
-      inside[k][i] = depth_in(environment.obstacles[k], environment.state.positions.row(i), 0) > 1e-9;
+      inside[k][i] =
+          depth_in(environment, environment.obstacles[k], environment.state.positions.row(i), 0) > 1e-9;
 
   double energy = 0, put_in = 0;
   bool energy_known = false;
@@ -351,13 +352,13 @@ SceneFindings observe(RandomScene scene) {
     for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
       for (std::size_t i = 0; i < held.size(); ++i) {
         const Vector3d from = before.positions.row(i), to = after.positions.row(i);
-        const double depth = depth_in(environment.obstacles[k], to, after.time);
+        const double depth = depth_in(environment, environment.obstacles[k], to, after.time);
         if (report.converged)
           found.unseen_depth = std::max(found.unseen_depth, depth - report.penetration_max);
         if (held[i]) continue;
         if (inside[k][i]) {
-          const double out = (depth_in(environment.obstacles[k], from, before.time) - depth) / h;
-          if (depth_in(environment.obstacles[k], from, before.time) > 0)
+          const double out = (depth_in(environment, environment.obstacles[k], from, before.time) - depth) / h;
+          if (depth_in(environment, environment.obstacles[k], from, before.time) > 0)
             found.exit_speed = std::max(found.exit_speed, out);
           inside[k][i] = depth > 0;
           continue;
@@ -365,21 +366,22 @@ SceneFindings observe(RandomScene scene) {
         if (!report.converged) continue;
         found.free_depth = std::max(found.free_depth, depth);
         if (report.substeps == 1)  // the way of a step in parts is not straight
-          found.crossed += goes_through(environment.obstacles[k], from, to, before.time, after.time);
+          found.crossed +=
+              goes_through(environment, environment.obstacles[k], from, to, before.time, after.time);
       }
 
     // Work of what moves the sheet: grippers and pushers here never turn.
     // A step in parts has means of forces, so that its work is its own account.
     double work = report.substeps > 1 ? report.work : 0;
-    for (std::size_t k = 0; report.substeps == 1 && k < environment.grasps.size(); ++k)
-      work +=
-          report.grasp_forces[k].dot(data::pose_at(environment.grasps[k].gripper, after.time).translation() -
-                                     data::pose_at(environment.grasps[k].gripper, before.time).translation());
+    const auto moved = [&](int frame) {
+      return Vector3d(frame_pose(environment, frame, after.time).translation() -
+                      frame_pose(environment, frame, before.time).translation());
+    };
+    for (std::size_t k = 0; report.substeps == 1 && k < environment.holds.size(); ++k)
+      work += report.hold_forces[k].dot(moved(environment.holds[k].frame));
     for (std::size_t k = 0; report.substeps == 1 && k < environment.obstacles.size(); ++k)
-      if (const auto* box = std::get_if<Box>(&environment.obstacles[k].shape);
-          box != nullptr && !box->trajectory.times.empty())
-        work += report.obstacle_forces[k].dot(data::pose_at(box->trajectory, after.time).translation() -
-                                              data::pose_at(box->trajectory, before.time).translation());
+      if (const auto* box = std::get_if<Box>(&environment.obstacles[k].shape))
+        work += report.obstacle_forces[k].dot(moved(box->frame));
     const double now = moved_energy(environment, report), gain = now - energy - work;
     // What falls puts in its weight's work, over the step.
     put_in += std::max(work, 0.0);
@@ -400,11 +402,12 @@ SceneFindings observe(RandomScene scene) {
     energy = now;
   }
   for (std::size_t i = 0; i < held.size(); ++i)
-    found.inside += !held[i] && std::any_of(environment.obstacles.begin(), environment.obstacles.end(),
-                                            [&](const Obstacle& obstacle) {
-                                              return depth_in(obstacle, environment.state.positions.row(i),
-                                                              environment.state.time) > 1e-6;
-                                            });
+    found.inside +=
+        !held[i] && std::any_of(environment.obstacles.begin(), environment.obstacles.end(),
+                                [&](const Obstacle& obstacle) {
+                                  return depth_in(environment, obstacle, environment.state.positions.row(i),
+                                                  environment.state.time) > 1e-6;
+                                });
   return found;
 }
 

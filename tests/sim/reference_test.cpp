@@ -14,6 +14,7 @@
 #include "sim/newton/solver.h"
 #include "sim/step/elastic_energy.h"
 #include "tests/sim/reference_scene.h"
+#include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
 namespace {
@@ -105,14 +106,15 @@ struct ReferenceRun {
 
   // Holds vertices at `share` of the way from the rest shape to their prescribed places.
   void hold(const json& scene, double share) {
-    environment.fixed.clear();
+    environment.holds.clear();
+    environment.state.held.clear();
     const data::Points& rest = sheet.rest.vertices;
     if (scene.contains("fixed") && scene["fixed"].contains("positions")) {
       const data::Points targets = reference_points(scene["fixed"]["positions"]);
       for (std::size_t i = 0; i < scene["fixed"]["vertices"].size(); ++i) {
         const int v = scene["fixed"]["vertices"][i];
-        environment.fixed.push_back(
-            {v, {true, true, true}, rest.row(v) + share * (targets.row(Eigen::Index(i)) - rest.row(v))});
+        environment.holds.push_back(support(
+            v, {true, true, true}, rest.row(v) + share * (targets.row(Eigen::Index(i)) - rest.row(v))));
       }
     }
     if (!scene.contains("rollers")) return;
@@ -121,8 +123,8 @@ struct ReferenceRun {
     for (int v : scene["rollers"].at("x").at("vertices")) axes[v][0] = true;
     for (int v : scene["rollers"].at("y").at("vertices")) axes[v][1] = true;
     for (int v = 0; v < int(rest.rows()); ++v)
-      environment.fixed.push_back(
-          {v, axes[v], Eigen::Vector3d(stretch * rest(v, 0), rest(v, 1), rest(v, 2))});
+      environment.holds.push_back(
+          support(v, axes[v], Eigen::Vector3d(stretch * rest(v, 0), rest(v, 1), rest(v, 2))));
   }
 
   // Implicit Euler in steps so long that inertia hardly counts, until nothing moves.
@@ -251,7 +253,7 @@ TEST_P(HangingStrip, StretchesUnderItsWeight) {
   ElasticEnergy energy;
   const data::Points force = run.support_forces(energy);
   double support = 0;
-  for (const FixedVertex& fixed : run.environment.fixed) support += force(fixed.vertex, 2);
+  for (const Hold& hold : run.environment.holds) support += force(hold.vertices[0], 2);
   const Eigen::VectorXd down = (run.sheet.rest.vertices - run.environment.state.positions).col(2);
   expect_positions(scene, run);
   judge("tip elongation m", {down.maxCoeff()});
@@ -344,8 +346,8 @@ TEST_P(Equilibrium, Holds) {
   ElasticEnergy energy;
   const data::Points force = run.support_forces(energy);
   Eigen::RowVector3d gripper = Eigen::RowVector3d::Zero();
-  const std::size_t held = run.environment.fixed.size();
-  for (std::size_t i = held / 2; i < held; ++i) gripper += force.row(run.environment.fixed[i].vertex);
+  const std::size_t held = run.environment.holds.size();
+  for (std::size_t i = held / 2; i < held; ++i) gripper += force.row(run.environment.holds[i].vertices[0]);
   judge("gripper force [N]", {gripper[0], gripper[1], gripper[2]});
   judge("potential of membrane [J]", {energy.membrane});
   judge("potential of bending [J]", {energy.bending});
@@ -361,15 +363,15 @@ TEST_P(CornerLift, MovesAsTheReferenceUntilItFolds) {
   const json scene = reference_scene(GetParam());
   Judge judge(scene);
   ReferenceRun run(scene);
-  Grasp grasp;
-  for (int v : scene.at("fixed").at("vertices")) grasp.vertices.push_back(v);
+  const std::vector<int> held = scene.at("fixed").at("vertices");
+  data::Trajectory gripper;
   const double dt = scene.at("dt");
   for (int k = 0; k <= scene.at("steps"); ++k) {
     const double t = k * dt / 3, s = t * t * t * (10 - 15 * t + 6 * t * t);
-    grasp.gripper.times.push_back(k * dt);
-    grasp.gripper.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(-0.1 * s, 0, 0.35 * s)));
+    gripper.times.push_back(k * dt);
+    gripper.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(-0.1 * s, 0, 0.35 * s)));
   }
-  run.environment.grasps.push_back(grasp);
+  run.environment.holds = {gripped(run.environment, held, gripper, dt)};
   SolverSettings settings;
   settings.time_step = dt;
   settings.tolerance = 1e-5;

@@ -37,8 +37,8 @@ TEST_P(Patch, UniaxialStretchGivesBackYoungsModulusAndPoissonsRatio) {
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i) {
     const auto x = sheet.rest.vertices.row(i);
     const bool left = x[0]<1e-9, right = x[0]> width - 1e-9;
-    environment.fixed.push_back(
-        {i, {left || right, left && x[1] < 1e-9, true}, {right ? width * (1 + stretch) : 0, 0, 0}});
+    environment.holds.push_back(
+        support(i, {left || right, left && x[1] < 1e-9, true}, {right ? width * (1 + stretch) : 0, 0, 0}));
   }
   const StepReport report = settle(sheet, environment, 10, 12, 1e-11);
   const double lateral =
@@ -63,7 +63,8 @@ TEST_P(Patch, ShearGivesBackTheShearModulus) {
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i) {
     const Eigen::Vector3d x = sheet.rest.vertices.row(i);
     const bool border = x.head<2>().minCoeff() < 1e-9 || x.head<2>().maxCoeff() > side - 1e-9;
-    environment.fixed.push_back({i, {border, border, true}, x + shear / 2 * Eigen::Vector3d(x[1], x[0], 0)});
+    environment.holds.push_back(
+        support(i, {border, border, true}, x + shear / 2 * Eigen::Vector3d(x[1], x[0], 0)));
   }
   const StepReport report = settle(sheet, environment, 10, 12, 1e-11);
   const double mu = 120 / (2 * 1.3);
@@ -87,7 +88,7 @@ TEST(Statics, AHangingStripStretchesByItsOwnWeight) {
   environment.gravity = {g, 0, 0};
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
     if (sheet.rest.vertices(i, 0) < 1e-9)
-      environment.fixed.push_back({i, {true, true, true}, sheet.rest.vertices.row(i)});
+      environment.holds.push_back(support(i, {true, true, true}, sheet.rest.vertices.row(i)));
   settle(sheet, environment, 1, 20, 1e-8);
   const double elongation = environment.state.positions.col(0).maxCoeff() - length;
   const double expected = 0.2 * g * length * length / (2 * 200);
@@ -121,7 +122,7 @@ TEST_P(HeavyElastica, TipDropsAsTheBoundaryValueProblemSays) {
                             .air_drag = 5};
     for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
       if (sheet.rest.vertices(i, 0) < 1e-3)
-        environment.fixed.push_back({i, {true, true, true}, sheet.rest.vertices.row(i)});
+        environment.holds.push_back(support(i, {true, true, true}, sheet.rest.vertices.row(i)));
     settle(sheet, environment, 0.2, 60, 1e-6);
     double tip = 0;
     int count = 0;

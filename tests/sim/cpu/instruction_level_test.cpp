@@ -188,7 +188,7 @@ TEST(InstructionLevel, SheetsTakeTheSameIterations) {
     environment.material.air_drag = 1;
     for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
       if (sheet.rest.vertices(i, 0) == 0)
-        environment.fixed.push_back({i, {true, true, true}, sheet.rest.vertices.row(i)});
+        environment.holds.push_back(support(i, {true, true, true}, sheet.rest.vertices.row(i)));
     Solver solver(make_sheet_plan(sheet, level), SolverSettings{});
     std::vector<int> iterations;
     for (int k = 0; k < 40; ++k) {

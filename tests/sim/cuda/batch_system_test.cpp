@@ -304,10 +304,11 @@ TEST(BatchSystem, HeldVerticesMoveAsTheyAreTold) {
   const Eigen::Matrix3d along = Eigen::Matrix3d::Identity() - normal * normal.transpose();
   ContactSet contacts;
   std::vector<VertexRestriction> restrictions;
-  const auto restrict = [&](int vertex, Hold hold, const Eigen::Matrix3d& free, const Eigen::Vector3d& move) {
+  const auto restrict = [&](int vertex, Freedom freedom, const Eigen::Matrix3d& free,
+                            const Eigen::Vector3d& move) {
     VertexConstraint constraint;
     constraint.vertex = vertex;
-    constraint.hold = hold;
+    constraint.freedom = freedom;
     constraint.free = free;
     constraint.correction = move;
     contacts.constraints.push_back(constraint);
@@ -316,9 +317,9 @@ TEST(BatchSystem, HeldVerticesMoveAsTheyAreTold) {
     for (int c = 0; c < 3; ++c) restriction.correction[c] = static_cast<float>(move[c]);
     restrictions.push_back(restriction);
   };
-  restrict(3, Hold::fixed, Eigen::Matrix3d::Zero(), correction);
-  restrict(40, Hold::slip, along, 1e-3 * normal);
-  restrict(77, Hold::slip, along, Eigen::Vector3d::Zero());
+  restrict(3, Freedom::held, Eigen::Matrix3d::Zero(), correction);
+  restrict(40, Freedom::slip, along, 1e-3 * normal);
+  restrict(77, Freedom::slip, along, Eigen::Vector3d::Zero());
   bench.batch.set_restrictions(1, restrictions);
   bench.batch.assemble_preconditioner();
   bench.batch.factorize();

@@ -7,6 +7,7 @@
 
 #include "data/procedural_mesh.h"
 #include "sim/oracle/projective_contact.h"
+#include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
 namespace {
@@ -22,13 +23,6 @@ Sheet square_sheet(double size, int cells) {
   mesh.width = mesh.height = size;
   mesh.cells_x = mesh.cells_y = cells;
   return make_sheet(data::rectangle(mesh));
-}
-
-Environment environment_of(const Sheet& sheet) {
-  Environment environment;
-  environment.state.positions = sheet.rest.vertices;
-  environment.state.velocities = Points::Zero(sheet.rest.vertices.rows(), 3);
-  return environment;
 }
 
 /// Plane through the origin that falls along +x by `slope` [rad].
@@ -226,15 +220,14 @@ TEST(Projective, ConvergesToTheStepThatNewtonsMethodFinds) {
       a.obstacles.push_back({Plane{}, -1});
       a.loads.push_back({24, {0.01, 0, 0.005}});
       // A corner is lifted off the table and dragged.
-      Grasp grasp;
-      grasp.vertices = {0, 1};
+      data::Trajectory gripper;
       for (int k = 0; k <= 20; ++k) {
         Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
         pose.translation() = Vector3d(0.3 * k * h, 0.1 * k * h, 0.4 * k * h);
-        grasp.gripper.times.push_back(k * h);
-        grasp.gripper.poses.push_back(pose);
+        gripper.times.push_back(k * h);
+        gripper.poses.push_back(pose);
       }
-      a.grasps.push_back(grasp);
+      a.holds = {gripped(a, {0, 1}, gripper, h)};
       Environment b = a;
       ProjectiveSettings settings;
       settings.iterations = 3000;
@@ -252,7 +245,7 @@ TEST(Projective, ConvergesToTheStepThatNewtonsMethodFinds) {
         EXPECT_TRUE(expected.converged) << k << " " << expected.residual;
         const double difference = (a.state.positions - b.state.positions).cwiseAbs().maxCoeff();
         EXPECT_LE(difference, 1e-9) << k;  // |r| / |M g| <= 1e-8: h^2 g 1e-8 times the vertices that share it
-        EXPECT_LE((report.grasp_forces[0] - expected.grasp_forces[0]).norm(), 1e-8);
+        EXPECT_LE((report.hold_forces[0] - expected.hold_forces[0]).norm(), 1e-8);
         EXPECT_LE((report.obstacle_forces[0] - expected.obstacle_forces[0]).norm(), 1e-8);
         b.state = a.state;
       }
@@ -278,8 +271,7 @@ TEST(Projective, EveryNamedSolverSolvesTheMetricOfARealSheet) {
   Environment environment = environment_of(sheet);
   environment.material.membrane_stiffness = 300;
   environment.obstacles.push_back({Box{.half_extents = {0.051, 0.051, 0.01},
-                                       .pose = Eigen::Isometry3d(Eigen::Translation3d(0.1, 0.1, -0.01)),
-                                       .trajectory = {}},
+                                       .pose = Eigen::Isometry3d(Eigen::Translation3d(0.1, 0.1, -0.01))},
                                    0.3});
   const auto bending =
       bending_operator(*plan, environment.material.bending_model, environment.material.poissons_ratio);

@@ -23,9 +23,8 @@ struct Run {
 
 std::vector<bool> held_vertices(const Environment& environment) {
   std::vector<bool> held(static_cast<std::size_t>(environment.state.positions.rows()), false);
-  for (const Grasp& grasp : environment.grasps)
-    for (const int i : grasp.vertices) held[static_cast<std::size_t>(i)] = true;
-  for (const FixedVertex& fixed : environment.fixed) held[static_cast<std::size_t>(fixed.vertex)] = true;
+  for (const Hold& hold : environment.holds)
+    for (const int i : hold.vertices) held[static_cast<std::size_t>(i)] = true;
   return held;
 }
 
@@ -39,8 +38,9 @@ RC_GTEST_PROP(Properties, NoVertexIsBelowASurfaceUnreported, ()) {
     for (const Vector3d& force : report.obstacle_forces) touched = touched || force.norm() > 0;
     for (const Obstacle& obstacle : run.environment.obstacles)
       for (std::size_t i = 0; i < held.size(); ++i) {
-        const double depth = depth_in(obstacle, run.environment.state.positions.row(static_cast<int>(i)),
-                                      run.environment.state.time);
+        const double depth =
+            depth_in(run.environment, obstacle, run.environment.state.positions.row(static_cast<int>(i)),
+                     run.environment.state.time);
         RC_ASSERT(depth <= report.penetration_max + 1e-9);
         if (!held[i] && report.converged) RC_ASSERT(depth <= 2e-9);  // the solver's on gaps, and rounding
       }
@@ -48,7 +48,7 @@ RC_GTEST_PROP(Properties, NoVertexIsBelowASurfaceUnreported, ()) {
   RC_CLASSIFY(touched);
 }
 
-// What grippers, supports and obstacles are reported to do is what weight, loads, air and inertia ask for:
+// What holds and obstacles are reported to do is what weight, loads, air and inertia ask for:
 // sum m (v1 - v0) / h = sum of all forces.
 RC_GTEST_PROP(Properties, ReportedForcesBalanceWeightAndInertia, ()) {
   Run run;
@@ -72,9 +72,8 @@ RC_GTEST_PROP(Properties, ReportedForcesBalanceWeightAndInertia, ()) {
       found += force;
       largest += force.norm();
     };
-    std::ranges::for_each(report.grasp_forces, add);
+    std::ranges::for_each(report.hold_forces, add);
     std::ranges::for_each(report.obstacle_forces, add);
-    for (const Load& support : report.fixed_forces) add(support.force);
     RC_ASSERT((asked - found).norm() <= unbalanced_sum(environment, run.mass, report) + 1e-12 * largest);
   }
 }

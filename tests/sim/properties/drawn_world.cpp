@@ -22,7 +22,7 @@ data::Trajectory even_path(const Vector3d& start, const Vector3d& velocity) {
           {Isometry3d(Translation3d(start)), Isometry3d(Translation3d(start + seconds * velocity))}};
 }
 
-Obstacle draw_obstacle() {
+Obstacle draw_obstacle(Environment& environment) {
   const Vector3d place(draw(0, 0.2), draw(0, 0.2), 0);
   const double friction = draw_chance(0.3) ? draw(0, 1) : -1;
   const int kind = draw_below(3);
@@ -34,7 +34,7 @@ Obstacle draw_obstacle() {
   if (kind == 1) return {Cylinder{place, draw_direction(), draw(0.01, 0.05)}, friction};
   Box box{.half_extents = {draw(0.01, 0.1), draw(0.01, 0.1), draw(0.005, 0.05)}};
   if (draw_chance(0.5))
-    box.trajectory = even_path(place, draw(0, 0.5) * draw_direction());
+    box.frame = add_frame(environment, even_path(place, draw(0, 0.5) * draw_direction()));
   else
     box.pose = Translation3d(place) * Eigen::AngleAxisd(draw(0, 3), draw_direction());
   return {box, friction};
@@ -110,11 +110,11 @@ Environment draw_fall(const Sheet& sheet) {
   environment.gravity = Vector3d(draw(-2, 2), draw(-2, 2), -9.81);
   environment.state.velocities.col(2).array() -= draw(0, 2);
   const int count = 1 + draw_below(3);
-  for (int k = 0; k < count; ++k) environment.obstacles.push_back(draw_obstacle());
+  for (int k = 0; k < count; ++k) environment.obstacles.push_back(draw_obstacle(environment));
   const auto touches = [&] {
     for (const Obstacle& obstacle : environment.obstacles)
       for (const auto& x : environment.state.positions.rowwise())
-        if (depth_in(obstacle, x.transpose(), 0) > -1e-3) return true;
+        if (depth_in(environment, obstacle, x.transpose(), 0) > -1e-3) return true;
     return false;
   };
   // Not for ever: a cylinder may stand upright.
@@ -123,35 +123,34 @@ Environment draw_fall(const Sheet& sheet) {
   return environment;
 }
 
-Grasp draw_grasp(const Environment& environment) {
+Hold draw_grasp(Environment& environment) {
   const data::Points& x = environment.state.positions;
   const Vector3d middle = x.row(draw_below(static_cast<int>(x.rows())));
-  Grasp grasp;
+  std::vector<int> vertices;
   const double reach = draw(0.001, 0.06);
   for (int i = 0; i < static_cast<int>(x.rows()); ++i)
-    if ((x.row(i).transpose() - middle).norm() <= reach) grasp.vertices.push_back(i);
-  grasp.gripper = even_path(middle, draw(0, 1) * draw_direction());
-  return grasp;
+    if ((x.row(i).transpose() - middle).norm() <= reach) vertices.push_back(i);
+  return gripped(environment, vertices, even_path(middle, draw(0, 1) * draw_direction()));
 }
 
 Environment draw_world(const Sheet& sheet) {
   Environment environment = draw_fall(sheet);
   const int rows = static_cast<int>(sheet.rest.vertices.rows()), grasps = draw_below(3);
   for (int k = 0; k < grasps; ++k) {
-    Grasp grasp = draw_grasp(environment);
+    const Hold grasp = draw_grasp(environment);
     if (k > 0 && std::ranges::any_of(grasp.vertices, [&](int i) {
-          return std::ranges::count(environment.grasps[0].vertices, i) > 0;
+          return std::ranges::count(environment.holds[0].vertices, i) > 0;
         }))
       continue;  // a vertex has one gripper
-    environment.grasps.push_back(grasp);
+    environment.holds.push_back(grasp);
   }
   const auto held = [&](int i) {
-    return std::ranges::any_of(environment.grasps,
-                               [&](const Grasp& grasp) { return std::ranges::count(grasp.vertices, i) > 0; });
+    return std::ranges::any_of(environment.holds,
+                               [&](const Hold& hold) { return std::ranges::count(hold.vertices, i) > 0; });
   };
   if (const int i = draw_below(rows); draw_chance(0.3) && !held(i))
-    environment.fixed.push_back(
-        {i, {draw_chance(0.5), draw_chance(0.5), true}, environment.state.positions.row(i)});
+    environment.holds.push_back(
+        support(i, {draw_chance(0.5), draw_chance(0.5), true}, environment.state.positions.row(i)));
   if (draw_chance(0.3)) environment.loads.push_back({draw_below(rows), draw(0, 0.05) * draw_direction()});
   return environment;
 }

@@ -24,7 +24,7 @@ Environment draw_flight(const Sheet& sheet);
 Environment draw_fall(const Sheet& sheet);
 
 /// Vertices about one of the sheet's, carried evenly.
-Grasp draw_grasp(const Environment& environment);
+Hold draw_grasp(Environment& environment);
 
 /// A fall with up to two grasps, a support and a load.
 Environment draw_world(const Sheet& sheet);

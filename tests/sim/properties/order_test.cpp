@@ -17,7 +17,7 @@ RC_GTEST_PROP(Properties, NeitherOrderNorThreadsChangeABatch, ()) {
   std::vector<Environment> environments, reordered;
   for (int e = 0; e < count; ++e) {
     environments.push_back(draw_fall(sheet));
-    environments.back().grasps.push_back(draw_grasp(environments.back()));
+    environments.back().holds.push_back(draw_grasp(environments.back()));
   }
   const std::vector<int> order = draw_order(count);
   for (const int e : order) reordered.push_back(environments[static_cast<std::size_t>(e)]);

@@ -140,7 +140,7 @@ Swing swing_of(const Sheet& sheet, BendingModel model, double damping) {
   for (int i = 0; i < mode.size(); ++i) {
     const double x = sheet.rest.vertices(i, 0);
     if (x <= clamped) {
-      environment.fixed.push_back({i, {true, true, true}, sheet.rest.vertices.row(i).transpose()});
+      environment.holds.push_back(support(i, {true, true, true}, sheet.rest.vertices.row(i).transpose()));
       continue;
     }
     const double s = 1.8751 * (x - clamped) / (0.2 - clamped);

@@ -11,7 +11,7 @@
 #include "data/procedural_mesh.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/grid_search.h"
-#include "sysid/replay/grasp_targets.h"
+#include "sysid/replay/recorded_grasp.h"
 #include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {
@@ -39,8 +39,8 @@ TEST_F(Lift, ClampHoldsThePatchAsItLies) {
   EXPECT_NEAR(replay.pivot.x(), 0.39, 1e-12);
   EXPECT_NEAR(replay.start + (replay.steps - 1) * 0.01, 2.5, 1e-9);
   const sim::Environment environment = make_environment(replay, {});
-  EXPECT_EQ(environment.grasps.at(0).vertices.size(), 4u);
-  EXPECT_EQ(environment.grasps.at(0).targets.rows(), 0);
+  EXPECT_EQ(environment.holds.at(0).vertices.size(), 4u);
+  EXPECT_EQ(environment.holds.at(0).targets.rows(), 0);
   EXPECT_EQ(environment.obstacles.size(), 1u);
 }
 
@@ -48,8 +48,8 @@ TEST_F(Lift, PointHoldsTheCornerAlone) {
   settings.grasp_shape = data::GraspShape::point;
   const Replay replay = make_replay(recording, settings);
   const sim::Environment environment = make_environment(replay, {});
-  ASSERT_EQ(environment.grasps.at(0).vertices.size(), 1u);
-  const auto corner = replay.recording.mesh.vertices.row(environment.grasps[0].vertices[0]);
+  ASSERT_EQ(environment.holds.at(0).vertices.size(), 1u);
+  const auto corner = replay.recording.mesh.vertices.row(environment.holds[0].vertices[0]);
   EXPECT_NEAR((corner - Eigen::RowVector3d(0.4, 0.4, 0)).norm(), 0, 1e-12);
 }
 
@@ -60,7 +60,7 @@ TEST_F(Lift, PinchClosesBeforeTheRecordingStarts) {
   ReplayCandidate candidate;
   candidate.nuisance.grasp_depth = 0.041;
   const sim::Environment environment = make_environment(replay, candidate);
-  const sim::Grasp& grasp = environment.grasps.at(0);
+  const sim::Hold& grasp = environment.holds.at(0);
   EXPECT_EQ(grasp.vertices.size(), 4u);
   EXPECT_EQ(grasp.from, replay.start);
   EXPECT_LE(grasp.from + grasp.closing_time, 0);
@@ -83,11 +83,11 @@ TEST_F(Lift, StartYawTurnsTheSheetAboutTheGripperAndTableHeightLeavesTheGripperW
   EXPECT_NEAR(is.head<2>().norm(), was.head<2>().norm(), 1e-12);
   EXPECT_NEAR(start.col(2).maxCoeff(), -0.01, 1e-12);
   EXPECT_NEAR(std::get<sim::Plane>(environment.obstacles.at(0).shape).point.z(), -0.01, 1e-12);
-  EXPECT_NEAR(environment.grasps.at(0).targets.col(2).norm(), 0, 1e-12);
+  EXPECT_NEAR(environment.holds.at(0).targets.col(2).norm(), 0, 1e-12);
 
   candidate.nuisance.table_height = 0.01;  // a table above the recorded grasp carries the patch
   const sim::Environment raised = make_environment(replay, candidate);
-  EXPECT_NEAR(raised.grasps.at(0).targets.col(2).minCoeff(), 0.01, 1e-12);
+  EXPECT_NEAR(raised.holds.at(0).targets.col(2).minCoeff(), 0.01, 1e-12);
 }
 
 TEST_F(Lift, RegistrationTakesBoundsAndPivotOfTheRecording) {
@@ -228,6 +228,7 @@ TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {
     if (slopes) stiffen_clamped(replay, sheet);
     replay.plan = sim::make_sheet_plan(sheet);
     replay.steps = 30;
+    replay.schedule = gripper_schedule(replay);
     data::Points last;
     run(replay, {{material, {}}}, {replay.steps},
         [&](std::size_t, ReplayResult result) { last = result.motion.positions.back(); });

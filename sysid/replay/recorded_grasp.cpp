@@ -1,9 +1,10 @@
-#include "sysid/replay/grasp_targets.h"
+#include "sysid/replay/recorded_grasp.h"
 
 #include <algorithm>
 #include <cmath>
 
 #include "data/error.h"
+#include "sim/scene/grasp.h"
 
 namespace flash::sysid {
 
@@ -17,16 +18,6 @@ Eigen::RowVector3d corner_of(const data::TriangleMesh& mesh, const std::array<in
     if (corner[k] == 1) position[k] = high[k];
   }
   return position;
-}
-
-/// Unit vector in the plane of the sheet from the grasped patch towards the middle of the sheet, base frame.
-Eigen::Vector3d inward(const data::Points& start, const std::vector<int>& patch, const Eigen::Vector3d& up) {
-  Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
-  for (const int vertex : patch) centre += start.row(vertex);
-  centre /= static_cast<double>(patch.size());
-  Eigen::Vector3d direction = (start.colwise().mean() - centre).transpose();
-  direction -= direction.dot(up) * up;
-  return direction.norm() > 1e-9 ? Eigen::Vector3d(direction.normalized()) : up.unitOrthogonal();
 }
 
 /// The patch a grasp of this shape takes.
@@ -67,22 +58,6 @@ const data::Trajectory& trajectory_of(const data::Recording& recording, const da
   return found->second;
 }
 
-data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridge, const Eigen::Vector3d& up,
-                           double pitch) {
-  const Eigen::Vector3d centre = flat.colwise().mean();
-  const Eigen::Vector3d across = up.cross(ridge).normalized();
-  const Eigen::Vector3d along = across.cross(up);
-  const Eigen::VectorXd b = ((flat.rowwise() - centre.transpose()) * across).cwiseAbs();
-  const double height = b.maxCoeff();
-  const Eigen::Matrix3d tilt = Eigen::AngleAxisd(pitch, across).toRotationMatrix();
-  data::Points targets(flat.rows(), 3);
-  for (Eigen::Index i = 0; i < flat.rows(); ++i) {
-    const double a = (flat.row(i).transpose() - centre).dot(along);
-    targets.row(i) = (centre + tilt * (a * along + (height - b[i]) * up)).transpose();
-  }
-  return targets;
-}
-
 void stiffen_clamped(const Replay& replay, sim::Sheet& sheet) {
   for (const data::RecordedGrasp& grasp : replay.recording.grasps) {
     if (shape_of(grasp, replay.settings) != data::GraspShape::clamp || grasp.from > replay.beginning ||
@@ -97,38 +72,41 @@ void stiffen_clamped(const Replay& replay, sim::Sheet& sheet) {
   }
 }
 
-sim::Grasp make_grasp(const Replay& replay, const data::RecordedGrasp& recorded,
-                      const ReplayNuisance& nuisance, const data::Points& flat) {
+std::shared_ptr<const sim::Schedule> gripper_schedule(const Replay& replay) {
+  std::vector<data::Trajectory> grippers;
+  for (const data::RecordedGrasp& grasp : replay.recording.grasps)
+    grippers.push_back(trajectory_of(replay.recording, grasp));
+  return sim::make_schedule(grippers, replay.start, replay.settings.solver.time_step, replay.steps);
+}
+
+sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, int frame,
+                    const ReplayNuisance& nuisance, const data::Points& flat) {
   const data::Recording& recording = replay.recording;
-  const Eigen::RowVector3d raise = nuisance.table_height * replay.up.transpose();
-  sim::Grasp grasp;
-  grasp.vertices = patch_of(replay, recorded, nuisance);
-  grasp.gripper = trajectory_of(recording, recorded);
-  grasp.to = recorded.to;
   const bool from_beginning = recorded.from <= replay.beginning;
-  grasp.from = from_beginning ? replay.start : recorded.from;
+  sim::Hold hold{.name = recorded.gripper,
+                 .vertices = patch_of(replay, recorded, nuisance),
+                 .frame = frame,
+                 .from = from_beginning ? replay.start : recorded.from,
+                 .to = recorded.to};
   const double available = from_beginning ? replay.beginning - replay.start : replay.settings.closing_time;
-  grasp.closing_time = std::min(replay.settings.closing_time, available);
+  hold.closing_time = std::min(replay.settings.closing_time, available);
 
   const bool pinched = shape_of(recorded, replay.settings) == data::GraspShape::pinch;
-  if (from_beginning && (pinched || nuisance.table_height != 0)) {
-    data::Points targets = flat(grasp.vertices, Eigen::all);
-    if (pinched) {
-      const Eigen::Vector3d inner = inward(flat, grasp.vertices, replay.up);
-      const bool given = recorded.direction.norm() > 0 && !nuisance.grasp_direction;
-      const Eigen::AngleAxisd turned(nuisance.grasp_direction.value_or(0.0), replay.up);
-      targets = pinch_targets(targets, given ? recorded.direction : Eigen::Vector3d(turned * inner),
-                              replay.up, nuisance.grasp_pitch.value_or(recorded.pitch));
-    }
-    if (replay.recording.has_table) {  // fingers do not push the patch into the table
-      const Eigen::Vector3d surface = recording.table_point + raise.transpose();
-      const double deepest = ((targets.rowwise() - surface.transpose()) * recording.table_normal).minCoeff();
-      if (deepest < 0) targets.rowwise() -= deepest * recording.table_normal.transpose();
-    }
-    const Eigen::Isometry3d gripper = data::pose_at(grasp.gripper, grasp.from);
-    grasp.targets = (targets.rowwise() - gripper.translation().transpose()) * gripper.linear();
+  if (!from_beginning || (!pinched && nuisance.table_height == 0)) return hold;
+  data::Points targets = flat(hold.vertices, Eigen::all);
+  if (pinched) {
+    const bool given = recorded.direction.norm() > 0 && !nuisance.grasp_direction;
+    const Eigen::AngleAxisd turned(nuisance.grasp_direction.value_or(0.0), replay.up);
+    const Eigen::Vector3d diagonal = turned * sim::towards_middle(flat, hold.vertices, replay.up);
+    targets = sim::pinch_targets(targets, given ? recorded.direction : diagonal, replay.up,
+                                 nuisance.grasp_pitch.value_or(recorded.pitch));
   }
-  return grasp;
+  if (recording.has_table)
+    sim::raise_above(recording.table_point + nuisance.table_height * replay.up, recording.table_normal,
+                     targets);
+  const Eigen::Isometry3d gripper = data::pose_at(trajectory_of(recording, recorded), hold.from);
+  hold.targets = (targets.rowwise() - gripper.translation().transpose()) * gripper.linear();
+  return hold;
 }
 
 }  // namespace flash::sysid

@@ -1,0 +1,79 @@
+#include "sim/scene/environment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::sim {
+
+using data::Points;
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double rounding = 1e-9;  ///< of a time that is a sum of steps [s]
+
+double distance_to_box(const Vector3d& half_extents, const Vector3d& point) {
+  return (point.cwiseAbs() - half_extents).cwiseMax(0.0).norm();
+}
+
+std::vector<int> vertices_in_reach(const Hold& hold, const State& state, const Isometry3d& frame_from_base) {
+  std::vector<int> vertices;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < static_cast<int>(state.positions.rows()); ++i) {
+    const Vector3d point = frame_from_base * Vector3d(state.positions.row(i));
+    const double distance = distance_to_box(hold.reach->half_extents, point);
+    nearest = std::min(nearest, distance);
+    if (distance <= hold.reach->threshold) vertices.push_back(i);
+  }
+  if (vertices.empty())
+    throw data::input_error("end effector " + hold.name, "grasps",
+                            "no vertex within " + data::format_short(hold.reach->threshold) +
+                                " m of its box at " + data::format_short(state.time) +
+                                " s; the nearest is " + data::format_short(nearest) + " m away");
+  return vertices;
+}
+
+HeldVertices take(const Hold& hold, const State& state, const Isometry3d& frame, double time) {
+  const Isometry3d frame_from_base = frame.inverse();
+  HeldVertices held;
+  held.vertices = hold.reach ? vertices_in_reach(hold, state, frame_from_base) : hold.vertices;
+  held.offsets.resize(static_cast<Eigen::Index>(held.vertices.size()), 3);
+  for (std::size_t v = 0; v < held.vertices.size(); ++v)
+    held.offsets.row(static_cast<Eigen::Index>(v)) =
+        frame_from_base * state.positions.row(held.vertices[v]).transpose();
+  held.from = std::isfinite(hold.from) ? hold.from : state.time;
+  held.arrival = std::max(held.from + hold.closing_time, time);
+  return held;
+}
+
+}  // namespace
+
+Isometry3d frame_pose(const Environment& environment, int frame, double time) {
+  return frame == base_frame ? Isometry3d::Identity() : pose_at(*environment.schedule, frame, time);
+}
+
+void update_holds(Environment& environment, double time) {
+  State& state = environment.state;
+  state.held.resize(environment.holds.size());
+  for (std::size_t k = 0; k < environment.holds.size(); ++k) {
+    const Hold& hold = environment.holds[k];
+    const bool closed = state.time >= hold.from - rounding && time <= hold.to + rounding;
+    if (!closed)
+      state.held[k] = {};
+    else if (state.held[k].vertices.empty())
+      state.held[k] = take(hold, state, frame_pose(environment, hold.frame, state.time), time);
+  }
+}
+
+bool all_arrived(const Environment& environment) {
+  const State& state = environment.state;
+  return std::all_of(state.held.begin(), state.held.end(),
+                     [&](const HeldVertices& held) { return held.arrival <= state.time + rounding; });
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,30 @@
+#pragma once
+#include <Eigen/Core>
+
+#include "data/recording.h"
+#include "data/trajectory.h"
+#include "sim/scene/hold.h"
+#include "sysid/replay/replay.h"
+
+namespace flash::sysid {
+
+/// The shape of a grasp under the settings, which may replace the recording's.
+data::GraspShape shape_of(const data::RecordedGrasp& grasp, const ReplaySettings& settings);
+
+/// The trajectory of the gripper of a grasp. Throws data::InputError where the recording has none of that
+/// name.
+const data::Trajectory& trajectory_of(const data::Recording& recording, const data::RecordedGrasp& grasp);
+
+/// The grippers of a replay over its steps, a frame for each grasp of the recording.
+std::shared_ptr<const sim::Schedule> gripper_schedule(const Replay& replay);
+
+/// A grasp of the recording as it is simulated: its patch, when it closes and where it takes the vertices.
+/// clamp: where the sheet lies. point: the vertex nearest the corner alone. pinch: folded to a ridge.
+/// `frame`: of the gripper in replay.schedule. `flat`: the sheet as it lies before the table is raised [m].
+sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, int frame,
+                    const ReplayNuisance& nuisance, const data::Points& flat);
+
+/// Makes stiff the triangles inside patches that a clamp takes at the beginning and never lets go.
+void stiffen_clamped(const Replay& replay, sim::Sheet& sheet);
+
+}  // namespace flash::sysid
