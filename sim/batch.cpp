@@ -66,13 +66,10 @@ namespace {
 bool frames_exist(const Environment& environment) {
   const int frames = environment.schedule ? static_cast<int>(environment.schedule->frames.size()) : 0;
   const auto exists = [&](int frame) { return frame >= base_frame && frame < frames; };
-  const auto has_frame = [&](const Obstacle& obstacle) {
-    const Box* box = std::get_if<Box>(&obstacle.shape);
-    return box == nullptr || exists(box->frame);
-  };
   return std::all_of(environment.holds.begin(), environment.holds.end(),
                      [&](const Hold& hold) { return exists(hold.frame); }) &&
-         std::all_of(environment.obstacles.begin(), environment.obstacles.end(), has_frame);
+         std::all_of(environment.obstacles.begin(), environment.obstacles.end(),
+                     [&](const Obstacle& obstacle) { return exists(obstacle.frame); });
 }
 
 void check(const SheetPlan& plan, const std::vector<Environment>& environments,
@@ -94,7 +91,7 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
     require(environment.holds.size() == environments.front().holds.size(),
             "batch: all environments need the same number of holds");
     require(frames_exist(environment),
-            "batch: a hold or a box names a frame that the schedule does not have");
+            "batch: a hold or an obstacle names a frame that the schedule does not have");
   }
 }
 

@@ -1,15 +1,83 @@
 #pragma once
-#include <Eigen/Core>
-#include <vector>
+#include "sim/law/vector3.h"
 
 namespace flash::sim {
+inline namespace FLASH_LEVEL {
+
+/// One, two or three equations G x = b, the rest of three unused.
+template <typename Real>
+struct FewEquations {
+  int size = 0;
+  Real matrix[3][3] = {};
+  Real right[3] = {};
+};
+
+/// Solves by Cramer's rule. Returns false where |det G| is less than `least_determinant`.
+template <typename Real>
+FLASH_HOST_DEVICE inline bool solve(const FewEquations<Real>& equations, Real least_determinant, Real x[3]) {
+  // Rows of the identity fill up to three.
+  Vector3<Real> column[3], right{};
+  for (int c = 0; c < 3; ++c)
+    for (int r = 0; r < 3; ++r)
+      column[c][r] = r < equations.size && c < equations.size ? equations.matrix[r][c] : Real(r == c);
+  for (int r = 0; r < equations.size; ++r) right[r] = equations.right[r];
+  const Real determinant = dot(column[0], cross(column[1], column[2]));
+  if (magnitude(determinant) < least_determinant) return false;
+  x[0] = dot(right, cross(column[1], column[2])) / determinant;
+  x[1] = dot(column[0], cross(right, column[2])) / determinant;
+  x[2] = dot(column[0], cross(column[1], right)) / determinant;
+  return true;
+}
 
 /// Solves a linear complementarity problem: the x >= 0 with y = N^T C x - b >= 0 and x . y = 0. The unit
-/// `normals` are the columns of N, the `directions` those of C. At most three of x are positive, of
-/// independent columns. Where there is none (faces that press against each other), returns what comes
-/// nearest. As forces, with b = N^T f and C = N: the non-negative ones that come nearest to f. As a
-/// displacement N x, with b minus the gaps: the shortest that closes all of them.
-std::vector<double> solve_lcp(const std::vector<Eigen::Vector3d>& normals,
-                              const std::vector<Eigen::Vector3d>& directions, const std::vector<double>& b);
+/// `normals` are the columns of N, the `directions` those of C; all have `count` entries. At most three of x
+/// are positive, of independent columns. Where there is none (faces that press against each other), x becomes
+/// what comes nearest. As forces, with b = N^T f and C = N: the non-negative ones that come nearest to f. As
+/// a displacement N x, with b minus the gaps: the shortest that closes all of them.
+template <typename Real>
+FLASH_HOST_DEVICE inline void solve_lcp(int count, const Vector3<Real>* normals,
+                                        const Vector3<Real>* directions, const Real* b, Real* x) {
+  constexpr Real parallel = 1e-6;  // sin^2 of 0.06 degrees, the angle between two faces
+  Real largest{}, best_violation{};
+  for (int k = 0; k < count; ++k) {
+    x[k] = 0;
+    largest = larger_of(magnitude(b[k]), largest);
+    best_violation = larger_of(b[k], best_violation);
+  }
+  const Real rounding = Real(1e-12) * largest;
+  // The solution uses one, two or three faces; in space no more are independent.
+  const auto try_faces = [&](int i, int j, int k, int size) {
+    const int faces[3] = {i, j, k};
+    FewEquations<Real> equations;
+    equations.size = size;
+    for (int r = 0; r < size; ++r) {
+      equations.right[r] = b[faces[r]];
+      for (int c = 0; c < size; ++c) equations.matrix[r][c] = dot(normals[faces[r]], directions[faces[c]]);
+    }
+    Real trial[3];
+    // Faces that are parallel give no unique force.
+    if (!solve(equations, parallel, trial)) return;
+    Vector3<Real> sum{};
+    for (int r = 0; r < size; ++r) {
+      if (trial[r] < 0) return;
+      sum = sum + trial[r] * directions[faces[r]];
+    }
+    Real violation{};
+    for (int each = 0; each < count; ++each)
+      violation = larger_of(b[each] - dot(normals[each], sum), violation);
+    if (violation >= best_violation - rounding) return;
+    best_violation = violation;
+    for (int each = 0; each < count; ++each) x[each] = 0;
+    for (int r = 0; r < size; ++r) x[faces[r]] = trial[r];
+  };
+  for (int i = 0; i < count; ++i) {
+    try_faces(i, i, i, 1);
+    for (int j = i + 1; j < count; ++j) {
+      try_faces(i, j, j, 2);
+      for (int k = j + 1; k < count; ++k) try_faces(i, j, k, 3);
+    }
+  }
+}
 
+}  // namespace FLASH_LEVEL
 }  // namespace flash::sim

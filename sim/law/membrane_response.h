@@ -4,42 +4,12 @@
 #include "sim/law/host_device.h"
 #include "sim/law/lanes.h"
 #include "sim/law/membrane_law.h"
+#include "sim/law/vector3.h"
 
 namespace flash::sim {
 inline namespace FLASH_LEVEL {
 
 // The formulas of sim/law/membrane.h, for one triangle (Real = double) or several (Real = Lanes).
-
-template <typename Real>
-struct Vector3 {
-  Real x, y, z;
-};
-
-template <typename Real>
-FLASH_HOST_DEVICE inline Vector3<Real> operator+(const Vector3<Real>& a, const Vector3<Real>& b) {
-  return {a.x + b.x, a.y + b.y, a.z + b.z};
-}
-template <typename Real>
-FLASH_HOST_DEVICE inline Vector3<Real> operator-(const Vector3<Real>& a, const Vector3<Real>& b) {
-  return {a.x - b.x, a.y - b.y, a.z - b.z};
-}
-template <typename Real>
-FLASH_HOST_DEVICE inline Vector3<Real> operator*(const Real& a, const Vector3<Real>& b) {
-  return {a * b.x, a * b.y, a * b.z};
-}
-template <typename Real>
-FLASH_HOST_DEVICE inline Real dot(const Vector3<Real>& a, const Vector3<Real>& b) {
-  return a.x * b.x + a.y * b.y + a.z * b.z;
-}
-template <typename Real>
-FLASH_HOST_DEVICE inline Vector3<Real> cross(const Vector3<Real>& a, const Vector3<Real>& b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-template <typename Real>
-FLASH_HOST_DEVICE inline Vector3<Real> select(const auto& condition, const Vector3<Real>& yes,
-                                              const Vector3<Real>& no) {
-  return {select(condition, yes.x, no.x), select(condition, yes.y, no.y), select(condition, yes.z, no.z)};
-}
 
 /// Deformation gradient (f1, f2) = s1 u1 v1^T + s2 u2 v2^T with s1 >= s2 >= 0, v1 = (c, s), v2 = (-s, c) and
 /// n = u1 x u2.

@@ -51,11 +51,11 @@ bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& repo
 /// takes the first exit that does not tear it. Returns whether the step is solved.
 bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport& report) {
   const double exit_speed = w.settings.exit_speed;
-  const StepProblem problem(*w.plan, environment, h, {exit_speed});
+  const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed});
   bool solved = solve_step(problem, w, report);
   if (report.start_penetration.depth > 0) {
     const auto inside = vertices_inside(problem.contacts, w.now.contacts);
-    const std::vector<Exit> exits = exits_of(problem.contacts, inside);
+    const std::vector<WayOut<double>> exits = exits_of(problem.contacts, inside);
     for (size_t k = 1; k < exits.size(); ++k) {
       if (solved && exits_gently(problem.contacts, *w.plan, inside, w.now.positions)) break;
       // A slower exit does not help an unsolved step, which costs the most: only staying is tried.

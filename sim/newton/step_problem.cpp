@@ -6,11 +6,11 @@
 namespace flash::sim {
 
 StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
-                         const Exit& exit)
+                         const WayOut<double>& way_out)
     : bending(
           bending_operator(plan, environment.material.bending_model, environment.material.poissons_ratio)),
       potential(plan, bending, environment, time_step),
-      contacts(environment, time_step, exit),
+      contacts(environment, time_step, way_out),
       gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81),
       force_scale(potential.mass().norm() * gravity) {}
 

@@ -23,8 +23,9 @@ struct StepProblem {
   double gravity;      ///< [m/s^2]; 9.81 without
   double force_scale;  ///< |M g| [N]
 
-  /// The arguments but `exit` have to outlive the problem.
-  StepProblem(const SheetPlan& plan, const Environment& environment, double time_step, const Exit& exit);
+  /// The arguments but `way_out` have to outlive the problem.
+  StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
+              const WayOut<double>& way_out);
 
   /// Fills in an iterate from its positions.
   void evaluate(Iterate& iterate) const;

@@ -36,11 +36,10 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
     // One that is held in some axes meets no obstacle in the others: such a step is not solved.
     if (c != nullptr && c->freedom == Freedom::held && c->free.isZero(0)) continue;
     for (size_t k = 0; k < environment.obstacles.size(); ++k) {
-      const Gap gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
-      const double depth =
-          gap.starts_inside
-              ? -gap_to(environment.obstacles[k], problem.contacts.motions[k], end.positions.row(i)).distance
-              : -gap.distance;
+      const SurfaceGap<double> gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
+      const double depth = gap.starts_inside
+                               ? -gap_to(problem.contacts.obstacles[k], vector3(end.positions, i)).distance
+                               : -gap.distance;
       report.penetration_max = worst(report.penetration_max, depth);
       // A vertex that leaves slowly may stay below the surface.
       report.complementarity = worst(report.complementarity, -gap.distance);
@@ -88,8 +87,8 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
     }
   }
   for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));
-  for (const ObstacleMotion& motion : problem.contacts.motions)
-    start_is_feasible = start_is_feasible && !motion.moves;
+  for (const MovingObstacle<double>& obstacle : problem.contacts.obstacles)
+    start_is_feasible = start_is_feasible && !obstacle.moves;
 
   const double stored_at_start = elastic_at_start.membrane + elastic_at_start.bending,
                stored_at_end = report.membrane + report.bending;

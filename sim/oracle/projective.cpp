@@ -152,7 +152,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   const IncrementalPotential step(*w.plan, bending, environment, h);
 
   Points x = environment.state.positions + h * environment.state.velocities;
-  const ContactStep contact_step(environment, h, Exit{std::numeric_limits<double>::infinity()});
+  const ContactStep contact_step(environment, h, {.speed = std::numeric_limits<double>::infinity()});
   const ContactSet holds = begin_step(contact_step, x);
   project_to_feasible(contact_step, holds, x);
   const Index n = x.rows();

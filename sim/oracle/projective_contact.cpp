@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "sim/step/contact_geometry.h"
+#include "sim/step/moving_obstacles.h"
 
 namespace flash::sim {
 namespace {
@@ -28,13 +28,12 @@ Vector3d moved_against(const Environment& environment, const Gap& gap, const dat
 std::vector<VertexContact> find_contacts(const Environment& environment, double time, double time_step,
                                          const data::Points& positions, const Eigen::VectorXd& reach,
                                          const std::vector<Vector3d>& free_axes, double tangent_angle) {
-  const std::vector<ObstacleMotion> motions = obstacle_motions(environment, time - time_step, time);
+  const std::vector<MovingObstacle<double>> obstacles = moving_obstacles(environment, time - time_step, time);
   std::vector<VertexContact> contacts;
   for (Index i = 0; i < positions.rows(); ++i) {
     if (free_axes[i].isZero()) continue;
-    for (std::size_t k = 0; k < environment.obstacles.size(); ++k) {
-      const Obstacle& obstacle = environment.obstacles[k];
-      const Gap gap = gap_to(obstacle, motions[k], positions.row(i));
+    for (std::size_t k = 0; k < obstacles.size(); ++k) {
+      const Gap gap = gap_of(gap_to(obstacles[k], vector3(positions, i)));
       if (!(gap.distance < reach[i]) || gap.normal.cwiseProduct(free_axes[i]).norm() < 1e-6) continue;
       VertexContact contact{static_cast<int>(i), static_cast<int>(k), {}, {}, 0};
       const Vector3d first = gap.normal.unitOrthogonal(), second = gap.normal.cross(first);
@@ -43,7 +42,7 @@ std::vector<VertexContact> find_contacts(const Environment& environment, double 
       contact.directions.row(2) = std::cos(tangent_angle) * second - std::sin(tangent_angle) * first;
       contact.gap = contact.directions * moved_against(environment, gap, positions, i);
       contact.gap[0] = gap.distance;
-      contact.friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
+      contact.friction = obstacles[k].friction;
       contacts.push_back(contact);
     }
   }
@@ -68,14 +67,13 @@ Eigen::VectorXd along_contacts(const std::vector<VertexContact>& contacts, const
 double contact_potential(const Environment& environment, double time, double time_step,
                          const std::vector<VertexContact>& contacts, const Eigen::VectorXd& multiplier,
                          const data::Points& positions) {
-  const std::vector<ObstacleMotion> motions = obstacle_motions(environment, time - time_step, time);
+  const std::vector<MovingObstacle<double>> obstacles = moving_obstacles(environment, time - time_step, time);
   double potential = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const double normal = multiplier[3 * k];
     if (normal == 0) continue;
     const VertexContact& contact = contacts[k];
-    const Gap gap = gap_to(environment.obstacles[contact.obstacle], motions[contact.obstacle],
-                           positions.row(contact.vertex));
+    const Gap gap = gap_of(gap_to(obstacles[contact.obstacle], vector3(positions, contact.vertex)));
     const Vector3d moved = moved_against(environment, gap, positions, contact.vertex);
     const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
     potential += normal * (contact.friction * slip - gap.distance);

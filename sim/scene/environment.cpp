@@ -33,8 +33,8 @@ std::vector<int> vertices_in_reach(const Hold& hold, const State& state, const I
   if (vertices.empty())
     throw data::input_error("end effector " + hold.name, "grasps",
                             "no vertex within " + data::format_short(hold.reach->threshold) +
-                                " m of its box at " + data::format_short(state.time) +
-                                " s; the nearest is " + data::format_short(nearest) + " m away");
+                                " m of its box at " + data::format_short(state.time) + " s; the nearest is " +
+                                data::format_short(nearest) + " m away");
   return vertices;
 }
 

@@ -19,11 +19,9 @@ struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, out of the solid
 };
 
-/// Box with half extents [m] at `pose` in its frame.
 struct Box {
-  Eigen::Vector3d half_extents = Eigen::Vector3d::Constant(0.01);
+  Eigen::Vector3d half_extents = Eigen::Vector3d::Constant(0.01);  ///< [m]
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  int frame = base_frame;  ///< of the schedule, which moves the box
 };
 
 /// Solid cylinder without ends: a peg or a rail.
@@ -33,10 +31,12 @@ struct Cylinder {
   double radius = 0.01;                             ///< [m]
 };
 
+/// A rigid shape that a sheet meets.
 struct Obstacle {
   std::variant<Plane, Box, Cylinder> shape = {};
   double friction = -1.0;  ///< Coulomb coefficient; below zero: the material's
   std::string name = {};   ///< under which the force is told
+  int frame = base_frame;  ///< of the schedule, in which the shape stands
 };
 
 /// A constant force on a vertex.
@@ -59,7 +59,8 @@ struct Environment {
   std::vector<Obstacle> obstacles;
   std::vector<Hold> holds;
   std::vector<Load> loads;
-  std::shared_ptr<const Schedule> schedule;  ///< of the frames that holds and boxes name; none: all at rest
+  std::shared_ptr<const Schedule>
+      schedule;  ///< of the frames that holds and obstacles name; none: all at rest
   State state;
 };
 

@@ -16,8 +16,7 @@ Vector3d towards_middle(const Points& positions, const std::vector<int>& patch, 
   return direction.norm() > 1e-9 ? Vector3d(direction.normalized()) : up.unitOrthogonal();
 }
 
-Points pinch_targets(const Points& flat, const Vector3d& ridge, const Vector3d& up,
-                           double pitch) {
+Points pinch_targets(const Points& flat, const Vector3d& ridge, const Vector3d& up, double pitch) {
   const Vector3d centre = flat.colwise().mean();
   const Vector3d across = up.cross(ridge).normalized();
   const Vector3d along = across.cross(up);

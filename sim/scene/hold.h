@@ -45,7 +45,7 @@ struct Hold {
 /// What a hold has taken; no vertices: it is open.
 struct HeldVertices {
   std::vector<int> vertices;
-  data::Points offsets;           ///< where they were in the frame when the hold took them [m], a row each
+  data::Points offsets;              ///< where they were in the frame when the hold took them [m], a row each
   double from = 0.0, arrival = 0.0;  ///< when they set out for the targets and arrive there [s]
 };
 

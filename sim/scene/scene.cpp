@@ -29,12 +29,12 @@ Obstacle obstacle_of(const data::Scene& scene, const std::string& object, const 
                      int frame) {
   Obstacle obstacle;
   obstacle.name = other.name;
+  obstacle.frame = frame;
   obstacle.friction = data::friction_between(scene, object, other.name).value_or(-1.0);
   if (const auto* plane = std::get_if<data::ScenePlane>(&other.shape))
     obstacle.shape = Plane{plane->point, plane->normal};
   else if (const auto* box = std::get_if<data::SceneBox>(&other.shape))
-    obstacle.shape =
-        Box{0.5 * box->size, frame == base_frame ? box->pose : Eigen::Isometry3d::Identity(), frame};
+    obstacle.shape = Box{0.5 * box->size, frame == base_frame ? box->pose : Eigen::Isometry3d::Identity()};
   else if (const auto* cylinder = std::get_if<data::SceneCylinder>(&other.shape))
     obstacle.shape = Cylinder{cylinder->point, cylinder->axis, cylinder->radius};
   return obstacle;

@@ -9,10 +9,11 @@
 namespace flash::sim {
 
 /// The one timeline of a simulation: poses T_base_frame of grippers, moving supports and moving obstacles, at
-/// even steps of time. A trajectory is sampled once; environments that see the same motion share the schedule.
+/// even steps of time. A trajectory is sampled once; environments that see the same motion share the
+/// schedule.
 struct Schedule {
-  double start = 0.0;       ///< time of the first pose of every frame [s]
-  double time_step = 0.01;  ///< between two poses [s]
+  double start = 0.0;                                  ///< time of the first pose of every frame [s]
+  double time_step = 0.01;                             ///< between two poses [s]
   std::vector<std::vector<Eigen::Isometry3d>> frames;  ///< poses of each frame; the last one stays for good
 };
 

@@ -18,13 +18,12 @@ namespace {
 constexpr double smoothing =
     1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
 
-double friction_of(const Environment& environment, const Touch& touch) {
-  const Obstacle& obstacle = environment.obstacles[touch.obstacle];
-  return obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
+double friction_of(const ContactStep& step, const Touch& touch) {
+  return step.obstacles[touch.obstacle].friction;
 }
 
-double friction_bound_of(const Environment& environment, const Touch& touch) {
-  return friction_of(environment, touch) * touch.normal_force;
+double friction_bound_of(const ContactStep& step, const Touch& touch) {
+  return friction_of(step, touch) * touch.normal_force;
 }
 
 /// Length of a slip as friction takes it, smooth where it starts [m].
@@ -50,13 +49,13 @@ double find_slips(const Vector3d& way, std::span<Touch> touches) {
 }
 
 /// Normal forces of the touches of a vertex that needs `needed` [N]. Each of several that it slips on rubs.
-void find_normal_forces(const Environment& environment, const Vector3d& needed, bool slipped,
+void find_normal_forces(const ContactStep& step, const Vector3d& needed, bool slipped,
                         std::span<Touch> touches) {
   const auto eligible = [](const Touch& touch) { return touch.touches(); };
   if (!slipped || std::count_if(touches.begin(), touches.end(), eligible) < 2)
     return share_force(touches, needed, eligible);
   std::vector<double> friction;
-  for (const Touch& touch : touches) friction.push_back(friction_of(environment, touch));
+  for (const Touch& touch : touches) friction.push_back(friction_of(step, touch));
   share_force_rubbing(touches, friction, needed, eligible);
 }
 
@@ -66,11 +65,11 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   VertexConstraint constraint;
   constraint.vertex = i;
   const bool slipped = find_slips(way_of(step, positions, i), touches) > resting_slip;
-  find_normal_forces(step.environment, needed, slipped, touches);
+  find_normal_forces(step, needed, slipped, touches);
   int held = 0;
   for (const Touch& touch : touches) {
     if (!touch.holds) continue;
-    constraint.friction_bound += friction_bound_of(step.environment, touch);
+    constraint.friction_bound += friction_bound_of(step, touch);
     constraint.slip_direction = touch.slip_direction;
     ++held;
   }
@@ -85,7 +84,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
     constraint.reaction = needed;
     for (Touch& touch : touches)
       if (touch.holds && bound > 0)
-        touch.friction = friction_bound_of(step.environment, touch) / bound * needed_tangential;
+        touch.friction = friction_bound_of(step, touch) / bound * needed_tangential;
     return constraint;
   }
   constraint.freedom = Freedom::slip;
@@ -98,7 +97,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   }
   for (Touch& touch : touches) {
     if (!touch.holds) continue;
-    const double own_bound = friction_bound_of(step.environment, touch);
+    const double own_bound = friction_bound_of(step, touch);
     const Vector3d& direction = slipped ? touch.slip_direction : constraint.slip_direction;
     touch.friction = -own_bound * direction;
     constraint.reaction += touch.normal_force * touch.normal + touch.friction;
@@ -118,62 +117,30 @@ bool stand_beside(const std::vector<Obstacle>& obstacles) {
 
 }  // namespace
 
-ContactStep::ContactStep(const Environment& environment_in, double time_step_in, const Exit& exit_in)
+ContactStep::ContactStep(const Environment& environment_in, double time_step_in,
+                         const WayOut<double>& way_out_in)
     : environment(environment_in),
       time(environment_in.state.time + time_step_in),
       time_step(time_step_in),
-      exit(exit_in),
-      motions(obstacle_motions(environment_in, environment_in.state.time, time)),
+      way_out(way_out_in),
+      obstacles(moving_obstacles(environment_in, environment_in.state.time, time)),
       several(stand_beside(environment_in.obstacles)) {}
 
-Gap ContactStep::gap(int obstacle, const Points& positions, int i) const {
-  const Vector3d start = environment.state.positions.row(i), point = positions.row(i);
-  const Obstacle& own = environment.obstacles[obstacle];
-  if (!several || !is_box(own))
-    return gap_after(own, motions[obstacle], {}, start, point, point, time_step, exit);
-  if (far_gap(obstacle, start, point) > 0) return gap_to(own, motions[obstacle], point);
-  // A vertex that starts inside goes straight out.
-  if (gap_at_start(own, motions[obstacle], start).distance < -inside_depth)
-    return gap_after(own, motions[obstacle], {}, start, point, point, time_step, exit);
-  return gap_after(own, motions[obstacle], {&environment.obstacles, &motions, obstacle}, start, point,
-                   slid(obstacle, start, point), time_step, exit);
+ObstacleStep<double> ContactStep::view() const {
+  return {obstacles.data(), static_cast<int>(obstacles.size()), several, time_step, way_out};
 }
 
-double ContactStep::far_gap(int obstacle, const Vector3d& start, const Vector3d& point) const {
-  const Box* box = std::get_if<Box>(&environment.obstacles[obstacle].shape);
-  constexpr double may_meet = -std::numeric_limits<double>::infinity();
-  if (box == nullptr) return may_meet;
-  const ObstacleMotion& motion = motions[obstacle];
-  const Vector3d carried =
-      motion.moves ? Vector3d(motion.end * (motion.start.inverse(Eigen::Isometry) * start)) : start;
-  const double radius = box->half_extents.norm();
-  if ((carried - motion.end.translation()).norm() <= radius + (point - carried).norm()) return may_meet;
-  return (point - motion.end.translation()).norm() - radius;
+SurfaceGap<double> ContactStep::gap(int obstacle, const Points& positions, int i) const {
+  return gap_in_step(view(), obstacle, vector3(environment.state.positions, i), vector3(positions, i));
 }
 
-Vector3d ContactStep::slid(int obstacle, const Vector3d& start, const Vector3d& point) const {
-  const auto surface_of = [&](int k, const Vector3d& end) {
-    return met_surface(environment.obstacles[k], motions[k], {&environment.obstacles, &motions, k}, start,
-                       end);
-  };
-  Vector3d end = point;
-  std::vector<int> others;
-  for (int k = 0; k < static_cast<int>(motions.size()); ++k)
-    if (k != obstacle && far_gap(k, start, point) < 0) others.push_back(k);
-  while (true) {
-    const std::optional<MetSurface> own = surface_of(obstacle, end);
-    std::optional<MetSurface> first;
-    auto its_place = others.end();
-    for (auto k = others.begin(); k != others.end(); ++k) {
-      const std::optional<MetSurface> met = surface_of(*k, end);
-      if (!met || (first && first->entry <= met->entry) || (own && own->entry < met->entry)) continue;
-      first = met;
-      its_place = k;
-    }
-    if (!first) return end;
-    end += std::max(0.0, first->offset - first->normal.dot(end)) * first->normal;
-    others.erase(its_place);
-  }
+bool ContactStep::is_far(int obstacle, const Points& positions, int i) const {
+  return several &&
+         far_gap(obstacles[obstacle], vector3(environment.state.positions, i), vector3(positions, i)) > 0;
+}
+
+double ContactStep::distance_at_start(int obstacle, int i) const {
+  return sim::distance_at_start(obstacles[obstacle], vector3(environment.state.positions, i));
 }
 
 ContactSet begin_step(const ContactStep& step, Points& positions) {
@@ -218,27 +185,25 @@ void add_hold_forces(const VertexConstraint& constraint, const Vector3d& reactio
 
 void find_clearance(const ContactStep& step, const Points& positions, std::vector<double>& clearance) {
   clearance.assign(positions.rows(), std::numeric_limits<double>::infinity());
-  for (size_t k = 0; k < step.motions.size(); ++k) {
-    if (step.several) {
-      for (int i = 0; i < positions.rows(); ++i)
-        if (clearance[i] > step.far_gap(int(k), step.environment.state.positions.row(i), positions.row(i)))
-          clearance[i] = std::min(clearance[i], step.gap(int(k), positions, i).distance);
-      continue;
+  const ObstacleStep<double> obstacles = step.view();
+  for (int k = 0; k < obstacles.count; ++k)
+    for (int i = 0; i < positions.rows(); ++i) {
+      const Vector3<double> start = vector3(step.environment.state.positions, i),
+                            point = vector3(positions, i);
+      if (obstacles.several && clearance[i] <= far_gap(obstacles.obstacles[k], start, point)) continue;
+      clearance[i] = std::min(clearance[i], distance_in_step(obstacles, k, start, point));
     }
-    lower_to_gaps(step.environment.obstacles[k], step.motions[k], step.environment.state.positions, positions,
-                  step.time_step, step.exit, clearance);
-  }
 }
 
 void add_touches(const ContactStep& step, const Points& positions, int i, std::vector<Touch>& touches) {
-  for (int k = 0; k < static_cast<int>(step.environment.obstacles.size()); ++k) {
-    const Gap gap = step.gap(k, positions, i);
+  for (int k = 0; k < static_cast<int>(step.obstacles.size()); ++k) {
+    const SurfaceGap<double> gap = step.gap(k, positions, i);
     touches.push_back({.obstacle = k,
                        .gap = gap.distance,
                        .starts_inside = gap.starts_inside,
-                       .normal = gap.normal,
-                       .curvature_direction = gap.curvature_direction,
-                       .surface_moved = gap.surface_moved});
+                       .normal = vector3d(gap.normal),
+                       .curvature_direction = vector3d(gap.curvature_direction),
+                       .surface_moved = vector3d(gap.surface_moved)});
   }
 }
 
@@ -277,7 +242,7 @@ std::vector<Matrix3d> friction_couplings(const ContactStep& step, const ContactS
       for (const Touch& touch : contacts.touches_of(k)) {
         if (!touch.holds) continue;
         normals.col(count) = touch.normal;
-        rubs.col(count++) = friction_of(step.environment, touch) * touch.slip_direction;
+        rubs.col(count++) = friction_of(step, touch) * touch.slip_direction;
       }
     }
     gram.topLeftCorner(count, count) =
@@ -294,11 +259,11 @@ double friction_potential(const ContactStep& step, const ContactSet& contacts, c
     if (constraint.friction_bound == 0) continue;
     for (const Touch& touch : contacts.touches_of(k)) {
       if (!touch.holds) continue;
-      const Gap gap = step.gap(touch.obstacle, positions, constraint.vertex);
-      const Vector3d moved = way_of(step, positions, constraint.vertex) - gap.surface_moved;
-      const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
-      potential += friction_bound_of(step.environment, touch) *
-                   (constraint.slip_stiffness.isZero(0) ? slip : smooth_length(slip));
+      const SurfaceGap<double> gap = step.gap(touch.obstacle, positions, constraint.vertex);
+      const Vector3<double> moved = vector3(way_of(step, positions, constraint.vertex)) - gap.surface_moved;
+      const double slip = norm(moved - dot(gap.normal, moved) * gap.normal);
+      potential +=
+          friction_bound_of(step, touch) * (constraint.slip_stiffness.isZero(0) ? slip : smooth_length(slip));
     }
   }
   return potential;
@@ -313,11 +278,11 @@ Vector3d slip_of(const ContactStep& step, const Points& positions, int vertex,
   size_t count = 0;
   for (const Touch& touch : touches) {
     if (!touch.holds) continue;
-    const Gap gap = step.gap(touch.obstacle, positions, vertex);
-    const double weight = friction_bound_of(step.environment, touch) + least_weight;
-    surfaces_moved += weight * gap.surface_moved;
+    const SurfaceGap<double> gap = step.gap(touch.obstacle, positions, vertex);
+    const double weight = friction_bound_of(step, touch) + least_weight;
+    surfaces_moved += weight * vector3d(gap.surface_moved);
     weights += weight;
-    normals[count++] = gap.normal;
+    normals[count++] = vector3d(gap.normal);
   }
   const Vector3d against = way_of(step, positions, vertex) - surfaces_moved / weights;
   if (count == 1) return against - normals[0] * normals[0].dot(against);

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sim/scene/environment.h"
-#include "sim/step/contact_way.h"
+#include "sim/step/moving_obstacles.h"
 #include "sim/step/touch.h"
 
 namespace flash::sim {
@@ -15,24 +15,24 @@ inline constexpr double resting_slip = 1e-13;
 
 /// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
 struct ContactStep {
-  ContactStep(const Environment& environment, double time_step, const Exit& exit);
+  ContactStep(const Environment& environment, double time_step, const WayOut<double>& way_out);
 
   const Environment& environment;
   double time, time_step;  ///< [s]
-  Exit exit;               ///< how vertices that start inside an obstacle leave it
-  std::vector<ObstacleMotion> motions;
+  WayOut<double> way_out;  ///< how vertices that start inside an obstacle leave it
+  std::vector<MovingObstacle<double>> obstacles;
   bool several;  ///< whether a box stands beside another obstacle, so that one may continue the other
 
+  ObstacleStep<double> view() const;
+
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
-  Gap gap(int obstacle, const data::Points& positions, int i) const;
+  SurfaceGap<double> gap(int obstacle, const data::Points& positions, int i) const;
 
-  /// A lower bound of the gap to a box that the way of a vertex from `start` to `point`, or one that slides
-  /// as far, cannot meet: by the sphere around it [m]; minus infinity where it may meet the obstacle.
-  double far_gap(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
+  /// Whether vertex i, were it at row i of `positions`, is too far from a box to meet it.
+  bool is_far(int obstacle, const data::Points& positions, int i) const;
 
-  /// Where the way of a vertex from `start` to `point` would end along the surfaces of other obstacles that
-  /// it meets before this one.
-  Eigen::Vector3d slid(int obstacle, const Eigen::Vector3d& start, const Eigen::Vector3d& point) const;
+  /// Signed distance of vertex i to an obstacle at the start of the step [m].
+  double distance_at_start(int obstacle, int i) const;
 };
 
 /// What a vertex may do at the current iterate of a step.

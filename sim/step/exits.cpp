@@ -2,50 +2,47 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 namespace flash::sim {
 
 using data::Points;
-using Eigen::Vector3d;
 
 namespace {
 
 constexpr double slow_share = 0.125;  ///< of the exit speed, where the sheet cannot leave at all of it
 
 /// Appends the directions that lead out of the faces of a box, across the axis of a cylinder, out of a plane.
-void add_directions(const Obstacle& obstacle, const ObstacleMotion& motion,
-                    std::vector<Vector3d>& directions) {
-  if (const auto* plane = std::get_if<Plane>(&obstacle.shape)) {
-    directions.push_back(plane->normal);
-  } else if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
+void add_directions(const MovingObstacle<double>& obstacle, std::vector<Vector3<double>>& directions) {
+  const Frame<double>& frame = obstacle.start;
+  if (obstacle.shape == ObstacleShape::plane) {
+    directions.push_back(frame.z);
+  } else if (obstacle.shape == ObstacleShape::cylinder) {
     constexpr int count = 16;
-    const Vector3d x = cylinder->axis.unitOrthogonal(), y = cylinder->axis.cross(x);
     for (int k = 0; k < count; ++k) {
       const double angle = 2 * std::numbers::pi * k / count;
-      directions.push_back(std::cos(angle) * x + std::sin(angle) * y);
+      directions.push_back(std::cos(angle) * frame.x + std::sin(angle) * frame.y);
     }
   } else {
     for (int axis = 0; axis < 3; ++axis)
-      for (const double sign : {1.0, -1.0}) directions.push_back(sign * motion.start.linear().col(axis));
+      for (const double sign : {1.0, -1.0}) directions.push_back(sign * frame.axis(axis));
   }
 }
 
 /// The unit direction in which a sheet leaves all obstacles that it starts in by the shortest way; zero where
 /// there is none. All vertices take the same way, so the sheet is not torn.
-Vector3d shortest_way_out(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
-  std::vector<Vector3d> directions;
-  for (std::size_t k = 0; k < step.motions.size(); ++k)
-    if (!inside[k].empty()) add_directions(step.environment.obstacles[k], step.motions[k], directions);
-  Vector3d best = Vector3d::Zero();
-  double shortest = std::numeric_limits<double>::infinity();
-  for (const Vector3d& direction : directions) {
+Vector3<double> shortest_way_out(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
+  std::vector<Vector3<double>> directions;
+  for (std::size_t k = 0; k < step.obstacles.size(); ++k)
+    if (!inside[k].empty()) add_directions(step.obstacles[k], directions);
+  Vector3<double> best{};
+  double shortest = no_such_side;
+  for (const Vector3<double>& direction : directions) {
     double longest = 0;
-    for (std::size_t k = 0; k < step.motions.size(); ++k)
+    for (std::size_t k = 0; k < step.obstacles.size(); ++k)
       for (const int i : inside[k])
-        longest = std::max(longest, depth_along(step.environment.obstacles[k], step.motions[k],
-                                                step.environment.state.positions.row(i), direction));
+        longest = std::max(
+            longest, depth_along(step.obstacles[k], vector3(step.environment.state.positions, i), direction));
     if (longest < shortest) {
       shortest = longest;
       best = direction;
@@ -56,14 +53,14 @@ Vector3d shortest_way_out(const ContactStep& step, const std::vector<std::vector
 
 }  // namespace
 
-std::vector<Exit> exits_of(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
-  const Vector3d way = shortest_way_out(step, inside);
-  std::vector<Exit> exits;
+std::vector<WayOut<double>> exits_of(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
+  const Vector3<double> direction = shortest_way_out(step, inside);
+  std::vector<WayOut<double>> exits;
   for (const double share : {1.0, slow_share}) {
-    exits.push_back({share * step.exit.speed});
-    if (!way.isZero(0)) exits.push_back({share * step.exit.speed, way});
+    exits.push_back({.speed = share * step.way_out.speed});
+    if (!is_zero(direction)) exits.push_back({share * step.way_out.speed, direction});
   }
-  exits.push_back({0});
+  exits.push_back({.speed = 0});
   return exits;
 }
 
@@ -72,7 +69,7 @@ bool exits_gently(const ContactStep& step, const SheetPlan& plan, const std::vec
   const data::SheetMaterial& material = step.environment.material;
   const Points& start = step.environment.state.positions;
   const Points& rest = plan.sheet.rest.vertices;
-  const double limit = step.exit.speed * std::sqrt(material.areal_density / material.membrane_stiffness);
+  const double limit = step.way_out.speed * std::sqrt(material.areal_density / material.membrane_stiffness);
   std::vector<bool> exiting(static_cast<size_t>(start.rows()), false);
   for (const std::vector<int>& vertices : inside)
     for (const int i : vertices) exiting[i] = true;

@@ -9,7 +9,7 @@ namespace flash::sim {
 /// Exits to try for a sheet that starts inside obstacles, the fastest first. Each vertex leaves on its own
 /// side; then all leave in the direction in which the whole sheet has the shortest way. At last it stays
 /// where it is. `inside` is as vertices_inside finds it.
-std::vector<Exit> exits_of(const ContactStep& step, const std::vector<std::vector<int>>& inside);
+std::vector<WayOut<double>> exits_of(const ContactStep& step, const std::vector<std::vector<int>>& inside);
 
 /// Whether leaving the obstacles has not torn the sheet, which ends the step at `end`. Edges at vertices that
 /// started inside must not be strained by more than v sqrt(rho / (E t)), or than they were at the start. A

@@ -17,17 +17,15 @@ constexpr int projection_rounds = 40, slip_rounds = 10;
 
 /// Whether the vertex is to land on the surface that held it at the iterate. The step has to be long enough
 /// to bring it down, and must not have taken it beyond the end of that surface.
-bool lands(const Touch& touch, const Gap& gap) {
+bool lands(const Touch& touch, const SurfaceGap<double>& gap) {
   return touch.holds && gap.distance > 0 && (touch.touches() || gap.distance <= closed_share * touch.gap) &&
-         gap.normal.dot(touch.normal) > same_surface;
+         dot(gap.normal, vector3(touch.normal)) > same_surface;
 }
 
 bool stays(const ContactStep& step, std::span<const Touch> touches, const Points& positions, int i) {
-  for (size_t k = 0; k < step.motions.size(); ++k) {
-    if (step.several && (touches.empty() || !touches[k].holds) &&
-        step.far_gap(int(k), step.environment.state.positions.row(i), positions.row(i)) > 0)
-      continue;
-    const Gap gap = step.gap(static_cast<int>(k), positions, i);
+  for (size_t k = 0; k < step.obstacles.size(); ++k) {
+    if ((touches.empty() || !touches[k].holds) && step.is_far(static_cast<int>(k), positions, i)) continue;
+    const SurfaceGap<double> gap = step.gap(static_cast<int>(k), positions, i);
     if (!(gap.distance >= 0) || (!touches.empty() && lands(touches[k], gap))) return false;
   }
   return true;
@@ -37,31 +35,27 @@ bool stays(const ContactStep& step, std::span<const Touch> touches, const Points
 /// planes at once; round surfaces and faces that change take a few rounds.
 void project_vertex(const ContactStep& step, std::span<const Touch> touches, Points& positions, int i) {
   if (stays(step, touches, positions, i)) return;
-  const size_t count = step.motions.size();
-  std::vector<Vector3d> normals(count);
-  std::vector<double> depths(count);
+  const size_t count = step.obstacles.size();
+  std::vector<Vector3<double>> normals(count);
+  std::vector<double> depths(count), shares(count);
   for (int round = 0; round < projection_rounds; ++round) {
     double moved = 0;
     for (size_t k = 0; k < count; ++k) {
-      const Gap gap = step.gap(static_cast<int>(k), positions, i);
+      const SurfaceGap<double> gap = step.gap(static_cast<int>(k), positions, i);
       normals[k] = gap.normal;
       depths[k] = -gap.distance;
       if (touches.empty() || !lands(touches[k], gap)) continue;
-      positions.row(i) -= gap.distance * gap.normal.transpose();
+      positions.row(i) -= gap.distance * vector3d(gap.normal).transpose();
       moved = std::max(moved, gap.distance);
       depths[k] = 0;
     }
     if (moved == 0 && std::all_of(depths.begin(), depths.end(), [](double depth) { return depth <= 0; }))
       return;
-    Vector3d way = Vector3d::Zero();
-    if (count == 1) {
-      way = std::max(0.0, depths[0]) * normals[0];
-    } else {
-      const std::vector<double> x = solve_lcp(normals, normals, depths);
-      for (size_t k = 0; k < count; ++k) way += x[k] * normals[k];
-    }
-    positions.row(i) += way.transpose();
-    if (std::max(moved, way.norm()) <= resting_slip) return;
+    solve_lcp(static_cast<int>(count), normals.data(), normals.data(), depths.data(), shares.data());
+    Vector3<double> way{};
+    for (size_t k = 0; k < count; ++k) way = way + shares[k] * normals[k];
+    positions.row(i) += vector3d(way).transpose();
+    if (std::max(moved, norm(way)) <= resting_slip) return;
   }
 }
 

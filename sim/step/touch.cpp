@@ -5,6 +5,7 @@
 #include <array>
 
 #include "sim/law/contact_law.h"
+#include "sim/step/moving_obstacles.h"
 
 namespace flash::sim {
 
@@ -13,15 +14,35 @@ using Eigen::Vector3d;
 
 namespace {
 
-void set_forces(std::span<Touch> touches, const std::vector<size_t>& those,
-                const std::vector<double>& forces) {
+/// The eligible touches of a vertex as columns of a complementarity problem.
+struct Surfaces {
+  std::vector<size_t> those;
+  std::vector<Vector3<double>> normals, directions;
+  std::vector<double> along;  ///< of the needed force [N]
+
+  Surfaces(std::span<const Touch> touches, const Vector3d& needed, bool (*eligible)(const Touch&)) {
+    for (size_t k = 0; k < touches.size(); ++k) {
+      if (!eligible(touches[k])) continue;
+      those.push_back(k);
+      normals.push_back(vector3(touches[k].normal));
+      along.push_back(touches[k].normal.dot(needed));
+    }
+    directions = normals;
+  }
+};
+
+void set_forces(const Surfaces& surfaces, std::span<Touch> touches) {
+  std::vector<double> forces(surfaces.those.size());
+  solve_lcp(static_cast<int>(forces.size()), surfaces.normals.data(), surfaces.directions.data(),
+            surfaces.along.data(), forces.data());
   for (Touch& touch : touches) {
     touch.holds = false;
     touch.normal_force = 0;
   }
-  for (size_t k = 0; k < those.size(); ++k) {
-    touches[those[k]].normal_force = forces[k];
-    touches[those[k]].holds = forces[k] > 0;
+  for (size_t k = 0; k < forces.size(); ++k) {
+    Touch& touch = touches[surfaces.those[k]];
+    touch.normal_force = forces[k];
+    touch.holds = forces[k] > 0;
   }
 }
 
@@ -35,34 +56,17 @@ void share_force(std::span<Touch> touches, const Vector3d& needed, bool (*eligib
     touch.holds = touch.normal_force > 0;
     return;
   }
-  std::vector<size_t> those;
-  std::vector<Vector3d> normals;
-  std::vector<double> along;
-  for (size_t k = 0; k < touches.size(); ++k) {
-    if (!eligible(touches[k])) continue;
-    those.push_back(k);
-    normals.push_back(touches[k].normal);
-    along.push_back(touches[k].normal.dot(needed));
-  }
-  if (those.size() == 1)
-    set_forces(touches, those, {std::max(0.0, along[0])});
-  else
-    set_forces(touches, those, solve_lcp(normals, normals, along));
+  set_forces(Surfaces(touches, needed, eligible), touches);
 }
 
 void share_force_rubbing(std::span<Touch> touches, const std::vector<double>& friction,
                          const Vector3d& needed, bool (*eligible)(const Touch&)) {
-  std::vector<size_t> those;
-  std::vector<Vector3d> normals, directions;
-  std::vector<double> along;
-  for (size_t k = 0; k < touches.size(); ++k) {
-    if (!eligible(touches[k])) continue;
-    those.push_back(k);
-    normals.push_back(touches[k].normal);
-    directions.push_back(touches[k].normal - friction[k] * touches[k].slip_direction);
-    along.push_back(touches[k].normal.dot(needed));
+  Surfaces surfaces(touches, needed, eligible);
+  for (size_t k = 0; k < surfaces.those.size(); ++k) {
+    const size_t touch = surfaces.those[k];
+    surfaces.directions[k] = surfaces.normals[k] - friction[touch] * vector3(touches[touch].slip_direction);
   }
-  set_forces(touches, those, solve_lcp(normals, directions, along));
+  set_forces(surfaces, touches);
 }
 
 Matrix3d along_surfaces(std::span<const Touch> touches) {

@@ -3,7 +3,7 @@
 #include <array>
 #include <cmath>
 
-#include "sim/step/contact_geometry.h"
+#include "sim/step/moving_obstacles.h"
 #include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
@@ -19,7 +19,7 @@ double weight_of(const Sheet& sheet, const Environment& environment) {
 Gap gap_at_rest(const Obstacle& obstacle, const Vector3d& point) {
   Environment environment;
   environment.obstacles.push_back(obstacle);
-  return gap_to(obstacle, obstacle_motions(environment, 0, 0)[0], point);
+  return gap_of(gap_to(moving_obstacles(environment, 0, 0)[0], vector3(point)));
 }
 
 TEST(Contact, GapsAreDistancesWithUnitNormalsOutward) {
@@ -160,8 +160,8 @@ TEST(Contact, AMovingBoxCarriesTheSheet) {
     path.times.push_back(k * 0.01);
     path.poses.push_back(pose);
   }
-  tray.frame = add_frame(environment, path);
-  environment.obstacles.push_back({tray});
+  const int carrier = add_frame(environment, path);
+  environment.obstacles.push_back({.shape = tray, .frame = carrier});
   Solver solver(sheet, {.tolerance = 1e-8});
   for (int n = 0; n < 50; ++n) solver.step(environment);
   const double carried = environment.state.positions(0, 0) - sheet.rest.vertices(0, 0);
@@ -174,8 +174,8 @@ Environment pushed_by_a_box(const Sheet& sheet, double height) {
   environment.obstacles.push_back({Plane{}});
   Box box{.half_extents = {0.02, 0.1, 0.5 * height}};
   const Vector3d start(-0.05, 0.03, 0.5 * height);
-  box.frame = add_frame(environment, straight_path(start, start + 0.2 * Vector3d::UnitX(), 1));
-  environment.obstacles.push_back({box});
+  const int pusher = add_frame(environment, straight_path(start, start + 0.2 * Vector3d::UnitX(), 1));
+  environment.obstacles.push_back({.shape = box, .frame = pusher});
   return environment;
 }
 
@@ -289,9 +289,9 @@ TEST(Contact, AFastPlateTakesTheSheetAlong) {
   Environment environment = environment_of(sheet);
   environment.gravity.setZero();
   Box plate{.half_extents = {0.1, 0.1, 0.0005}};
-  plate.frame =
+  const int carrier =
       add_frame(environment, straight_path(Vector3d(0.03, 0.03, -0.02), Vector3d(0.03, 0.03, 9.98), 1));
-  environment.obstacles = {{plate}};
+  environment.obstacles = {{.shape = plate, .frame = carrier}};
   Solver solver(sheet, {});
   for (int n = 1; n <= 5; ++n) {
     EXPECT_TRUE(solver.step(environment).converged);

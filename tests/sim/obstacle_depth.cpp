@@ -12,7 +12,7 @@ double depth_in(const Environment& environment, const Obstacle& obstacle, const 
   if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape))
     return cylinder->radius - (point - cylinder->point).cross(cylinder->axis).norm();
   const Box& box = std::get<Box>(obstacle.shape);
-  const Isometry3d pose = frame_pose(environment, box.frame, time) * box.pose;
+  const Isometry3d pose = frame_pose(environment, obstacle.frame, time) * box.pose;
   return (box.half_extents - (pose.inverse() * point).cwiseAbs()).minCoeff();
 }
 

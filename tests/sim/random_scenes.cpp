@@ -190,9 +190,9 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
       const double speed = lot.log_uniform(0.05, 2);
       const Vector3d start(-0.021, 0.2 * side, 0.0205);
       const double until = seconds + 1;
-      pusher.frame =
+      const int carrier =
           add_frame(environment, straight_path(start, start + speed * until * Vector3d::UnitX(), until), h);
-      environment.obstacles = {table, {pusher}};
+      environment.obstacles = {table, {.shape = pusher, .frame = carrier}};
       if (lot.chance(0.3)) {
         const Vector3d away = Vector3d(side + 0.02, 0, 0);
         environment.obstacles.push_back({Plane{away, -Vector3d::UnitX()}});
@@ -229,7 +229,7 @@ bool goes_through(const Environment& environment, const Obstacle& obstacle, cons
   const auto* box = std::get_if<Box>(&obstacle.shape);
   if (box == nullptr) return false;
   const auto seen_from_box = [&](const Vector3d& x, double time) {
-    return Vector3d((frame_pose(environment, box->frame, time) * box->pose).inverse() * x);
+    return Vector3d((frame_pose(environment, obstacle.frame, time) * box->pose).inverse() * x);
   };
   const Vector3d start = seen_from_box(from, from_time), end = seen_from_box(to, to_time);
   for (int axis = 0; axis < 3; ++axis) {
@@ -380,8 +380,7 @@ SceneFindings observe(RandomScene scene) {
     for (std::size_t k = 0; report.substeps == 1 && k < environment.holds.size(); ++k)
       work += report.hold_forces[k].dot(moved(environment.holds[k].frame));
     for (std::size_t k = 0; report.substeps == 1 && k < environment.obstacles.size(); ++k)
-      if (const auto* box = std::get_if<Box>(&environment.obstacles[k].shape))
-        work += report.obstacle_forces[k].dot(moved(box->frame));
+      work += report.obstacle_forces[k].dot(moved(environment.obstacles[k].frame));
     const double now = moved_energy(environment, report), gain = now - energy - work;
     // What falls puts in its weight's work, over the step.
     put_in += std::max(work, 0.0);

@@ -34,9 +34,10 @@ Obstacle draw_obstacle(Environment& environment) {
   if (kind == 1) return {Cylinder{place, draw_direction(), draw(0.01, 0.05)}, friction};
   Box box{.half_extents = {draw(0.01, 0.1), draw(0.01, 0.1), draw(0.005, 0.05)}};
   if (draw_chance(0.5))
-    box.frame = add_frame(environment, even_path(place, draw(0, 0.5) * draw_direction()));
-  else
-    box.pose = Translation3d(place) * Eigen::AngleAxisd(draw(0, 3), draw_direction());
+    return {.shape = box,
+            .friction = friction,
+            .frame = add_frame(environment, even_path(place, draw(0, 0.5) * draw_direction()))};
+  box.pose = Translation3d(place) * Eigen::AngleAxisd(draw(0, 3), draw_direction());
   return {box, friction};
 }
 

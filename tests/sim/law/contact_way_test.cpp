@@ -1,9 +1,11 @@
-#include "sim/step/contact_way.h"
+#include "sim/law/contact_way.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "sim/step/moving_obstacles.h"
 
 namespace flash::sim {
 namespace {
@@ -16,11 +18,31 @@ Isometry3d random_pose() {
                     Eigen::AngleAxisd(3 * Vector3d::Random().x(), Vector3d::Random().normalized()));
 }
 
+Frame<double> frame_of(const Isometry3d& pose) {
+  return {vector3(pose.linear().col(0)), vector3(pose.linear().col(1)), vector3(pose.linear().col(2)),
+          vector3(pose.translation())};
+}
+
+/// The gap of a way without other obstacles, in a step of 10 ms from which things come out at 1 m/s.
+Gap gap_of_way(const MovingObstacle<double>& obstacle, const Vector3d& from, const Vector3d& to) {
+  return gap_of(gap_after(obstacle, {}, vector3(from), vector3(to), vector3(to), 0.01, {.speed = 1}));
+}
+
+MovingObstacle<double> at_rest(const Obstacle& obstacle) {
+  Environment environment;
+  environment.obstacles = {obstacle};
+  return moving_obstacles(environment, 0, 0)[0];
+}
+
 TEST(ContactWay, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
   int through = 0;
   for (int sample = 0; sample < 20000; ++sample) {
     const Box box{.half_extents = 0.02 * Vector3d::Ones() + 0.3 * Vector3d::Random().cwiseAbs()};
-    ObstacleMotion motion{random_pose(), random_pose(), true};
+    const Isometry3d start = random_pose(), end = random_pose();
+    MovingObstacle<double> moving = at_rest({box});
+    moving.start = frame_of(start);
+    moving.end = frame_of(end);
+    moving.moves = true;
     const Vector3d from = 0.8 * Vector3d::Random(), to = 0.8 * Vector3d::Random();
     if ((from.cwiseAbs() - box.half_extents).maxCoeff() < 0) continue;
     // Brute force: the faces through which the straight way, seen from the box, goes in and out.
@@ -44,8 +66,7 @@ TEST(ContactWay, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
       if (before.maxCoeff() <= 0 && now.maxCoeff() > 0) now.maxCoeff(&out);
     }
     if (by_an_edge) continue;
-    const Gap gap =
-        gap_after({box}, motion, {}, motion.start * from, motion.end * to, motion.end * to, 0.01, Exit{1});
+    const Gap gap = gap_of_way(moving, start * from, end * to);
     const bool ends_inside = (to.cwiseAbs() - box.half_extents).maxCoeff() <= 0;
     if (in < 0 || (!ends_inside && out != in)) {
       // Never in, or out by a face beside: the distance of the point alone.
@@ -57,7 +78,7 @@ TEST(ContactWay, WaysThroughABoxEndAgainstTheFaceTheyEnteredBy) {
     ++through;
     EXPECT_NEAR(gap.distance, in_sign * to[in] - box.half_extents[in], 1e-9) << sample;
     EXPECT_LT(gap.distance, 0) << sample;
-    EXPECT_NEAR((gap.normal - in_sign * motion.end.linear().col(in)).norm(), 0, 1e-9) << sample;
+    EXPECT_NEAR((gap.normal - in_sign * end.linear().col(in)).norm(), 0, 1e-9) << sample;
   }
   EXPECT_GT(through, 500);
 }
@@ -72,7 +93,7 @@ TEST(ContactWay, NoWayPassesThroughACylinder) {
     double nearest = 1;
     for (int k = 0; k <= 1000; ++k)
       nearest = std::min(nearest, across(from + k / 1000.0 * (to - from)).norm());
-    const Gap gap = gap_after({cylinder}, {}, {}, from, to, to, 0.01, Exit{1});
+    const Gap gap = gap_of_way(at_rest({cylinder}), from, to);
     if (nearest > 0.301) {
       EXPECT_GT(gap.distance, 0) << sample;
     }
@@ -90,16 +111,36 @@ TEST(ContactWay, WhatStartsInsideMayStayThereForItsWayOut) {
   Box box{.half_extents = {0.1, 0.1, 0.05}};
   const Obstacle obstacles[] = {
       {Plane{Vector3d(0, 0, 0.05)}}, {box}, {Cylinder{Vector3d::Zero(), Vector3d::UnitY(), 0.05}}};
-  const double time_step = 0.01, speed = 1;
   for (const Obstacle& obstacle : obstacles) {
     const Vector3d start(0, 0, 0.02);  // 30 mm deep, 10 mm a step
-    const Gap gap = gap_after(obstacle, {}, {}, start, start, start, time_step, Exit{speed});
+    const Gap gap = gap_of_way(at_rest(obstacle), start, start);
     EXPECT_NEAR(gap.sunk, 0.02, 1e-12);
     EXPECT_NEAR(gap.distance, -0.01, 1e-12);
     EXPECT_NEAR((gap.normal - Vector3d::UnitZ()).norm(), 0, 1e-12);
-    EXPECT_NEAR(gap_after(obstacle, {}, {}, Vector3d(0, 0, 0.045), start, start, time_step, Exit{speed}).sunk,
-                0, 1e-12);
+    EXPECT_NEAR(gap_of_way(at_rest(obstacle), Vector3d(0, 0, 0.045), start).sunk, 0, 1e-12);
   }
+}
+
+TEST(ContactWay, AMovingObstacleIsMetAsOneAtRestIsInItsFrame) {
+  const Obstacle obstacles[] = {{Plane{Vector3d(0.1, 0, 0), Vector3d(1, 2, 2).normalized()}},
+                                {Box{.half_extents = {0.3, 0.2, 0.1}}},
+                                {Cylinder{Vector3d(0, 0.1, 0), Vector3d(2, 1, 2).normalized(), 0.3}}};
+  for (const Obstacle& obstacle : obstacles)
+    for (int sample = 0; sample < 2000; ++sample) {
+      const Isometry3d start = random_pose(), end = random_pose();
+      const MovingObstacle<double> still = at_rest(obstacle);
+      Environment environment;
+      environment.obstacles = {obstacle};
+      environment.obstacles[0].frame = 0;
+      environment.schedule = std::make_shared<const Schedule>(Schedule{0, 1, {{start, end}}});
+      const MovingObstacle<double> moving = moving_obstacles(environment, 0, 1)[0];
+      const Vector3d from = 0.5 * Vector3d::Random(), to = 0.5 * Vector3d::Random();
+      const Gap expected = gap_of_way(still, from, to), gap = gap_of_way(moving, start * from, end * to);
+      EXPECT_NEAR(gap.distance, expected.distance, 1e-12);
+      EXPECT_NEAR((gap.normal - end.linear() * expected.normal).norm(), 0, 1e-12);
+      EXPECT_NEAR((gap.surface_moved - (end * to - start * to)).norm(), 0, 1e-12);
+      EXPECT_NEAR(gap.sunk, expected.sunk, 1e-12);
+    }
 }
 
 }  // namespace

@@ -1,0 +1,70 @@
+#include "sim/step/moving_obstacles.h"
+
+#include <Eigen/Geometry>
+
+namespace flash::sim {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+namespace {
+
+/// A frame at `origin` whose third axis is `axis`.
+Isometry3d frame_along(const Vector3d& origin, const Vector3d& axis) {
+  Isometry3d frame = Isometry3d::Identity();
+  frame.translation() = origin;
+  frame.linear().col(0) = axis.unitOrthogonal();
+  frame.linear().col(1) = axis.cross(frame.linear().col(0));
+  frame.linear().col(2) = axis;
+  return frame;
+}
+
+/// Fills in the shape of an obstacle; returns where it stands in the frame that carries it.
+Isometry3d describe(const Plane& plane, MovingObstacle<double>& moving) {
+  moving.shape = ObstacleShape::plane;
+  return frame_along(plane.point, plane.normal);
+}
+Isometry3d describe(const Box& box, MovingObstacle<double>& moving) {
+  moving.shape = ObstacleShape::box;
+  moving.half_extents = vector3(box.half_extents);
+  return box.pose;
+}
+Isometry3d describe(const Cylinder& cylinder, MovingObstacle<double>& moving) {
+  moving.shape = ObstacleShape::cylinder;
+  moving.radius = cylinder.radius;
+  return frame_along(cylinder.point, cylinder.axis);
+}
+
+Frame<double> frame_of(const Isometry3d& pose) {
+  return {vector3(pose.linear().col(0)), vector3(pose.linear().col(1)), vector3(pose.linear().col(2)),
+          vector3(pose.translation())};
+}
+
+}  // namespace
+
+Gap gap_of(const SurfaceGap<double>& gap) {
+  return {gap.distance,
+          vector3d(gap.normal),
+          vector3d(gap.surface_moved),
+          vector3d(gap.curvature_direction),
+          gap.starts_inside,
+          gap.sunk};
+}
+
+std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environment, double start,
+                                                     double end) {
+  std::vector<MovingObstacle<double>> all;
+  for (const Obstacle& obstacle : environment.obstacles) {
+    MovingObstacle<double> moving;
+    const Isometry3d place =
+        std::visit([&](const auto& shape) { return describe(shape, moving); }, obstacle.shape);
+    moving.moves = obstacle.frame != base_frame;
+    moving.start = frame_of(moving.moves ? frame_pose(environment, obstacle.frame, start) * place : place);
+    moving.end = moving.moves ? frame_of(frame_pose(environment, obstacle.frame, end) * place) : moving.start;
+    moving.friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
+    all.push_back(moving);
+  }
+  return all;
+}
+
+}  // namespace flash::sim

@@ -1,0 +1,29 @@
+#pragma once
+#include <Eigen/Core>
+#include <vector>
+
+#include "sim/law/obstacle_step.h"
+#include "sim/scene/environment.h"
+
+namespace flash::sim {
+
+inline Vector3<double> vector3(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+inline Vector3<double> vector3(const data::Points& rows, Eigen::Index i) {
+  return {rows(i, 0), rows(i, 1), rows(i, 2)};
+}
+inline Eigen::Vector3d vector3d(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+
+/// How a point stands against an obstacle, as SurfaceGap says.
+struct Gap {
+  double distance;  ///< [m]
+  Eigen::Vector3d normal, surface_moved, curvature_direction;
+  bool starts_inside;
+  double sunk;  ///< [m]
+};
+Gap gap_of(const SurfaceGap<double>& gap);
+
+/// The obstacles of an environment between the times `start` and `end` [s], their friction on its sheet.
+std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environment, double start,
+                                                     double end);
+
+}  // namespace flash::sim
