@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "apps/hold_watch.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/memory_limit.h"
@@ -121,6 +122,14 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
          std::to_string(largest.substeps) + "\n";
 }
 
+/// In quotes where a comma, a quote or a line break would end it.
+std::string csv_field(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
 std::string force_rows(double time, const std::vector<SceneBody>& bodies,
                        const std::vector<StepReport>& reports) {
   std::map<std::string, Vector3d> forces;
@@ -136,7 +145,7 @@ std::string force_rows(double time, const std::vector<SceneBody>& bodies,
   }
   std::string rows;
   for (const auto& [body, force] : forces) {
-    rows += time_text(time) + "," + body;
+    rows += time_text(time) + "," + csv_field(body);
     for (double component : force) rows += "," + data::format_number(component);
     rows += "\n";
   }
@@ -162,16 +171,6 @@ struct Deepest {
 };
 
 constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
-
-/// Who holds a vertex: an end effector, or a support.
-std::string holder_of(const Environment& environment, int vertex) {
-  for (std::size_t k = 0; k < environment.holds.size(); ++k) {
-    const std::vector<int>& held = environment.state.held[k].vertices;
-    if (environment.holds[k].frame != base_frame && std::count(held.begin(), held.end(), vertex) > 0)
-      return environment.holds[k].name;
-  }
-  return "a support";
-}
 
 std::set<int> frames_to_write(const data::Scene& scene, int steps) {
   std::set<int> frames;
@@ -248,6 +247,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   Deepest held, started;
   double inside_at_end = 0;  // depth at the start of the last step [m]
   std::string holder;
+  std::vector<HoldWatch> watches(bodies.size());
   const data::TriangleMesh at_start = merged(bodies);
   const auto begin_writing = [&] {
     // Of a former run; its tables first, so that they never stand beside frames of this one.
@@ -277,6 +277,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       inside_at_end = 0;
       for (std::size_t b = 0; b < reports.size(); ++b) {
         const StepReport& report = reports[b];
+        watches[b].see(bodies[b].environment);
         converged = converged && report.converged;
         halved = halved || report.substeps > 1;
         started.see(report.start_penetration, b, time - scene.time_step);
@@ -293,9 +294,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       summary.steps = step;
       if (scene.rest_motion) {
         summary.last_motion = scene.time_step * stop_motion(bodies);
-        const bool arrived = std::all_of(bodies.begin(), bodies.end(),
-                                         [](const SceneBody& body) { return all_arrived(body.environment); });
-        done = summary.at_rest = arrived && summary.last_motion <= *scene.rest_motion;
+        const bool over = std::all_of(bodies.begin(), bodies.end(),
+                                      [](const SceneBody& body) { return motion_is_over(body.environment); });
+        done = summary.at_rest = over && summary.last_motion <= *scene.rest_motion;
       }
       if (frames.count(step) || (scene.rest_motion && (done || step == steps)))
         write_frame(step, merged(bodies));
@@ -307,6 +308,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     throw;
   }
   write_tables();
+  for (std::size_t b = 0; b < bodies.size() && summary.steps > 0; ++b)
+    for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
+      summary.warnings.push_back(bodies[b].name + ": " + warning);
   summary.held_penetration_max = held.penetration.depth;
   summary.start_penetration_max = started.penetration.depth;
   if (held.penetration.depth > told_depth)

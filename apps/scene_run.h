@@ -24,7 +24,7 @@ struct SceneSummary {
   bool at_rest = true;     ///< quasistatic: whether that is below the scene's bound
   std::vector<std::string> notices;
   std::vector<std::string>
-      warnings;  ///< vertices held inside an obstacle, or that start there, one line each
+      warnings;  ///< of holds, and of vertices held inside an obstacle or that start there
 };
 
 struct SceneRun {

@@ -142,6 +142,8 @@ void read_obstacles(const JsonObject& file, Scene& scene) {
       if (!(box.size.array() > 0).all()) throw object.error("size", "three lengths above 0");
       if (object.has("pose")) box.pose = read_pose(object, "pose");
       box.trajectory = read_trajectory(object);
+      if (object.has("pose") && !box.trajectory.times.empty())
+        throw object.error("pose", "either pose or a trajectory or keyframes");
       obstacle.shape = box;
     }
     obstacle.friction = read_friction(object);

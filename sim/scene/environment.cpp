@@ -32,8 +32,9 @@ std::vector<int> vertices_in_reach(const Hold& hold, const State& state, const I
   }
   if (vertices.empty())
     throw data::input_error("end effector " + hold.name, "grasps",
-                            "no vertex within " + data::format_short(hold.reach->threshold) +
-                                " m of its box at " + data::format_short(state.time) + " s; the nearest is " +
+                            "no vertex of " + hold.reach->object + " within " +
+                                data::format_short(hold.reach->threshold) + " m of its box at " +
+                                data::format_short(state.time) + " s; the nearest is " +
                                 data::format_short(nearest) + " m away");
   return vertices;
 }
@@ -62,7 +63,8 @@ void update_holds(Environment& environment, double time) {
   state.held.resize(environment.holds.size());
   for (std::size_t k = 0; k < environment.holds.size(); ++k) {
     const Hold& hold = environment.holds[k];
-    const bool closed = state.time >= hold.from - rounding && time <= hold.to + rounding;
+    const double middle = 0.5 * (state.time + time);
+    const bool closed = hold.from <= middle && middle < hold.to;
     if (!closed)
       state.held[k] = {};
     else if (state.held[k].vertices.empty())
@@ -70,10 +72,19 @@ void update_holds(Environment& environment, double time) {
   }
 }
 
-bool all_arrived(const Environment& environment) {
+bool motion_is_over(const Environment& environment) {
   const State& state = environment.state;
-  return std::all_of(state.held.begin(), state.held.end(),
-                     [&](const HeldVertices& held) { return held.arrival <= state.time + rounding; });
+  const double time = state.time + rounding;
+  for (std::size_t k = 0; k < environment.holds.size(); ++k) {
+    const Hold& hold = environment.holds[k];
+    if (hold.from > time || (hold.to > time && std::isfinite(hold.to))) return false;
+    if (k < state.held.size() && state.held[k].arrival > time) return false;
+  }
+  if (!environment.schedule) return true;
+  const Schedule& schedule = *environment.schedule;
+  return std::all_of(schedule.frames.begin(), schedule.frames.end(), [&](const auto& poses) {
+    return schedule.start + static_cast<double>(poses.size() - 1) * schedule.time_step <= time;
+  });
 }
 
 }  // namespace flash::sim

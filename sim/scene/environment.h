@@ -67,12 +67,14 @@ struct Environment {
 /// Pose of a frame of the environment's schedule at `time` [s]; that of the base frame is the identity.
 Eigen::Isometry3d frame_pose(const Environment& environment, int frame, double time);
 
-/// Closes and opens the holds for the step that ends at `time` [s]. A hold that closes stores in
-/// environment.state.held which vertices it takes and where they are in its frame; one that opens forgets
-/// them. Throws data::InputError where a reach has no vertex in it, with the distance of the nearest.
+/// Closes and opens the holds for the step that ends at `time` [s]: a hold acts in the steps whose middle
+/// lies between its `from` and `to`, so that one that follows another leaves no step out. One that closes
+/// stores in environment.state.held which vertices it takes and where they are in its frame; one that opens
+/// forgets them. Throws data::InputError where a reach has no vertex in it, with the distance of the nearest.
 void update_holds(Environment& environment, double time);
 
-/// Whether every hold has its vertices at their targets.
-bool all_arrived(const Environment& environment);
+/// Whether nothing is still to come: every hold has closed, has its vertices at their targets and does not
+/// open any more, and every frame of the schedule has reached its last pose.
+bool motion_is_over(const Environment& environment);
 
 }  // namespace flash::sim

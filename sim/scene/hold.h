@@ -15,6 +15,7 @@ inline constexpr int base_frame = -1;
 
 /// The vertices within `threshold` of a box about the origin of a frame: what an open end effector can take.
 struct Reach {
+  std::string object = {};                                         ///< name of what it takes, for messages
   Eigen::Vector3d half_extents = Eigen::Vector3d::Constant(0.01);  ///< [m]
   double threshold = 0.01;                                         ///< [m]
 };
@@ -25,9 +26,9 @@ enum class Closing {
   even,    ///< at one speed: supports of a quasistatic test
 };
 
-/// Vertices that something outside carries: a gripper, a support, a prescribed motion. It carries them in
-/// every step that lies between `from` and `to`. A vertex that several holds take obeys the last of them in
-/// each axis.
+/// Vertices that something outside carries: a gripper, a support, a prescribed motion. It carries them in the
+/// steps whose middle lies between `from` and `to`. A vertex that several holds take obeys the last of them
+/// in each axis.
 struct Hold {
   std::string name = {};           ///< under which the force is told
   std::vector<int> vertices = {};  ///< empty with a reach, which takes them when the hold closes

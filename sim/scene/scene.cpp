@@ -114,7 +114,7 @@ void add_end_effectors(const data::Scene& scene, const std::string& object, Time
                                      .from = grasp.from,
                                      .to = grasp.to,
                                      .closing_time = grasp.zero_length ? grasp.closing_time : 0.0,
-                                     .reach = Reach{0.5 * effector.size, grasp.threshold}});
+                                     .reach = Reach{object, 0.5 * effector.size, grasp.threshold}});
   }
 }
 
@@ -147,6 +147,10 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, T
   }
   add_supports(scene, object, timeline, environment);
   add_end_effectors(scene, object.name, timeline, environment);
+  for (const Hold& hold : environment.holds)
+    if (hold.axes != std::array<bool, 3>{true, true, true} && !environment.obstacles.empty())
+      notices.push_back(object.name + ": " + hold.name +
+                        " holds its vertices in some axes alone: they meet no obstacle in the others");
   return body;
 }
 

@@ -1,14 +1,29 @@
 #include "sim/step/penetration.h"
 
+#include <algorithm>
+
 #include "sim/step/contact_set.h"
 
 namespace flash::sim {
+
+namespace {
+
+/// Whether the frame that carries the vertex is that of the obstacle: a hand is no obstacle to what it holds.
+bool is_carried_by(const Environment& environment, const VertexConstraint& held, int obstacle) {
+  const int frame = environment.obstacles[static_cast<std::size_t>(obstacle)].frame;
+  return frame != base_frame && std::any_of(held.holds.begin(), held.holds.end(), [&](int hold) {
+           return hold >= 0 && environment.holds[static_cast<std::size_t>(hold)].frame == frame;
+         });
+}
+
+}  // namespace
 
 Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, const data::Points& positions) {
   Penetration deepest;
   for (size_t j = 0; j < contacts.held; ++j) {
     const int i = contacts.constraints[j].vertex;
     for (int k = 0; k < static_cast<int>(step.obstacles.size()); ++k) {
+      if (is_carried_by(step.environment, contacts.constraints[j], k)) continue;
       const SurfaceGap<double> gap = step.gap(k, positions, i);
       const double depth = gap.sunk - gap.distance;
       if (depth > deepest.depth) deepest = {depth, i, k};

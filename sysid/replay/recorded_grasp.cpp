@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "data/error.h"
+#include "data/text.h"
 #include "sim/scene/grasp.h"
 
 namespace flash::sysid {
@@ -69,6 +70,20 @@ void stiffen_clamped(const Replay& replay, sim::Sheet& sheet) {
       if (std::all_of(triangle.vertices.begin(), triangle.vertices.end(),
                       [&](int vertex) { return held[static_cast<std::size_t>(vertex)]; }))
         triangle.stiff = true;
+  }
+}
+
+void check_grasps_act(const Replay& replay) {
+  const double step = replay.settings.solver.time_step;
+  for (std::size_t k = 0; k < replay.recording.grasps.size(); ++k) {
+    const data::RecordedGrasp& grasp = replay.recording.grasps[k];
+    const double first = std::max(0.0, std::ceil((grasp.from - replay.start) / step - 0.5));
+    const double middle = replay.start + (first + 0.5) * step;
+    if (first < replay.steps && middle >= grasp.to)
+      throw data::input_error(replay.recording.source, "grasps[" + std::to_string(k) + "]",
+                              "found " + data::format_short(grasp.to - grasp.from) +
+                                  " s between from and to, expected the middle of a step of " +
+                                  data::format_short(step) + " s between them: it would never close");
   }
 }
 

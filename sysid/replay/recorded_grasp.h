@@ -15,6 +15,9 @@ data::GraspShape shape_of(const data::RecordedGrasp& grasp, const ReplaySettings
 /// name.
 const data::Trajectory& trajectory_of(const data::Recording& recording, const data::RecordedGrasp& grasp);
 
+/// Throws data::InputError where a grasp lasts so short that it acts in no step of the replay.
+void check_grasps_act(const Replay& replay);
+
 /// The grippers of a replay over its steps, a frame for each grasp of the recording.
 std::shared_ptr<const sim::Schedule> gripper_schedule(const Replay& replay);
 

@@ -145,6 +145,7 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   const double step = settings.solver.time_step;
   replay.start = replay.beginning - steps_in(pre_roll, step) * step;
   replay.steps = count_steps(recording, replay.start, step);
+  check_grasps_act(replay);
   replay.schedule = gripper_schedule(replay);
 
   if (recording.grasps.empty()) {
@@ -228,12 +229,16 @@ ReplayResult result_of(const Replay& replay, const std::vector<int>& kept, const
 
   const sim::View<double> forces = batch.hold_forces();
   motion.forces.assign(stats.size(), Eigen::Vector3d::Zero());
-  if (forces.shape[2] == 0) return result;
-  const double* last =
-      forces.data + environment * forces.strides[0] + (forces.shape[2] - 1) * forces.strides[2];
-  for (Eigen::Vector3d& force : motion.forces) {
-    force = Eigen::Map<const Eigen::Vector3d>(last);
-    last += forces.strides[1];
+  // A gripper may open and close again: its grasps are holds of their own.
+  const std::vector<data::RecordedGrasp>& grasps = replay.recording.grasps;
+  for (std::size_t k = 0; k < grasps.size(); ++k) {
+    if (grasps[k].gripper != grasps.back().gripper) continue;
+    const double* of_grasp =
+        forces.data + environment * forces.strides[0] + static_cast<std::ptrdiff_t>(k) * forces.strides[2];
+    for (Eigen::Vector3d& force : motion.forces) {
+      force += Eigen::Map<const Eigen::Vector3d>(of_grasp);
+      of_grasp += forces.strides[1];
+    }
   }
   return result;
 }

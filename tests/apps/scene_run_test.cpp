@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/scene.h"
@@ -296,6 +297,50 @@ TEST_F(SceneRunTest, ASheetThatIsLeftInsideIsSaid) {
   const SceneSummary whole = run(0.25);
   ASSERT_EQ(whole.warnings.size(), 1u);
   EXPECT_EQ(whole.warnings[0].find("still inside"), std::string::npos) << whole.warnings[0];
+}
+
+TEST_F(SceneRunTest, HoldsThatNeverActOrContestAVertexAreWarnedOf) {
+  const std::string head = R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 10, "gravity": [0, 0, 0],
+  "keyframes": [], "objects": {"cloth": {"asset": "cloth.json")";
+  const auto warnings = [&](const std::string& holds) {
+    return run_scene(data::load_scene(write("holds.json", head + holds + "}}}")), {}, out()).warnings;
+  };
+  const std::string still = R"({"name": "a", "vertices": [0, 1],
+    "keyframes": [{"t": 0, "translation": [0, 0, 0]}])";
+  EXPECT_TRUE(warnings(R"(, "prescribed": [)" + still + "}]").empty());
+  const std::vector<std::string> late = warnings(R"(, "prescribed": [)" + still + R"(, "from": 5}])");
+  ASSERT_EQ(late.size(), 1u);
+  EXPECT_NE(late[0].find("a never held anything: asked from 5 to inf s"), std::string::npos) << late[0];
+  const std::vector<std::string> two = warnings(
+      R"(, "fixed": [{"name": "bar", "vertices": [1]}], "prescribed": [)" + still + R"(, "from": 0.05}])");
+  ASSERT_EQ(two.size(), 1u);
+  EXPECT_NE(two[0].find("vertex 1 is held by bar and by a at 0.06 s; it obeys a"), std::string::npos)
+      << two[0];
+}
+
+TEST_F(SceneRunTest, AQuasistaticRunWaitsForWhatIsStillToCome) {
+  const data::Scene scene =
+      data::load_scene(write("late.json", R"({"schema": "flash-scene/1", "timestep": 0.1,
+  "steps": 40, "gravity": [0, 0, 0], "keyframes": [], "quasistatic": {"motion": 1e-6},
+  "objects": {"cloth": {"asset": "cloth.json", "fixed": [{"vertices": [0, 6, 12, 18, 24, 30]}],
+    "prescribed": [{"name": "pull", "vertices": [5, 11, 17, 23, 29, 35],
+      "keyframes": [{"t": 0, "translation": [0, 0, 0]}, {"t": 1, "translation": [0, 0, 0]},
+                    {"t": 2, "translation": [0.01, 0, 0]}]}]}}})"));
+  const SceneSummary summary = run_scene(scene, {}, out());
+  EXPECT_TRUE(summary.at_rest);
+  EXPECT_GE(summary.steps, 20);  // the pull begins after a second and takes another
+}
+
+TEST_F(SceneRunTest, AHandIsNoObstacleToWhatItHolds) {
+  const data::Scene scene =
+      data::load_scene(write("hand.json", R"({"schema": "flash-scene/1", "timestep": 0.01,
+  "steps": 5, "gravity": [0, 0, -9.81], "objects": {"cloth": {"asset": "cloth.json"}},
+  "end_effectors": {"hand, left": {"size": [0.02, 0.02, 0.02], "collides": true,
+    "keyframes": [{"t": 0, "translation": [0, 0, 0]}, {"t": 0.05, "translation": [0, 0, 0.01]}],
+    "grasps": [{"object": "cloth"}]}}})"));
+  EXPECT_TRUE(run_scene(scene, {}, out()).warnings.empty());
+  // A name with a comma is one field.
+  EXPECT_NE(data::read_file(out() + "/forces.csv").find("\n0.01,\"hand, left\","), std::string::npos);
 }
 
 }  // namespace

@@ -265,7 +265,7 @@ TEST(Hold, MovesASupportEvenlyAndSaysWhenItHasArrived) {
     const double share = std::min(1.0, n / 10.0);
     EXPECT_LE((environment.state.positions.row(0).transpose() - (start + share * (end - start))).norm(),
               1e-12);
-    EXPECT_EQ(all_arrived(environment), n >= 10) << n;
+    EXPECT_EQ(motion_is_over(environment), n >= 10) << n;
   }
 }
 
@@ -300,7 +300,7 @@ TEST(Hold, OfTwoOnAVertexTheLaterRulesEachAxisThatItHolds) {
 TEST(Hold, AReachTakesWhatIsInItWhenItCloses) {
   const Sheet sheet = small_sheet();
   Environment environment = weightless(sheet);
-  environment.holds = {{.name = "hand", .from = 2 * h, .reach = Reach{Vector3d::Constant(0.01), 0.011}}};
+  environment.holds = {{.name = "hand", .from = 2 * h, .reach = Reach{.threshold = 0.011}}};
   Solver solver(sheet, {});
   for (int n = 1; n <= 3; ++n) {
     solver.step(environment);
@@ -314,15 +314,51 @@ TEST(Hold, AReachWithoutAVertexIsRefusedByName) {
   const Sheet sheet = small_sheet();
   Environment environment = weightless(sheet);
   environment.state.positions.col(2).array() += 0.5;
-  environment.holds = {{.name = "hand", .reach = Reach{}}};
+  environment.holds = {{.name = "hand", .reach = Reach{.object = "towel"}}};
   try {
     Solver(sheet, {}).step(environment);
     FAIL() << "a hand that takes nothing";
   } catch (const data::InputError& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "end effector hand: grasps: no vertex within 0.01 m of its box at 0 s; the nearest is 0.49 m away");
+    EXPECT_STREQ(error.what(),
+                 "end effector hand: grasps: no vertex of towel within 0.01 m of its box at 0 s; the nearest "
+                 "is 0.49 m away");
   }
+}
+
+TEST(Hold, OneThatFollowsAnotherBetweenTwoStepsLeavesNoStepOut) {
+  const Sheet sheet = small_sheet();
+  for (const double change : {0.02, 0.0201, 0.025, 0.0299}) {
+    Environment environment = environment_of(sheet);
+    Hold first = support(0, {true, true, true}, sheet.rest.vertices.row(0)), second = first;
+    first.to = second.from = change;
+    environment.holds = {first, second};
+    Solver solver(sheet, {});
+    for (int n = 1; n <= 5; ++n) {
+      const StepReport report = solver.step(environment);
+      EXPECT_GT((report.hold_forces[0] + report.hold_forces[1]).norm(), 0) << change << " " << n;
+      EXPECT_EQ(environment.state.positions.row(0), sheet.rest.vertices.row(0));
+    }
+    EXPECT_TRUE(environment.state.held[0].vertices.empty());
+  }
+}
+
+TEST(Hold, MotionIsNotOverBeforeWhatIsStillToCome) {
+  const Sheet sheet = small_sheet();
+  Environment still = weightless(sheet);
+  EXPECT_TRUE(motion_is_over(still));
+  Environment later = still;
+  later.holds = {support(0, {true, true, true}, sheet.rest.vertices.row(0))};
+  later.holds[0].from = 1;
+  EXPECT_FALSE(motion_is_over(later));
+  later.holds[0].from = 0;
+  later.holds[0].to = 1;
+  EXPECT_FALSE(motion_is_over(later));
+  Environment moved = still;
+  add_frame(moved, straight_path(Vector3d::Zero(), Vector3d::UnitX(), 1));
+  moved.state.time = 0.99;
+  EXPECT_FALSE(motion_is_over(moved));
+  moved.state.time = 1;
+  EXPECT_TRUE(motion_is_over(moved));
 }
 
 }  // namespace

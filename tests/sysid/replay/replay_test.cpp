@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "data/atomic_file.h"
@@ -172,6 +173,43 @@ TEST(Replay, StampsOfAnyClockGiveTheSameStepsAndScore) {
     // Stamps of today are resolved to 2.4e-7 s; the gripper moves at less than 0.4 m/s.
     EXPECT_NEAR(score_of(replay), expected, 1e-7);
   }
+}
+
+TEST(Replay, AGraspInTwoPartsPullsAsOne) {
+  const data::TemporaryFolder folder;
+  const Replay whole = short_lift(folder);
+  const ReplayCandidate candidate{short_lift_material(), {}};
+  for (const double change : {0.2, 0.2037}) {
+    data::Recording recording = whole.recording;
+    recording.grasps.push_back(recording.grasps[0]);
+    recording.grasps[0].to = recording.grasps[1].from = change;
+    // Of vertices, wherever they are by then.
+    for (data::RecordedGrasp& grasp : recording.grasps) {
+      grasp.select = {};
+      grasp.select.vertices = data::select_vertices(whole.recording, whole.recording.grasps[0]);
+    }
+    ReplaySettings settings = whole.settings;
+    settings.clamp_slopes = false;
+    const Motion parts = std::move(run(make_replay(recording, settings), {candidate}).front().motion);
+    recording.grasps = {recording.grasps[0]};
+    recording.grasps[0].to = std::numeric_limits<double>::infinity();
+    const Motion one = std::move(run(make_replay(recording, settings), {candidate}).front().motion);
+    ASSERT_EQ(parts.forces.size(), one.forces.size());
+    for (std::size_t k = 0; k < one.forces.size(); ++k)
+      EXPECT_LE((parts.forces[k] - one.forces[k]).norm(), 1e-12 + 1e-9 * one.forces[k].norm())
+          << change << " " << k;
+  }
+}
+
+TEST(Replay, AGraspThatActsInNoStepIsRefused) {
+  const data::TemporaryFolder folder;
+  const Replay replay = short_lift(folder);
+  data::Recording recording = replay.recording;
+  recording.grasps[0].to = recording.grasps[0].from + 1e-6;
+  EXPECT_NE(data::input_error_of([&] {
+              make_replay(recording, replay.settings);
+            }).find("grasps[0]: found 1e-06 s between from and to, expected the middle of a step of 0.01 s"),
+            std::string::npos);
 }
 
 TEST(Replay, ASimulationWithoutEndIsRefusedWithItsCause) {
