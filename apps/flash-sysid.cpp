@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   flash::add_fit_verb(app, action);
 #endif
   flash::add_plan_verb(app, action);
+  flash::add_repeatability_verb(app, action);
   flash::add_synth_verb(app, action);
   flash::add_import_verb(app, action);
   flash::add_segment_verb(app, action);
