@@ -42,8 +42,9 @@ __global__ void __launch_bounds__(team_threads, dense_teams)
   const int triangles = batch.sheet.triangle_count;
   FOR_OWN_ENVIRONMENTS(batch, e) {
     const ElasticEnergies energy = elastic_gradient<places_on_chip>(
-        batch.sheet, batch.environments[e], places_of(batch, e), batch.gradients + 3L * batch.sheet.size * e,
-        batch.triangle_gradients + 9L * triangles * blockIdx.x, shared_memory<double>());
+        batch.sheet, batch.environments[e], {}, places_of(batch, e),
+        batch.gradients + 3L * batch.sheet.size * e,
+        {batch.triangle_gradients + 9L * triangles * blockIdx.x, nullptr}, shared_memory<double>());
     if (threadIdx.x == 0) batch.energies[e] = energy;
     __syncthreads();
   }
@@ -55,10 +56,10 @@ __global__ void __launch_bounds__(team_threads, hessian_teams)
   float* chip = shared_memory<float>();
   float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares, chip);
+    write_shares(batch.sheet, batch.environments[e], {}, places_of(batch, e), Preconditioner, shares, chip);
     __syncthreads();
     if constexpr (Preconditioner)
-      assemble_blocks(batch.sheet, batch.environments[e], shares,
+      assemble_blocks(batch.sheet, batch.environments[e], {}, {}, shares,
                       batch.blocks + 9L * batch.sheet.block_count * e, chip);
     else
       assemble_block_rows(batch.sheet, batch.environments[e], shares,
@@ -104,7 +105,7 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
     }
     __syncthreads();
     multiply(batch.sheet, batch.block_rows + batch.block_row_size * e,
-             static_cast<float>(batch.environments[e].rigidity), x, result_of(batch, e));
+             static_cast<float>(batch.environments[e].rigidity), {}, x, result_of(batch, e));
     __syncthreads();
   }
 }
@@ -117,10 +118,10 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
     const LinearProblem<Stored> problem = {
         batch.block_rows + batch.block_row_size * e,
         static_cast<float>(batch.environments[e].rigidity),
+        {},
         factor_of<Stored>(batch, e),
         vector_of(batch, e),
-        batch.restrictions + static_cast<long>(batch.restrictions_each) * e,
-        batch.restriction_counts[e],
+        {batch.restrictions + static_cast<long>(batch.restrictions_each) * e, batch.restriction_counts[e]},
         tolerance};
     const int solves =
         conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),

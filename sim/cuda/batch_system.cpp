@@ -16,18 +16,6 @@ std::string why_no_device() {
   return count > 0 ? "" : "no device";
 }
 
-namespace {
-
-/// Panels that fit on chip beside the rest of a factorization.
-FrontSettings fitting(FrontSettings settings) {
-  constexpr int rest = 8192 + 64;  // numbers
-  settings.panel_capacity =
-      std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
-  return settings;
-}
-
-}  // namespace
-
 struct BatchSystem::Memory {
   int count;
   FactorPrecision precision;
@@ -53,7 +41,7 @@ struct BatchSystem::Memory {
          const FrontSettings& settings)
       : count(static_cast<int>(materials.size())),
         precision(factor_precision),
-        front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting(settings))),
+        front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting_fronts(settings))),
         layout(lay_out(sheet, bending, front_plan)),
         plan(front_plan, layout),
         environments(materials) {

@@ -13,10 +13,10 @@ template <typename Stored>
 struct LinearProblem {
   const float* block_rows;
   float rigidity;
+  HingeMatrix hinges;
   const Stored* factor;
   const float* gradient;
-  const VertexRestriction* restrictions;
-  int restriction_count;
+  Restrictions restrictions;
   float tolerance;
 };
 
@@ -27,11 +27,11 @@ struct LinearVectors {
   SolveVectors solve;
 };
 
-__device__ inline void restrict_to_free(const VertexRestriction* restrictions, int count, float* x) {
-  if (count == 0) return;
+__device__ inline void restrict_to_free(const Restrictions& restrictions, float* x) {
+  if (restrictions.count == 0) return;
   __syncthreads();
-  for (int k = static_cast<int>(threadIdx.x); k < count; k += team_threads) {
-    const VertexRestriction& restriction = restrictions[k];
+  for (int k = static_cast<int>(threadIdx.x); k < restrictions.count; k += team_threads) {
+    const VertexRestriction& restriction = restrictions.list[k];
     float* own = x + 3 * restriction.place;
     const float a = own[0], b = own[1], c = own[2];
     const float* free = restriction.free;
@@ -54,7 +54,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   float* preconditioned = v.solve.forward + size;
   const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
   const auto restricted = [&](float* x) {
-    restrict_to_free(problem.restrictions, problem.restriction_count, x);
+    restrict_to_free(problem.restrictions, x);
   };
   for (int i = first; i < size; i += team_threads) {
     v.residual[i] = -problem.gradient[i];
@@ -62,15 +62,15 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   }
   __syncthreads();
   int moved = 0;
-  for (int k = first; k < problem.restriction_count; k += team_threads) {
-    const VertexRestriction& restriction = problem.restrictions[k];
+  for (int k = first; k < problem.restrictions.count; k += team_threads) {
+    const VertexRestriction& restriction = problem.restrictions.list[k];
     for (int c = 0; c < 3; ++c) {
       moved += restriction.correction[c] != 0;
       direction[3 * restriction.place + c] = search[4 * restriction.place + c] = restriction.correction[c];
     }
   }
   if (sum_over_team(static_cast<float>(moved), partial) > 0) {
-    multiply(sheet, problem.block_rows, problem.rigidity, v.search, v.image);
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.search, v.image);
     for (int i = first; i < size; i += team_threads) {
       v.residual[i] -= v.image[i];
       change[i] += v.image[i];
@@ -95,7 +95,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     for (int i = first; i < size; i += team_threads)
       search[slot(i)] = preconditioned[i] + (iteration == 1 ? 0 : kept * search[slot(i)]);
     __syncthreads();
-    multiply(sheet, problem.block_rows, problem.rigidity, v.search, v.image);
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.search, v.image);
     product = 0;
     for (int i = first; i < size; i += team_threads) product += search[slot(i)] * v.image[i];
     const float curvature = sum_over_team(product, partial);

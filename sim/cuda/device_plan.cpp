@@ -1,6 +1,15 @@
 #include "sim/cuda/device_plan.h"
 
+#include <algorithm>
+
 namespace flash::sim::cuda {
+
+FrontSettings fitting_fronts(FrontSettings settings) {
+  constexpr int rest = 8192 + 64;  // numbers
+  settings.panel_capacity =
+      std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
+  return settings;
+}
 
 template <typename Number>
 const Number* DevicePlan::upload(const std::vector<Number>& numbers,
@@ -37,7 +46,8 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.corners = upload(layout.corners, ints_);
   sheet.pair_sources = upload(layout.pair_sources, sources_);
   sheet.slice_sources = upload(layout.slice_sources, sources_);
-  sheet.block_vertex = upload(layout.block_vertex, ints_);
+  sheet.block_rows = upload(layout.block_rows, ints_);
+  sheet.block_columns = upload(layout.block_columns, ints_);
   sheet.slice_starts = upload(layout.slice_starts, ints_);
   sheet.slice_columns = upload(layout.slice_columns, ints_);
   sheet.group_rows = upload(layout.group_rows, ints_);
@@ -48,6 +58,15 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
       upload(std::vector<float>(layout.group_values.begin(), layout.group_values.end()), floats_);
   sheet.stand_in = upload(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end()), floats_);
   sheet.vertex_area = upload(layout.vertex_area, doubles_);
+  sheet.hinge_count = layout.hinge_count;
+  sheet.hinge_vertices = upload(layout.hinge_vertices, ints_);
+  sheet.hinge_weights = upload(layout.hinge_weights, doubles_);
+  sheet.hinge_rest_angles = upload(layout.hinge_rest_angles, doubles_);
+  sheet.hinge_rest_areas = upload(layout.hinge_rest_areas, doubles_);
+  sheet.hinge_corner_starts = upload(layout.hinge_corner_starts, ints_);
+  sheet.hinge_corners = upload(layout.hinge_corners, ints_);
+  sheet.hinge_source_starts = upload(layout.hinge_source_starts, ints_);
+  sheet.hinge_sources = upload(layout.hinge_sources, ints_);
 }
 
 }  // namespace flash::sim::cuda

@@ -6,6 +6,9 @@
 
 namespace flash::sim::cuda {
 
+/// Settings with panels that fit on chip beside the rest of a factorization.
+FrontSettings fitting_fronts(FrontSettings settings = {});
+
 /// The structure of a sheet on the device, once for all its environments.
 class DevicePlan {
  public:

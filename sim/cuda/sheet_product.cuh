@@ -1,5 +1,6 @@
 #pragma once
 #include "sim/cuda/four.h"
+#include "sim/cuda/hinges.cuh"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/cuda/team.cuh"
 
@@ -64,15 +65,19 @@ inline __device__ void add_block_rows(const SheetTables& tables, const float* bl
   }
 }
 
-/// y = (B + scale S) x, x four numbers a vertex. The caller has synchronized x; y is of the calling threads'
+/// y = (B + scale S + hinges) x, x four numbers a vertex. The caller has synchronized x; y is of the calling threads'
 /// own rows i, i + team_threads, ...
 inline __device__ void multiply(const SheetTables& tables, const float* blocks, float scale,
-                                const Four<float>* x, float* y) {
+                                const HingeMatrix& hinges, const Four<float>* x, float* y) {
+  if (hinges.gradients != nullptr) multiply_hinges(tables, hinges, x);
   multiply_scalar_rows(
       tables, tables.single_group_values, [&](int vertex) { return x[vertex]; },
       [&](int row, int c, float sum) { y[3 * row + c] = scale * sum; });
   __syncthreads();
   add_block_rows(tables, blocks, x, y);
+  if (hinges.gradients == nullptr) return;
+  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size; i += team_threads)
+    y[i] += hinge_row(tables, hinges, i);
 }
 
 }  // namespace flash::sim::cuda
