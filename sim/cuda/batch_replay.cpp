@@ -144,6 +144,7 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   m.restrictions = arena.take<VertexRestriction>(held);
   m.restriction_of = arena.take<int>(size);
   m.hold_starts = arena.take<double>(3 * held);
+  m.clocks = arena.take<long long>(replay_phases + 1);
   return m;
 }
 
@@ -352,6 +353,23 @@ Points BatchReplay::kept_positions(int environment, int index) const {
                             static_cast<std::size_t>(index);
   const std::vector<double> numbers = m.kept.read(place * 3 * m.size(), 3 * m.size());
   return Eigen::Map<const Points>(numbers.data(), m.layout.size, 3);
+}
+
+std::vector<double> BatchReplay::phases() const {
+  const Memory& m = *memory_;
+  cuda::check(cudaStreamSynchronize(m.stream));
+  std::vector<double> shares(replay_phases, 0.0);
+  double all = 0;
+  for (const TeamMemory& team : m.team_memory.read(0, m.team_memory.size())) {
+    long long clocks[replay_phases];
+    cuda::check(cudaMemcpy(clocks, team.clocks, sizeof(clocks), cudaMemcpyDeviceToHost));
+    for (int k = 0; k < replay_phases; ++k) {
+      shares[static_cast<std::size_t>(k)] += static_cast<double>(clocks[k]);
+      all += static_cast<double>(clocks[k]);
+    }
+  }
+  for (double& share : shares) share /= all;
+  return shares;
 }
 
 std::vector<ReplayStep> BatchReplay::stats(int environment) const {

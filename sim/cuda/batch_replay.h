@@ -37,7 +37,7 @@ struct ReplaySettings {
   int first_step = 0;              ///< at which the environments stand
   int steps = 0;                   ///< the last one
   std::vector<int> kept_steps{};   ///< whose positions are kept, ascending; step 0 is the start
-  int restart_interval = 50;       ///< steps after which a solver forgets its factor
+  int restart_interval = 10;       ///< steps after which a solver forgets its factor and may change its team
   FactorPrecision precision = FactorPrecision::half;
 };
 
@@ -74,6 +74,8 @@ class BatchReplay {
   data::Points velocities(int environment) const;  ///< [m/s]
   data::Points kept_positions(int environment, int index) const;
   std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on
+  /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions, rest.
+  std::vector<double> phases() const;
 
  private:
   struct Memory;

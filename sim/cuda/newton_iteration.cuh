@@ -16,11 +16,21 @@ struct Work {
   Iterate now, trial, longer;
 };
 
+/// Counts the time since the last call to a phase.
+__device__ inline void count_phase(const TeamMemory& memory, ReplayPhase phase) {
+  if (threadIdx.x != 0) return;
+  const long long now = clock64();
+  memory.clocks[static_cast<int>(phase)] += now - memory.clocks[replay_phases];
+  memory.clocks[replay_phases] = now;
+}
+
 __device__ inline void evaluate(const Work& w, const StepProblem& step, Iterate& at) {
+  count_phase(w.memory, ReplayPhase::rest);
   if (w.replay.places_on_chip)
     evaluate<true>(w.replay.sheet, step, w.memory, at);
   else
     evaluate<false>(w.replay.sheet, step, w.memory, at);
+  count_phase(w.memory, ReplayPhase::evaluation);
 }
 
 /// The parts of the Hessian at the iterate, from which a matrix is put together.
@@ -47,6 +57,7 @@ __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& s
   assemble_block_rows(w.replay.sheet, step.numbers, w.memory.shares, w.memory.block_rows,
                       shared_memory<float>());
   __syncthreads();
+  count_phase(w.memory, ReplayPhase::matrix);
 }
 
 /// Factorizes the positive Hessian at the iterate. Returns false where it is not positive definite after all.
@@ -56,10 +67,12 @@ __device__ __noinline__ bool factorize(const Work& w, const StepProblem& step) {
   write_parts(w, step, true);
   assemble_blocks(w.replay.sheet, step.numbers, step.restrictions, hinges_of(w), w.memory.shares,
                   w.memory.blocks, chip);
+  count_phase(w.memory, ReplayPhase::preconditioner);
   const bool positive = factorize(w.replay.fronts, w.memory.blocks, w.memory.updates,
                                   static_cast<Stored*>(w.memory.factor), chip);
   const float failures = sum_over_team(positive ? 0.0f : 1.0f, chip);
   __syncthreads();
+  count_phase(w.memory, ReplayPhase::factorization);
   return failures == 0;
 }
 
@@ -85,9 +98,11 @@ __device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) 
       step.restrictions,
       static_cast<float>(linear_tolerance * w.replay.tolerance * step.material->force_scale)};
   float* chip = shared_memory<float>();
-  return conjugate_gradients(w.replay.fronts, tables, problem,
-                             {m.residual, m.image, m.search, {m.forward, m.passed}}, m.direction, m.change,
-                             chip, chip + team_warps);
+  const int solves = conjugate_gradients(w.replay.fronts, tables, problem,
+                                         {m.residual, m.image, m.search, {m.forward, m.passed}}, m.direction,
+                                         m.change, chip, chip + team_warps);
+  count_phase(m, ReplayPhase::directions);
+  return solves;
 }
 
 /// The slope of the potential along the direction, at an iterate [J].

@@ -28,6 +28,7 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
         *velocities = replay.velocities + static_cast<long>(size) * e;
   const ReplayMaterial& material = replay.materials[e];
   const auto iterate = [&](int k) { return Iterate{memory.positions[k], memory.forces[k], {}, 0, 0, 0}; };
+  if (threadIdx.x == 0) memory.clocks[replay_phases] = clock64();
   Work w = {replay, memory, true, iterate(0), iterate(1), iterate(2)};
   StepProblem step = {&material,
                       replay.time_step,
@@ -75,6 +76,7 @@ __global__ void __launch_bounds__(team_threads, dense_teams)
     const int interval = replay.restart_interval,
               end = min(replay.end_step, (first / interval + 1) * interval);
     advance<Stored>(replay, memory, e, first, end);
+    count_phase(memory, ReplayPhase::rest);
     __syncthreads();
     if (threadIdx.x == 0 && end < replay.end_step) add(replay.queue, e, end);
   }

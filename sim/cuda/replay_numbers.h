@@ -33,6 +33,10 @@ struct ReplayStats {
   int converged;
 };
 
+/// Where the time of a step goes.
+enum class ReplayPhase { evaluation, matrix, preconditioner, factorization, directions, rest };
+inline constexpr int replay_phases = 6;
+
 /// Memory of a team. Vectors have three numbers a vertex where nothing is said.
 struct TeamMemory {
   Point* positions[3];  ///< of the iterates
@@ -50,6 +54,7 @@ struct TeamMemory {
   VertexRestriction* restrictions;
   int* restriction_of;  ///< by place, -1 for none
   double* hold_starts;  ///< where held vertices were when the step began
+  long long* clocks;    ///< ticks of the processor spent in each phase
 };
 
 /// The queue of work: environments, each as often as it has parts of its motion left.

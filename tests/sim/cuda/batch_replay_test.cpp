@@ -360,8 +360,8 @@ TEST(BatchReplay, WhatDoesNotFitIsRefused) {
   refused([](ReplayEnvironment& e) { e.material.poissons_ratio = 0.1; });
   refused([](ReplayEnvironment& e) { e.holds = std::make_shared<HoldMotion>(2); });
   refused([](ReplayEnvironment& e) {
-    e.holds = std::make_shared<HoldMotion>(3, std::vector<HeldVertex>{{.vertex = 1, .target = {}},
-                                                                      {.vertex = 1, .target = {}}});
+    const HeldVertex held{1, {true, true, true}, Vector3d::Zero()};
+    e.holds = std::make_shared<HoldMotion>(3, std::vector<HeldVertex>{held, held});
   });
   EXPECT_THROW(BatchReplay(scene.plan, {}, settings_of(3, 1e-3)), std::invalid_argument);
 }
