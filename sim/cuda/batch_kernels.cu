@@ -88,7 +88,7 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
     const SolveVectors v = linear_vectors(batch).solve;
     for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
       v.forward[size + i] = vector_of(batch, e)[i];
-    solve(batch.fronts, factor_of<Stored>(batch, e), v, shared_memory<float>());
+    solve(batch.fronts, factor_of<Stored>(batch, e), v, shared_memory<char>());
     for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
       result_of(batch, e)[i] = v.forward[size + i];
     __syncthreads();
@@ -125,7 +125,8 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
         tolerance};
     const int solves =
         conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
-                            batch.changes + 3L * batch.sheet.size * e, chip, chip + team_warps);
+                            batch.changes + 3L * batch.sheet.size * e, chip,
+                            reinterpret_cast<char*>(chip + team_warps));
     if (threadIdx.x == 0) batch.solves[e] = solves;
   }
 }
@@ -146,7 +147,7 @@ Choice evaluation(int size) {
 
 template <typename Stored>
 Choice choice(BatchKernel kernel, const FrontTables& fronts) {
-  const int number = sizeof(float), solve_bytes = number * solve_memory(fronts.largest_columns);
+  const int number = sizeof(float), solve_bytes = solve_memory<Stored>();
   switch (kernel) {
     case BatchKernel::evaluate:
       return evaluation(fronts.size);

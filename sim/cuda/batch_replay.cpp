@@ -196,7 +196,7 @@ struct BatchReplay::Memory {
     numbers.sheet = plan.sheet;
     numbers.teams = team_memory.data();
     numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), 0};
-    numbers.places_on_chip = replay_has_places_on_chip(plan.fronts);
+    place_on_chip(settings.precision, numbers);
     numbers.time_step = solver.time_step;
     numbers.tolerance = solver.tolerance;
     numbers.max_iterations = solver.max_iterations;

@@ -47,7 +47,7 @@ __device__ inline void restrict_to_free(const Restrictions& restrictions, float*
 template <typename Stored>
 __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
                                    const LinearProblem<Stored>& problem, const LinearVectors& v,
-                                   float* direction, float* change, float* partial, float* own) {
+                                   float* direction, float* change, float* partial, char* own) {
   constexpr int most = 20;
   const int size = 3 * sheet.size, first = static_cast<int>(threadIdx.x);
   float* search = reinterpret_cast<float*>(v.search);

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sim/cuda/layout/solve_plan.h"
+
 namespace flash::sim::cuda {
 
 FrontSettings fitting_fronts(FrontSettings settings) {
@@ -22,18 +24,18 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
-  fronts.largest_columns = plan.largest_columns;
   fronts.vector_size = plan.vector_size;
   fronts.factor_size = plan.factor_size;
   fronts.update_size = plan.update_size;
   fronts.fronts = upload(plan.fronts, fronts_);
   fronts.levels = upload(plan.levels, levels_);
-  fronts.child_rows = upload(plan.child_rows, ints_);
   fronts.panel_rows = upload(plan.panel_rows, ints_);
   fronts.entries = upload(plan.entries, ints_);
   fronts.blocks = upload(plan.blocks, places_);
-  fronts.forward = upload(plan.forward, forward_);
-  fronts.backward = upload(plan.backward, backward_);
+  const SolvePlan solve = plan_solve(plan);
+  fronts.chunks = upload(solve.chunks, chunks_);
+  fronts.chunk_starts = upload(solve.starts, ints_);
+  fronts.gathers = upload(solve.gathers, gathers_);
 
   sheet.size = layout.size;
   sheet.triangle_count = layout.triangle_count;

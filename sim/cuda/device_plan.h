@@ -27,8 +27,8 @@ class DevicePlan {
   std::vector<DeviceArray<FrontLayout>> fronts_;
   std::vector<DeviceArray<FrontLevel>> levels_;
   std::vector<DeviceArray<BlockPlace>> places_;
-  std::vector<DeviceArray<ForwardTask>> forward_;
-  std::vector<DeviceArray<BackwardTask>> backward_;
+  std::vector<DeviceArray<SolveChunk>> chunks_;
+  std::vector<DeviceArray<Gather>> gathers_;
   std::vector<DeviceArray<EdgeSources>> sources_;
 };
 

@@ -76,6 +76,10 @@ __device__ __noinline__ bool factorize(const Work& w, const StepProblem& step) {
   return failures == 0;
 }
 
+/// On-chip bytes for sums over the team, before what a solve needs.
+inline constexpr int linear_partial_bytes = 64;
+static_assert(linear_partial_bytes >= team_warps * static_cast<int>(sizeof(float)));
+
 /// Finds the direction by conjugate gradients. Returns their number of solves.
 template <typename Stored>
 __device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) {
@@ -97,10 +101,17 @@ __device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) 
       m.gradient,
       step.restrictions,
       static_cast<float>(linear_tolerance * w.replay.tolerance * step.material->force_scale)};
-  float* chip = shared_memory<float>();
-  const int solves = conjugate_gradients(w.replay.fronts, tables, problem,
-                                         {m.residual, m.image, m.search, {m.forward, m.passed}}, m.direction,
-                                         m.change, chip, chip + team_warps);
+  char* chip = shared_memory<char>();
+  const auto on_chip = [&](int at, auto* otherwise) {
+    return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
+  };
+  const LinearVectors vectors = {m.residual,
+                                 m.image,
+                                 on_chip(w.replay.search_at, m.search),
+                                 {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
+  const int solves =
+      conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction, m.change,
+                          reinterpret_cast<float*>(chip), chip + linear_partial_bytes);
   count_phase(m, ReplayPhase::directions);
   return solves;
 }

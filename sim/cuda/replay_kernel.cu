@@ -88,26 +88,46 @@ Kernel kernel_of(FactorPrecision precision) {
   return precision == FactorPrecision::half ? replay_kernel<__half> : replay_kernel<float>;
 }
 
-int bytes_of(const FrontTables& fronts) {
-  const int number = sizeof(float);
-  const int always = std::max({gradient_memory(fronts.size, false), hessian_memory * number,
-                               number * factor_memory(fronts.shared_panel),
-                               number * (team_warps + solve_memory(fronts.largest_columns))});
-  return replay_has_places_on_chip(fronts) ? std::max(always, gradient_memory(fronts.size, true)) : always;
+template <typename Stored>
+constexpr int linear_bytes = linear_partial_bytes + solve_memory<Stored>();
+
+int linear_bytes_of(FactorPrecision precision) {
+  return precision == FactorPrecision::half ? linear_bytes<__half> : linear_bytes<float>;
+}
+
+/// What a team needs in any case, and as much as leaves room for as many teams as there are registers for.
+int bytes_of(FactorPrecision precision, const FrontTables& fronts) {
+  constexpr int number = sizeof(float), reserved = 1024;
+  return std::max({gradient_memory(fronts.size, false), hessian_memory * number,
+                   number * factor_memory(fronts.shared_panel), linear_bytes_of(precision),
+                   most_memory() / dense_teams - reserved});
 }
 
 }  // namespace
 
-bool replay_has_places_on_chip(const FrontTables& fronts) {
-  return dense_teams * (gradient_memory(fronts.size, true) + 1024) <= most_memory();
+void place_on_chip(FactorPrecision precision, ReplayNumbers& numbers) {
+  const FrontTables& fronts = numbers.fronts;
+  const int room = bytes_of(precision, fronts);
+  numbers.places_on_chip = gradient_memory(fronts.size, true) <= room;
+  int used = linear_bytes_of(precision);
+  const auto place = [&](long bytes) {
+    if (used + bytes > room) return -1;
+    const int at = used;
+    used += rounded_up(static_cast<int>(bytes), 16);
+    return at;
+  };
+  constexpr long number = sizeof(float);
+  numbers.forward_at = place(6 * number * fronts.size);
+  numbers.passed_at = place(number * fronts.vector_size);
+  numbers.search_at = place(4 * number * fronts.size);
 }
 
 int resident_replay_teams(FactorPrecision precision, const FrontTables& fronts) {
-  return resident_teams(kernel_of(precision), bytes_of(fronts));
+  return resident_teams(kernel_of(precision), bytes_of(precision, fronts));
 }
 
 void run_replay(FactorPrecision precision, const ReplayNumbers& numbers, int teams, cudaStream_t stream) {
-  launch(kernel_of(precision), teams, bytes_of(numbers.fronts), stream, numbers);
+  launch(kernel_of(precision), teams, bytes_of(precision, numbers.fronts), stream, numbers);
 }
 
 }  // namespace flash::sim::cuda

@@ -17,7 +17,7 @@ inline constexpr int dense_teams = 2, hessian_teams = 3, sparse_teams = 4;
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;
 
-/// Rows that a warp takes in one sweep of a forward task, and columns of a backward task.
+/// Rows of a front that a warp takes together in a forward solve, and columns in a backward one.
 inline constexpr int forward_rows = 16, backward_columns = 8;
 
 /// Vertices eliminated together and those below them, as a dense matrix of three rows and columns a vertex:
@@ -44,22 +44,10 @@ struct alignas(16) BlockPlace {
   int source;  ///< block of the BlockPattern
 };
 
-/// Rows `first_row` to `end_row` of a front's columns times its own numbers.
-struct ForwardTask {
-  int front, first_row, end_row;
-};
-
-/// Columns `first_column` on of a front, `backward_columns` at most, times all its numbers.
-struct BackwardTask {
-  int front, first_column;
-};
-
 /// Fronts of one height, which do not depend on each other. In a factorization the team divides into
 /// `groups`, each of which takes every groups-th front.
 struct FrontLevel {
   int first_front, front_count;
-  int first_forward, forward_count;
-  int first_backward, backward_count;
   int groups;
 };
 

@@ -1,0 +1,35 @@
+#pragma once
+#include "sim/cuda/layout/front_layout.h"
+
+namespace flash::sim::cuda {
+
+// Plain numbers, laid out on the host and read by kernels as they are.
+
+/// Numbers of the factor in a chunk at most: forward `forward_rows` rows of `chunk_columns`, backward
+/// `backward_columns` columns of `chunk_rows`.
+inline constexpr int chunk_columns = 30, chunk_rows = 64;
+inline constexpr int chunk_numbers = backward_columns * chunk_rows;
+static_assert(forward_rows * chunk_columns <= chunk_numbers && chunk_columns % 3 == 0 && chunk_columns <= 32);
+
+/// A piece of the factor that a warp works on, with all that it needs to know of it.
+struct alignas(16) SolveChunk {
+  enum { backward = 1, begins = 2, ends = 4, ends_level = 8 };
+
+  int flags = 0;
+  int panel_at = 0, leading = 0;  ///< of its first number in the factor; from one column to the next
+  int columns = 0, rows = 0;      ///< 0: nothing to do
+  int right_at = 0;               ///< of the right-hand sides of its columns; backward of its results
+  int table_at = 0;               ///< forward in `gathers`, of its first column; backward in FrontPlan::entries
+  int row_table_at = 0;           ///< forward in `gathers`, of its first row below
+  int first_row = 0, own_columns = 0, below_at = 0, below_count = 0;  ///< of the front, forward
+  int y_at = 0, passed_at = 0;                                        ///< where results go, forward
+  int unused[2] = {};
+};
+static_assert(sizeof(SolveChunk) == 64);
+
+/// Where what two children pass up for a vertex begins, -1 for none.
+struct alignas(8) Gather {
+  int first = -1, second = -1;
+};
+
+}  // namespace flash::sim::cuda
