@@ -12,13 +12,13 @@ static_assert((team_threads & (team_threads - 1)) == 0);
 
 /// Teams that a processor of the device has registers for, at least: dense fronts and triangles need many,
 /// the rest of a linear problem needs many threads.
-inline constexpr int dense_teams = 2, hessian_teams = 3, sparse_teams = 4;
+inline constexpr int dense_teams = 2, hessian_teams = 3, sparse_teams = 3;
 
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;
 
-/// Rows of a front that a warp takes together in a forward solve, and columns in a backward one.
-inline constexpr int forward_rows = 16, backward_columns = 8;
+/// Rows of a front are padded to so many.
+inline constexpr int row_padding = 16;
 
 /// Vertices eliminated together and those below them, as a dense matrix of three rows and columns a vertex:
 /// its own rows, up to `below_at` with zeros, then those below, up to `leading` with zeros.

@@ -20,7 +20,7 @@ struct Node {
 
 int below_at(const Node& node) { return rounded_up(3 * node.column_count, 4); }
 int leading(const Node& node) {
-  return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), forward_rows);
+  return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), row_padding);
 }
 int factor_size(const Node& node) { return 3 * node.column_count * leading(node); }
 int below(const Node& node) { return 3 * static_cast<int>(node.rows.size()); }

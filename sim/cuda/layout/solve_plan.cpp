@@ -15,14 +15,14 @@ int number(long value) {
   return static_cast<int>(value);
 }
 
-/// One row of chunks of a front.
-Task forward_task(const FrontPlan& plan, const FrontLayout& front, int first_gather, int row) {
+/// Chunks of a front side by side, `rows` each.
+Task forward_task(const FrontPlan& plan, const FrontLayout& front, int first_gather, int row, int rows) {
   const int columns = 3 * front.column_count;
   // Above the diagonal there are zeros.
-  const int end = row + forward_rows > front.below_at ? columns : std::min(columns, row + forward_rows);
+  const int end = row + rows > front.below_at ? columns : std::min(columns, row + rows);
   SolveChunk chunk;
   chunk.leading = front.leading;
-  chunk.rows = forward_rows;
+  chunk.rows = std::min(rows, front.leading - row);
   chunk.row_table_at = first_gather + front.column_count + std::max(0, row - front.below_at) / 3;
   chunk.first_row = row;
   chunk.own_columns = columns;
@@ -42,11 +42,11 @@ Task forward_task(const FrontPlan& plan, const FrontLayout& front, int first_gat
   return task;
 }
 
-/// A few columns of a front.
-Task backward_task(const FrontPlan& plan, const FrontLayout& front, int column) {
+/// Chunks of a front one below the other, `columns` each.
+Task backward_task(const FrontPlan& plan, const FrontLayout& front, int column, int columns) {
   SolveChunk chunk;
   chunk.leading = front.leading;
-  chunk.columns = std::min(backward_columns, 3 * front.column_count - column);
+  chunk.columns = std::min(columns, 3 * front.column_count - column);
   chunk.right_at = 3 * (plan.size + front.first_column) + column;
   Task task;
   // Above the diagonal there are zeros.
@@ -59,6 +59,17 @@ Task backward_task(const FrontPlan& plan, const FrontLayout& front, int column) 
     task.push_back(chunk);
   }
   return task;
+}
+
+/// Tasks as large as leaves some for each warp.
+template <typename Cut>
+std::vector<Task> enough_tasks(const std::array<int, 3>& sizes, const Cut& cut) {
+  std::vector<Task> tasks;
+  for (const int size : sizes) {
+    tasks = cut(size);
+    if (tasks.size() >= 2 * team_warps) break;
+  }
+  return tasks;
 }
 
 using Warps = std::array<std::vector<SolveChunk>, team_warps>;
@@ -102,22 +113,29 @@ SolvePlan plan_solve(const FrontPlan& plan) {
     }
   }
   // Copies go by whole chunks, beyond the last one.
-  solve.gathers.resize(solve.gathers.size() + 2 * forward_rows);
+  solve.gathers.resize(solve.gathers.size() + column_gathers + row_gathers);
   Warps warps;
   for (const FrontLevel& level : plan.levels) {
-    std::vector<Task> tasks;
-    for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
-      for (int row = 0; row < plan.fronts[f].leading; row += forward_rows)
-        tasks.push_back(forward_task(plan, plan.fronts[f], first_gather[f], row));
-    share_out(std::move(tasks), 0, warps);
+    const std::vector<Task> tasks = enough_tasks({chunk_rows, chunk_rows / 2, chunk_rows / 4}, [&](int rows) {
+      std::vector<Task> cut;
+      for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
+        for (int row = 0; row < plan.fronts[f].leading; row += rows)
+          cut.push_back(forward_task(plan, plan.fronts[f], first_gather[f], row, rows));
+      return cut;
+    });
+    share_out(tasks, 0, warps);
   }
   for (std::size_t l = plan.levels.size(); l-- > 0;) {
     const FrontLevel& level = plan.levels[l];
-    std::vector<Task> tasks;
-    for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
-      for (int column = 0; column < 3 * plan.fronts[f].column_count; column += backward_columns)
-        tasks.push_back(backward_task(plan, plan.fronts[f], column));
-    share_out(std::move(tasks), SolveChunk::backward, warps);
+    const std::vector<Task> tasks =
+        enough_tasks({chunk_columns, 2 * chunk_columns / 3, chunk_columns / 3}, [&](int columns) {
+          std::vector<Task> cut;
+          for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
+            for (int column = 0; column < 3 * plan.fronts[f].column_count; column += columns)
+              cut.push_back(backward_task(plan, plan.fronts[f], column, columns));
+          return cut;
+        });
+    share_out(tasks, SolveChunk::backward, warps);
   }
   for (const auto& chunks : warps) {
     solve.starts.push_back(static_cast<int>(solve.chunks.size()));
