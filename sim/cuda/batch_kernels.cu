@@ -29,6 +29,7 @@ __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
   return {batch.residuals + size * team,
           batch.images + size * team,
           batch.searches + batch.sheet.size * team,
+          batch.searches + batch.sheet.size * team,
           {batch.forward + 2 * size * team, batch.passed + batch.fronts.vector_size * team}};
 }
 

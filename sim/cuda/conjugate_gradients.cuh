@@ -24,6 +24,7 @@ struct LinearProblem {
 struct LinearVectors {
   float *residual, *image;
   Four<float>* search;  ///< four
+  Four<float>* near;    ///< four: a copy of `search` for products on chip, free during a solve; or `search`
   SolveVectors solve;
 };
 
@@ -69,8 +70,16 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
       direction[3 * restriction.place + c] = search[4 * restriction.place + c] = restriction.correction[c];
     }
   }
+  // The copy is of the thread's own numbers.
+  const auto copy_search = [&] {
+    if (v.near == v.search) return;
+    for (int i = first; i < size; i += team_threads)
+      reinterpret_cast<float*>(v.near)[slot(i)] = search[slot(i)];
+  };
   if (sum_over_team(static_cast<float>(moved), partial) > 0) {
-    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.search, v.image);
+    copy_search();
+    __syncthreads();
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
     for (int i = first; i < size; i += team_threads) {
       v.residual[i] -= v.image[i];
       change[i] += v.image[i];
@@ -94,8 +103,9 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     previous = along;
     for (int i = first; i < size; i += team_threads)
       search[slot(i)] = preconditioned[i] + (iteration == 1 ? 0 : kept * search[slot(i)]);
+    copy_search();
     __syncthreads();
-    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.search, v.image);
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
     product = 0;
     for (int i = first; i < size; i += team_threads) product += search[slot(i)] * v.image[i];
     const float curvature = sum_over_team(product, partial);

@@ -25,10 +25,10 @@ __host__ __device__ constexpr int slot_bytes() {
          static_cast<int>(sizeof(SolveChunk));
 }
 
-/// On-chip bytes that a solve needs.
+/// On-chip bytes that a solve needs: slots, and right-hand sides of each warp's chunk.
 template <typename Stored>
 __host__ __device__ constexpr int solve_memory() {
-  return team_warps * solve_depth * slot_bytes<Stored>();
+  return team_warps * (solve_depth * slot_bytes<Stored>() + chunk_columns * static_cast<int>(sizeof(float)));
 }
 
 /// Three numbers a vertex of one environment: what a solve works on, in any memory.
@@ -94,14 +94,15 @@ class ChunkStream {
 #pragma unroll
         for (int k = 0; k < 4; ++k)
           reinterpret_cast<int4*>(slot + described_at)[k] = reinterpret_cast<const int4*>(&c)[k];
+      // Absent rows and columns become zeros.
       constexpr int copies = chunk_rows / together, side_by_side = 32 / copies;
       const int part = lane() % copies * together, first = lane() / copies;
       Stored* to = reinterpret_cast<Stored*>(slot) + first * chunk_rows + part;
       const Stored* from = factor_ + c.panel_at + first * c.leading + part;
 #pragma unroll
       for (int k = 0; k < chunk_columns; k += side_by_side)
-        if (first + k < c.columns && part < c.rows)
-          __pipeline_memcpy_async(to + k * chunk_rows, from + static_cast<long>(k) * c.leading, 16);
+        __pipeline_memcpy_async(to + k * chunk_rows, from + static_cast<long>(k) * c.leading, 16,
+                                first + k < c.columns && part < c.rows ? 0 : 16);
       if (c.flags & SolveChunk::backward) {
         if (4 * lane() < c.rows)
           __pipeline_memcpy_async(slot + table_at + 16 * lane(), tables_.entries + c.table_at + 4 * lane(), 16);
@@ -131,27 +132,32 @@ __device__ inline float passed_up(const Gather& gather, int coordinate, const fl
 inline constexpr int half_columns = chunk_columns / 2;
 static_assert(chunk_rows == 16 * 4 && chunk_columns <= 32);
 
-/// `sum`: of the chunks of the task so far, of the lane's four rows.
+/// `sum`: of the chunks of the task so far, of the lane's four rows. `right`: room for chunk_columns numbers.
 template <typename Stored>
-__device__ void run_forward(const char* slot, const SolveChunk& c, const SolveVectors& v, float4& sum) {
+__device__ void run_forward(const char* slot, const SolveChunk& c, const SolveVectors& v, float* right,
+                            float4& sum) {
   constexpr unsigned all = 0xffffffffu;
   const Gather* gathers = ChunkStream<Stored>::template table<Gather>(slot);
   const int row = 4 * (lane() % 16), half = lane() / 16;
-  float own = 0;
-  if (lane() < c.columns)
-    own = v.forward[c.right_at + lane()] + passed_up(gathers[lane() / 3], lane() % 3, v.passed);
+  if (lane() < chunk_columns)
+    right[lane()] = lane() < c.columns ? v.forward[c.right_at + lane()] +
+                                             passed_up(gathers[lane() / 3], lane() % 3, v.passed)
+                                       : 0;
+  __syncwarp();
   if (c.flags & SolveChunk::begins) sum = {0, 0, 0, 0};
   const Stored* numbers = ChunkStream<Stored>::numbers(slot) + half * half_columns * chunk_rows + row;
 #pragma unroll
-  for (int k = 0; k < half_columns; ++k) {
-    const int column = half * half_columns + k;
-    const float x = __shfl_sync(all, own, column);
-    if (column >= c.columns) continue;
-    const float4 w = load_four(numbers + k * chunk_rows);
-    sum.x += w.x * x;
-    sum.y += w.y * x;
-    sum.z += w.z * x;
-    sum.w += w.w * x;
+  for (int first = 0; first < half_columns; first += 4) {
+    const float4 four = load_four(right + half * half_columns + first);
+    const float x[4] = {four.x, four.y, four.z, four.w};
+#pragma unroll
+    for (int k = 0; k < 4; ++k) {
+      const float4 w = load_four(numbers + (first + k) * chunk_rows);
+      sum.x += w.x * x[k];
+      sum.y += w.y * x[k];
+      sum.z += w.z * x[k];
+      sum.w += w.w * x[k];
+    }
   }
   if (!(c.flags & SolveChunk::ends)) return;
   // Of its four rows each half keeps two.
@@ -188,7 +194,6 @@ __device__ void run_backward(const char* slot, const SolveChunk& c, const SolveV
     const Stored* numbers = ChunkStream<Stored>::numbers(slot) + half * half_columns * chunk_rows + row;
 #pragma unroll
     for (int k = 0; k < half_columns; ++k) {
-      if (half * half_columns + k >= c.columns) continue;
       const float4 w = load_four(numbers + k * chunk_rows);
       sums[k] += (w.x * x.x + w.y * x.y) + (w.z * x.z + w.w * x.w);
     }
@@ -219,13 +224,15 @@ __device__ void run_backward(const char* slot, const SolveChunk& c, const SolveV
 template <typename Stored>
 __device__ void solve(const FrontTables& tables, const Stored* factor, const SolveVectors& v, char* chip) {
   ChunkStream<Stored> stream(tables, factor, chip);
+  float* right = reinterpret_cast<float*>(chip + team_warps * solve_depth * slot_bytes<Stored>()) +
+                 warp() * chunk_columns;
   float4 sum = {0, 0, 0, 0};
   for (int l = 0; l < tables.level_count; ++l) {
     __syncthreads();
     for (bool more = true; more;) {
       const char* slot = stream.take();
       const SolveChunk chunk = ChunkStream<Stored>::chunk(slot);
-      if (chunk.columns > 0) run_forward<Stored>(slot, chunk, v, sum);
+      if (chunk.columns > 0) run_forward<Stored>(slot, chunk, v, right, sum);
       more = !(chunk.flags & SolveChunk::ends_level);
     }
   }

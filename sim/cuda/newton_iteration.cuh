@@ -107,6 +107,7 @@ __device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) 
   };
   const LinearVectors vectors = {m.residual,
                                  m.image,
+                                 m.search,
                                  on_chip(w.replay.search_at, m.search),
                                  {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
   const int solves =

@@ -119,7 +119,9 @@ void place_on_chip(FactorPrecision precision, ReplayNumbers& numbers) {
   constexpr long number = sizeof(float);
   numbers.forward_at = place(6 * number * fronts.size);
   numbers.passed_at = place(number * fronts.vector_size);
-  numbers.search_at = place(4 * number * fronts.size);
+  // Where a solve has its chunks.
+  const bool fits = 4 * number * fronts.size <= linear_bytes_of(precision) - linear_partial_bytes;
+  numbers.search_at = fits ? linear_partial_bytes : -1;
 }
 
 int resident_replay_teams(FactorPrecision precision, const FrontTables& fronts) {

@@ -72,7 +72,7 @@ struct ReplayNumbers {
   const TeamMemory* teams;
   WorkQueue queue;
   int places_on_chip;  ///< whether there is room
-  int forward_at, passed_at, search_at;  ///< these vectors of the linear problem on chip; -1: there is no room
+  int forward_at, passed_at, search_at;  ///< these vectors of the linear problem on chip, -1 without room
 
   // Settings.
   double time_step, tolerance;
