@@ -38,7 +38,7 @@ __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
   for (int e = static_cast<int>(blockIdx.x); e < (batch).environment_count; e += static_cast<int>(gridDim.x))
 
 template <bool places_on_chip>
-__global__ void __launch_bounds__(team_threads, dense_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     evaluate_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int triangles = batch.sheet.triangle_count;
   FOR_OWN_ENVIRONMENTS(batch, e) {
@@ -52,7 +52,7 @@ __global__ void __launch_bounds__(team_threads, dense_teams)
 }
 
 template <bool Preconditioner>
-__global__ void __launch_bounds__(team_threads, hessian_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
   float* chip = shared_memory<float>();
   float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
@@ -70,7 +70,7 @@ __global__ void __launch_bounds__(team_threads, hessian_teams)
 }
 
 template <typename Stored>
-__global__ void __launch_bounds__(team_threads, dense_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     factorize_kernel(const __grid_constant__ BatchNumbers batch, float) {
   FOR_OWN_ENVIRONMENTS(batch, e) {
     if (threadIdx.x == 0) batch.positive[e] = 1;
@@ -82,7 +82,7 @@ __global__ void __launch_bounds__(team_threads, dense_teams)
 }
 
 template <typename Stored>
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     solve_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int size = 3 * batch.sheet.size;
   FOR_OWN_ENVIRONMENTS(batch, e) {
@@ -96,7 +96,7 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
   }
 }
 
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     multiply_kernel(const __grid_constant__ BatchNumbers batch, float) {
   FOR_OWN_ENVIRONMENTS(batch, e) {
     Four<float>* x = linear_vectors(batch).search;
@@ -112,7 +112,7 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
 }
 
 template <typename Stored>
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     find_directions_kernel(const __grid_constant__ BatchNumbers batch, float tolerance) {
   float* chip = shared_memory<float>();
   FOR_OWN_ENVIRONMENTS(batch, e) {
@@ -124,10 +124,9 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
         vector_of(batch, e),
         {batch.restrictions + static_cast<long>(batch.restrictions_each) * e, batch.restriction_counts[e]},
         tolerance};
-    const int solves =
-        conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
-                            batch.changes + 3L * batch.sheet.size * e, chip,
-                            reinterpret_cast<char*>(chip + team_warps));
+    const int solves = conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch),
+                                           result_of(batch, e), batch.changes + 3L * batch.sheet.size * e,
+                                           chip, reinterpret_cast<char*>(chip + team_warps));
     if (threadIdx.x == 0) batch.solves[e] = solves;
   }
 }
@@ -141,14 +140,14 @@ struct Choice {
 /// Places on chip where all teams find room.
 Choice evaluation(int size) {
   const int near = gradient_memory(size, true);
-  return dense_teams * (near + 1024) <= most_memory()
+  return resident_teams_each * (near + 1024) <= most_memory()
              ? Choice{evaluate_kernel<true>, near}
              : Choice{evaluate_kernel<false>, gradient_memory(size, false)};
 }
 
 template <typename Stored>
 Choice choice(BatchKernel kernel, const FrontTables& fronts) {
-  const int number = sizeof(float), solve_bytes = solve_memory<Stored>();
+  const int number = sizeof(float), solve_bytes = solve_memory<Stored>(fronts.solve_depth);
   switch (kernel) {
     case BatchKernel::evaluate:
       return evaluation(fronts.size);

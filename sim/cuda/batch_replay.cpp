@@ -39,7 +39,7 @@ void check(const SheetPlan& plan, const std::vector<ReplayEnvironment>& environm
   require(settings.first_step >= 0 && settings.steps >= settings.first_step,
           "the steps have to ascend from first_step to steps");
   require(settings.restart_interval > 0, "restart_interval has to be positive");
-  require(settings.solver.halvings >= 0 && settings.solver.halvings <= most_halvings,
+  require(settings.halvings >= 0 && settings.halvings <= most_halvings,
           "halvings have to lie between 0 and 16");
   const std::vector<int>& kept = settings.kept_steps;
   require(std::adjacent_find(kept.begin(), kept.end(), std::greater_equal<>()) == kept.end(),
@@ -174,7 +174,7 @@ struct BatchReplay::Memory {
       : settings(std::move(replay_settings)),
         count(static_cast<int>(environments.size())),
         step(settings.first_step),
-        front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting_fronts())),
+        front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting_fronts(settings.fronts))),
         layout(lay_out(sheet, common_bending(sheet, environments), front_plan)),
         plan(front_plan, layout) {
     upload_state(environments);
@@ -182,26 +182,24 @@ struct BatchReplay::Memory {
     const int all_steps = settings.steps - settings.first_step;
     stats = DeviceArray<ReplayStats>(static_cast<std::size_t>(all_steps) * environments.size());
     upload_kept_steps();
-    const bool damped = std::any_of(environments.begin(), environments.end(), [](const auto& e) {
-      return e.material.stiffness_damping != 0;
-    });
+    const bool damped = std::any_of(environments.begin(), environments.end(),
+                                    [](const auto& e) { return e.material.stiffness_damping != 0; });
     lay_out_teams({front_plan, layout, settings.precision, damped, most_held});
     const int parts = all_steps / settings.restart_interval + 2;
     entries = DeviceArray<int>(static_cast<std::size_t>(count) * static_cast<std::size_t>(parts));
     counters = DeviceArray<int>(2);
     steps = DeviceArray<int>(environments.size());
 
-    const SolverSettings& solver = settings.solver;
     numbers.fronts = plan.fronts;
     numbers.sheet = plan.sheet;
     numbers.teams = team_memory.data();
     numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), 0};
     place_on_chip(settings.precision, numbers);
-    numbers.time_step = solver.time_step;
-    numbers.tolerance = solver.tolerance;
-    numbers.max_iterations = solver.max_iterations;
-    numbers.stale_factor_solves = solver.stale_factor_solves;
-    numbers.halvings = solver.halvings;
+    numbers.time_step = settings.time_step;
+    numbers.tolerance = settings.tolerance;
+    numbers.max_iterations = settings.max_iterations;
+    numbers.stale_factor_solves = settings.stale_factor_solves;
+    numbers.halvings = settings.halvings;
     numbers.restart_interval = settings.restart_interval;
     numbers.stats_begin = settings.first_step;
     numbers.stats_each = all_steps;
@@ -349,8 +347,8 @@ Points BatchReplay::velocities(int environment) const {
 Points BatchReplay::kept_positions(int environment, int index) const {
   const Memory& m = *memory_;
   cuda::check(cudaStreamSynchronize(m.stream));
-  const std::size_t place = static_cast<std::size_t>(environment) * m.settings.kept_steps.size() +
-                            static_cast<std::size_t>(index);
+  const std::size_t place =
+      static_cast<std::size_t>(environment) * m.settings.kept_steps.size() + static_cast<std::size_t>(index);
   const std::vector<double> numbers = m.kept.read(place * 3 * m.size(), 3 * m.size());
   return Eigen::Map<const Points>(numbers.data(), m.layout.size, 3);
 }

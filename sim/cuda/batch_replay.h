@@ -7,7 +7,7 @@
 #include "data/material.h"
 #include "data/mesh.h"
 #include "sim/cuda/environment_numbers.h"
-#include "sim/newton/solver_settings.h"
+#include "sim/cuda/layout/front_plan.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 
@@ -33,12 +33,20 @@ struct ReplayEnvironment {
 };
 
 struct ReplaySettings {
-  SolverSettings solver{.stale_factor_solves = 0};  ///< all but exit_speed and stop; a fresh factor is cheap
-  int first_step = 0;              ///< at which the environments stand
-  int steps = 0;                   ///< the last one
-  std::vector<int> kept_steps{};   ///< whose positions are kept, ascending; step 0 is the start
-  int restart_interval = 10;       ///< steps after which a solver forgets its factor and may change its team
+  // As in SolverSettings.
+  double time_step = 0.01;  ///< h [s]
+  int max_iterations = 60;  ///< Newton iterations a step
+  double tolerance = 1e-3;  ///< on the relative residual |r| / |M g|
+  int stale_factor_solves =
+      2;             ///< solves by an old factor, beyond which it is renewed: cheaper than on the CPU
+  int halvings = 8;  ///< a step that cannot be solved is repeated in two halves, so often
+
+  int first_step = 0;             ///< at which the environments stand
+  int steps = 0;                  ///< the last one
+  std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; step 0 is the start
+  int restart_interval = 10;      ///< steps after which a solver forgets its factor and may change its team
   FactorPrecision precision = FactorPrecision::half;
+  FrontSettings fronts{};
 };
 
 /// How one step of one environment went, as in StepReport.

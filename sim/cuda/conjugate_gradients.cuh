@@ -54,9 +54,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   float* search = reinterpret_cast<float*>(v.search);
   float* preconditioned = v.solve.forward + size;
   const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
-  const auto restricted = [&](float* x) {
-    restrict_to_free(problem.restrictions, x);
-  };
+  const auto restricted = [&](float* x) { restrict_to_free(problem.restrictions, x); };
   for (int i = first; i < size; i += team_threads) {
     v.residual[i] = -problem.gradient[i];
     direction[i] = change[i] = search[slot(i)] = 0;

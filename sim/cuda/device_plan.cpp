@@ -7,7 +7,7 @@
 namespace flash::sim::cuda {
 
 FrontSettings fitting_fronts(FrontSettings settings) {
-  constexpr int rest = 8192 + 64;  // numbers
+  constexpr int tile = 1024, rest = team_warps * tile + 64;  // numbers
   settings.panel_capacity =
       std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
   return settings;
@@ -25,6 +25,8 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
   fronts.vector_size = plan.vector_size;
+  constexpr int room_for_two = 128 * 1024;  // chunks in half precision, with their tables
+  fronts.solve_depth = most_memory() >= room_for_two ? 2 : 1;
   fronts.factor_size = plan.factor_size;
   fronts.update_size = plan.update_size;
   fronts.fronts = upload(plan.fronts, fronts_);

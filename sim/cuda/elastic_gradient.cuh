@@ -99,8 +99,7 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
   });
   const double membrane = triangle_gradients(tables, environment, place, shares.triangles);
   ElasticEnergies rest = {};
-  if (tables.hinge_count > 0)
-    rest = hinge_gradients(tables, environment, start.angles, place, shares.hinges);
+  if (tables.hinge_count > 0) rest = hinge_gradients(tables, environment, start.angles, place, shares.hinges);
   if (start.metrics != nullptr)
     rest.damping += add_damping_gradients(tables, environment, start.metrics, place, shares.triangles);
   __syncthreads();

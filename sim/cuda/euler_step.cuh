@@ -63,7 +63,17 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
   constexpr double energy_tolerance = 1e-2;
   const SheetTables& tables = w.replay.sheet;
   const ReplayMaterial& material = *step.material;
-  enum { kinetic, kinetic_at_start, falls, unbalanced, work, moved_holds, inertial_at_start, mass_sum, count };
+  enum {
+    kinetic,
+    kinetic_at_start,
+    falls,
+    unbalanced,
+    work,
+    moved_holds,
+    inertial_at_start,
+    mass_sum,
+    count
+  };
   double sums[count] = {};
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     const double mass = step.mass(tables, i);
@@ -86,7 +96,8 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
                stored_at_end = w.now.elastic.membrane + w.now.elastic.bending;
   const double gain = per_step * sums[kinetic] - sums[kinetic_at_start] + stored_at_end - stored_at_start -
                       sums[falls] - sums[work];
-  const double there = sums[kinetic_at_start] + stored_at_start + fmax(0.0, sums[falls]) + fmax(0.0, sums[work]);
+  const double there =
+      sums[kinetic_at_start] + stored_at_start + fmax(0.0, sums[falls]) + fmax(0.0, sums[work]);
   const double rounding = 1e-9 * sums[mass_sum] * material.weight_factor +
                           1e-14 * material.membrane_stiffness * sums[mass_sum] / material.areal_density;
   const double allowed = energy_tolerance * there + sums[unbalanced] + rounding;
@@ -125,8 +136,8 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepHolds& holds, dou
   iterate_to_balance<Stored>(w, step, stats);
   const double tolerance = w.replay.tolerance;
   const StepEnd end = judge_end(w, step);
-  const bool solved =
-      end.energy_is_sound && balanced(step, w.now, tolerance > rounding_tolerance ? tolerance : rounding_tolerance);
+  const bool solved = end.energy_is_sound &&
+                      balanced(step, w.now, tolerance > rounding_tolerance ? tolerance : rounding_tolerance);
   if (!solved) w.refactor = true;
   if (!solved && !last_try) return false;
   // A sheet that is not finite stands still instead.
@@ -172,7 +183,8 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepHolds&
     begin += length;
     bool converged = stats.converged;
     // A second half ends its whole.
-    for (; level > 0 && (second >> level & 1); --level) converged = converged && (first_converged >> level & 1);
+    for (; level > 0 && (second >> level & 1); --level)
+      converged = converged && (first_converged >> level & 1);
     if (level == 0) {
       stats.converged = converged;
       break;

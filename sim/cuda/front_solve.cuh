@@ -13,9 +13,6 @@ namespace flash::sim::cuda {
 // barrier a level each way; the factor is read twice. It comes from memory by chunks, the next of each
 // warp on its way to the chip while it works on one.
 
-/// Chunks of a warp that are on their way or worked on.
-inline constexpr int solve_depth = 2;
-
 /// A chunk on chip: numbers, what SolveChunk::table_at says, and the chunk itself [bytes].
 inline constexpr int chunk_table_bytes = 4 * chunk_rows;
 static_assert(static_cast<int>(sizeof(Gather)) * (column_gathers + row_gathers) <= chunk_table_bytes);
@@ -27,8 +24,8 @@ __host__ __device__ constexpr int slot_bytes() {
 
 /// On-chip bytes that a solve needs: slots, and right-hand sides of each warp's chunk.
 template <typename Stored>
-__host__ __device__ constexpr int solve_memory() {
-  return team_warps * (solve_depth * slot_bytes<Stored>() + chunk_columns * static_cast<int>(sizeof(float)));
+__host__ __device__ constexpr int solve_memory(int depth) {
+  return team_warps * (depth * slot_bytes<Stored>() + chunk_columns * static_cast<int>(sizeof(float)));
 }
 
 /// Three numbers a vertex of one environment: what a solve works on, in any memory.
@@ -52,21 +49,24 @@ class ChunkStream {
   __device__ ChunkStream(const FrontTables& tables, const Stored* factor, char* chip)
       : tables_(tables),
         factor_(factor),
-        slots_(chip + warp() * solve_depth * slot_bytes<Stored>()),
+        slots_(chip + warp() * tables.solve_depth * slot_bytes<Stored>()),
         next_(tables.chunk_starts[warp()]),
         end_(tables.chunk_starts[warp() + 1]) {
     if (next_ < end_) described_ = load_chunk(tables_.chunks + next_);
-    for (int k = 0; k + 1 < solve_depth; ++k) send();
+    if (tables.solve_depth > 1) send();
   }
 
   /// The next chunk, on chip until the next call.
   __device__ const char* take() {
     __syncwarp();
     send();
-    __pipeline_wait_prior(solve_depth - 1);
+    if (tables_.solve_depth > 1)
+      __pipeline_wait_prior(1);
+    else
+      __pipeline_wait_prior(0);
     __syncwarp();
     const char* slot = slots_ + taken_ * slot_bytes<Stored>();
-    taken_ = taken_ + 1 == solve_depth ? 0 : taken_ + 1;
+    taken_ = taken_ + 1 == tables_.solve_depth ? 0 : taken_ + 1;
     return slot;
   }
 
@@ -89,7 +89,7 @@ class ChunkStream {
       const SolveChunk c = described_;
       if (++next_ < end_) described_ = load_chunk(tables_.chunks + next_);
       char* slot = slots_ + sent_ * slot_bytes<Stored>();
-      sent_ = sent_ + 1 == solve_depth ? 0 : sent_ + 1;
+      sent_ = sent_ + 1 == tables_.solve_depth ? 0 : sent_ + 1;
       if (lane() == 0)
 #pragma unroll
         for (int k = 0; k < 4; ++k)
@@ -105,10 +105,13 @@ class ChunkStream {
                                 first + k < c.columns && part < c.rows ? 0 : 16);
       if (c.flags & SolveChunk::backward) {
         if (4 * lane() < c.rows)
-          __pipeline_memcpy_async(slot + table_at + 16 * lane(), tables_.entries + c.table_at + 4 * lane(), 16);
+          __pipeline_memcpy_async(slot + table_at + 16 * lane(), tables_.entries + c.table_at + 4 * lane(),
+                                  16);
       } else if (c.rows > 0 && lane() < column_gathers + row_gathers) {
-        const int at = lane() < column_gathers ? c.table_at + lane() : c.row_table_at + lane() - column_gathers;
-        __pipeline_memcpy_async(slot + table_at + sizeof(Gather) * lane(), tables_.gathers + at, sizeof(Gather));
+        const int at =
+            lane() < column_gathers ? c.table_at + lane() : c.row_table_at + lane() - column_gathers;
+        __pipeline_memcpy_async(slot + table_at + sizeof(Gather) * lane(), tables_.gathers + at,
+                                sizeof(Gather));
       }
     }
     __pipeline_commit();
@@ -199,7 +202,7 @@ __device__ void run_backward(const char* slot, const SolveChunk& c, const SolveV
     }
   }
   if (!(c.flags & SolveChunk::ends)) return;
-  // Halves of the sixteen lanes take halves of the columns: six, three, then two or one; the rest adds up.
+    // Halves of the sixteen lanes take halves of the columns: six, three, then two or one; the rest adds up.
 #pragma unroll
   for (int kept = 6, bit = 8; kept >= 3; kept /= 2, bit /= 2) {
     const bool upper = lane() & bit;
@@ -210,7 +213,8 @@ __device__ void run_backward(const char* slot, const SolveChunk& c, const SolveV
     }
   }
   const bool last = lane() & 2;
-  const float first = __shfl_xor_sync(all, last ? sums[0] : sums[2], 2), second = __shfl_xor_sync(all, sums[1], 2);
+  const float first = __shfl_xor_sync(all, last ? sums[0] : sums[2], 2),
+              second = __shfl_xor_sync(all, sums[1], 2);
   float a = (last ? sums[2] : sums[0]) + first, b = sums[1] + second;
   a += __shfl_xor_sync(all, a, 1);
   b += __shfl_xor_sync(all, b, 1);
@@ -224,7 +228,7 @@ __device__ void run_backward(const char* slot, const SolveChunk& c, const SolveV
 template <typename Stored>
 __device__ void solve(const FrontTables& tables, const Stored* factor, const SolveVectors& v, char* chip) {
   ChunkStream<Stored> stream(tables, factor, chip);
-  float* right = reinterpret_cast<float*>(chip + team_warps * solve_depth * slot_bytes<Stored>()) +
+  float* right = reinterpret_cast<float*>(chip + team_warps * tables.solve_depth * slot_bytes<Stored>()) +
                  warp() * chunk_columns;
   float4 sum = {0, 0, 0, 0};
   for (int l = 0; l < tables.level_count; ++l) {

@@ -10,8 +10,8 @@ namespace flash::sim::cuda {
 /// One step of an environment as a problem.
 struct StepProblem {
   const ReplayMaterial* material;
-  double h;                     ///< [s]
-  EnvironmentNumbers numbers;   ///< of this h
+  double h;                                 ///< [s]
+  EnvironmentNumbers numbers;               ///< of this h
   const Point *start, *velocities, *loads;  ///< `loads` null without
   Restrictions restrictions;
   StepStart damped_since;
@@ -33,7 +33,8 @@ struct StepProblem {
     const int k = restrictions.of_place[i];
     if (k < 0) return force;
     const float* p = restrictions.list[k].free;
-    return {p[0] * force.x + p[3] * force.y + p[6] * force.z, p[1] * force.x + p[4] * force.y + p[7] * force.z,
+    return {p[0] * force.x + p[3] * force.y + p[6] * force.z,
+            p[1] * force.x + p[4] * force.y + p[7] * force.z,
             p[2] * force.x + p[5] * force.y + p[8] * force.z};
   }
 };
@@ -43,9 +44,9 @@ struct Iterate {
   Point* positions;
   double* force;
   ElasticEnergies elastic;
-  double potential;       ///< [J]
-  double residual;        ///< norm [N]
-  double worst;           ///< largest residual of a vertex, as a share of its weight
+  double potential;  ///< [J]
+  double residual;   ///< norm [N]
+  double worst;      ///< largest residual of a vertex, as a share of its weight
 };
 
 __device__ inline Triple force_at(const double* force, int i) {
@@ -87,8 +88,7 @@ __device__ inline double add_turned_damping(const SheetTables& tables, const Ste
   for (int k = 0; k < 9; ++k) moments[k / 3][k % 3] = sums[k];
   const RigidTurn turn = rigid_turn(moments);
   for (int i = first; i < tables.size; i += team_threads) {
-    const Triple bent =
-        triple(positions[i]) - to_centre - turn.turn(triple(step.start[i]) - from_centre);
+    const Triple bent = triple(positions[i]) - to_centre - turn.turn(triple(step.start[i]) - from_centre);
     memory.bent[i] = {bent.x, bent.y, bent.z, 0};
   }
   __syncthreads();
@@ -139,7 +139,8 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
     const Triple moved = triple(positions[i]) - triple(step.start[i]), inertial = step.inertial(i, moved),
                  load = step.load(i);
     const Triple own = force_at(force, i) + mass * (per_step * inertial + drag * moved) - load;
-    potential += 0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
+    potential +=
+        0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
     force[3 * i] = own.x;
     force[3 * i + 1] = own.y;
     force[3 * i + 2] = own.z;

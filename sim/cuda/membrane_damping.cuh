@@ -75,7 +75,8 @@ __device__ double add_damping_gradients(const SheetTables& tables, const Environ
   double potential = 0;
   for (int t = static_cast<int>(threadIdx.x); t < count; t += team_threads) {
     const TriangleGradient g = triangle_gradient(tables, t, place);
-    const Metric strain = strain_since(tables, t, g, metrics), stress = stress_of(environment.damping, strain);
+    const Metric strain = strain_since(tables, t, g, metrics),
+                 stress = stress_of(environment.damping, strain);
     potential += 0.5 * g.area * (stress.xx * strain.xx + 2 * stress.xy * strain.xy + stress.yy * strain.yy);
     const Triple p1 = g.area * (stress.xx * g.f1 + stress.xy * g.f2),
                  p2 = g.area * (stress.xy * g.f1 + stress.yy * g.f2);
@@ -123,16 +124,15 @@ __device__ void add_damping_shares(const SheetTables& tables, const EnvironmentN
 #pragma unroll
         for (int c = 0; c < 2; ++c)
           m[r][c] = (r == c ? along : 0) + lame.mu * wj[r] * wi[c] + lame.lambda * wi[r] * wj[c];
-      const double turned = wj[0] * (stress.xx * wi[0] + stress.xy * wi[1]) +
-                            wj[1] * (stress.xy * wi[0] + stress.yy * wi[1]);
+      const double turned =
+          wj[0] * (stress.xx * wi[0] + stress.xy * wi[1]) + wj[1] * (stress.xy * wi[0] + stress.yy * wi[1]);
       float* to = shares + static_cast<long>(block_step) * (3 * t + b);
 #pragma unroll
       for (int c = 0; c < 3; ++c) {
         const double on1 = m[0][0] * f1[c] + m[0][1] * f2[c], on2 = m[1][0] * f1[c] + m[1][1] * f2[c];
 #pragma unroll
         for (int r = 0; r < 3; ++r)
-          to[3 * c + r] +=
-              static_cast<float>(g.area * (f1[r] * on1 + f2[r] * on2 + (r == c ? turned : 0)));
+          to[3 * c + r] += static_cast<float>(g.area * (f1[r] * on1 + f2[r] * on2 + (r == c ? turned : 0)));
       }
     }
   }

@@ -39,10 +39,9 @@ __device__ inline void write_parts(const Work& w, const StepProblem& step, bool 
   write_shares(tables, step.numbers, step.damped_since, w.now.positions, positive, w.memory.shares,
                shared_memory<float>());
   if (tables.hinge_count > 0)
-    write_hinge_matrix(
-        tables, step.numbers.effective_rigidity(),
-        [&](int vertex) { return triple(w.now.positions[vertex]); },
-        {w.memory.hinge_matrix, w.memory.hinge_products});
+    write_hinge_matrix(tables, step.numbers.effective_rigidity(),
+                       [&](int vertex) { return triple(w.now.positions[vertex]); },
+                       {w.memory.hinge_matrix, w.memory.hinge_products});
   __syncthreads();
 }
 
@@ -105,14 +104,14 @@ __device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) 
   const auto on_chip = [&](int at, auto* otherwise) {
     return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
   };
-  const LinearVectors vectors = {m.residual,
-                                 m.image,
-                                 m.search,
-                                 on_chip(w.replay.search_at, m.search),
-                                 {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
-  const int solves =
-      conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction, m.change,
-                          reinterpret_cast<float*>(chip), chip + linear_partial_bytes);
+  const LinearVectors vectors = {
+      m.residual,
+      m.image,
+      m.search,
+      on_chip(w.replay.search_at, m.search),
+      {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
+  const int solves = conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction, m.change,
+                                         reinterpret_cast<float*>(chip), chip + linear_partial_bytes);
   count_phase(m, ReplayPhase::directions);
   return solves;
 }
@@ -174,7 +173,9 @@ __device__ inline void lengthen(Work& w, const StepProblem& step, double slope, 
     const double end_slope = slope_at(w, step, w.trial);
     if (end_slope > flat_slope * slope) return;
     const double secant = slope / (slope - end_slope);
-    const double growth = secant < least_growth ? least_growth : secant > greatest_growth ? greatest_growth : secant;
+    const double growth = secant < least_growth      ? least_growth
+                          : secant > greatest_growth ? greatest_growth
+                                                     : secant;
     move(w, step, length * growth, w.longer);
     if (w.longer.potential >= w.trial.potential || !(w.longer.residual < residual_growth * w.now.residual))
       return;
@@ -189,8 +190,8 @@ __device__ void iterate_to_balance(Work& w, const StepProblem& step, ReplayStats
   constexpr int most_forced_moves = 6;
   bool stuck = false;
   int forced_moves = 0;
-  for (int iterations = 0;
-       iterations < w.replay.max_iterations && !balanced(step, w.now, w.replay.tolerance); ++iterations) {
+  for (int iterations = 0; iterations < w.replay.max_iterations && !balanced(step, w.now, w.replay.tolerance);
+       ++iterations) {
     ++stats.iterations;
     if (w.refactor) {
       if (!factorize<Stored>(w, step)) return;

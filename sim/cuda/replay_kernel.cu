@@ -63,7 +63,7 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
 /// A block is a team. It takes an environment through some steps, until the solver forgets what it holds,
 /// and then takes the next that waits. So none waits for another, and all end at nearly the same time.
 template <typename Stored>
-__global__ void __launch_bounds__(team_threads, dense_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     replay_kernel(const __grid_constant__ ReplayNumbers replay) {
   int* next = shared_memory<int>();
   const TeamMemory& memory = replay.teams[blockIdx.x];
@@ -88,19 +88,18 @@ Kernel kernel_of(FactorPrecision precision) {
   return precision == FactorPrecision::half ? replay_kernel<__half> : replay_kernel<float>;
 }
 
-template <typename Stored>
-constexpr int linear_bytes = linear_partial_bytes + solve_memory<Stored>();
-
-int linear_bytes_of(FactorPrecision precision) {
-  return precision == FactorPrecision::half ? linear_bytes<__half> : linear_bytes<float>;
+int linear_bytes_of(FactorPrecision precision, const FrontTables& fronts) {
+  return linear_partial_bytes + (precision == FactorPrecision::half
+                                     ? solve_memory<__half>(fronts.solve_depth)
+                                     : solve_memory<float>(fronts.solve_depth));
 }
 
 /// What a team needs in any case, and as much as leaves room for as many teams as there are registers for.
 int bytes_of(FactorPrecision precision, const FrontTables& fronts) {
-  constexpr int number = sizeof(float), reserved = 1024;
+  constexpr int number = sizeof(float), reserved = 1024;  // by the device, for each team
   return std::max({gradient_memory(fronts.size, false), hessian_memory * number,
-                   number * factor_memory(fronts.shared_panel), linear_bytes_of(precision),
-                   most_memory() / dense_teams - reserved});
+                   number * factor_memory(fronts.shared_panel), linear_bytes_of(precision, fronts),
+                   most_memory() / resident_teams_each - reserved});
 }
 
 }  // namespace
@@ -109,7 +108,7 @@ void place_on_chip(FactorPrecision precision, ReplayNumbers& numbers) {
   const FrontTables& fronts = numbers.fronts;
   const int room = bytes_of(precision, fronts);
   numbers.places_on_chip = gradient_memory(fronts.size, true) <= room;
-  int used = linear_bytes_of(precision);
+  int used = linear_bytes_of(precision, fronts);
   const auto place = [&](long bytes) {
     if (used + bytes > room) return -1;
     const int at = used;
@@ -120,7 +119,7 @@ void place_on_chip(FactorPrecision precision, ReplayNumbers& numbers) {
   numbers.forward_at = place(6 * number * fronts.size);
   numbers.passed_at = place(number * fronts.vector_size);
   // Where a solve has its chunks.
-  const bool fits = 4 * number * fronts.size <= linear_bytes_of(precision) - linear_partial_bytes;
+  const bool fits = 4 * number * fronts.size <= linear_bytes_of(precision, fronts) - linear_partial_bytes;
   numbers.search_at = fits ? linear_partial_bytes : -1;
 }
 

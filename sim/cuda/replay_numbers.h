@@ -13,7 +13,7 @@ struct ReplayMaterial {
   MembraneLaw law;
   SheetLame lame, damping;  ///< `damping` as `lame`, but for the law that has no lambda
   double membrane_stiffness, rigidity, areal_density, air_drag, stiffness_damping;  ///< as in SheetMaterial
-  double gravity[3];     ///< [m/s^2]
+  double gravity[3];                                                                ///< [m/s^2]
   double weight_factor;  ///< |gravity|, 9.81 without [m/s^2]
   double force_scale;    ///< |M g| [N]
   int motion;            ///< of what holds it
@@ -71,17 +71,17 @@ struct ReplayNumbers {
   SheetTables sheet;
   const TeamMemory* teams;
   WorkQueue queue;
-  int places_on_chip;  ///< whether there is room
+  int places_on_chip;                    ///< whether there is room
   int forward_at, passed_at, search_at;  ///< these vectors of the linear problem on chip, -1 without room
 
   // Settings.
   double time_step, tolerance;
   int max_iterations, stale_factor_solves, halvings, restart_interval;
-  int end_step;                ///< of this launch
+  int end_step;                 ///< of this launch
   int stats_begin, stats_each;  ///< the step that comes first in `stats`, and how many an environment has
 
   const ReplayMaterial* materials;
-  const Point* loads;  ///< a force a vertex of each environment [N]; null without
+  const Point* loads;      ///< a force a vertex of each environment [N]; null without
   const int* hold_starts;  ///< of each motion and step, in `holds`
   int motion_steps;        ///< steps of a motion, and one more, in `hold_starts`
   const HeldPlace* holds;

@@ -69,10 +69,10 @@ inline __device__ float add_block_rows(const SheetTables& tables, const float* b
   return product;
 }
 
-/// y = (B + scale S + hinges) x, x four numbers a vertex. The caller has synchronized x; y is of the calling threads'
-/// own rows i, i + team_threads, ... Returns the thread's part of x.y.
+/// y = (B + scale S + hinges) x, x four numbers a vertex. The caller has synchronized x; y is of the calling
+/// threads' own rows i, i + team_threads, ... Returns the thread's part of x.y.
 inline __device__ float multiply(const SheetTables& tables, const float* blocks, float scale,
-                                const HingeMatrix& hinges, const Four<float>* x, float* y) {
+                                 const HingeMatrix& hinges, const Four<float>* x, float* y) {
   if (hinges.gradients != nullptr) multiply_hinges(tables, hinges, x);
   multiply_scalar_rows(
       tables, tables.single_group_values, [&](int vertex) { return x[vertex]; },

@@ -92,10 +92,10 @@ Floor floor_of(const Towel& towel, double iterations, double factorizations, dou
 
 void time_replay(const Towel& towel, int environments, int steps, int stale_factor_solves) {
   ReplaySettings settings;
-  settings.solver.stale_factor_solves = stale_factor_solves;
+  settings.stale_factor_solves = stale_factor_solves;
   settings.steps = steps;
   settings.kept_steps = {steps};
-  BatchReplay replay(towel.plan, lifts(towel, environments, steps, settings.solver.time_step), settings);
+  BatchReplay replay(towel.plan, lifts(towel, environments, steps, settings.time_step), settings);
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   replay.advance(steps);
@@ -135,7 +135,8 @@ int main(int count, char** arguments) {
   }
   const std::vector<int> vertices = numbers_of(count > 1 ? arguments[1] : "1024,2025,4096"),
                          environments = numbers_of(count > 2 ? arguments[2] : "1,64,256,1024");
-  const int steps = count > 3 ? std::stoi(arguments[3]) : 100, stale = count > 4 ? std::stoi(arguments[4]) : 0;
+  const int steps = count > 3 ? std::stoi(arguments[3]) : 100,
+            stale = count > 4 ? std::stoi(arguments[4]) : 2;
   std::printf("%8s %6s %6s %10s %8s %8s %8s %8s %9s %10s %10s %8s %7s %7s\n", "vertices", "envs", "teams",
               "ms a step", "iters", "factors", "solves", "substeps", "conv. %", "us an env.", "floor us",
               "ratio", "of B/s", "of F/s");

@@ -6,13 +6,12 @@ namespace flash::sim::cuda {
 // Plain numbers, laid out on the host and read by kernels as they are.
 
 /// Threads of a team: the block that works on one environment. A power of two.
-inline constexpr int team_threads = 256;
+inline constexpr int team_threads = 512;
 inline constexpr int team_warps = team_threads / 32;
 static_assert((team_threads & (team_threads - 1)) == 0);
 
-/// Teams that a processor of the device has registers for, at least: dense fronts and triangles need many,
-/// the rest of a linear problem needs many threads.
-inline constexpr int dense_teams = 2, hessian_teams = 3, sparse_teams = 3;
+/// Teams that a processor of the device has registers for, at least.
+inline constexpr int resident_teams_each = 1;
 
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;

@@ -32,7 +32,7 @@ struct FrontPlan {
 
 struct FrontSettings {
   int leaf_size = 8;             ///< vertices, at most, of a front without children
-  int panel_capacity = 20600;    ///< numbers of on-chip memory that a team has for panels
+  int panel_capacity = 40000;    ///< numbers of on-chip memory that a team has for panels
   int most_groups = team_warps;  ///< of a team in a factorization
 };
 

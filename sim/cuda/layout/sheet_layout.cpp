@@ -120,8 +120,7 @@ void add_hinges(const SheetPlan& plan, const std::vector<int>& position, SheetLa
     for (int b = 0; b < 6; ++b) {
       const auto [row, column] = blocks[b];
       const BlockSlot slot = plan.hinge_slots[e][b];
-      sources[slot.block].push_back(16 * e +
-                                    (slot.transposed ? 4 * column + row : 4 * row + column));
+      sources[slot.block].push_back(16 * e + (slot.transposed ? 4 * column + row : 4 * row + column));
     }
   }
   flatten(corners, layout.hinge_corner_starts, layout.hinge_corners);

@@ -16,8 +16,8 @@ struct alignas(16) SolveChunk {
   int columns = 0, rows = 0;      ///< 0: nothing to do
   int right_at = 0;               ///< of the right-hand sides of its columns; backward of its results
   int panel_at = 0, leading = 0;  ///< of its first number in the factor; from one column to the next
-  int table_at = 0;               ///< forward in `gathers`, of its first column; backward in FrontPlan::entries
-  int row_table_at = 0;           ///< forward in `gathers`, of its first row below
+  int table_at = 0;      ///< forward in `gathers`, of its first column; backward in FrontPlan::entries
+  int row_table_at = 0;  ///< forward in `gathers`, of its first row below
   int first_row = 0, own_columns = 0, below_at = 0, below_count = 0;  ///< of the front, forward
   int y_at = 0, passed_at = 0;                                        ///< where results go, forward
   int unused[2] = {};

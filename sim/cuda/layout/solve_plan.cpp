@@ -32,7 +32,8 @@ Task forward_task(const FrontPlan& plan, const FrontLayout& front, int first_gat
   chunk.passed_at = front.vector_at;
   Task task;
   for (int column = 0; column < end; column += chunk_columns) {
-    chunk.flags = (column == 0 ? SolveChunk::begins : 0) | (column + chunk_columns >= end ? SolveChunk::ends : 0);
+    chunk.flags =
+        (column == 0 ? SolveChunk::begins : 0) | (column + chunk_columns >= end ? SolveChunk::ends : 0);
     chunk.columns = std::min(chunk_columns, end - column);
     chunk.panel_at = number(front.panel_at + static_cast<long>(column) * front.leading + row);
     chunk.right_at = 3 * (plan.size + front.first_column) + column;
@@ -76,7 +77,8 @@ using Warps = std::array<std::vector<SolveChunk>, team_warps>;
 
 /// Gives the tasks of a level to the warps, the longest first and each to the one with the least to do.
 void share_out(std::vector<Task> tasks, int flags, Warps& warps) {
-  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) { return a.size() > b.size(); });
+  std::stable_sort(tasks.begin(), tasks.end(),
+                   [](const Task& a, const Task& b) { return a.size() > b.size(); });
   std::array<std::size_t, team_warps> before{};
   for (int w = 0; w < team_warps; ++w) before[w] = warps[w].size();
   const auto busy = [&](int w) { return warps[w].size() - before[w]; };
