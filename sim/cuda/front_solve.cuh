@@ -47,12 +47,15 @@ template <typename Stored>
 class ChunkStream {
  public:
   __device__ ChunkStream(const FrontTables& tables, const Stored* factor, char* chip)
-      : tables_(tables),
+      : chunks_(tables.chunks),
+        gathers_(tables.gathers),
+        entries_(tables.entries),
+        depth_(tables.solve_depth),
         factor_(factor),
         slots_(chip + warp() * tables.solve_depth * slot_bytes<Stored>()),
         next_(tables.chunk_starts[warp()]),
         end_(tables.chunk_starts[warp() + 1]) {
-    if (next_ < end_) described_ = load_chunk(tables_.chunks + next_);
+    if (next_ < end_) described_ = load_chunk(chunks_ + next_);
     if (tables.solve_depth > 1) send();
   }
 
@@ -60,13 +63,13 @@ class ChunkStream {
   __device__ const char* take() {
     __syncwarp();
     send();
-    if (tables_.solve_depth > 1)
+    if (depth_ > 1)
       __pipeline_wait_prior(1);
     else
       __pipeline_wait_prior(0);
     __syncwarp();
     const char* slot = slots_ + taken_ * slot_bytes<Stored>();
-    taken_ = taken_ + 1 == tables_.solve_depth ? 0 : taken_ + 1;
+    taken_ = taken_ + 1 == depth_ ? 0 : taken_ + 1;
     return slot;
   }
 
@@ -87,9 +90,9 @@ class ChunkStream {
   __device__ void send() {
     if (next_ < end_) {
       const SolveChunk c = described_;
-      if (++next_ < end_) described_ = load_chunk(tables_.chunks + next_);
+      if (++next_ < end_) described_ = load_chunk(chunks_ + next_);
       char* slot = slots_ + sent_ * slot_bytes<Stored>();
-      sent_ = sent_ + 1 == tables_.solve_depth ? 0 : sent_ + 1;
+      sent_ = sent_ + 1 == depth_ ? 0 : sent_ + 1;
       if (lane() == 0)
 #pragma unroll
         for (int k = 0; k < 4; ++k)
@@ -105,19 +108,20 @@ class ChunkStream {
                                 first + k < c.columns && part < c.rows ? 0 : 16);
       if (c.flags & SolveChunk::backward) {
         if (4 * lane() < c.rows)
-          __pipeline_memcpy_async(slot + table_at + 16 * lane(), tables_.entries + c.table_at + 4 * lane(),
-                                  16);
+          __pipeline_memcpy_async(slot + table_at + 16 * lane(), entries_ + c.table_at + 4 * lane(), 16);
       } else if (c.rows > 0 && lane() < column_gathers + row_gathers) {
         const int at =
             lane() < column_gathers ? c.table_at + lane() : c.row_table_at + lane() - column_gathers;
-        __pipeline_memcpy_async(slot + table_at + sizeof(Gather) * lane(), tables_.gathers + at,
-                                sizeof(Gather));
+        __pipeline_memcpy_async(slot + table_at + sizeof(Gather) * lane(), gathers_ + at, sizeof(Gather));
       }
     }
     __pipeline_commit();
   }
 
-  const FrontTables& tables_;
+  const SolveChunk* chunks_;
+  const Gather* gathers_;
+  const int* entries_;
+  int depth_;
   const Stored* factor_;
   char* slots_;
   int next_, end_, sent_ = 0, taken_ = 0;
