@@ -47,16 +47,14 @@ template <typename Stored>
 class ChunkStream {
  public:
   __device__ ChunkStream(const FrontTables& tables, const Stored* factor, char* chip)
-      : chunks_(tables.chunks),
-        gathers_(tables.gathers),
+      : gathers_(tables.gathers),
         entries_(tables.entries),
         depth_(tables.solve_depth),
         factor_(factor),
         slots_(chip + warp() * tables.solve_depth * slot_bytes<Stored>()),
-        next_(tables.chunk_starts[warp()]),
-        end_(tables.chunk_starts[warp() + 1]) {
-    if (next_ < end_) described_ = load_chunk(chunks_ + next_);
-    if (tables.solve_depth > 1) send();
+        next_(tables.chunks + tables.chunk_starts[warp()]),
+        described_(load_chunk(next_)) {
+    if (depth_ > 1) send();
   }
 
   /// The next chunk, on chip until the next call.
@@ -73,6 +71,9 @@ class ChunkStream {
     return slot;
   }
 
+  /// Nothing is on its way any more.
+  __device__ void finish() { __pipeline_wait_prior(0); }
+
   __device__ static SolveChunk chunk(const char* slot) {
     return load_chunk(reinterpret_cast<const SolveChunk*>(slot + described_at));
   }
@@ -87,44 +88,43 @@ class ChunkStream {
   static constexpr int table_at = chunk_numbers * static_cast<int>(sizeof(Stored)),
                        described_at = table_at + chunk_table_bytes;
 
+  /// Behind the last chunk of a warp stand some without numbers.
   __device__ void send() {
-    if (next_ < end_) {
-      const SolveChunk c = described_;
-      if (++next_ < end_) described_ = load_chunk(chunks_ + next_);
-      char* slot = slots_ + sent_ * slot_bytes<Stored>();
-      sent_ = sent_ + 1 == depth_ ? 0 : sent_ + 1;
-      if (lane() == 0)
+    const SolveChunk& c = described_;
+    char* slot = slots_ + sent_ * slot_bytes<Stored>();
+    sent_ = sent_ + 1 == depth_ ? 0 : sent_ + 1;
+    if (lane() == 0)
 #pragma unroll
-        for (int k = 0; k < 4; ++k)
-          reinterpret_cast<int4*>(slot + described_at)[k] = reinterpret_cast<const int4*>(&c)[k];
-      // Absent rows and columns become zeros.
-      constexpr int copies = chunk_rows / together, side_by_side = 32 / copies;
-      const int part = lane() % copies * together, first = lane() / copies;
-      Stored* to = reinterpret_cast<Stored*>(slot) + first * chunk_rows + part;
-      const Stored* from = factor_ + c.panel_at + first * c.leading + part;
+      for (int k = 0; k < 4; ++k)
+        reinterpret_cast<int4*>(slot + described_at)[k] = reinterpret_cast<const int4*>(&c)[k];
+    // Absent rows and columns become zeros.
+    constexpr int copies = chunk_rows / together, side_by_side = 32 / copies;
+    const int part = lane() % copies * together, first = lane() / copies;
+    const int columns = part < c.rows ? c.columns : 0;
+    Stored* to = reinterpret_cast<Stored*>(slot) + first * chunk_rows + part;
+    const Stored* from = factor_ + c.panel_at + first * c.leading + part;
 #pragma unroll
-      for (int k = 0; k < chunk_columns; k += side_by_side)
-        __pipeline_memcpy_async(to + k * chunk_rows, from + static_cast<long>(k) * c.leading, 16,
-                                first + k < c.columns && part < c.rows ? 0 : 16);
-      if (c.flags & SolveChunk::backward) {
-        if (4 * lane() < c.rows)
-          __pipeline_memcpy_async(slot + table_at + 16 * lane(), entries_ + c.table_at + 4 * lane(), 16);
-      } else if (c.rows > 0 && lane() < column_gathers + row_gathers) {
-        const int at =
-            lane() < column_gathers ? c.table_at + lane() : c.row_table_at + lane() - column_gathers;
-        __pipeline_memcpy_async(slot + table_at + sizeof(Gather) * lane(), gathers_ + at, sizeof(Gather));
-      }
+    for (int k = 0; k < chunk_columns; k += side_by_side)
+      __pipeline_memcpy_async(to + k * chunk_rows, from + k * c.leading, 16, first + k < columns ? 0 : 16);
+    if (c.flags & SolveChunk::backward) {
+      if (4 * lane() < c.rows)
+        __pipeline_memcpy_async(slot + table_at + 16 * lane(), entries_ + c.table_at + 4 * lane(), 16);
+    } else if (lane() < column_gathers + row_gathers) {
+      const int at = lane() < column_gathers ? c.table_at : c.row_table_at - column_gathers;
+      __pipeline_memcpy_async(slot + table_at + sizeof(Gather) * lane(), gathers_ + at + lane(),
+                              sizeof(Gather));
     }
     __pipeline_commit();
+    described_ = load_chunk(++next_);
   }
 
-  const SolveChunk* chunks_;
   const Gather* gathers_;
   const int* entries_;
   int depth_;
   const Stored* factor_;
   char* slots_;
-  int next_, end_, sent_ = 0, taken_ = 0;
+  int sent_ = 0, taken_ = 0;
+  const SolveChunk* next_;
   SolveChunk described_;
 };
 
@@ -254,6 +254,7 @@ __device__ void solve(const FrontTables& tables, const Stored* factor, const Sol
       more = !(chunk.flags & SolveChunk::ends_level);
     }
   }
+  stream.finish();
   __syncthreads();
 }
 

@@ -24,6 +24,9 @@ struct alignas(16) SolveChunk {
 };
 static_assert(sizeof(SolveChunk) == 64);
 
+/// Chunks without numbers behind the last of a warp, which looks so far ahead.
+inline constexpr int chunks_ahead = 2;
+
 /// Where what two children pass up for a vertex begins, -1 for none.
 struct alignas(8) Gather {
   int first = -1, second = -1;

@@ -142,6 +142,7 @@ SolvePlan plan_solve(const FrontPlan& plan) {
   for (const auto& chunks : warps) {
     solve.starts.push_back(static_cast<int>(solve.chunks.size()));
     solve.chunks.insert(solve.chunks.end(), chunks.begin(), chunks.end());
+    solve.chunks.resize(solve.chunks.size() + chunks_ahead);
   }
   solve.starts.push_back(static_cast<int>(solve.chunks.size()));
   return solve;
