@@ -4,26 +4,16 @@
 #include <cmath>
 #include <cstdio>
 #include <random>
-#include <sstream>
 #include <string>
 
 #include "sim/cuda/batch_replay.h"
 #include "sim/cuda/batch_system.h"
 #include "sim/cuda/layout/sheet_layout.h"
+#include "tests/bench/device_bench.h"
 #include "tests/bench/towel.h"
 
 namespace flash::sim::cuda {
 namespace {
-
-// Of an H200: copies between places of its memory, and multiply-adds in single precision, measured.
-constexpr double bandwidth = 4.26e12, single_rate = 60.8e12;
-
-std::vector<int> numbers_of(const std::string& list) {
-  std::vector<int> numbers;
-  std::stringstream stream(list);
-  for (std::string item; std::getline(stream, item, ',');) numbers.push_back(std::stoi(item));
-  return numbers;
-}
 
 /// The vertices within 2 cm of a corner rise 0.25 m in 1.5 s, by minimum jerk.
 std::shared_ptr<const HoldMotion> lift(const data::Points& rest, int steps, double time_step) {
@@ -40,7 +30,7 @@ std::shared_ptr<const HoldMotion> lift(const data::Points& rest, int steps, doub
   return motion;
 }
 
-/// E t from 10 to 300 N/m and D from 1e-5 to 1e-4 N m, evenly in their logarithms, as Sobol's points are.
+/// E t from 10 to 300 N/m and D from 1e-5 to 1e-4 N m, drawn evenly in their logarithms.
 std::vector<ReplayEnvironment> lifts(const Towel& towel, int count, int steps, double time_step) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0, 1);
