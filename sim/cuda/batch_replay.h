@@ -34,12 +34,11 @@ struct ReplayEnvironment {
 
 struct ReplaySettings {
   // As in SolverSettings.
-  double time_step = 0.01;  ///< h [s]
-  int max_iterations = 60;  ///< Newton iterations a step
-  double tolerance = 1e-3;  ///< on the relative residual |r| / |M g|
-  int stale_factor_solves =
-      2;             ///< solves by an old factor, beyond which it is renewed: cheaper than on the CPU
-  int halvings = 8;  ///< a step that cannot be solved is repeated in two halves, so often
+  double time_step = 0.01;      ///< h [s]
+  int max_iterations = 60;      ///< Newton iterations a step
+  double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
+  int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
+  int halvings = 8;             ///< a step that cannot be solved is repeated in two halves, so often
 
   int first_step = 0;             ///< at which the environments stand
   int steps = 0;                  ///< the last one

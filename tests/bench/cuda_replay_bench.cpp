@@ -126,7 +126,7 @@ int main(int count, char** arguments) {
   const std::vector<int> vertices = numbers_of(count > 1 ? arguments[1] : "1024,2025,4096"),
                          environments = numbers_of(count > 2 ? arguments[2] : "1,64,256,1024");
   const int steps = count > 3 ? std::stoi(arguments[3]) : 100,
-            stale = count > 4 ? std::stoi(arguments[4]) : 2;
+            stale = count > 4 ? std::stoi(arguments[4]) : 5;
   std::printf("%8s %6s %6s %10s %8s %8s %8s %8s %9s %10s %10s %8s %7s %7s\n", "vertices", "envs", "teams",
               "ms a step", "iters", "factors", "solves", "substeps", "conv. %", "us an env.", "floor us",
               "ratio", "of B/s", "of F/s");

@@ -166,6 +166,7 @@ ReplaySettings settings_of(int steps, double tolerance) {
   ReplaySettings settings;
   settings.time_step = time_step;
   settings.tolerance = tolerance;
+  settings.stale_factor_solves = 0;
   settings.steps = steps;
   for (int k = 1; k <= steps; ++k) settings.kept_steps.push_back(k);
   return settings;
@@ -206,14 +207,15 @@ TEST(BatchReplay, TrajectoriesAreThoseOfTheProcessorAndCloserAsTheToleranceFalls
         EXPECT_TRUE(step.converged);
         EXPECT_LE(step.residual, tolerance);
       }
-      const double apart = distance(scene, device, processor);
-      EXPECT_LE(apart, tolerance == 1e-3 ? 1e-4 : 1e-6);
-      int iterations[2] = {}, solves[2] = {};
-      for (const ReplayStep& step : device.steps) iterations[0] += step.iterations, solves[0] += step.solves;
-      for (const ReplayStep& step : processor.steps)
-        iterations[1] += step.iterations, solves[1] += step.solves;
-      std::printf("%-40s %.0e: %.2e; iterations %d beside %d, solves %d beside %d\n", scene.name.c_str(),
-                  tolerance, apart, iterations[0], iterations[1], solves[0], solves[1]);
+      EXPECT_LE(distance(scene, device, processor), tolerance == 1e-3 ? 1e-4 : 1e-6);
+      // As many iterations: at a threshold rounding decides.
+      const auto iterations = [](const Trajectory& trajectory) {
+        int sum = 0;
+        for (const ReplayStep& step : trajectory.steps) sum += step.iterations;
+        return sum;
+      };
+      const int expected = iterations(processor);
+      EXPECT_NEAR(iterations(device), expected, 0.05 * expected + 1);
     }
   }
 }
