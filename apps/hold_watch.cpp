@@ -22,9 +22,10 @@ std::string contest(const Environment& environment) {
         if (!environment.holds[k].axes[static_cast<std::size_t>(axis)]) continue;
         const auto [entry, fresh] = owner.try_emplace({vertex, axis}, k);
         if (fresh || entry->second == k) continue;
-        return "vertex " + std::to_string(vertex) + " is held by " + name_of(environment.holds[entry->second]) +
-               " and by " + name_of(environment.holds[k]) + " at " +
-               data::format_short(environment.state.time) + " s; it obeys " + name_of(environment.holds[k]);
+        return "vertex " + std::to_string(vertex) + " is held by " +
+               name_of(environment.holds[entry->second]) + " and by " + name_of(environment.holds[k]) +
+               " at " + data::format_short(environment.state.time) + " s; it obeys " +
+               name_of(environment.holds[k]);
       }
   return {};
 }

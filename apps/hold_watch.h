@@ -8,7 +8,7 @@ namespace flash::sim {
 
 /// What a run has seen of the holds of an environment.
 struct HoldWatch {
-  std::vector<bool> closed;      ///< holds that carry vertices now
+  std::vector<bool> closed;  ///< holds that carry vertices now
   std::vector<bool> ever_closed;
   std::string contested;  ///< the first time that two holds carried a vertex in one axis; empty: never
 

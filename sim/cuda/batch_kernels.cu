@@ -29,6 +29,7 @@ __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
   return {batch.residuals + size * team,
           batch.images + size * team,
           batch.searches + batch.sheet.size * team,
+          batch.searches + batch.sheet.size * team,
           {batch.forward + 2 * size * team, batch.passed + batch.fronts.vector_size * team}};
 }
 
@@ -37,28 +38,29 @@ __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
   for (int e = static_cast<int>(blockIdx.x); e < (batch).environment_count; e += static_cast<int>(gridDim.x))
 
 template <bool places_on_chip>
-__global__ void __launch_bounds__(team_threads, dense_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     evaluate_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int triangles = batch.sheet.triangle_count;
   FOR_OWN_ENVIRONMENTS(batch, e) {
     const ElasticEnergies energy = elastic_gradient<places_on_chip>(
-        batch.sheet, batch.environments[e], places_of(batch, e), batch.gradients + 3L * batch.sheet.size * e,
-        batch.triangle_gradients + 9L * triangles * blockIdx.x, shared_memory<double>());
+        batch.sheet, batch.environments[e], {}, places_of(batch, e),
+        batch.gradients + 3L * batch.sheet.size * e,
+        {batch.triangle_gradients + 9L * triangles * blockIdx.x, nullptr}, shared_memory<double>());
     if (threadIdx.x == 0) batch.energies[e] = energy;
     __syncthreads();
   }
 }
 
 template <bool Preconditioner>
-__global__ void __launch_bounds__(team_threads, hessian_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
   float* chip = shared_memory<float>();
   float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    write_shares(batch.sheet, batch.environments[e], places_of(batch, e), Preconditioner, shares, chip);
+    write_shares(batch.sheet, batch.environments[e], {}, places_of(batch, e), Preconditioner, shares, chip);
     __syncthreads();
     if constexpr (Preconditioner)
-      assemble_blocks(batch.sheet, batch.environments[e], shares,
+      assemble_blocks(batch.sheet, batch.environments[e], {}, {}, shares,
                       batch.blocks + 9L * batch.sheet.block_count * e, chip);
     else
       assemble_block_rows(batch.sheet, batch.environments[e], shares,
@@ -68,7 +70,7 @@ __global__ void __launch_bounds__(team_threads, hessian_teams)
 }
 
 template <typename Stored>
-__global__ void __launch_bounds__(team_threads, dense_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     factorize_kernel(const __grid_constant__ BatchNumbers batch, float) {
   FOR_OWN_ENVIRONMENTS(batch, e) {
     if (threadIdx.x == 0) batch.positive[e] = 1;
@@ -80,21 +82,21 @@ __global__ void __launch_bounds__(team_threads, dense_teams)
 }
 
 template <typename Stored>
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     solve_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int size = 3 * batch.sheet.size;
   FOR_OWN_ENVIRONMENTS(batch, e) {
     const SolveVectors v = linear_vectors(batch).solve;
     for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
       v.forward[size + i] = vector_of(batch, e)[i];
-    solve(batch.fronts, factor_of<Stored>(batch, e), v, shared_memory<float>());
+    solve(batch.fronts, factor_of<Stored>(batch, e), v, shared_memory<char>());
     for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
       result_of(batch, e)[i] = v.forward[size + i];
     __syncthreads();
   }
 }
 
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     multiply_kernel(const __grid_constant__ BatchNumbers batch, float) {
   FOR_OWN_ENVIRONMENTS(batch, e) {
     Four<float>* x = linear_vectors(batch).search;
@@ -104,27 +106,27 @@ __global__ void __launch_bounds__(team_threads, sparse_teams)
     }
     __syncthreads();
     multiply(batch.sheet, batch.block_rows + batch.block_row_size * e,
-             static_cast<float>(batch.environments[e].rigidity), x, result_of(batch, e));
+             static_cast<float>(batch.environments[e].rigidity), {}, x, result_of(batch, e));
     __syncthreads();
   }
 }
 
 template <typename Stored>
-__global__ void __launch_bounds__(team_threads, sparse_teams)
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
     find_directions_kernel(const __grid_constant__ BatchNumbers batch, float tolerance) {
   float* chip = shared_memory<float>();
   FOR_OWN_ENVIRONMENTS(batch, e) {
     const LinearProblem<Stored> problem = {
         batch.block_rows + batch.block_row_size * e,
         static_cast<float>(batch.environments[e].rigidity),
+        {},
         factor_of<Stored>(batch, e),
         vector_of(batch, e),
-        batch.restrictions + static_cast<long>(batch.restrictions_each) * e,
-        batch.restriction_counts[e],
+        {batch.restrictions + static_cast<long>(batch.restrictions_each) * e, batch.restriction_counts[e]},
         tolerance};
-    const int solves =
-        conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
-                            batch.changes + 3L * batch.sheet.size * e, chip, chip + team_warps);
+    const int solves = conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch),
+                                           result_of(batch, e), batch.changes + 3L * batch.sheet.size * e,
+                                           chip, reinterpret_cast<char*>(chip + team_warps));
     if (threadIdx.x == 0) batch.solves[e] = solves;
   }
 }
@@ -138,14 +140,14 @@ struct Choice {
 /// Places on chip where all teams find room.
 Choice evaluation(int size) {
   const int near = gradient_memory(size, true);
-  return dense_teams * (near + 1024) <= most_memory()
+  return resident_teams_each * (near + 1024) <= most_memory()
              ? Choice{evaluate_kernel<true>, near}
              : Choice{evaluate_kernel<false>, gradient_memory(size, false)};
 }
 
 template <typename Stored>
 Choice choice(BatchKernel kernel, const FrontTables& fronts) {
-  const int number = sizeof(float), solve_bytes = number * solve_memory(fronts.largest_columns);
+  const int number = sizeof(float), solve_bytes = solve_memory<Stored>(fronts.solve_depth);
   switch (kernel) {
     case BatchKernel::evaluate:
       return evaluation(fronts.size);

@@ -13,20 +13,11 @@ std::string why_no_device() {
   int count = 0;
   const cudaError_t status = cudaGetDeviceCount(&count);
   if (status != cudaSuccess) return cudaGetErrorString(status);
-  return count > 0 ? "" : "no device";
+  if (count == 0) return "no device";
+  constexpr int least_memory = 99 * 1024;
+  if (most_memory() < least_memory) return "the device has less than 99 KB of memory on chip for a block";
+  return "";
 }
-
-namespace {
-
-/// Panels that fit on chip beside the rest of a factorization.
-FrontSettings fitting(FrontSettings settings) {
-  constexpr int rest = 8192 + 64;  // numbers
-  settings.panel_capacity =
-      std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
-  return settings;
-}
-
-}  // namespace
 
 struct BatchSystem::Memory {
   int count;
@@ -53,7 +44,7 @@ struct BatchSystem::Memory {
          const FrontSettings& settings)
       : count(static_cast<int>(materials.size())),
         precision(factor_precision),
-        front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting(settings))),
+        front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting_fronts(settings))),
         layout(lay_out(sheet, bending, front_plan)),
         plan(front_plan, layout),
         environments(materials) {

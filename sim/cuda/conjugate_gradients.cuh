@@ -13,10 +13,10 @@ template <typename Stored>
 struct LinearProblem {
   const float* block_rows;
   float rigidity;
+  HingeMatrix hinges;
   const Stored* factor;
   const float* gradient;
-  const VertexRestriction* restrictions;
-  int restriction_count;
+  Restrictions restrictions;
   float tolerance;
 };
 
@@ -24,14 +24,15 @@ struct LinearProblem {
 struct LinearVectors {
   float *residual, *image;
   Four<float>* search;  ///< four
+  Four<float>* near;    ///< four: a copy of `search` for products on chip, free during a solve; or `search`
   SolveVectors solve;
 };
 
-__device__ inline void restrict_to_free(const VertexRestriction* restrictions, int count, float* x) {
-  if (count == 0) return;
+__device__ inline void restrict_to_free(const Restrictions& restrictions, float* x) {
+  if (restrictions.count == 0) return;
   __syncthreads();
-  for (int k = static_cast<int>(threadIdx.x); k < count; k += team_threads) {
-    const VertexRestriction& restriction = restrictions[k];
+  for (int k = static_cast<int>(threadIdx.x); k < restrictions.count; k += team_threads) {
+    const VertexRestriction& restriction = restrictions.list[k];
     float* own = x + 3 * restriction.place;
     const float a = own[0], b = own[1], c = own[2];
     const float* free = restriction.free;
@@ -42,78 +43,89 @@ __device__ inline void restrict_to_free(const VertexRestriction* restrictions, i
 
 /// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
 /// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
-/// Returns the number of solves with the factor, to all threads. `partial`, `own`: on chip, a number a warp
+/// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, a number a warp
 /// and solve_memory.
 template <typename Stored>
 __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
                                    const LinearProblem<Stored>& problem, const LinearVectors& v,
-                                   float* direction, float* change, float* partial, float* own) {
+                                   float* direction, float* change, float* partial, char* chip) {
   constexpr int most = 20;
   const int size = 3 * sheet.size, first = static_cast<int>(threadIdx.x);
   float* search = reinterpret_cast<float*>(v.search);
   float* preconditioned = v.solve.forward + size;
   const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
-  const auto restricted = [&](float* x) {
-    restrict_to_free(problem.restrictions, problem.restriction_count, x);
-  };
+  const auto restricted = [&](float* x) { restrict_to_free(problem.restrictions, x); };
   for (int i = first; i < size; i += team_threads) {
     v.residual[i] = -problem.gradient[i];
     direction[i] = change[i] = search[slot(i)] = 0;
   }
   __syncthreads();
   int moved = 0;
-  for (int k = first; k < problem.restriction_count; k += team_threads) {
-    const VertexRestriction& restriction = problem.restrictions[k];
+  for (int k = first; k < problem.restrictions.count; k += team_threads) {
+    const VertexRestriction& restriction = problem.restrictions.list[k];
     for (int c = 0; c < 3; ++c) {
       moved += restriction.correction[c] != 0;
       direction[3 * restriction.place + c] = search[4 * restriction.place + c] = restriction.correction[c];
     }
   }
+  // The copy is of the thread's own numbers.
+  const auto copy_search = [&] {
+    if (v.near == v.search) return;
+    for (int i = first; i < size; i += team_threads)
+      reinterpret_cast<float*>(v.near)[slot(i)] = search[slot(i)];
+  };
   if (sum_over_team(static_cast<float>(moved), partial) > 0) {
-    multiply(sheet, problem.block_rows, problem.rigidity, v.search, v.image);
+    copy_search();
+    __syncthreads();
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
     for (int i = first; i < size; i += team_threads) {
       v.residual[i] -= v.image[i];
       change[i] += v.image[i];
     }
   }
-  restricted(v.residual);
-  float squares = 0;
-  for (int i = first; i < size; i += team_threads) squares += v.residual[i] * v.residual[i];
-  float norm = sqrtf(sum_over_team(squares, partial)), previous = 0;
+  // The residual's norm; it becomes the next right-hand side of the factor.
+  const auto take_residual = [&] {
+    restricted(v.residual);
+    float squares = 0;
+    for (int i = first; i < size; i += team_threads) {
+      const float own = v.residual[i];
+      preconditioned[i] = own;
+      squares += own * own;
+    }
+    return sqrtf(sum_over_team(squares, partial));
+  };
+  float norm = take_residual(), previous = 0;
   const float target = fmaxf(0.1f * norm, problem.tolerance);
   int iteration = 0;
   while (norm > target && iteration < most) {
     ++iteration;
-    for (int i = first; i < size; i += team_threads) preconditioned[i] = v.residual[i];
-    solve(fronts, problem.factor, v.solve, own);
+    solve(fronts, problem.factor, v.solve, chip);
     restricted(preconditioned);
     float product = 0;
     for (int i = first; i < size; i += team_threads) product += v.residual[i] * preconditioned[i];
     const float along = sum_over_team(product, partial);
     const float kept = iteration == 1 ? 0 : along / previous;
     previous = along;
-    for (int i = first; i < size; i += team_threads)
-      search[slot(i)] = preconditioned[i] + (iteration == 1 ? 0 : kept * search[slot(i)]);
+    float* near = reinterpret_cast<float*>(v.near);
+    for (int i = first; i < size; i += team_threads) {
+      const float own = preconditioned[i] + (iteration == 1 ? 0 : kept * search[slot(i)]);
+      search[slot(i)] = own;
+      near[slot(i)] = own;
+    }
     __syncthreads();
-    multiply(sheet, problem.block_rows, problem.rigidity, v.search, v.image);
-    product = 0;
-    for (int i = first; i < size; i += team_threads) product += search[slot(i)] * v.image[i];
+    product = multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
     const float curvature = sum_over_team(product, partial);
     // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
     if (curvature <= 0 && iteration > 1) break;
     const float step = curvature > 0 ? along / curvature : 1;
     for (int i = first; i < size; i += team_threads) {
-      direction[i] += step * search[slot(i)];
-      change[i] += step * v.image[i];
+      const float image = step * v.image[i];
+      direction[i] += step * near[slot(i)];
+      change[i] += image;
+      v.residual[i] -= image;
     }
     if (curvature <= 0) break;
-    restricted(v.image);
-    squares = 0;
-    for (int i = first; i < size; i += team_threads) {
-      v.residual[i] -= step * v.image[i];
-      squares += v.residual[i] * v.residual[i];
-    }
-    norm = sqrtf(sum_over_team(squares, partial));
+    norm = take_residual();
   }
   __syncthreads();
   return iteration;

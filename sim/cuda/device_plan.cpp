@@ -1,6 +1,17 @@
 #include "sim/cuda/device_plan.h"
 
+#include <algorithm>
+
+#include "sim/cuda/layout/solve_plan.h"
+
 namespace flash::sim::cuda {
+
+FrontSettings fitting_fronts(FrontSettings settings) {
+  constexpr int tile = 1024, rest = team_warps * tile + 64;  // numbers
+  settings.panel_capacity =
+      std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
+  return settings;
+}
 
 template <typename Number>
 const Number* DevicePlan::upload(const std::vector<Number>& numbers,
@@ -13,18 +24,20 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
-  fronts.largest_columns = plan.largest_columns;
   fronts.vector_size = plan.vector_size;
+  constexpr int room_for_two = 128 * 1024;  // chunks in half precision, with their tables
+  fronts.solve_depth = most_memory() >= room_for_two ? 2 : 1;
   fronts.factor_size = plan.factor_size;
   fronts.update_size = plan.update_size;
   fronts.fronts = upload(plan.fronts, fronts_);
   fronts.levels = upload(plan.levels, levels_);
-  fronts.child_rows = upload(plan.child_rows, ints_);
   fronts.panel_rows = upload(plan.panel_rows, ints_);
   fronts.entries = upload(plan.entries, ints_);
   fronts.blocks = upload(plan.blocks, places_);
-  fronts.forward = upload(plan.forward, forward_);
-  fronts.backward = upload(plan.backward, backward_);
+  const SolvePlan solve = plan_solve(plan);
+  fronts.chunks = upload(solve.chunks, chunks_);
+  fronts.chunk_starts = upload(solve.starts, ints_);
+  fronts.gathers = upload(solve.gathers, gathers_);
 
   sheet.size = layout.size;
   sheet.triangle_count = layout.triangle_count;
@@ -37,7 +50,8 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.corners = upload(layout.corners, ints_);
   sheet.pair_sources = upload(layout.pair_sources, sources_);
   sheet.slice_sources = upload(layout.slice_sources, sources_);
-  sheet.block_vertex = upload(layout.block_vertex, ints_);
+  sheet.block_rows = upload(layout.block_rows, ints_);
+  sheet.block_columns = upload(layout.block_columns, ints_);
   sheet.slice_starts = upload(layout.slice_starts, ints_);
   sheet.slice_columns = upload(layout.slice_columns, ints_);
   sheet.group_rows = upload(layout.group_rows, ints_);
@@ -48,6 +62,15 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
       upload(std::vector<float>(layout.group_values.begin(), layout.group_values.end()), floats_);
   sheet.stand_in = upload(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end()), floats_);
   sheet.vertex_area = upload(layout.vertex_area, doubles_);
+  sheet.hinge_count = layout.hinge_count;
+  sheet.hinge_vertices = upload(layout.hinge_vertices, ints_);
+  sheet.hinge_weights = upload(layout.hinge_weights, doubles_);
+  sheet.hinge_rest_angles = upload(layout.hinge_rest_angles, doubles_);
+  sheet.hinge_rest_areas = upload(layout.hinge_rest_areas, doubles_);
+  sheet.hinge_corner_starts = upload(layout.hinge_corner_starts, ints_);
+  sheet.hinge_corners = upload(layout.hinge_corners, ints_);
+  sheet.hinge_source_starts = upload(layout.hinge_source_starts, ints_);
+  sheet.hinge_sources = upload(layout.hinge_sources, ints_);
 }
 
 }  // namespace flash::sim::cuda

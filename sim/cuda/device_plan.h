@@ -6,6 +6,9 @@
 
 namespace flash::sim::cuda {
 
+/// Settings with panels that fit on chip beside the rest of a factorization.
+FrontSettings fitting_fronts(FrontSettings settings = {});
+
 /// The structure of a sheet on the device, once for all its environments.
 class DevicePlan {
  public:
@@ -24,8 +27,8 @@ class DevicePlan {
   std::vector<DeviceArray<FrontLayout>> fronts_;
   std::vector<DeviceArray<FrontLevel>> levels_;
   std::vector<DeviceArray<BlockPlace>> places_;
-  std::vector<DeviceArray<ForwardTask>> forward_;
-  std::vector<DeviceArray<BackwardTask>> backward_;
+  std::vector<DeviceArray<SolveChunk>> chunks_;
+  std::vector<DeviceArray<Gather>> gathers_;
   std::vector<DeviceArray<EdgeSources>> sources_;
 };
 

@@ -1,6 +1,8 @@
 #pragma once
 #include "sim/cuda/environment_numbers.h"
+#include "sim/cuda/hinges.cuh"
 #include "sim/cuda/membrane.cuh"
+#include "sim/cuda/membrane_damping.cuh"
 #include "sim/cuda/sheet_product.cuh"
 
 namespace flash::sim::cuda {
@@ -9,10 +11,15 @@ namespace flash::sim::cuda {
 // adds up its triangles in a fixed order. Most of what is read are the values of bending, a megabyte for
 // 1,024 vertices, and most of the time goes by until they are there: so many are on their way at a time.
 
-/// Bytes on chip: places, where they fit, and a number a warp.
+/// Bytes on chip: places, where they fit, and sums over the team.
 __host__ __device__ inline int gradient_memory(int size, bool places_on_chip) {
-  return static_cast<int>(sizeof(double)) * (team_warps + (places_on_chip ? 3 * size : 0));
+  return static_cast<int>(sizeof(double)) * (most_sums * team_warps + (places_on_chip ? 3 * size : 0));
 }
+
+/// What elements give to their vertices: nine numbers a triangle, twelve a hinge.
+struct GradientShares {
+  double *triangles, *hinges;
+};
 
 /// What the triangles of one environment give to `shares`. Returns the energy of the thread's own.
 template <typename Places>
@@ -43,13 +50,14 @@ __device__ double triangle_gradients(const SheetTables& tables, const Environmen
 /// energy of the thread's own vertices.
 template <typename Places>
 __device__ double add_up_gradient(const SheetTables& tables, const Places& place, const double* shares,
-                                  double* gradient) {
+                                  const double* hinge_shares, double* gradient) {
   double bending = 0;
   for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += team_threads) {
     double* own = gradient + 3 * vertex;
     const Triple p = place(vertex), bent = {own[0], own[1], own[2]};
     bending += dot(bent, p);
     Triple sum = {0, 0, 0};
+    if (tables.hinge_count > 0) sum = hinge_gradient_of(tables, vertex, hinge_shares);
 #pragma unroll 6
     for (int k = tables.corner_starts[vertex]; k < tables.corner_starts[vertex + 1]; ++k) {
       const double* share = shares + tables.corners[k];
@@ -62,22 +70,24 @@ __device__ double add_up_gradient(const SheetTables& tables, const Places& place
   return bending;
 }
 
-/// Membrane and bending energy [J], to all threads, and the gradient of both [N], three numbers a vertex.
-/// `shares`: memory for nine numbers a triangle; `chip`: gradient_memory.
+/// Membrane and bending energy [J], to all threads, and the gradient of both [N], three numbers a vertex;
+/// with the damping of elements since `start`. `chip`: gradient_memory.
 template <bool places_on_chip>
 __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                            const Point* positions, double* gradient, double* shares,
-                                            double* chip) {
-  double *partial = chip, *near = chip + team_warps;
+                                            const StepStart& start, const Point* positions, double* gradient,
+                                            const GradientShares& shares, double* chip) {
+  double *partial = chip, *near = chip + most_sums * team_warps;
+  // Far from the origin places would round the energy of bending.
+  const Triple origin = triple(positions[0]);
   const auto place = [&](int vertex) -> Triple {
     if constexpr (places_on_chip)
       return {near[3 * vertex], near[3 * vertex + 1], near[3 * vertex + 2]};
     else
-      return triple(positions[vertex]);
+      return triple(positions[vertex]) - origin;
   };
   if constexpr (places_on_chip) {
     for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += team_threads) {
-      const Point p = positions[vertex];
+      const Triple p = triple(positions[vertex]) - origin;
       near[3 * vertex] = p.x;
       near[3 * vertex + 1] = p.y;
       near[3 * vertex + 2] = p.z;
@@ -87,10 +97,16 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
   multiply_scalar_rows(tables, tables.group_values, place, [&](int row, int c, double sum) {
     gradient[3 * row + c] = environment.rigidity * sum;
   });
-  const double membrane = triangle_gradients(tables, environment, place, shares);
+  const double membrane = triangle_gradients(tables, environment, place, shares.triangles);
+  ElasticEnergies rest = {};
+  if (tables.hinge_count > 0) rest = hinge_gradients(tables, environment, start.angles, place, shares.hinges);
+  if (start.metrics != nullptr)
+    rest.damping += add_damping_gradients(tables, environment, start.metrics, place, shares.triangles);
   __syncthreads();
-  const double bending = add_up_gradient(tables, place, shares, gradient);
-  return {sum_over_team(membrane, partial), 0.5 * sum_over_team(bending, partial)};
+  const double bending = add_up_gradient(tables, place, shares.triangles, shares.hinges, gradient);
+  double sums[3] = {membrane, 0.5 * bending + rest.bending, rest.damping};
+  sum_over_team(sums, partial);
+  return {sums[0], sums[1], sums[2]};
 }
 
 }  // namespace flash::sim::cuda

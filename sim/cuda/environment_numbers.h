@@ -1,4 +1,5 @@
 #pragma once
+#include "sim/law/host_device.h"
 #include "sim/law/membrane_law.h"
 
 namespace flash::sim::cuda {
@@ -8,11 +9,22 @@ struct EnvironmentNumbers {
   MembraneLaw law = MembraneLaw::corotated;
   SheetLame lame{};
   double rigidity = 0;         ///< D [N m]
-  double inertia_density = 0;  ///< areal density over h^2 [kg/m^2/s^2]
+  double inertia_density = 0;  ///< areal density over h^2, and what air drag adds [kg/m^2/s^2]
+  SheetLame damping{};         ///< moduli of the damped membrane times b / h
+  double damping_share = 0;    ///< b / h
+
+  /// What the stiffness of bending enters the matrix with.
+  FLASH_HOST_DEVICE double effective_rigidity() const { return rigidity * (1 + damping_share); }
 };
 
 /// How the numbers of a factor are stored. Half of them cost less to read, and change a preconditioner alone.
 enum class FactorPrecision { single, half };
+
+/// Strains and angles at the start of a step, for damping; null without.
+struct StepStart {
+  const double* metrics = nullptr;  ///< F^T F: three numbers a triangle, triangle_count apart
+  const double* angles = nullptr;   ///< of hinges [rad]
+};
 
 /// A vertex that may not move in every direction, by its place in the elimination.
 struct VertexRestriction {
@@ -21,8 +33,16 @@ struct VertexRestriction {
   float correction[3];  ///< its move in the other directions [m]
 };
 
+/// Restrictions of one environment, and which of them a vertex has.
+struct Restrictions {
+  const VertexRestriction* list = nullptr;
+  int count = 0;
+  const int* of_place = nullptr;  ///< by place, -1 for none; null where there are none
+};
+
 struct ElasticEnergies {
   double membrane, bending;  ///< [J]
+  double damping;            ///< potential of damping over a step, turns apart [J]
 };
 
 }  // namespace flash::sim::cuda

@@ -1,5 +1,7 @@
 #pragma once
+#include "sim/cuda/hinges.cuh"
 #include "sim/cuda/membrane.cuh"
+#include "sim/cuda/membrane_damping.cuh"
 #include "sim/cuda/team.cuh"
 
 namespace flash::sim::cuda {
@@ -17,10 +19,11 @@ inline constexpr int share_numbers = 12;
 /// Through these on chip a warp writes what its lanes have one after the other.
 inline constexpr int hessian_memory = team_threads * 3 * share_numbers;
 
-/// The blocks (1,0), (2,0), (2,1) of each triangle. `positive`: of the Hessian without negative eigenvalues.
-/// `chip`: hessian_memory.
+/// The blocks (1,0), (2,0), (2,1) of each triangle, with its damping since `start`. `positive`: of the
+/// Hessian without negative eigenvalues. `chip`: hessian_memory.
 inline __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                    const Point* positions, bool positive, float* shares, float* chip) {
+                                    const StepStart& start, const Point* positions, bool positive,
+                                    float* shares, float* chip) {
   constexpr int fours = 3 * share_numbers / 4;
   float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
   for (int first = 32 * warp(); first < tables.triangle_count; first += team_threads) {
@@ -69,6 +72,11 @@ inline __device__ void write_shares(const SheetTables& tables, const Environment
     for (int i = lane(); i < count; i += 32) to[i] = own_chip[i];
     __syncwarp();
   }
+  if (start.metrics == nullptr) return;
+  __syncthreads();
+  add_damping_shares(
+      tables, environment, start.metrics, [&](int vertex) { return triple(positions[vertex]); }, positive,
+      share_numbers, shares);
 }
 
 /// Three by three numbers, column after column.
@@ -148,20 +156,59 @@ inline __device__ void assemble_block_rows(const SheetTables& tables, const Envi
   }
 }
 
-/// The same with the stand-in for bending, as blocks of the pattern: what is factorized. `chip`: nine numbers
-/// a thread, through which a warp writes its blocks one after the other.
+/// Adds what the hinges give to block b of the pattern.
+inline __device__ void add_hinge_blocks(const SheetTables& tables, const HingeMatrix& hinges, int b,
+                                        Block& block) {
+  for (int k = tables.hinge_source_starts[b]; k < tables.hinge_source_starts[b + 1]; ++k) {
+    const int source = tables.hinge_sources[k];
+    const float *row = hinges.gradients + 12L * (source / 16) + 3 * (source / 4 % 4),
+                *column = hinges.gradients + 12L * (source / 16) + 3 * (source % 4);
+#pragma unroll
+    for (int e = 0; e < 9; ++e) block.numbers[e] += row[e % 3] * column[e / 3];
+  }
+}
+
+/// Leaves of a block what moves in the free directions of both its vertices; on the diagonal stands a mean
+/// stiffness in the others.
+inline __device__ void restrict_block(const SheetTables& tables, const Restrictions& restrictions, int b,
+                                      Block& block) {
+  const int row = restrictions.of_place[tables.block_rows[b]],
+            column = restrictions.of_place[tables.block_columns[b]];
+  if (row < 0 && column < 0) return;
+  const float mean = (block.numbers[0] + block.numbers[4] + block.numbers[8]) / 3;
+  const auto product = [](const float* left, const float* right) {
+    Block result;
+#pragma unroll
+    for (int e = 0; e < 9; ++e)
+      result.numbers[e] = left[e % 3] * right[e / 3 * 3] + left[3 + e % 3] * right[e / 3 * 3 + 1] +
+                          left[6 + e % 3] * right[e / 3 * 3 + 2];
+    return result;
+  };
+  if (row >= 0) block = product(restrictions.list[row].free, block.numbers);
+  if (column >= 0) block = product(block.numbers, restrictions.list[column].free);
+  if (b >= tables.size) return;
+  const float* free = restrictions.list[row].free;
+#pragma unroll
+  for (int e = 0; e < 9; ++e) block.numbers[e] += mean * ((e % 4 == 0 ? 1.0f : 0.0f) - free[e]);
+}
+
+/// The same with bending or the stand-in for it, as blocks of the pattern: what is factorized. `chip`: nine
+/// numbers a thread, through which a warp writes its blocks one after the other.
 inline __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                       const Restrictions& restrictions, const HingeMatrix& hinges,
                                        const float* shares, float* blocks, float* chip) {
   float* own_chip = chip + 9 * 32 * warp();
   for (int first = 32 * warp(); first < tables.block_count; first += team_threads) {
     const int b = min(first + lane(), tables.block_count - 1);
     Block block = b < tables.size
-                      ? go_through_row(tables, environment, tables.block_vertex[b], shares, [](int, Block) {})
+                      ? go_through_row(tables, environment, tables.block_rows[b], shares, [](int, Block) {})
                       : sum_of_shares(tables.pair_sources[b - tables.size], shares);
     if (tables.stand_in != nullptr) {
-      const float bending = static_cast<float>(environment.rigidity) * tables.stand_in[b];
+      const float bending = static_cast<float>(environment.effective_rigidity()) * tables.stand_in[b];
       for (int e = 0; e < 9; e += 4) block.numbers[e] += bending;
     }
+    if (hinges.gradients != nullptr) add_hinge_blocks(tables, hinges, b, block);
+    if (restrictions.of_place != nullptr) restrict_block(tables, restrictions, b, block);
     for (int e = 0; e < 9; ++e) own_chip[9 * lane() + e] = block.numbers[e];
     __syncwarp();
     const int count = 9 * min(32, tables.block_count - first);

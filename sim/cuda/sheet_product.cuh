@@ -1,5 +1,6 @@
 #pragma once
 #include "sim/cuda/four.h"
+#include "sim/cuda/hinges.cuh"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/cuda/team.cuh"
 
@@ -48,31 +49,36 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
   }
 }
 
-/// y += B x, B the block rows of one environment: a thread a scalar row.
-inline __device__ void add_block_rows(const SheetTables& tables, const float* blocks, const Four<float>* x,
-                                      float* y) {
+/// y += B x, B the block rows of one environment: a thread a scalar row. Returns the thread's part of x.y.
+inline __device__ float add_block_rows(const SheetTables& tables, const float* blocks,
+                                       const HingeMatrix& hinges, const Four<float>* x, float* y) {
+  float product = 0;
   for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size; i += team_threads) {
     const int slice = i / (3 * slice_size), row = i - slice * 3 * slice_size, vertex = row / 3;
     float sum = y[i];
-#pragma unroll 2
+#pragma unroll 4
     for (int k = tables.slice_starts[slice]; k < tables.slice_starts[slice + 1]; ++k) {
       const Four<float> from = x[tables.slice_columns[k * slice_size + vertex]];
       const float* column = blocks + static_cast<long>(k) * slice_numbers + row;
       sum += column[0] * from.x + column[3 * slice_size] * from.y + column[6 * slice_size] * from.z;
     }
+    if (hinges.gradients != nullptr) sum += hinge_row(tables, hinges, i);
     y[i] = sum;
+    product += sum * reinterpret_cast<const float*>(x)[i / 3 * 4 + i % 3];
   }
+  return product;
 }
 
-/// y = (B + scale S) x, x four numbers a vertex. The caller has synchronized x; y is of the calling threads'
-/// own rows i, i + team_threads, ...
-inline __device__ void multiply(const SheetTables& tables, const float* blocks, float scale,
-                                const Four<float>* x, float* y) {
+/// y = (B + scale S + hinges) x, x four numbers a vertex. The caller has synchronized x; y is of the calling
+/// threads' own rows i, i + team_threads, ... Returns the thread's part of x.y.
+inline __device__ float multiply(const SheetTables& tables, const float* blocks, float scale,
+                                 const HingeMatrix& hinges, const Four<float>* x, float* y) {
+  if (hinges.gradients != nullptr) multiply_hinges(tables, hinges, x);
   multiply_scalar_rows(
       tables, tables.single_group_values, [&](int vertex) { return x[vertex]; },
       [&](int row, int c, float sum) { y[3 * row + c] = scale * sum; });
   __syncthreads();
-  add_block_rows(tables, blocks, x, y);
+  return add_block_rows(tables, blocks, hinges, x, y);
 }
 
 }  // namespace flash::sim::cuda

@@ -10,12 +10,17 @@ struct SheetTables {
   const double *gradients, *areas;
   const int *corner_starts, *corners;
   const EdgeSources *pair_sources, *slice_sources;
-  const int* block_vertex;
+  const int *block_rows, *block_columns;
   const int *slice_starts, *slice_columns;
   const int *group_rows, *group_starts, *group_columns;
   const double* group_values;
   const float *single_group_values, *stand_in;
   const double* vertex_area;
+  int hinge_count;
+  const int* hinge_vertices;
+  const double *hinge_weights, *hinge_rest_angles, *hinge_rest_areas;
+  const int *hinge_corner_starts, *hinge_corners;
+  const int *hinge_source_starts, *hinge_sources;
 };
 
 }  // namespace flash::sim::cuda

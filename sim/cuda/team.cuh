@@ -52,6 +52,27 @@ __device__ Number sum_over_warp(Number value) {
   return value;
 }
 
+/// On-chip numbers that sums over the team need: as many at once at most.
+inline constexpr int most_sums = 12;
+
+/// Sums of `count` values a thread, for all threads. `partial`: on-chip memory for as many a warp.
+template <int count>
+__device__ void sum_over_team(double (&values)[count], double* partial) {
+  static_assert(count <= most_sums);
+#pragma unroll
+  for (int k = 0; k < count; ++k) values[k] = sum_over_warp(values[k]);
+  __syncthreads();
+  if (lane() == 0)
+#pragma unroll
+    for (int k = 0; k < count; ++k) partial[count * warp() + k] = values[k];
+  __syncthreads();
+#pragma unroll
+  for (int k = 0; k < count; ++k) {
+    values[k] = 0;
+    for (int w = 0; w < team_warps; ++w) values[k] += partial[count * w + k];
+  }
+}
+
 /// The sum of one value a thread, for all threads. `partial`: on-chip memory for a number a warp.
 template <typename Number>
 __device__ Number sum_over_team(Number value, Number* partial) {

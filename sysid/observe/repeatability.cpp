@@ -28,7 +28,9 @@ constexpr double unseen = std::numeric_limits<double>::quiet_NaN();
 class LocalPlanes {
  public:
   LocalPlanes(const Points& points, int neighbours)
-      : points_(points), neighbours_(std::min<Eigen::Index>(neighbours, points.rows())), tree_(3, std::cref(points_)) {
+      : points_(points),
+        neighbours_(std::min<Eigen::Index>(neighbours, points.rows())),
+        tree_(3, std::cref(points_)) {
     std::vector<double> spacings;
     for (Eigen::Index i = 0; i < points_.rows(); ++i) {
       search(points_.row(i).transpose());
@@ -43,7 +45,8 @@ class LocalPlanes {
   double distance(const Vector3d& point, Vector3d& normal) {
     search(point);
     Vector3d mean = Vector3d::Zero();
-    for (const Eigen::Index i : nearest_) mean += points_.row(i).transpose() / static_cast<double>(neighbours_);
+    for (const Eigen::Index i : nearest_)
+      mean += points_.row(i).transpose() / static_cast<double>(neighbours_);
     Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
     for (const Eigen::Index i : nearest_) {
       const Vector3d off = points_.row(i).transpose() - mean;
@@ -60,7 +63,8 @@ class LocalPlanes {
   void search(const Vector3d& point) {
     nearest_.resize(static_cast<std::size_t>(neighbours_));
     squared_.resize(static_cast<std::size_t>(neighbours_));
-    tree_.index->knnSearch(point.data(), static_cast<std::size_t>(neighbours_), nearest_.data(), squared_.data());
+    tree_.index->knnSearch(point.data(), static_cast<std::size_t>(neighbours_), nearest_.data(),
+                           squared_.data());
   }
 
   Points points_;
@@ -90,7 +94,8 @@ struct Trial {
                                     [&](const Seen& seen) { return seen.time >= time - 1e-9; });
     if (after == keyframes.end()) return result;
     const bool exact = after->time <= time + 1e-9;
-    if (!exact && (after == keyframes.begin() || after->time - (after - 1)->time > longest_gap)) return result;
+    if (!exact && (after == keyframes.begin() || after->time - (after - 1)->time > longest_gap))
+      return result;
     for (Eigen::Index i = 0; i < points.rows(); ++i) {
       const auto distance_to = [&](const Seen& seen) {
         Vector3d normal;
@@ -312,13 +317,16 @@ Repeatability measure_repeatability(const data::Recording& first, const data::Re
   const Registration& r = result.registration;
   add_distances(
       a, settings,
-      [&](const Seen& seen) { return b.distances(in_second(seen.points, r), seen.time + r.time_offset); }, result);
+      [&](const Seen& seen) { return b.distances(in_second(seen.points, r), seen.time + r.time_offset); },
+      result);
   add_distances(
       b, settings,
-      [&](const Seen& seen) { return a.distances(in_first(seen.points, r), seen.time - r.time_offset); }, result);
+      [&](const Seen& seen) { return a.distances(in_first(seen.points, r), seen.time - r.time_offset); },
+      result);
   if (result.keyframes.empty())
-    throw data::InputError(first.source + ", " + second.source +
-                           ": no keyframe of one shows cloth that the other saw at the same time after its start");
+    throw data::InputError(
+        first.source + ", " + second.source +
+        ": no keyframe of one shows cloth that the other saw at the same time after its start");
   for (const TrialDistance& keyframe : result.keyframes)
     result.distance += keyframe.distance / static_cast<double>(result.keyframes.size());
   return result;

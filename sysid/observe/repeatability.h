@@ -25,17 +25,17 @@ struct TrialDistance {
 
 /// How far two trials of one experiment lie from each other.
 struct Repeatability {
-  double distance = 0;                 ///< mean over `keyframes` [m]
+  double distance = 0;                   ///< mean over `keyframes` [m]
   std::vector<TrialDistance> keyframes;  ///< those of the first trial, then those of the second
-  Registration registration;           ///< of the second trial to the first
+  Registration registration;             ///< of the second trial to the first
 };
 
 /// The distance between two trials, by the measure of a score: points of a keyframe to the surface that the
-/// other trial saw at the same time. That surface is the plane through the nearest points of its cloud. Between
-/// two keyframes the distances to both are interpolated. A point counts where the other trial saw the cloth
-/// within three times its spacing. Offset, yaw and clock of the second trial are fitted inside the bounds of the
-/// first recording, so that the distance is that of shape and motion. Throws data::InputError where the trials
-/// have no keyframe in common.
+/// other trial saw at the same time. That surface is the plane through the nearest points of its cloud.
+/// Between two keyframes the distances to both are interpolated. A point counts where the other trial saw the
+/// cloth within three times its spacing. Offset, yaw and clock of the second trial are fitted inside the
+/// bounds of the first recording, so that the distance is that of shape and motion. Throws data::InputError
+/// where the trials have no keyframe in common.
 Repeatability measure_repeatability(const data::Recording& first, const data::Recording& second,
                                     const RepeatabilitySettings& settings);
 

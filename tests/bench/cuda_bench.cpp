@@ -5,25 +5,15 @@
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <sstream>
 #include <string>
 
 #include "sim/cuda/batch_system.h"
 #include "sim/cuda/layout/sheet_layout.h"
+#include "tests/bench/device_bench.h"
 #include "tests/bench/towel.h"
 
 namespace flash::sim::cuda {
 namespace {
-
-// Of an H200: copies between places of its memory, and multiply-adds in single precision, measured.
-constexpr double bandwidth = 4.26e12, single_rate = 60.8e12;
-
-std::vector<int> numbers_of(const std::string& list) {
-  std::vector<int> numbers;
-  std::stringstream stream(list);
-  for (std::string item; std::getline(stream, item, ',');) numbers.push_back(std::stoi(item));
-  return numbers;
-}
 
 /// The least that a part has to do for an environment; what environments share is free.
 struct Part {

@@ -6,19 +6,18 @@ namespace flash::sim::cuda {
 // Plain numbers, laid out on the host and read by kernels as they are.
 
 /// Threads of a team: the block that works on one environment. A power of two.
-inline constexpr int team_threads = 256;
+inline constexpr int team_threads = 512;
 inline constexpr int team_warps = team_threads / 32;
 static_assert((team_threads & (team_threads - 1)) == 0);
 
-/// Teams that a processor of the device has registers for, at least: dense fronts and triangles need many,
-/// the rest of a linear problem needs many threads.
-inline constexpr int dense_teams = 2, hessian_teams = 3, sparse_teams = 4;
+/// Teams that a processor of the device has registers for, at least.
+inline constexpr int resident_teams_each = 1;
 
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;
 
-/// Rows that a warp takes in one sweep of a forward task, and columns of a backward task.
-inline constexpr int forward_rows = 16, backward_columns = 8;
+/// Rows of a front are padded to so many.
+inline constexpr int row_padding = 16;
 
 /// Vertices eliminated together and those below them, as a dense matrix of three rows and columns a vertex:
 /// its own rows, up to `below_at` with zeros, then those below, up to `leading` with zeros.
@@ -44,22 +43,10 @@ struct alignas(16) BlockPlace {
   int source;  ///< block of the BlockPattern
 };
 
-/// Rows `first_row` to `end_row` of a front's columns times its own numbers.
-struct ForwardTask {
-  int front, first_row, end_row;
-};
-
-/// Columns `first_column` on of a front, `backward_columns` at most, times all its numbers.
-struct BackwardTask {
-  int front, first_column;
-};
-
 /// Fronts of one height, which do not depend on each other. In a factorization the team divides into
 /// `groups`, each of which takes every groups-th front.
 struct FrontLevel {
   int first_front, front_count;
-  int first_forward, forward_count;
-  int first_backward, backward_count;
   int groups;
 };
 

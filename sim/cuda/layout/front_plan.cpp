@@ -20,7 +20,7 @@ struct Node {
 
 int below_at(const Node& node) { return rounded_up(3 * node.column_count, 4); }
 int leading(const Node& node) {
-  return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), forward_rows);
+  return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), row_padding);
 }
 int factor_size(const Node& node) { return 3 * node.column_count * leading(node); }
 int below(const Node& node) { return 3 * static_cast<int>(node.rows.size()); }
@@ -163,11 +163,10 @@ void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, F
   for (std::size_t first = 0; first < nodes.size();) {
     FrontLevel level{};
     level.first_front = static_cast<int>(first);
-    int panel = 0, columns = 0;
+    int panel = 0;
     for (; first < nodes.size() && nodes[first].height == static_cast<int>(plan.levels.size()); ++first) {
       ++level.front_count;
       panel = std::max(panel, panel_size(nodes[first]));
-      columns = std::max(columns, 3 * nodes[first].column_count);
     }
     // As many groups as fronts, so that none is idle.
     level.groups = 1;
@@ -175,7 +174,6 @@ void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, F
            2 * level.groups * panel <= settings.panel_capacity)
       level.groups *= 2;
     plan.shared_panel = std::max(plan.shared_panel, level.groups * rounded_up(panel, 4));
-    plan.largest_columns = std::max(plan.largest_columns, columns);
     plan.levels.push_back(level);
   }
 }
@@ -277,35 +275,6 @@ void add_blocks(const BlockPattern& pattern, const std::vector<Node>& nodes, Fro
   }
 }
 
-/// Rows of a forward task: many where a level has tasks enough for all warps, so that a warp has more loads
-/// under way.
-int rows_a_task(const FrontPlan& plan, const FrontLevel& level) {
-  for (const int rows : {4 * forward_rows, 2 * forward_rows}) {
-    int tasks = 0;
-    for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
-      tasks += (plan.fronts[f].leading + rows - 1) / rows;
-    if (tasks >= 2 * team_warps) return rows;
-  }
-  return forward_rows;
-}
-
-void add_tasks(FrontPlan& plan) {
-  for (FrontLevel& level : plan.levels) {
-    level.first_forward = static_cast<int>(plan.forward.size());
-    level.first_backward = static_cast<int>(plan.backward.size());
-    const int rows = rows_a_task(plan, level);
-    for (int f = level.first_front; f < level.first_front + level.front_count; ++f) {
-      const FrontLayout& front = plan.fronts[f];
-      for (int row = 0; row < front.leading; row += rows)
-        plan.forward.push_back({f, row, std::min(row + rows, front.leading)});
-      for (int column = 0; column < 3 * front.column_count; column += backward_columns)
-        plan.backward.push_back({f, column});
-    }
-    level.forward_count = static_cast<int>(plan.forward.size()) - level.first_forward;
-    level.backward_count = static_cast<int>(plan.backward.size()) - level.first_backward;
-  }
-}
-
 }  // namespace
 
 FrontPlan plan_fronts(const BlockPattern& pattern, const data::Points& places,
@@ -329,7 +298,6 @@ FrontPlan plan_fronts(const BlockPattern& pattern, const data::Points& places,
   place_memory(nodes, plan);
   add_panel_rows(plan);
   add_blocks(pattern, nodes, plan);
-  add_tasks(plan);
   return plan;
 }
 

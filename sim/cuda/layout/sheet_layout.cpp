@@ -99,6 +99,34 @@ void add_scalar_rows(const BendingOperator& bending, const std::vector<int>& pos
   layout.stand_in = bending.stand_in;
 }
 
+void add_hinges(const SheetPlan& plan, const std::vector<int>& position, SheetLayout& layout) {
+  const int count = static_cast<int>(plan.hinges.size());
+  layout.hinge_count = count;
+  layout.hinge_vertices.resize(4L * count);
+  layout.hinge_rest_areas.resize(2L * count);
+  std::vector<std::vector<int>> corners(layout.size), sources(layout.block_count);
+  for (int e = 0; e < count; ++e) {
+    const Hinge& hinge = plan.hinges[e];
+    for (int k = 0; k < 4; ++k) {
+      const int vertex = hinge.vertices[k];
+      layout.hinge_vertices[k * count + e] = position[vertex];
+      corners[position[vertex]].push_back(4 * e + k);
+      sources[vertex].push_back(16 * e + 5 * k);
+    }
+    for (int k = 0; k < 2; ++k) layout.hinge_rest_areas[k * count + e] = hinge.rest_areas[k];
+    layout.hinge_weights.push_back(hinge.weight);
+    layout.hinge_rest_angles.push_back(hinge.rest_angle);
+    constexpr std::pair<int, int> blocks[6] = {{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}};
+    for (int b = 0; b < 6; ++b) {
+      const auto [row, column] = blocks[b];
+      const BlockSlot slot = plan.hinge_slots[e][b];
+      sources[slot.block].push_back(16 * e + (slot.transposed ? 4 * column + row : 4 * row + column));
+    }
+  }
+  flatten(corners, layout.hinge_corner_starts, layout.hinge_corners);
+  flatten(sources, layout.hinge_source_starts, layout.hinge_sources);
+}
+
 }  // namespace
 
 SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts) {
@@ -106,16 +134,20 @@ SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const
   layout.size = plan.pattern.size;
   layout.order.resize(layout.size);
   layout.vertex_area.resize(layout.size);
-  layout.block_vertex.resize(layout.size);
   layout.block_count = layout.size + static_cast<int>(plan.pattern.pairs.size());
   for (int vertex = 0; vertex < layout.size; ++vertex) {
     layout.order[fronts.position[vertex]] = vertex;
     layout.vertex_area[fronts.position[vertex]] = plan.sheet.vertex_area[vertex];
-    layout.block_vertex[vertex] = fronts.position[vertex];
+  }
+  layout.block_rows = layout.block_columns = fronts.position;
+  for (const auto& [row, column] : plan.pattern.pairs) {
+    layout.block_rows.push_back(fronts.position[row]);
+    layout.block_columns.push_back(fronts.position[column]);
   }
   add_triangles(plan, fronts.position, layout);
   add_block_rows(plan, fronts.position, layout);
   add_scalar_rows(bending, fronts.position, layout);
+  if (bending.model == data::BendingModel::hinge) add_hinges(plan, fronts.position, layout);
   return layout;
 }
 

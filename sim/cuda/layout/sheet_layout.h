@@ -21,8 +21,8 @@ struct SheetLayout {
   std::vector<int> corner_starts, corners;
 
   // Blocks of the pattern.
-  std::vector<EdgeSources> pair_sources;  ///< of each pair; those over no edge have none
-  std::vector<int> block_vertex;          ///< place of the vertex of each block on the diagonal
+  std::vector<EdgeSources> pair_sources;       ///< of each pair; those over no edge have none
+  std::vector<int> block_rows, block_columns;  ///< places of the vertices of each block
   int block_count = 0;
 
   // Block rows, in slices of vertices (sliced ELLPACK): as many blocks a vertex as the fullest of its slice,
@@ -36,7 +36,14 @@ struct SheetLayout {
   std::vector<double> group_values;
   std::vector<double> stand_in;  ///< one number a block
 
-  std::vector<double> vertex_area;  ///< by place [m^2]
+  // Hinges; without them where the model is another. Each array by hinge.
+  int hinge_count = 0;
+  std::vector<int> hinge_vertices;                       ///< four times hinge_count
+  std::vector<double> hinge_weights, hinge_rest_angles;  ///< as in Hinge
+  std::vector<double> hinge_rest_areas;                  ///< twice
+  std::vector<int> hinge_corner_starts, hinge_corners;   ///< of each vertex: 4 * hinge + corner
+  std::vector<int> hinge_source_starts, hinge_sources;   ///< of each block: 16 * hinge + 4 * row + column
+  std::vector<double> vertex_area;                       ///< by place [m^2]
 };
 
 SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts);

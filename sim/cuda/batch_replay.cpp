@@ -1,0 +1,383 @@
+#include "sim/cuda/batch_replay.h"
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <stdexcept>
+#include <string>
+
+#include "sim/cuda/device_arena.h"
+#include "sim/cuda/device_plan.h"
+#include "sim/cuda/replay_kernel.h"
+#include "sim/law/membrane.h"
+
+namespace flash::sim::cuda {
+
+using data::Points;
+
+namespace {
+
+constexpr int most_halvings = 16;
+
+void require(bool met, const char* what) {
+  if (!met) throw std::invalid_argument(std::string("replay: ") + what);
+}
+
+const BendingOperator& common_bending(const SheetPlan& plan,
+                                      const std::vector<ReplayEnvironment>& environments) {
+  require(!environments.empty(), "no environments");
+  const auto bending = [&](const ReplayEnvironment& e) -> const BendingOperator& {
+    return bending_operator(plan, e.material.bending_model, e.material.poissons_ratio);
+  };
+  for (const ReplayEnvironment& e : environments)
+    require(&bending(e) == &bending(environments.front()), "all environments need the same bending operator");
+  return bending(environments.front());
+}
+
+void check(const SheetPlan& plan, const std::vector<ReplayEnvironment>& environments,
+           const ReplaySettings& settings) {
+  require(settings.first_step >= 0 && settings.steps >= settings.first_step,
+          "the steps have to ascend from first_step to steps");
+  require(settings.restart_interval > 0, "restart_interval has to be positive");
+  require(settings.halvings >= 0 && settings.halvings <= most_halvings,
+          "halvings have to lie between 0 and 16");
+  const std::vector<int>& kept = settings.kept_steps;
+  require(std::adjacent_find(kept.begin(), kept.end(), std::greater_equal<>()) == kept.end(),
+          "kept_steps have to ascend");
+  require(kept.empty() || (kept.front() >= settings.first_step && kept.back() <= settings.steps),
+          "kept_steps have to lie between first_step and steps");
+  const int size = plan.pattern.size;
+  for (const ReplayEnvironment& e : environments) {
+    require(e.positions.rows() == size && e.velocities.rows() == size,
+            "every environment needs a position and a velocity for each vertex");
+    require(e.holds == nullptr || std::ssize(*e.holds) >= settings.steps - settings.first_step,
+            "what is held has to be given for each step");
+    for (const Load& load : e.loads) require(load.vertex >= 0 && load.vertex < size, "a load's vertex");
+  }
+}
+
+ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& environment, int motion) {
+  const data::SheetMaterial& m = environment.material;
+  const SheetLame lame = sheet_lame(m.membrane_stiffness, m.poissons_ratio);
+  const Membrane membrane = membrane_of(m.constitutive, lame);
+  const double gravity = environment.gravity.norm(), weight_factor = gravity > 0 ? gravity : 9.81;
+  return {membrane.law,
+          membrane.lame,
+          {lame.mu, m.constitutive == data::Constitutive::tri_arap ? 0 : lame.lambda},
+          m.membrane_stiffness,
+          m.bending_rigidity,
+          m.areal_density,
+          m.air_drag,
+          m.stiffness_damping,
+          {environment.gravity.x(), environment.gravity.y(), environment.gravity.z()},
+          weight_factor,
+          m.areal_density * plan.sheet.vertex_area.norm() * weight_factor,
+          motion};
+}
+
+/// Motions one after the other, each once.
+struct FlatHolds {
+  std::vector<int> starts;
+  std::vector<HeldPlace> holds;
+  std::map<const HoldMotion*, int> motions;
+  int most = 0;  ///< held in one step
+
+  void add(const HoldMotion* motion, int steps, const std::vector<int>& position) {
+    if (!motions.emplace(motion, static_cast<int>(motions.size())).second) return;
+    std::vector<int> held_in(position.size(), -1);
+    for (int k = 0; k < steps; ++k) {
+      starts.push_back(static_cast<int>(holds.size()));
+      if (motion == nullptr) continue;
+      for (const HeldVertex& held : (*motion)[k]) {
+        require(held.vertex >= 0 && held.vertex < std::ssize(position) && held_in[held.vertex] != k,
+                "a vertex that is not there or is held twice");
+        held_in[held.vertex] = k;
+        holds.push_back({position[held.vertex],
+                         int{held.axes[0]} | 2 * int{held.axes[1]} | 4 * int{held.axes[2]},
+                         {held.target.x(), held.target.y(), held.target.z()}});
+      }
+      most = std::max(most, static_cast<int>(holds.size()) - starts.back());
+    }
+    starts.push_back(static_cast<int>(holds.size()));
+  }
+};
+
+/// What a team needs besides the sheet.
+struct TeamSizes {
+  const FrontPlan& fronts;
+  const SheetLayout& layout;
+  FactorPrecision precision;
+  bool damped;
+  int most_held;
+};
+
+TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
+  const auto number = [](long count) { return static_cast<std::size_t>(count); };
+  const std::size_t size = number(sizes.layout.size), triangles = number(sizes.layout.triangle_count),
+                    hinges = number(sizes.layout.hinge_count), held = number(sizes.most_held),
+                    factor = number(sizes.fronts.factor_size);
+  TeamMemory m{};
+  for (int k = 0; k < 3; ++k) {
+    m.positions[k] = arena.take<Point>(size);
+    m.forces[k] = arena.take<double>(3 * size);
+  }
+  for (float** vector : {&m.gradient, &m.direction, &m.change, &m.residual, &m.image})
+    *vector = arena.take<float>(3 * size);
+  m.forward = arena.take<float>(6 * size);
+  m.passed = arena.take<float>(number(sizes.fronts.vector_size));
+  m.search = arena.take<Four<float>>(size);
+  m.shares = arena.take<float>(36 * triangles);
+  m.updates = arena.take<float>(number(sizes.fronts.update_size));
+  m.block_rows = arena.take<float>(number(sizes.layout.slice_starts.back()) * slice_numbers);
+  m.blocks = arena.take<float>(9 * number(sizes.layout.block_count));
+  m.factor = arena.take<float>(sizes.precision == FactorPrecision::half ? (factor + 1) / 2 : factor);
+  m.triangle_gradients = arena.take<double>(9 * triangles);
+  m.hinge_gradients = arena.take<double>(12 * hinges);
+  m.hinge_matrix = arena.take<float>(12 * hinges);
+  m.hinge_products = arena.take<float>(hinges);
+  if (sizes.damped) {
+    m.start_metrics = arena.take<double>(3 * triangles);
+    m.start_angles = arena.take<double>(hinges);
+    m.bent = arena.take<Point>(size);
+    m.damped = arena.take<double>(3 * size);
+  }
+  m.restrictions = arena.take<VertexRestriction>(held);
+  m.restriction_of = arena.take<int>(size);
+  m.hold_starts = arena.take<double>(3 * held);
+  m.clocks = arena.take<long long>(replay_phases + 1);
+  return m;
+}
+
+}  // namespace
+
+struct BatchReplay::Memory {
+  ReplaySettings settings;
+  int count, step;
+  FrontPlan front_plan;
+  SheetLayout layout;
+  DevicePlan plan;
+  cudaStream_t stream = nullptr;
+
+  DeviceArray<ReplayMaterial> materials;
+  DeviceArray<Point> positions, velocities, loads;
+  DeviceArray<int> hold_starts, kept_index, order, entries, counters, steps;
+  DeviceArray<HeldPlace> holds;
+  DeviceArray<ReplayStats> stats;
+  DeviceArray<double> kept;
+  DeviceArray<char> arena;
+  DeviceArray<TeamMemory> team_memory;
+  int teams = 0;
+  ReplayNumbers numbers{};
+
+  Memory(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments,
+         ReplaySettings replay_settings)
+      : settings(std::move(replay_settings)),
+        count(static_cast<int>(environments.size())),
+        step(settings.first_step),
+        front_plan(plan_fronts(sheet.pattern, sheet.sheet.rest.vertices, fitting_fronts(settings.fronts))),
+        layout(lay_out(sheet, common_bending(sheet, environments), front_plan)),
+        plan(front_plan, layout) {
+    upload_state(environments);
+    const int most_held = upload_motions(sheet, environments);
+    const int all_steps = settings.steps - settings.first_step;
+    stats = DeviceArray<ReplayStats>(static_cast<std::size_t>(all_steps) * environments.size());
+    upload_kept_steps();
+    const bool damped = std::any_of(environments.begin(), environments.end(),
+                                    [](const auto& e) { return e.material.stiffness_damping != 0; });
+    lay_out_teams({front_plan, layout, settings.precision, damped, most_held});
+    const int parts = all_steps / settings.restart_interval + 2;
+    entries = DeviceArray<int>(static_cast<std::size_t>(count) * static_cast<std::size_t>(parts));
+    counters = DeviceArray<int>(2);
+    steps = DeviceArray<int>(environments.size());
+
+    numbers.fronts = plan.fronts;
+    numbers.sheet = plan.sheet;
+    numbers.teams = team_memory.data();
+    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), 0};
+    place_on_chip(settings.precision, numbers);
+    numbers.time_step = settings.time_step;
+    numbers.tolerance = settings.tolerance;
+    numbers.max_iterations = settings.max_iterations;
+    numbers.stale_factor_solves = settings.stale_factor_solves;
+    numbers.halvings = settings.halvings;
+    numbers.restart_interval = settings.restart_interval;
+    numbers.stats_begin = settings.first_step;
+    numbers.stats_each = all_steps;
+    numbers.materials = materials.data();
+    numbers.loads = loads.data();
+    numbers.hold_starts = hold_starts.data();
+    numbers.motion_steps = all_steps + 1;
+    numbers.holds = holds.data();
+    numbers.positions = positions.data();
+    numbers.velocities = velocities.data();
+    numbers.stats = stats.data();
+    numbers.kept_index = kept_index.data();
+    numbers.kept_count = static_cast<int>(settings.kept_steps.size());
+    numbers.order = order.data();
+    numbers.kept = kept.data();
+    check(cudaStreamCreate(&stream));
+    keep_start(environments);
+  }
+  ~Memory() {
+    if (stream != nullptr) cudaStreamDestroy(stream);
+  }
+
+  std::size_t size() const { return layout.order.size(); }
+
+  void upload_state(const std::vector<ReplayEnvironment>& environments) {
+    std::vector<Point> x, v, forces;
+    const bool loaded = std::any_of(environments.begin(), environments.end(),
+                                    [](const ReplayEnvironment& e) { return !e.loads.empty(); });
+    for (const ReplayEnvironment& e : environments) {
+      Points load = Points::Zero(e.positions.rows(), 3);
+      for (const Load& one : e.loads) load.row(one.vertex) += one.force.transpose();
+      for (const int vertex : layout.order) {
+        const auto point = [vertex](const Points& p) {
+          return Point{p(vertex, 0), p(vertex, 1), p(vertex, 2), 0};
+        };
+        x.push_back(point(e.positions));
+        v.push_back(point(e.velocities));
+        if (loaded) forces.push_back(point(load));
+      }
+    }
+    positions = DeviceArray<Point>(x);
+    velocities = DeviceArray<Point>(v);
+    loads = DeviceArray<Point>(forces);
+    order = DeviceArray<int>(layout.order);
+  }
+
+  /// Returns how many vertices are held at once at most.
+  int upload_motions(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments) {
+    FlatHolds flat;
+    std::vector<ReplayMaterial> all;
+    for (const ReplayEnvironment& e : environments) {
+      flat.add(e.holds.get(), settings.steps - settings.first_step, front_plan.position);
+      all.push_back(material_of(sheet, e, flat.motions.at(e.holds.get())));
+    }
+    materials = DeviceArray<ReplayMaterial>(all);
+    hold_starts = DeviceArray<int>(flat.starts);
+    holds = DeviceArray<HeldPlace>(flat.holds);
+    return flat.most;
+  }
+
+  void upload_kept_steps() {
+    const int all_steps = settings.steps - settings.first_step;
+    std::vector<int> index(static_cast<std::size_t>(all_steps), -1);
+    for (std::size_t k = 0; k < settings.kept_steps.size(); ++k)
+      if (settings.kept_steps[k] > settings.first_step)
+        index[static_cast<std::size_t>(settings.kept_steps[k] - settings.first_step - 1)] =
+            static_cast<int>(k);
+    kept_index = DeviceArray<int>(index);
+    kept = DeviceArray<double>(static_cast<std::size_t>(count) * settings.kept_steps.size() * 3 * size());
+  }
+
+  void lay_out_teams(const TeamSizes& sizes) {
+    teams = std::min(count, resident_replay_teams(settings.precision, plan.fronts));
+    require(teams > 0, "the sheet is too large for the device");
+    DeviceArena counting(nullptr);
+    lay_out_team(sizes, counting);
+    const std::size_t bytes = counting.used();
+    arena = DeviceArray<char>(static_cast<std::size_t>(teams) * bytes);
+    std::vector<TeamMemory> all;
+    const std::vector<int> none(size(), -1);
+    for (int t = 0; t < teams; ++t) {
+      DeviceArena own(arena.data() + static_cast<std::size_t>(t) * bytes);
+      all.push_back(lay_out_team(sizes, own));
+      check(cudaMemcpy(all.back().restriction_of, none.data(), none.size() * sizeof(int),
+                       cudaMemcpyHostToDevice));
+    }
+    team_memory = DeviceArray<TeamMemory>(all);
+  }
+
+  void keep_start(const std::vector<ReplayEnvironment>& environments) {
+    if (settings.kept_steps.empty() || settings.kept_steps.front() != settings.first_step) return;
+    for (std::size_t e = 0; e < environments.size(); ++e)
+      kept.write(e * settings.kept_steps.size() * 3 * size(), environments[e].positions.data(), 3 * size());
+  }
+
+  void advance(int more) {
+    require(more >= 0 && more <= settings.steps - step, "it cannot advance beyond its last step");
+    if (more == 0) return;
+    const int end = step + more, interval = settings.restart_interval;
+    const int parts = (end - 1) / interval - step / interval + 1;
+    check(cudaStreamSynchronize(stream));
+    std::vector<int> queue(static_cast<std::size_t>(count) * static_cast<std::size_t>(parts), -1);
+    for (int e = 0; e < count; ++e) queue[static_cast<std::size_t>(e)] = e;
+    const int counts[2] = {0, count};
+    entries.write(0, queue.data(), queue.size());
+    counters.write(0, counts, 2);
+    const std::vector<int> stand(static_cast<std::size_t>(count), step);
+    steps.write(0, stand.data(), stand.size());
+    numbers.queue.size = static_cast<int>(queue.size());
+    numbers.end_step = end;
+    run_replay(settings.precision, numbers, teams, stream);
+    step = end;
+  }
+
+  Points points(const DeviceArray<Point>& array, int e) const {
+    check(cudaStreamSynchronize(stream));
+    const std::vector<Point> all = array.read(static_cast<std::size_t>(e) * size(), size());
+    Points result(layout.size, 3);
+    for (int i = 0; i < layout.size; ++i) result.row(layout.order[i]) << all[i].x, all[i].y, all[i].z;
+    return result;
+  }
+};
+
+BatchReplay::BatchReplay(std::shared_ptr<const SheetPlan> plan,
+                         const std::vector<ReplayEnvironment>& environments, ReplaySettings settings) {
+  check(*plan, environments, settings);
+  memory_ = std::make_unique<Memory>(*plan, environments, std::move(settings));
+}
+BatchReplay::~BatchReplay() = default;
+BatchReplay::BatchReplay(BatchReplay&&) noexcept = default;
+
+int BatchReplay::size() const { return memory_->count; }
+int BatchReplay::step() const { return memory_->step; }
+int BatchReplay::teams() const { return memory_->teams; }
+void BatchReplay::advance(int steps) { memory_->advance(steps); }
+void BatchReplay::synchronize() { cuda::check(cudaStreamSynchronize(memory_->stream)); }
+
+Points BatchReplay::positions(int environment) const {
+  return memory_->points(memory_->positions, environment);
+}
+Points BatchReplay::velocities(int environment) const {
+  return memory_->points(memory_->velocities, environment);
+}
+
+Points BatchReplay::kept_positions(int environment, int index) const {
+  const Memory& m = *memory_;
+  cuda::check(cudaStreamSynchronize(m.stream));
+  const std::size_t place =
+      static_cast<std::size_t>(environment) * m.settings.kept_steps.size() + static_cast<std::size_t>(index);
+  const std::vector<double> numbers = m.kept.read(place * 3 * m.size(), 3 * m.size());
+  return Eigen::Map<const Points>(numbers.data(), m.layout.size, 3);
+}
+
+std::vector<double> BatchReplay::phases() const {
+  const Memory& m = *memory_;
+  cuda::check(cudaStreamSynchronize(m.stream));
+  std::vector<double> shares(replay_phases, 0.0);
+  double all = 0;
+  for (const TeamMemory& team : m.team_memory.read(0, m.team_memory.size())) {
+    long long clocks[replay_phases];
+    cuda::check(cudaMemcpy(clocks, team.clocks, sizeof(clocks), cudaMemcpyDeviceToHost));
+    for (int k = 0; k < replay_phases; ++k) {
+      shares[static_cast<std::size_t>(k)] += static_cast<double>(clocks[k]);
+      all += static_cast<double>(clocks[k]);
+    }
+  }
+  for (double& share : shares) share /= all;
+  return shares;
+}
+
+std::vector<ReplayStep> BatchReplay::stats(int environment) const {
+  const Memory& m = *memory_;
+  cuda::check(cudaStreamSynchronize(m.stream));
+  const auto each = static_cast<std::size_t>(m.numbers.stats_each);
+  std::vector<ReplayStep> steps;
+  for (const ReplayStats& s : m.stats.read(static_cast<std::size_t>(environment) * each, each))
+    steps.push_back({s.residual, s.iterations, s.solves, s.factorizations, s.substeps, s.converged != 0});
+  return steps;
+}
+
+}  // namespace flash::sim::cuda

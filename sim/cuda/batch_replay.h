@@ -1,0 +1,92 @@
+#pragma once
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "data/material.h"
+#include "data/mesh.h"
+#include "sim/cuda/environment_numbers.h"
+#include "sim/cuda/layout/front_plan.h"
+#include "sim/plan/sheet_plan.h"
+#include "sim/scene/environment.h"
+
+namespace flash::sim::cuda {
+
+/// A vertex held in some axes at the end of a step.
+struct HeldVertex {
+  int vertex;
+  std::array<bool, 3> axes = {true, true, true};
+  Eigen::Vector3d target;  ///< places of the held axes [m]
+};
+
+/// What is held in each step, no vertex twice in one.
+using HoldMotion = std::vector<std::vector<HeldVertex>>;
+
+/// One environment: a sheet without obstacles, its start and what holds it. Environments may share a motion.
+struct ReplayEnvironment {
+  data::SheetMaterial material;
+  Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
+  std::vector<Load> loads;
+  std::shared_ptr<const HoldMotion> holds;  ///< by step, from first_step on
+  data::Points positions, velocities;       ///< [m], [m/s]
+};
+
+struct ReplaySettings {
+  // As in SolverSettings.
+  double time_step = 0.01;      ///< h [s]
+  int max_iterations = 60;      ///< Newton iterations a step
+  double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
+  int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
+  int halvings = 8;             ///< a step that cannot be solved is repeated in two halves, so often
+
+  int first_step = 0;             ///< at which the environments stand
+  int steps = 0;                  ///< the last one
+  std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; step 0 is the start
+  int restart_interval = 10;      ///< steps after which a solver forgets its factor and may change its team
+  FactorPrecision precision = FactorPrecision::half;
+  FrontSettings fronts{};
+};
+
+/// How one step of one environment went, as in StepReport.
+struct ReplayStep {
+  double residual = 0;  ///< |r| / |M g|
+  int iterations = 0, solves = 0, factorizations = 0, substeps = 0;
+  bool converged = false;
+};
+
+/// Replays of many environments of one sheet on the device, each step to the tolerance that the CPU's Solver
+/// has. A block of threads takes an environment through up to `restart_interval` steps and then another one
+/// that waits. So none waits for the others, and what an environment gets depends on its own numbers alone,
+/// bitwise. Linear problems are in single precision, energies, residuals and positions in double. A held
+/// vertex moves on a straight line within a step that has to be halved.
+class BatchReplay {
+ public:
+  /// Throws std::invalid_argument where environments do not fit the plan, have not the same bending operator,
+  /// or miss holds for a step; std::runtime_error with the device's message.
+  BatchReplay(std::shared_ptr<const SheetPlan> plan, const std::vector<ReplayEnvironment>& environments,
+              ReplaySettings settings);
+  ~BatchReplay();
+  BatchReplay(BatchReplay&&) noexcept;
+
+  int size() const;
+  int step() const;   ///< steps that are queued or taken, first_step included
+  int teams() const;  ///< environments that the device works on at the same time
+
+  /// Queues the next steps of all environments and returns; what reads results waits for them.
+  void advance(int steps);
+  void synchronize();
+
+  data::Points positions(int environment) const;   ///< [m]
+  data::Points velocities(int environment) const;  ///< [m/s]
+  data::Points kept_positions(int environment, int index) const;
+  std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on
+  /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions, rest.
+  std::vector<double> phases() const;
+
+ private:
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
+
+}  // namespace flash::sim::cuda

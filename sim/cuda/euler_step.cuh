@@ -1,0 +1,200 @@
+#pragma once
+#include "sim/cuda/newton_iteration.cuh"
+
+namespace flash::sim::cuda {
+
+// One time step of an environment as in sim/newton/solver.h, whole or in halves.
+
+/// What holds an environment's vertices at the end of a step.
+struct StepHolds {
+  const HeldPlace* list;
+  int count;
+};
+
+/// Notes what is held and where it is now; clear_holds takes it back.
+__device__ inline void begin_holds(const Work& w, const StepHolds& holds, const Point* positions) {
+  for (int k = static_cast<int>(threadIdx.x); k < holds.count; k += team_threads) {
+    const HeldPlace& held = holds.list[k];
+    VertexRestriction restriction = {held.place, {}, {}};
+    for (int axis = 0; axis < 3; ++axis) restriction.free[4 * axis] = held.axes >> axis & 1 ? 0.0f : 1.0f;
+    w.memory.restrictions[k] = restriction;
+    w.memory.restriction_of[held.place] = k;
+    const Point from = positions[held.place];
+    w.memory.hold_starts[3 * k] = from.x;
+    w.memory.hold_starts[3 * k + 1] = from.y;
+    w.memory.hold_starts[3 * k + 2] = from.z;
+  }
+  __syncthreads();
+}
+
+__device__ inline void clear_holds(const Work& w, const StepHolds& holds) {
+  __syncthreads();
+  for (int k = static_cast<int>(threadIdx.x); k < holds.count; k += team_threads)
+    w.memory.restriction_of[holds.list[k].place] = -1;
+  __syncthreads();
+}
+
+/// The positions without forces, held vertices where they have to be: `share` of their way of the whole step.
+__device__ inline void predict(const Work& w, const StepProblem& step, const StepHolds& holds, double share) {
+  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+    const Triple x = triple(step.start[i]) + step.h * triple(step.velocities[i]);
+    w.now.positions[i] = {x.x, x.y, x.z, 0};
+  }
+  __syncthreads();
+  for (int k = static_cast<int>(threadIdx.x); k < holds.count; k += team_threads) {
+    const HeldPlace& held = holds.list[k];
+    Point& own = w.now.positions[held.place];
+    double* places[3] = {&own.x, &own.y, &own.z};
+#pragma unroll
+    for (int axis = 0; axis < 3; ++axis) {
+      const double from = w.memory.hold_starts[3 * k + axis], to = held.target[axis];
+      if (held.axes >> axis & 1) *places[axis] = share == 1 ? to : from + share * (to - from);
+    }
+  }
+}
+
+struct StepEnd {
+  bool energy_is_sound;  ///< whether it came from somewhere
+  bool finite;           ///< whether all positions are
+};
+
+/// The end of a step, its energy as account_for_energy of the CPU has it.
+__device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
+  constexpr double energy_tolerance = 1e-2;
+  const SheetTables& tables = w.replay.sheet;
+  const ReplayMaterial& material = *step.material;
+  enum {
+    kinetic,
+    kinetic_at_start,
+    falls,
+    unbalanced,
+    work,
+    moved_holds,
+    inertial_at_start,
+    mass_sum,
+    count
+  };
+  double sums[count] = {};
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    const double mass = step.mass(tables, i);
+    const Triple way = triple(w.now.positions[i]) - triple(step.start[i]), speed = triple(step.velocities[i]),
+                 force = force_at(w.now.force, i), residual = step.residual(i, force),
+                 inertial = step.inertial(i, {0, 0, 0}), held_way = way - step.residual(i, way);
+    sums[kinetic] += 0.5 * mass * dot(way, way);
+    sums[kinetic_at_start] += 0.5 * mass * dot(speed, speed);
+    sums[falls] += mass * dot(step.gravity(), way) + dot(step.load(i), way);
+    sums[unbalanced] += fabs(dot(residual, way));
+    sums[work] += dot(force - residual, way);
+    sums[moved_holds] += dot(held_way, held_way) > 0 ? 1 : 0;
+    sums[inertial_at_start] += 0.5 * mass * dot(inertial, inertial);
+    sums[mass_sum] += mass;
+  }
+  sum_over_team(sums, shared_memory<double>());
+  __syncthreads();
+  const double per_step = 1 / (step.h * step.h);
+  const double stored_at_start = step.at_start.membrane + step.at_start.bending,
+               stored_at_end = w.now.elastic.membrane + w.now.elastic.bending;
+  const double gain = per_step * sums[kinetic] - sums[kinetic_at_start] + stored_at_end - stored_at_start -
+                      sums[falls] - sums[work];
+  const double there =
+      sums[kinetic_at_start] + stored_at_start + fmax(0.0, sums[falls]) + fmax(0.0, sums[work]);
+  const double rounding = 1e-9 * sums[mass_sum] * material.weight_factor +
+                          1e-14 * material.membrane_stiffness * sums[mass_sum] / material.areal_density;
+  const double allowed = energy_tolerance * there + sums[unbalanced] + rounding;
+  const bool finite = isfinite(sums[kinetic]);
+  if (!(gain <= allowed)) return {false, finite};
+  if (sums[moved_holds] > 0) return {true, finite};
+  return {w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + allowed, finite};
+}
+
+/// What damping measures from, at the start of a step of h.
+__device__ inline void begin_damping(const Work& w, StepProblem& step) {
+  const ReplayMaterial& material = *step.material;
+  EnvironmentNumbers& numbers = step.numbers;
+  numbers = {material.law, material.lame, material.rigidity,
+             material.areal_density * (1 / (step.h * step.h) + material.air_drag / step.h)};
+  step.damped_since = {};
+  if (material.stiffness_damping == 0) return;
+  const double share = material.stiffness_damping / step.h;
+  numbers.damping = {share * material.damping.mu, share * material.damping.lambda};
+  numbers.damping_share = share;
+  const auto place = [&](int vertex) { return triple(step.start[vertex]); };
+  write_metrics(w.replay.sheet, place, w.memory.start_metrics);
+  if (w.replay.sheet.hinge_count > 0) write_angles(w.replay.sheet, place, w.memory.start_angles);
+  step.damped_since = {w.memory.start_metrics, w.memory.start_angles};
+  __syncthreads();
+}
+
+/// One step of step.h as a whole; the state advances in any case. Returns whether the step is solved.
+template <typename Stored>
+__device__ bool try_step(Work& w, StepProblem& step, const StepHolds& holds, double share, Point* positions,
+                         Point* velocities, ReplayStats& stats, bool last_try) {
+  constexpr double rounding_tolerance = 1e-6;
+  begin_damping(w, step);
+  predict(w, step, holds, share);
+  evaluate(w, step, w.now);
+  iterate_to_balance<Stored>(w, step, stats);
+  const double tolerance = w.replay.tolerance;
+  const StepEnd end = judge_end(w, step);
+  const bool solved = end.energy_is_sound &&
+                      balanced(step, w.now, tolerance > rounding_tolerance ? tolerance : rounding_tolerance);
+  if (!solved) w.refactor = true;
+  if (!solved && !last_try) return false;
+  // A sheet that is not finite stands still instead.
+  const double residual = end.finite ? w.now.residual / step.material->force_scale : INFINITY;
+  if (!(residual <= stats.residual)) stats.residual = residual;
+  ++stats.substeps;
+  stats.converged = end.energy_is_sound && balanced(step, w.now, tolerance);
+  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+    const Triple moved = triple(w.now.positions[i]) - triple(positions[i]), speed = (1 / step.h) * moved;
+    velocities[i] = {end.finite ? speed.x : 0, end.finite ? speed.y : 0, end.finite ? speed.z : 0, 0};
+    if (end.finite) positions[i] = w.now.positions[i];
+  }
+  if (end.finite) step.at_start = w.now.elastic;
+  __syncthreads();
+  return solved;
+}
+
+/// One time step, in halves where it cannot be solved as a whole, so often as `halvings` says. Once a half
+/// has failed the other is not divided any more.
+template <typename Stored>
+__device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepHolds& holds, Point* positions,
+                                    Point* velocities) {
+  constexpr int most_halvings = 16;
+  ReplayStats stats = {};
+  begin_holds(w, holds, positions);
+  // Of each part of a part, from the whole step on: halves that it may be divided into still.
+  int halvings[most_halvings + 1], level = 0;
+  unsigned second = 0, first_converged = 0;  // a bit a level
+  double begin = 0;                          // share of the step that is behind
+  halvings[0] = w.replay.halvings;
+  while (true) {
+    const double length = 1.0 / (1 << level);
+    step.h = length * w.replay.time_step;
+    const bool last_try = halvings[level] == 0;
+    const bool solved =
+        try_step<Stored>(w, step, holds, begin + length, positions, velocities, stats, last_try);
+    if (!solved && !last_try) {
+      halvings[level + 1] = halvings[level] - 1;
+      ++level;
+      second &= ~(1u << level);
+      continue;
+    }
+    begin += length;
+    bool converged = stats.converged;
+    // A second half ends its whole.
+    for (; level > 0 && (second >> level & 1); --level)
+      converged = converged && (first_converged >> level & 1);
+    if (level == 0) {
+      stats.converged = converged;
+      break;
+    }
+    first_converged = (first_converged & ~(1u << level)) | (converged ? 1u << level : 0);
+    second |= 1u << level;
+    if (!converged) halvings[level] = 0;
+  }
+  clear_holds(w, holds);
+  return stats;
+}
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,20 @@
+#pragma once
+#include <vector>
+
+#include "sim/cuda/layout/front_plan.h"
+#include "sim/cuda/layout/solve_chunk.h"
+
+namespace flash::sim::cuda {
+
+/// How the warps of a team share a solve: each goes through chunks of its own, first all heights upwards and
+/// then downwards. Which numbers a warp needs does not depend on the right-hand side, so that they can be on
+/// their way long before.
+struct SolvePlan {
+  std::vector<SolveChunk> chunks;  ///< of one warp after the other
+  std::vector<int> starts;         ///< of each warp, and the end
+  std::vector<Gather> gathers;     ///< of each vertex of each front
+};
+
+SolvePlan plan_solve(const FrontPlan& fronts);
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,221 @@
+#pragma once
+#include "sim/cuda/conjugate_gradients.cuh"
+#include "sim/cuda/front_factor.cuh"
+#include "sim/cuda/incremental_potential.cuh"
+#include "sim/cuda/membrane_hessian.cuh"
+
+namespace flash::sim::cuda {
+
+// Newton's method of sim/newton/newton_iteration.h for one environment. All threads of a team decide alike.
+
+/// A team at work on an environment.
+struct Work {
+  const ReplayNumbers& replay;
+  const TeamMemory& memory;
+  bool refactor;  ///< whether the next solve needs a new factor
+  Iterate now, trial, longer;
+};
+
+/// Counts the time since the last call to a phase.
+__device__ inline void count_phase(const TeamMemory& memory, ReplayPhase phase) {
+  if (threadIdx.x != 0) return;
+  const long long now = clock64();
+  memory.clocks[static_cast<int>(phase)] += now - memory.clocks[replay_phases];
+  memory.clocks[replay_phases] = now;
+}
+
+__device__ inline void evaluate(const Work& w, const StepProblem& step, Iterate& at) {
+  count_phase(w.memory, ReplayPhase::rest);
+  if (w.replay.places_on_chip)
+    evaluate<true>(w.replay.sheet, step, w.memory, at);
+  else
+    evaluate<false>(w.replay.sheet, step, w.memory, at);
+  count_phase(w.memory, ReplayPhase::evaluation);
+}
+
+/// The parts of the Hessian at the iterate, from which a matrix is put together.
+__device__ inline void write_parts(const Work& w, const StepProblem& step, bool positive) {
+  const SheetTables& tables = w.replay.sheet;
+  write_shares(tables, step.numbers, step.damped_since, w.now.positions, positive, w.memory.shares,
+               shared_memory<float>());
+  if (tables.hinge_count > 0)
+    write_hinge_matrix(tables, step.numbers.effective_rigidity(),
+                       [&](int vertex) { return triple(w.now.positions[vertex]); },
+                       {w.memory.hinge_matrix, w.memory.hinge_products});
+  __syncthreads();
+}
+
+__device__ inline HingeMatrix hinges_of(const Work& w) {
+  if (w.replay.sheet.hinge_count == 0) return {};
+  return {w.memory.hinge_matrix, w.memory.hinge_products};
+}
+
+/// Assembles the Hessian at the iterate: exact, or `positive`.
+__device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& step, bool positive) {
+  write_parts(w, step, positive);
+  assemble_block_rows(w.replay.sheet, step.numbers, w.memory.shares, w.memory.block_rows,
+                      shared_memory<float>());
+  __syncthreads();
+  count_phase(w.memory, ReplayPhase::matrix);
+}
+
+/// Factorizes the positive Hessian at the iterate. Returns false where it is not positive definite after all.
+template <typename Stored>
+__device__ __noinline__ bool factorize(const Work& w, const StepProblem& step) {
+  float* chip = shared_memory<float>();
+  write_parts(w, step, true);
+  assemble_blocks(w.replay.sheet, step.numbers, step.restrictions, hinges_of(w), w.memory.shares,
+                  w.memory.blocks, chip);
+  count_phase(w.memory, ReplayPhase::preconditioner);
+  const bool positive = factorize(w.replay.fronts, w.memory.blocks, w.memory.updates,
+                                  static_cast<Stored*>(w.memory.factor), chip);
+  const float failures = sum_over_team(positive ? 0.0f : 1.0f, chip);
+  __syncthreads();
+  count_phase(w.memory, ReplayPhase::factorization);
+  return failures == 0;
+}
+
+/// On-chip bytes for sums over the team, before what a solve needs.
+inline constexpr int linear_partial_bytes = 64;
+static_assert(linear_partial_bytes >= team_warps * static_cast<int>(sizeof(float)));
+
+/// Finds the direction by conjugate gradients. Returns their number of solves.
+template <typename Stored>
+__device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) {
+  constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
+  const SheetTables& tables = w.replay.sheet;
+  const TeamMemory& m = w.memory;
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    const Triple residual = step.residual(i, force_at(w.now.force, i));
+    m.gradient[3 * i] = static_cast<float>(residual.x);
+    m.gradient[3 * i + 1] = static_cast<float>(residual.y);
+    m.gradient[3 * i + 2] = static_cast<float>(residual.z);
+  }
+  __syncthreads();
+  const LinearProblem<Stored> problem = {
+      m.block_rows,
+      static_cast<float>(step.numbers.effective_rigidity()),
+      hinges_of(w),
+      static_cast<const Stored*>(m.factor),
+      m.gradient,
+      step.restrictions,
+      static_cast<float>(linear_tolerance * w.replay.tolerance * step.material->force_scale)};
+  char* chip = shared_memory<char>();
+  const auto on_chip = [&](int at, auto* otherwise) {
+    return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
+  };
+  const LinearVectors vectors = {
+      m.residual,
+      m.image,
+      m.search,
+      on_chip(w.replay.search_at, m.search),
+      {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
+  const int solves = conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction, m.change,
+                                         reinterpret_cast<float*>(chip), chip + linear_partial_bytes);
+  count_phase(m, ReplayPhase::directions);
+  return solves;
+}
+
+/// The slope of the potential along the direction, at an iterate [J].
+__device__ inline double slope_at(const Work& w, const StepProblem& step, const Iterate& at) {
+  double slope[1] = {};
+  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+    const float* way = w.memory.direction + 3 * i;
+    slope[0] += dot(step.residual(i, force_at(at.force, i)), Triple{way[0], way[1], way[2]});
+  }
+  sum_over_team(slope, shared_memory<double>());
+  __syncthreads();
+  return slope[0];
+}
+
+/// Evaluates the point `length` directions from the iterate.
+__device__ inline void move(const Work& w, const StepProblem& step, double length, Iterate& to) {
+  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+    const Point from = w.now.positions[i];
+    const float* way = w.memory.direction + 3 * i;
+    to.positions[i] = {from.x + length * way[0], from.y + length * way[1], from.z + length * way[2], 0};
+  }
+  evaluate(w, step, to);
+}
+
+__device__ inline void swap_iterates(Iterate& a, Iterate& b) {
+  const Iterate c = a;
+  a = b;
+  b = c;
+}
+
+/// The potential guides the step. Near the solution it falls by less than its rounding: a smaller residual
+/// does as well.
+__device__ inline bool acceptable(const Work& w, double slope, double length) {
+  constexpr double armijo_share = 1e-4, residual_share = 0.1;
+  return w.trial.potential <= w.now.potential + armijo_share * length * slope ||
+         w.trial.residual <= (1 - residual_share * length) * w.now.residual;
+}
+
+/// Halves a whole step until it is acceptable or too short; returns its length.
+__device__ inline double line_search(Work& w, const StepProblem& step, double slope) {
+  constexpr double least_length = 1e-3;
+  double length = 1;
+  move(w, step, length, w.trial);
+  while (!acceptable(w, slope, length) && length > least_length) {
+    length *= 0.5;
+    move(w, step, length, w.trial);
+  }
+  return length;
+}
+
+/// Goes on along the line, by secants, while the potential falls. A sheet about to buckle needs it: the
+/// matrix, made positive, is stiffer than the sheet, and steps are too short.
+__device__ inline void lengthen(Work& w, const StepProblem& step, double slope, double length) {
+  constexpr double greatest_length = 30, flat_slope = 0.2, least_growth = 1.5, greatest_growth = 3,
+                   residual_growth = 10;
+  while (length >= 1 && length < greatest_length) {
+    const double end_slope = slope_at(w, step, w.trial);
+    if (end_slope > flat_slope * slope) return;
+    const double secant = slope / (slope - end_slope);
+    const double growth = secant < least_growth      ? least_growth
+                          : secant > greatest_growth ? greatest_growth
+                                                     : secant;
+    move(w, step, length * growth, w.longer);
+    if (w.longer.potential >= w.trial.potential || !(w.longer.residual < residual_growth * w.now.residual))
+      return;
+    length *= growth;
+    swap_iterates(w.trial, w.longer);
+  }
+}
+
+/// From w.now to balance or until it cannot go on. Counts its work in `stats`.
+template <typename Stored>
+__device__ void iterate_to_balance(Work& w, const StepProblem& step, ReplayStats& stats) {
+  constexpr int most_forced_moves = 6;
+  bool stuck = false;
+  int forced_moves = 0;
+  for (int iterations = 0; iterations < w.replay.max_iterations && !balanced(step, w.now, w.replay.tolerance);
+       ++iterations) {
+    ++stats.iterations;
+    if (w.refactor) {
+      if (!factorize<Stored>(w, step)) return;
+      ++stats.factorizations;
+    }
+    assemble_matrix(w, step, stuck);
+    const int solves = linear_step<Stored>(w, step);
+    stats.solves += solves;
+    w.refactor = solves > w.replay.stale_factor_solves;
+
+    const double slope = slope_at(w, step, w.now);
+    const double length = line_search(w, step, slope);
+    if (!acceptable(w, slope, length)) {
+      if (!stuck) {
+        // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
+        stuck = w.refactor = true;
+        continue;
+      }
+      if (++forced_moves > most_forced_moves || !isfinite(w.trial.potential)) return;
+    }
+    stuck = false;
+    lengthen(w, step, slope, length);
+    swap_iterates(w.now, w.trial);
+  }
+}
+
+}  // namespace flash::sim::cuda

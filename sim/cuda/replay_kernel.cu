@@ -1,0 +1,134 @@
+#include "sim/cuda/replay_kernel.h"
+
+#include <algorithm>
+
+#include "sim/cuda/euler_step.cuh"
+#include "sim/cuda/launch.h"
+#include "sim/cuda/work_queue.cuh"
+
+namespace flash::sim::cuda {
+namespace {
+
+/// Positions of an environment in the order of the mesh.
+__device__ void keep(const ReplayNumbers& replay, const Point* positions, double* kept) {
+  for (int i = static_cast<int>(threadIdx.x); i < replay.sheet.size; i += team_threads) {
+    double* to = kept + 3L * replay.order[i];
+    const Point from = positions[i];
+    to[0] = from.x;
+    to[1] = from.y;
+    to[2] = from.z;
+  }
+}
+
+/// Takes an environment from its step `first` up to `end`.
+template <typename Stored>
+__device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, int e, int first, int end) {
+  const int size = replay.sheet.size;
+  Point *positions = replay.positions + static_cast<long>(size) * e,
+        *velocities = replay.velocities + static_cast<long>(size) * e;
+  const ReplayMaterial& material = replay.materials[e];
+  const auto iterate = [&](int k) { return Iterate{memory.positions[k], memory.forces[k], {}, 0, 0, 0}; };
+  if (threadIdx.x == 0) memory.clocks[replay_phases] = clock64();
+  Work w = {replay, memory, true, iterate(0), iterate(1), iterate(2)};
+  StepProblem step = {&material,
+                      replay.time_step,
+                      {},
+                      positions,
+                      velocities,
+                      replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
+                      {memory.restrictions, 0, memory.restriction_of},
+                      {},
+                      {}};
+  // The energy that it starts with.
+  Iterate& now = w.now;
+  for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads) now.positions[i] = positions[i];
+  step.numbers = {material.law, material.lame, material.rigidity, 0};
+  evaluate(w, step, now);
+  step.at_start = now.elastic;
+  for (int at = first; at < end; ++at) {
+    if (at % replay.restart_interval == 0) w.refactor = true;
+    const int* starts = replay.hold_starts + static_cast<long>(material.motion) * replay.motion_steps +
+                        (at - replay.stats_begin);
+    const StepHolds holds = {replay.holds + starts[0], starts[1] - starts[0]};
+    step.restrictions.count = holds.count;
+    const ReplayStats stats = advance_step<Stored>(w, step, holds, positions, velocities);
+    const long place = at - replay.stats_begin;
+    if (threadIdx.x == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
+    const int kept = replay.kept_index[place];
+    if (kept >= 0)
+      keep(replay, positions, replay.kept + 3L * size * (static_cast<long>(replay.kept_count) * e + kept));
+  }
+}
+
+/// A block is a team. It takes an environment through some steps, until the solver forgets what it holds,
+/// and then takes the next that waits. So none waits for another, and all end at nearly the same time.
+template <typename Stored>
+__global__ void __launch_bounds__(team_threads, resident_teams_each)
+    replay_kernel(const __grid_constant__ ReplayNumbers replay) {
+  int* next = shared_memory<int>();
+  const TeamMemory& memory = replay.teams[blockIdx.x];
+  while (true) {
+    __syncthreads();
+    if (threadIdx.x == 0) next[0] = take(replay.queue, &next[1]);
+    __syncthreads();
+    const int e = next[0], first = next[1];
+    if (e < 0) return;
+    const int interval = replay.restart_interval,
+              end = min(replay.end_step, (first / interval + 1) * interval);
+    advance<Stored>(replay, memory, e, first, end);
+    count_phase(memory, ReplayPhase::rest);
+    __syncthreads();
+    if (threadIdx.x == 0 && end < replay.end_step) add(replay.queue, e, end);
+  }
+}
+
+using Kernel = void (*)(ReplayNumbers);
+
+Kernel kernel_of(FactorPrecision precision) {
+  return precision == FactorPrecision::half ? replay_kernel<__half> : replay_kernel<float>;
+}
+
+int linear_bytes_of(FactorPrecision precision, const FrontTables& fronts) {
+  return linear_partial_bytes + (precision == FactorPrecision::half
+                                     ? solve_memory<__half>(fronts.solve_depth)
+                                     : solve_memory<float>(fronts.solve_depth));
+}
+
+/// What a team needs in any case, and as much as leaves room for as many teams as there are registers for.
+int bytes_of(FactorPrecision precision, const FrontTables& fronts) {
+  constexpr int number = sizeof(float), reserved = 1024;  // by the device, for each team
+  return std::max({gradient_memory(fronts.size, false), hessian_memory * number,
+                   number * factor_memory(fronts.shared_panel), linear_bytes_of(precision, fronts),
+                   most_memory() / resident_teams_each - reserved});
+}
+
+}  // namespace
+
+void place_on_chip(FactorPrecision precision, ReplayNumbers& numbers) {
+  const FrontTables& fronts = numbers.fronts;
+  const int room = bytes_of(precision, fronts);
+  numbers.places_on_chip = gradient_memory(fronts.size, true) <= room;
+  int used = linear_bytes_of(precision, fronts);
+  const auto place = [&](long bytes) {
+    if (used + bytes > room) return -1;
+    const int at = used;
+    used += rounded_up(static_cast<int>(bytes), 16);
+    return at;
+  };
+  constexpr long number = sizeof(float);
+  numbers.forward_at = place(6 * number * fronts.size);
+  numbers.passed_at = place(number * fronts.vector_size);
+  // Where a solve has its chunks.
+  const bool fits = 4 * number * fronts.size <= linear_bytes_of(precision, fronts) - linear_partial_bytes;
+  numbers.search_at = fits ? linear_partial_bytes : -1;
+}
+
+int resident_replay_teams(FactorPrecision precision, const FrontTables& fronts) {
+  return resident_teams(kernel_of(precision), bytes_of(precision, fronts));
+}
+
+void run_replay(FactorPrecision precision, const ReplayNumbers& numbers, int teams, cudaStream_t stream) {
+  launch(kernel_of(precision), teams, bytes_of(precision, numbers.fronts), stream, numbers);
+}
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,17 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include "sim/cuda/replay_numbers.h"
+
+namespace flash::sim::cuda {
+
+/// Teams that the device runs at the same time, on which the queue of a replay relies.
+int resident_replay_teams(FactorPrecision precision, const FrontTables& fronts);
+
+/// Says what of a replay finds room on chip.
+void place_on_chip(FactorPrecision precision, ReplayNumbers& numbers);
+
+/// Queues the steps first_step to end_step of all environments.
+void run_replay(FactorPrecision precision, const ReplayNumbers& numbers, int teams, cudaStream_t stream);
+
+}  // namespace flash::sim::cuda

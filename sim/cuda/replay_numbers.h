@@ -1,0 +1,96 @@
+#pragma once
+#include "sim/cuda/environment_numbers.h"
+#include "sim/cuda/four.h"
+#include "sim/cuda/front_tables.h"
+#include "sim/cuda/sheet_tables.h"
+
+namespace flash::sim::cuda {
+
+// What the kernel of a replay knows. Vertices by their places in the elimination.
+
+/// An environment apart from its state.
+struct ReplayMaterial {
+  MembraneLaw law;
+  SheetLame lame, damping;  ///< `damping` as `lame`, but for the law that has no lambda
+  double membrane_stiffness, rigidity, areal_density, air_drag, stiffness_damping;  ///< as in SheetMaterial
+  double gravity[3];                                                                ///< [m/s^2]
+  double weight_factor;  ///< |gravity|, 9.81 without [m/s^2]
+  double force_scale;    ///< |M g| [N]
+  int motion;            ///< of what holds it
+};
+
+/// A vertex held in some axes at the end of a step.
+struct HeldPlace {
+  int place;
+  int axes;  ///< bits 1, 2 and 4: x, y and z
+  double target[3];
+};
+
+/// How one step of one environment went.
+struct ReplayStats {
+  double residual;  ///< |r| / |M g|
+  int iterations, solves, factorizations, substeps;
+  int converged;
+};
+
+/// Where the time of a step goes.
+enum class ReplayPhase { evaluation, matrix, preconditioner, factorization, directions, rest };
+inline constexpr int replay_phases = 6;
+
+/// Memory of a team. Vectors have three numbers a vertex where nothing is said.
+struct TeamMemory {
+  Point* positions[3];  ///< of the iterates
+  double* forces[3];    ///< what each vertex needs from outside [N]
+  float *gradient, *direction, *change;
+  float *residual, *image, *forward, *passed;
+  Four<float>* search;
+  float *shares, *updates, *block_rows, *blocks;
+  void* factor;
+  double *triangle_gradients, *hinge_gradients;
+  float *hinge_matrix, *hinge_products;
+  double *start_metrics, *start_angles;  ///< null where nothing is damped
+  Point* bent;
+  double* damped;
+  VertexRestriction* restrictions;
+  int* restriction_of;  ///< by place, -1 for none
+  double* hold_starts;  ///< where held vertices were when the step began
+  long long* clocks;    ///< ticks of the processor spent in each phase
+};
+
+/// The queue of work: environments, each as often as it has parts of its motion left.
+struct WorkQueue {
+  int* entries;  ///< -1 where nothing stands yet
+  int* taken;
+  int* added;
+  int* steps;  ///< where each environment stands
+  int size;    ///< entries in all
+};
+
+struct ReplayNumbers {
+  FrontTables fronts;
+  SheetTables sheet;
+  const TeamMemory* teams;
+  WorkQueue queue;
+  int places_on_chip;                    ///< whether there is room
+  int forward_at, passed_at, search_at;  ///< these vectors of the linear problem on chip, -1 without room
+
+  // Settings.
+  double time_step, tolerance;
+  int max_iterations, stale_factor_solves, halvings, restart_interval;
+  int end_step;                 ///< of this launch
+  int stats_begin, stats_each;  ///< the step that comes first in `stats`, and how many an environment has
+
+  const ReplayMaterial* materials;
+  const Point* loads;      ///< a force a vertex of each environment [N]; null without
+  const int* hold_starts;  ///< of each motion and step, in `holds`
+  int motion_steps;        ///< steps of a motion, and one more, in `hold_starts`
+  const HeldPlace* holds;
+  Point *positions, *velocities;  ///< state of each environment
+  ReplayStats* stats;
+  const int* kept_index;  ///< of each step from stats_begin on, -1 where it is not kept
+  int kept_count;
+  const int* order;  ///< vertex at each place
+  double* kept;      ///< environments x kept steps x vertices x 3 [m]
+};
+
+}  // namespace flash::sim::cuda

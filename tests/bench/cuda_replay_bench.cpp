@@ -1,0 +1,137 @@
+// Whole steps on the device: sheets carried by a corner, each of its own material, without a table. Usage:
+// flash_cuda_replay_bench [VERTICES[,...] [ENVIRONMENTS[,...] [STEPS [SOLVES_BY_AN_OLD_FACTOR]]]]
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <string>
+
+#include "sim/cuda/batch_replay.h"
+#include "sim/cuda/batch_system.h"
+#include "sim/cuda/layout/sheet_layout.h"
+#include "tests/bench/device_bench.h"
+#include "tests/bench/towel.h"
+
+namespace flash::sim::cuda {
+namespace {
+
+/// The vertices within 2 cm of a corner rise 0.25 m in 1.5 s, by minimum jerk.
+std::shared_ptr<const HoldMotion> lift(const data::Points& rest, int steps, double time_step) {
+  auto motion = std::make_shared<HoldMotion>(static_cast<std::size_t>(steps));
+  const Eigen::RowVector3d corner = rest.colwise().minCoeff();
+  for (int k = 0; k < steps; ++k) {
+    const double s = std::min(1.0, (k + 1) * time_step / 1.5);
+    const Eigen::Vector3d way(0, 0, 0.25 * s * s * s * (10 + s * (6 * s - 15)));
+    for (int i = 0; i < rest.rows(); ++i)
+      if ((rest.row(i) - corner).norm() <= 0.02)
+        (*motion)[static_cast<std::size_t>(k)].push_back(
+            {i, {true, true, true}, rest.row(i).transpose() + way});
+  }
+  return motion;
+}
+
+/// E t from 10 to 300 N/m and D from 1e-5 to 1e-4 N m, drawn evenly in their logarithms.
+std::vector<ReplayEnvironment> lifts(const Towel& towel, int count, int steps, double time_step) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> share(0, 1);
+  const data::Points& rest = towel.plan->sheet.rest.vertices;
+  const auto motion = lift(rest, steps, time_step);
+  std::vector<ReplayEnvironment> environments;
+  for (int e = 0; e < count; ++e) {
+    ReplayEnvironment environment;
+    environment.material = towel.material;
+    environment.material.membrane_stiffness = 10 * std::pow(30, share(random));
+    environment.material.bending_rigidity = 1e-5 * std::pow(10, share(random));
+    environment.holds = motion;
+    environment.positions = rest;
+    environment.velocities = data::Points::Zero(rest.rows(), 3);
+    environments.push_back(environment);
+  }
+  return environments;
+}
+
+/// The least that the parts of a step have to move and compute, by its counts: as flash_cuda_bench has them,
+/// the factor in half precision.
+struct Floor {
+  double bytes = 0, flops = 0, seconds = 0;
+
+  void add(double times, double part_bytes, double part_flops) {
+    bytes += times * part_bytes;
+    flops += times * part_flops;
+    seconds += times * std::max(part_bytes / bandwidth, part_flops / single_rate);
+  }
+};
+
+Floor floor_of(const Towel& towel, double iterations, double factorizations, double solves) {
+  const FrontPlan fronts = plan_fronts(towel.plan->pattern, towel.plan->sheet.rest.vertices);
+  const SheetLayout layout = lay_out(*towel.plan, towel.bending(), fronts);
+  const double vertices = layout.size, triangles = layout.triangle_count,
+               entries = static_cast<double>(fronts.factor_entries),
+               blocks = static_cast<double>(layout.block_count),
+               edge_blocks = 2.0 * static_cast<double>(towel.plan->edge_count) + vertices,
+               scalar_flops = 24 * static_cast<double>(layout.group_columns.size());
+  Floor floor;
+  floor.add(iterations + 1, 32 * vertices + 24 * vertices, 2 * (300 * triangles + scalar_flops));
+  floor.add(iterations, 32 * vertices + 36 * edge_blocks, 2 * 900 * triangles);
+  floor.add(factorizations, 32 * vertices + 36 * blocks, 2 * 900 * triangles);
+  floor.add(factorizations, 36 * blocks + 2 * entries, fronts.factor_flops);
+  floor.add(solves, 4 * entries + 24 * vertices, 4 * entries);
+  floor.add(solves, 36 * edge_blocks + 24 * vertices, 18 * edge_blocks + scalar_flops);
+  return floor;
+}
+
+void time_replay(const Towel& towel, int environments, int steps, int stale_factor_solves) {
+  ReplaySettings settings;
+  settings.stale_factor_solves = stale_factor_solves;
+  settings.steps = steps;
+  settings.kept_steps = {steps};
+  BatchReplay replay(towel.plan, lifts(towel, environments, steps, settings.time_step), settings);
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  replay.advance(steps);
+  replay.synchronize();
+  const double seconds = std::chrono::duration<double>(Clock::now() - start).count() / steps;
+  double iterations = 0, solves = 0, factorizations = 0, substeps = 0, converged = 0;
+  for (int e = 0; e < environments; ++e)
+    for (const ReplayStep& step : replay.stats(e)) {
+      iterations += step.iterations;
+      solves += step.solves;
+      factorizations += step.factorizations;
+      substeps += step.substeps;
+      converged += step.converged;
+    }
+  const double count = static_cast<double>(environments) * steps;
+  const Floor floor = floor_of(towel, iterations / count, factorizations / count, solves / count);
+  const double each = seconds / environments;
+  std::printf("%8d %6d %6d %10.3f %8.2f %8.2f %8.2f %8.3f %9.3f %10.2f %10.2f %8.1f %7.3f %7.3f\n",
+              static_cast<int>(towel.positions.rows()), environments, replay.teams(), 1e3 * seconds,
+              iterations / count, factorizations / count, solves / count, substeps / count,
+              100 * converged / count, 1e6 * each, 1e6 * floor.seconds, each / floor.seconds,
+              floor.bytes / each / bandwidth, floor.flops / each / single_rate);
+  std::printf("         share of evaluation, matrix, preconditioner, factorization, directions, rest:");
+  for (const double share : replay.phases()) std::printf(" %.3f", share);
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+}  // namespace
+}  // namespace flash::sim::cuda
+
+int main(int count, char** arguments) {
+  using namespace flash::sim::cuda;
+  if (const std::string why = why_no_device(); !why.empty()) {
+    std::fprintf(stderr, "flash_cuda_replay_bench: %s\n", why.c_str());
+    return 2;
+  }
+  const std::vector<int> vertices = numbers_of(count > 1 ? arguments[1] : "1024,2025,4096"),
+                         environments = numbers_of(count > 2 ? arguments[2] : "1,64,256,1024");
+  const int steps = count > 3 ? std::stoi(arguments[3]) : 100,
+            stale = count > 4 ? std::stoi(arguments[4]) : 5;
+  std::printf("%8s %6s %6s %10s %8s %8s %8s %8s %9s %10s %10s %8s %7s %7s\n", "vertices", "envs", "teams",
+              "ms a step", "iters", "factors", "solves", "substeps", "conv. %", "us an env.", "floor us",
+              "ratio", "of B/s", "of F/s");
+  for (const int size : vertices) {
+    const flash::sim::Towel towel(size);
+    for (const int batch : environments) time_replay(towel, batch, steps, stale);
+  }
+}

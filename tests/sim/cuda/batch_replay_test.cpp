@@ -1,0 +1,402 @@
+// Replays on the device beside the processor's Solver, and closed forms.
+#ifdef FLASH_HAVE_CUDA
+#include "sim/cuda/batch_replay.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+#include "sim/cuda/batch_system.h"
+#include "sim/newton/solver.h"
+#include "tests/sim/cuda/meshes.h"
+#include "tests/sim/sheet_scene.h"
+
+namespace flash::sim::cuda {
+namespace {
+
+using data::Points;
+using Eigen::Vector3d;
+
+#define SKIP_WITHOUT_DEVICE() \
+  if (const std::string why = why_no_device(); !why.empty()) GTEST_SKIP() << why
+
+constexpr double time_step = 0.01;
+
+/// A replay of one environment.
+struct Scene {
+  std::string name;
+  std::shared_ptr<const SheetPlan> plan;
+  ReplayEnvironment environment;
+  int steps;
+};
+
+/// Minimum jerk from 0 to 1 within `duration`.
+double risen(double time, double duration) {
+  const double s = std::min(time / duration, 1.0);
+  return s * s * s * (10 + s * (6 * s - 15));
+}
+
+/// A sheet that lies in the plane z = 0, not quite flat: flat ones stand in equilibrium under compression.
+ReplayEnvironment resting(const SheetPlan& plan) {
+  ReplayEnvironment environment;
+  environment.positions = plan.sheet.rest.vertices;
+  for (int i = 0; i < environment.positions.rows(); ++i)
+    environment.positions(i, 2) +=
+        1e-3 * std::sin(20 * environment.positions(i, 0) + 30 * environment.positions(i, 1));
+  environment.velocities = Points::Zero(environment.positions.rows(), 3);
+  environment.material.membrane_stiffness = 60;
+  environment.material.bending_rigidity = 5e-5;
+  environment.material.areal_density = 0.2;
+  return environment;
+}
+
+/// The vertices nearest to the first corner of the mesh's bounding box.
+std::vector<int> corner(const SheetPlan& plan, int count) {
+  const Points& x = plan.sheet.rest.vertices;
+  const Eigen::RowVector3d from = x.colwise().minCoeff();
+  std::vector<int> order(static_cast<std::size_t>(x.rows()));
+  for (int i = 0; i < x.rows(); ++i) order[static_cast<std::size_t>(i)] = i;
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return (x.row(a) - from).squaredNorm() < (x.row(b) - from).squaredNorm();
+  });
+  order.resize(static_cast<std::size_t>(count));
+  return order;
+}
+
+using Way = std::function<Vector3d(double)>;  ///< displacement by time
+
+std::shared_ptr<const HoldMotion> carried(const ReplayEnvironment& environment, const std::vector<int>& held,
+                                          int steps, const Way& way,
+                                          std::array<bool, 3> axes = {true, true, true}) {
+  auto motion = std::make_shared<HoldMotion>();
+  for (int k = 1; k <= steps; ++k) {
+    motion->emplace_back();
+    for (const int vertex : held)
+      motion->back().push_back(
+          {vertex, axes, environment.positions.row(vertex).transpose() + way(k * time_step)});
+  }
+  return motion;
+}
+
+Way lift(double height, double duration) {
+  return [=](double time) { return Vector3d(0, 0, height * risen(time, duration)); };
+}
+
+std::shared_ptr<const SheetPlan> grid() { return small_plans()[2].second; }
+
+/// A lift by a corner with each membrane, and each bending model with and without both dampings.
+std::vector<Scene> scenes() {
+  std::vector<Scene> scenes;
+  const auto add = [&](std::string name, const std::shared_ptr<const SheetPlan>& plan,
+                       const std::function<void(ReplayEnvironment&)>& change) {
+    Scene scene{std::move(name), plan, resting(*plan), 30};
+    scene.environment.holds = carried(scene.environment, corner(*plan, 3), scene.steps, lift(0.05, 0.25));
+    change(scene.environment);
+    scenes.push_back(scene);
+  };
+  using data::BendingModel;
+  using data::Constitutive;
+  const auto plan = grid();
+  for (const auto& [name, law] :
+       {std::pair{"corotated", Constitutive::tri_corotated}, std::pair{"arap", Constitutive::tri_arap},
+        std::pair{"stvk", Constitutive::tri_stvk}, std::pair{"neohookean", Constitutive::tri_neohookean}})
+    add(name, plan, [law = law](ReplayEnvironment& e) { e.material.constitutive = law; });
+  for (const auto& [name, model] :
+       {std::pair{"plate", BendingModel::plate}, std::pair{"isometric", BendingModel::isometric},
+        std::pair{"hinge", BendingModel::hinge}}) {
+    add(name, plan, [model = model](ReplayEnvironment& e) { e.material.bending_model = model; });
+    add(std::string(name) + ", damped", plan, [model = model](ReplayEnvironment& e) {
+      e.material.bending_model = model;
+      e.material.stiffness_damping = 0.02;
+      e.material.air_drag = 0.5;
+    });
+  }
+  add("arap, damped", plan, [](ReplayEnvironment& e) {
+    e.material.constitutive = Constitutive::tri_arap;
+    e.material.stiffness_damping = 0.05;
+  });
+  add("Delaunay, swinging", small_plans()[3].second, [](ReplayEnvironment& e) {
+    e.material.air_drag = 1;
+    for (int i = 0; i < e.velocities.rows(); ++i) e.velocities.row(i) << 0.3, 0, 0.5 * e.positions(i, 0);
+  });
+  add("disc with a load, one axis free", small_plans()[4].second, [](ReplayEnvironment& e) {
+    e.loads.push_back({7, {0.002, 0.001, -0.003}});
+    std::vector<int> held;
+    for (const HeldVertex& one : e.holds->front()) held.push_back(one.vertex);
+    e.holds = carried(e, held, 30, lift(0.02, 0.2), {false, true, true});
+  });
+  add("held in nothing, far from the origin", plan, [](ReplayEnvironment& e) {
+    e.holds = nullptr;
+    e.positions.rowwise() += Eigen::RowVector3d(3, -2, 5);
+    for (int i = 0; i < e.velocities.rows(); ++i) e.velocities(i, 2) = 0.2 * std::sin(0.3 * i);
+  });
+  return scenes;
+}
+
+struct Trajectory {
+  std::vector<Points> positions;  ///< after each step
+  std::vector<ReplayStep> steps;
+};
+
+Trajectory by_processor(const Scene& scene, double tolerance) {
+  Environment environment;
+  environment.material = scene.environment.material;
+  environment.gravity = scene.environment.gravity;
+  environment.loads = scene.environment.loads;
+  environment.state.positions = scene.environment.positions;
+  environment.state.velocities = scene.environment.velocities;
+  Solver solver(scene.plan, {.time_step = time_step, .tolerance = tolerance, .stale_factor_solves = 0});
+  Trajectory trajectory;
+  for (int k = 0; k < scene.steps; ++k) {
+    environment.holds.clear();
+    environment.state.held.clear();
+    if (scene.environment.holds != nullptr)
+      for (const HeldVertex& held : (*scene.environment.holds)[static_cast<std::size_t>(k)])
+        environment.holds.push_back(support(held.vertex, held.axes, held.target));
+    const StepReport report = solver.step(environment);
+    trajectory.positions.push_back(environment.state.positions);
+    trajectory.steps.push_back({report.residual, report.iterations, report.solves, report.factorizations,
+                                report.substeps, report.converged});
+  }
+  return trajectory;
+}
+
+ReplaySettings settings_of(int steps, double tolerance) {
+  ReplaySettings settings;
+  settings.time_step = time_step;
+  settings.tolerance = tolerance;
+  settings.stale_factor_solves = 0;
+  settings.steps = steps;
+  for (int k = 1; k <= steps; ++k) settings.kept_steps.push_back(k);
+  return settings;
+}
+
+Trajectory trajectory_of(const BatchReplay& replay, int e, int steps) {
+  Trajectory trajectory;
+  for (int k = 0; k < steps; ++k) trajectory.positions.push_back(replay.kept_positions(e, k));
+  trajectory.steps = replay.stats(e);
+  return trajectory;
+}
+
+Trajectory by_device(const Scene& scene, double tolerance) {
+  BatchReplay replay(scene.plan, {scene.environment}, settings_of(scene.steps, tolerance));
+  replay.advance(scene.steps);
+  return trajectory_of(replay, 0, scene.steps);
+}
+
+/// Largest distance of a vertex at any time, as a share of the sheet's size.
+double distance(const Scene& scene, const Trajectory& a, const Trajectory& b) {
+  const Points& rest = scene.plan->sheet.rest.vertices;
+  const double size = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
+  double largest = 0;
+  for (std::size_t k = 0; k < a.positions.size(); ++k) {
+    const double own = (a.positions[k] - b.positions[k]).rowwise().norm().maxCoeff();
+    largest = own <= largest ? largest : own;
+  }
+  return largest / size;
+}
+
+TEST(BatchReplay, TrajectoriesAreThoseOfTheProcessorAndCloserAsTheToleranceFalls) {
+  SKIP_WITHOUT_DEVICE();
+  for (const Scene& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    for (const double tolerance : {1e-3, 1e-5}) {
+      const Trajectory device = by_device(scene, tolerance), processor = by_processor(scene, tolerance);
+      for (const ReplayStep& step : device.steps) {
+        EXPECT_TRUE(step.converged);
+        EXPECT_LE(step.residual, tolerance);
+      }
+      EXPECT_LE(distance(scene, device, processor), tolerance == 1e-3 ? 1e-4 : 1e-6);
+      // As many iterations: at a threshold rounding decides.
+      const auto iterations = [](const Trajectory& trajectory) {
+        int sum = 0;
+        for (const ReplayStep& step : trajectory.steps) sum += step.iterations;
+        return sum;
+      };
+      const int expected = iterations(processor);
+      EXPECT_NEAR(iterations(device), expected, 0.05 * expected + 1);
+    }
+  }
+}
+
+/// The same scene with other materials, starts and holds.
+std::vector<ReplayEnvironment> family(const Scene& scene, int count) {
+  std::vector<ReplayEnvironment> environments;
+  for (int e = 0; e < count; ++e) {
+    ReplayEnvironment environment = scene.environment;
+    environment.material.membrane_stiffness = 20.0 + 15 * e;
+    environment.material.bending_rigidity = 2e-5 * (1 + e % 4);
+    environment.velocities.col(0).setConstant(0.05 * e);
+    if (e % 3 == 1) environment.holds = nullptr;
+    environments.push_back(environment);
+  }
+  return environments;
+}
+
+void expect_equal(const Trajectory& a, const Trajectory& b) {
+  EXPECT_EQ(a.positions, b.positions);
+  ASSERT_EQ(a.steps.size(), b.steps.size());
+  for (std::size_t k = 0; k < a.steps.size(); ++k) {
+    EXPECT_EQ(a.steps[k].residual, b.steps[k].residual);
+    EXPECT_EQ(a.steps[k].solves, b.steps[k].solves);
+  }
+}
+
+TEST(BatchReplay, ABatchEqualsAloneBitwiseRunAfterRunAndInParts) {
+  SKIP_WITHOUT_DEVICE();
+  constexpr int count = 7, steps = 9;
+  const std::vector<Scene> all = scenes();
+  for (const std::size_t which : {std::size_t{4}, std::size_t{5}, std::size_t{9}}) {
+    SCOPED_TRACE(all[which].name);
+    const std::vector<ReplayEnvironment> environments = family(all[which], count);
+    ReplaySettings settings = settings_of(steps, 1e-3);
+    settings.restart_interval = 3;
+    settings.stale_factor_solves = 5;
+    const auto run = [&](const std::vector<ReplayEnvironment>& chosen, int part) {
+      BatchReplay replay(all[which].plan, chosen, settings);
+      for (int step = 0; step < steps; step += part) replay.advance(part);
+      std::vector<Trajectory> trajectories;
+      for (int e = 0; e < replay.size(); ++e) trajectories.push_back(trajectory_of(replay, e, steps));
+      return trajectories;
+    };
+    const auto together = run(environments, steps), again = run(environments, steps),
+               in_parts = run(environments, 3);
+    for (int e = 0; e < count; ++e) {
+      const auto at = static_cast<std::size_t>(e);
+      expect_equal(together[at], again[at]);
+      expect_equal(together[at], in_parts[at]);
+      expect_equal(together[at], run({environments[at]}, steps)[0]);
+    }
+  }
+}
+
+// More environments than the device has teams for: each comes back to the queue several times.
+TEST(BatchReplay, EnvironmentsThatWaitForATeamAreAsEachAlone) {
+  SKIP_WITHOUT_DEVICE();
+  constexpr int count = 701, steps = 6;
+  const Scene scene = scenes().front();
+  const std::vector<ReplayEnvironment> environments = family(scene, count);
+  ReplaySettings settings = settings_of(steps, 1e-3);
+  settings.restart_interval = 2;
+  BatchReplay together(scene.plan, environments, settings);
+  together.advance(steps);
+  for (int e = 0; e < count; e += 100) {
+    BatchReplay alone(scene.plan, {environments[static_cast<std::size_t>(e)]}, settings);
+    alone.advance(steps);
+    expect_equal(trajectory_of(together, e, steps), trajectory_of(alone, 0, steps));
+    EXPECT_EQ(together.velocities(e), alone.velocities(0));
+  }
+}
+
+Trajectory by_team(const Scene& scene, int most_groups) {
+  ReplaySettings settings = settings_of(scene.steps, 1e-3);
+  settings.fronts = {.leaf_size = 6, .panel_capacity = 12 * 1024, .most_groups = most_groups};
+  BatchReplay replay(scene.plan, {scene.environment}, settings);
+  replay.advance(scene.steps);
+  return trajectory_of(replay, 0, scene.steps);
+}
+
+// What compute-sanitizer's racecheck can follow: it does not know barriers of some warps.
+TEST(BatchReplay, AnUndividedTeamMovesASheetAsTheProcessorDoes) {
+  SKIP_WITHOUT_DEVICE();
+  for (const std::size_t which : {std::size_t{5}, std::size_t{9}}) {
+    Scene scene = scenes()[which];
+    scene.steps = 3;
+    EXPECT_LE(distance(scene, by_team(scene, 1), by_processor(scene, 1e-3)), 1e-4);
+  }
+}
+
+TEST(BatchReplay, AMotionDoesNotDependOnHowATeamIsDivided) {
+  SKIP_WITHOUT_DEVICE();
+  Scene scene = scenes()[5];
+  scene.steps = 4;
+  expect_equal(by_team(scene, 1), by_team(scene, team_warps));
+}
+
+TEST(BatchReplay, AFallingSheetMovesAsImplicitEulerSays) {
+  SKIP_WITHOUT_DEVICE();
+  constexpr int steps = 20;
+  for (const double drag : {0.0, 2.0}) {
+    const auto plan = grid();
+    ReplayEnvironment environment = resting(*plan);
+    environment.positions = plan->sheet.rest.vertices;
+    environment.material.air_drag = drag;
+    environment.gravity = {1, 2, -9};
+    BatchReplay replay(plan, {environment}, settings_of(steps, 1e-9));
+    replay.advance(steps);
+    Vector3d speed = Vector3d::Zero(), fallen = Vector3d::Zero();
+    for (int k = 0; k < steps; ++k) {
+      speed = (speed + time_step * environment.gravity) / (1 + drag * time_step);
+      fallen += time_step * speed;
+      const Points expected = plan->sheet.rest.vertices.rowwise() + fallen.transpose();
+      // A residual of 1e-9 of the weight in each step, over h^2 / m: no more than its fall times that.
+      EXPECT_LE((replay.kept_positions(0, k) - expected).cwiseAbs().maxCoeff(), 1e-7 * fallen.norm() + 1e-13);
+    }
+    EXPECT_LE((replay.velocities(0).rowwise() - speed.transpose()).cwiseAbs().maxCoeff(),
+              1e-7 * speed.norm());
+  }
+}
+
+TEST(BatchReplay, AStepThatIterationsDoNotSolveIsTakenInHalves) {
+  SKIP_WITHOUT_DEVICE();
+  Scene scene = scenes().front();
+  scene.steps = 12;
+  ReplaySettings settings = settings_of(scene.steps, 1e-4);
+  settings.max_iterations = 2;
+  BatchReplay replay(scene.plan, {scene.environment}, settings);
+  replay.advance(scene.steps);
+  const Trajectory device = trajectory_of(replay, 0, scene.steps);
+  int most = 0;
+  for (const ReplayStep& step : device.steps) {
+    EXPECT_TRUE(step.converged);
+    EXPECT_LE(step.residual, 1e-4);
+    most = std::max(most, step.substeps);
+  }
+  EXPECT_GT(most, 1);
+  // Shorter steps are another discretization: of an acceleration a over t, h a t / 2 apart.
+  const double time = scene.steps * time_step;
+  EXPECT_LE((device.positions.back() - by_processor(scene, 1e-4).positions.back()).cwiseAbs().maxCoeff(),
+            0.5 * time_step * 2 * 9.81 * time);
+}
+
+TEST(BatchReplay, AnEnvironmentThatIsNotFiniteLeavesTheOthersAlone) {
+  SKIP_WITHOUT_DEVICE();
+  constexpr int steps = 3;
+  const Scene scene = scenes().front();
+  std::vector<ReplayEnvironment> environments = family(scene, 3);
+  environments[1].velocities(5, 2) = std::nan("");
+  BatchReplay replay(scene.plan, environments, settings_of(steps, 1e-3));
+  replay.advance(steps);
+  EXPECT_FALSE(replay.stats(1).front().converged);
+  for (const int e : {0, 2}) {
+    BatchReplay alone(scene.plan, {environments[static_cast<std::size_t>(e)]}, settings_of(steps, 1e-3));
+    alone.advance(steps);
+    expect_equal(trajectory_of(replay, e, steps), trajectory_of(alone, 0, steps));
+  }
+}
+
+TEST(BatchReplay, WhatDoesNotFitIsRefused) {
+  SKIP_WITHOUT_DEVICE();
+  const Scene scene = scenes().front();
+  const auto refused = [&](const std::function<void(ReplayEnvironment&)>& change) {
+    ReplayEnvironment other = scene.environment;
+    change(other);
+    EXPECT_THROW(BatchReplay(scene.plan, {scene.environment, other}, settings_of(3, 1e-3)),
+                 std::invalid_argument);
+  };
+  refused([](ReplayEnvironment& e) { e.positions.conservativeResize(3, 3); });
+  refused([](ReplayEnvironment& e) { e.material.poissons_ratio = 0.1; });
+  refused([](ReplayEnvironment& e) { e.holds = std::make_shared<HoldMotion>(2); });
+  refused([](ReplayEnvironment& e) {
+    const HeldVertex held{1, {true, true, true}, Vector3d::Zero()};
+    e.holds = std::make_shared<HoldMotion>(3, std::vector<HeldVertex>{held, held});
+  });
+  EXPECT_THROW(BatchReplay(scene.plan, {}, settings_of(3, 1e-3)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace flash::sim::cuda
+#endif
