@@ -30,7 +30,7 @@ struct HandEyeOptions {
   DatasetChoice dataset;
   std::string setup;
   bool refine_intrinsics = false, time_offset = false;
-  calib::TargetSize target_size = calib::TargetSize::automatic;
+  double target_size_sd = calib::kPrintSd;
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2;
   std::string out, report;
@@ -148,7 +148,7 @@ int run_handeye(const HandEyeOptions& options) {
   constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
   if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
   settings.closed_forms = calib::opencv_closed_forms();
-  settings.target_size = options.target_size;
+  settings.target_size_sd = options.target_size_sd;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = options.time_offset;
   const calib::ImageCalibration solved = solve(options, setup, dataset, settings, phases);
@@ -199,7 +199,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
-  add_target_size_option(*verb, options->target_size);
+  add_target_size_options(*verb, options->target_size_sd);
   verb->add_flag(
       "--time-offset", options->time_offset,
       "Solve for a constant time between pictures and poses, where the poses are a stream over time "

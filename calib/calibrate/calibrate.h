@@ -7,11 +7,11 @@
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/convention_check.h"
 #include "calib/solve/errors_in_variables.h"
-#include "calib/solve/target_size.h"
 #include "calib/solve/view_selection.h"
 #include "calib/uncertainty/correlated_pose_errors.h"
 #include "calib/uncertainty/observability.h"
 #include "calib/uncertainty/split_check.h"
+#include "calib/uncertainty/target_size.h"
 
 namespace flash::calib {
 
@@ -25,7 +25,8 @@ struct CalibrateSettings {
   double surprise = 35;   ///< squared size of a correction over that of most views, 6 degrees of freedom
   int folds = 10;         ///< of the held-out residuals
   std::vector<ClosedForm> closed_forms = calib::closed_forms();  ///< of the comparison table
-  TargetSize target_size = TargetSize::automatic;
+  /// Of the target's size over the stated one, before a picture is taken; 0: as stated; infinity: not known.
+  double target_size_sd = kPrintSd;
   int threads = 1;  ///< of held-out residuals and splits; 0: one a processor
 };
 
@@ -44,6 +45,8 @@ struct Calibration {
   Refinement refined;
   HandEyePoses poses;
   Matrix6d covariance = Matrix6d::Zero();  ///< of X, right perturbation (dt, dtheta)
+  Unknowns unknowns;                       ///< of the solution
+  Eigen::MatrixXd shared_covariance;       ///< of all shared unknowns (SharedColumns), before splits widen it
   double corner_rms = 0;                   ///< with corrections, 2-D rms per corner [px]
   double chain_rms = 0;                    ///< without [px]
   double centre_rms = 0;  ///< of the target's projected middle against the view's own pose, without [px]
@@ -52,7 +55,7 @@ struct Calibration {
   std::vector<ViewResult> views;
   RotationDiversity diversity;
   WeakestDirection weakest;
-  std::optional<ScaleCheck> scale;
+  std::optional<TargetSize> size;
   std::vector<SplitCheck> splits;  ///< of X, interleaved first; none where there are too few views
   double covariance_factor = 1;    ///< by which the splits have widened the covariance
   std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found

@@ -84,6 +84,15 @@ Json to_json(const NamedTransform& transform) {
           {"rotation_xyzw", list(v.tail<4>())}};
 }
 
+Json to_json(const TargetSize& size) {
+  return {{"estimate", size.estimate},
+          {"sd", size.sd},
+          {"solved", size.prior_sd > 0},
+          {"prior_sd", std::isfinite(size.prior_sd) ? Json(size.prior_sd) : Json(nullptr)},
+          {"wanted", size.wanted ? Json(size.wanted->estimate) : Json(nullptr)},
+          {"wanted_sd", size.wanted ? Json(size.wanted->sd) : Json(nullptr)}};
+}
+
 Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code) {
   const Extrinsics extrinsics = extrinsics_of(calibration, inputs);
   const Vector6d sd = calibration.covariance.diagonal().cwiseSqrt();
@@ -121,10 +130,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"weakest_mm", 1e3 * calibration.weakest.translation},
       {"weakest_deg", kDegrees * calibration.weakest.rotation}};
   json["convention_findings"] = Json::array();
-  json["scale"] = calibration.scale ? Json{{"estimate", calibration.scale->estimate},
-                                           {"sd", calibration.scale->sd},
-                                           {"solved", calibration.scale->solved}}
-                                    : Json(nullptr);
+  json["scale"] = calibration.size ? to_json(*calibration.size) : Json(nullptr);
   json["splits"] = nullptr;
   if (!calibration.splits.empty()) {
     json["splits"] = {{"covariance_factor", calibration.covariance_factor}};
@@ -136,12 +142,9 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   json["smooth_errors"] = nullptr;
   if (calibration.pose_errors) {
     const CorrelatedPoseErrors& errors = *calibration.pose_errors;
-    json["smooth_errors"] = {{"found", errors.found},
-                             {"gain", errors.gain},
-                             {"translation_m", errors.translation},
-                             {"rotation_rad", errors.rotation},
-                             {"about_base_rad", errors.about_base},
-                             {"reach", errors.reach}};
+    json["smooth_errors"] = {{"found", errors.found},           {"gain", errors.gain},
+                             {"share", errors.share},           {"translation_m", errors.translation},
+                             {"rotation_rad", errors.rotation}, {"reach", errors.reach}};
   }
   json["warnings"] = calibration.warnings;
   json["exit_code"] = exit_code;

@@ -125,9 +125,9 @@ TEST_P(Traps, WrongSquareSizeIsMeasured) {
   for (Observation& o : scene.observations) o.T_camera_target.front().translation() /= 1.08;
   const Calibration result = calibrated(scene);
   EXPECT_FALSE(result.usable);
-  ASSERT_TRUE(result.scale);
-  EXPECT_NEAR(result.scale->estimate, 1.08, 4 * result.scale->sd);
-  EXPECT_LT(result.scale->sd, 0.01);
+  ASSERT_TRUE(result.size && result.size->wanted);
+  EXPECT_NEAR(result.size->wanted->estimate, 1.08, 4 * result.size->wanted->sd);
+  EXPECT_LT(result.size->wanted->sd, 0.01);
   EXPECT_TRUE(result.warnings.front().starts_with("the data want a target 1.0")) << result.warnings.front();
 }
 
@@ -169,7 +169,8 @@ TEST_P(Traps, CopiesCountOnce) {
   const Calibration twice = calibrated(scene);
   EXPECT_EQ(twice.used.size(), 20U);
   EXPECT_EQ(twice.views[20].reason, "a copy of 0.png");
-  EXPECT_LT((once.covariance - twice.covariance).norm(), 1e-6 * once.covariance.norm());
+  // The seed differs, and noise levels are iterated until the deviance stands still to 1e-3.
+  EXPECT_LT((once.covariance - twice.covariance).norm(), 1e-3 * once.covariance.norm());
 }
 
 TEST_P(Traps, OneAxisIsRefusedWithItsName) {
