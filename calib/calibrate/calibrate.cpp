@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "calib/calibrate/plausibility.h"
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
 #include "data/error.h"
@@ -282,6 +283,10 @@ void finish(Calibration& result, const std::vector<Observation>& used) {
   result.diversity = rotation_diversity(robot);
   result.weakest = weakest_direction(result.covariance, median(distances), "camera");
   warn(result);
+  const std::string implausible = implausibility(result, used);
+  if (implausible.empty()) return;
+  result.warnings.insert(result.warnings.begin(), implausible);
+  result.usable = false;
 }
 
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
