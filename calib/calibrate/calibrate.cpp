@@ -289,9 +289,12 @@ void finish(Calibration& result, const std::vector<Observation>& used) {
   result.usable = false;
 }
 
-Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
-                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
-                      const CalibrateSettings& settings) {
+namespace {
+
+/// With the unknowns that the settings state.
+Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                  const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                  const CalibrateSettings& settings) {
   Calibration result;
   result.setup = setup;
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
@@ -323,6 +326,51 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   finish(result, observations);
   warn_of_size(result, sized.disputed);
   return result;
+}
+
+/// By how much the squared residuals of views left out fall from one solution to the other [px^2], over the
+/// views that both use.
+MeanDifference fall_of_held_out(const Calibration& from, const Calibration& to) {
+  std::vector<double> before, after;
+  for (std::size_t i = 0; i < from.used.size(); ++i) {
+    const auto other = std::find(to.used.begin(), to.used.end(), from.used[i]);
+    if (other == to.used.end()) continue;
+    before.push_back(from.held_out.squares[i]);
+    after.push_back(to.held_out.squares[static_cast<std::size_t>(other - to.used.begin())]);
+  }
+  return mean_difference(before, after);
+}
+
+}  // namespace
+
+Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                      const CalibrateSettings& settings) {
+  Calibration stated = solve(setup, camera, points, symmetries, all, settings);
+  // A size that nobody knows and a focal length that nobody knows look alike.
+  constexpr std::size_t kEnough = 8;
+  const bool asked = settings.refine.bundle.unknowns.intrinsics > 0;
+  if (asked || !settings.check_lens || std::isinf(settings.target_size_sd) || stated.used.size() < kEnough)
+    return stated;
+  CalibrateSettings with_lens = settings;
+  with_lens.refine.bundle.unknowns.intrinsics = kLensUnknowns;
+  Calibration solved = solve(setup, camera, points, symmetries, all, with_lens);
+  if (!solved.refined.converged || solved.used.size() < stated.used.size()) return stated;
+  const MeanDifference gain = fall_of_held_out(stated, solved);
+  constexpr double kClearly = 2, kMuch = 0.2;  // standard errors; of the squares that are left
+  if (!(gain.mean > kClearly * gain.sd && gain.mean > kMuch * stated.held_out.px * stated.held_out.px))
+    return stated;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the lens is not as stated: views left out are predicted to %.2f px with it solved for, to %.2f px "
+      "without (focal lengths %.1f %.1f px, stated %.1f %.1f); the answer is for the lens solved for: "
+      "calibrate it (flash-calib intrinsics)",
+      solved.held_out.px, stated.held_out.px, solved.refined.bundle.intrinsics.front().fx,
+      solved.refined.bundle.intrinsics.front().fy, camera.fx, camera.fy);
+  solved.lens_found = true;
+  solved.warnings.insert(solved.warnings.begin(), text);
+  return solved;
 }
 
 }  // namespace flash::calib

@@ -78,6 +78,7 @@ void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout
 CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
                        const Target& target, const Calibration& calibration) {
   CellMember member{.arm = arm, .camera = camera, .setup = calibration.setup, .intrinsics = *dataset.camera};
+  if (has_pixels(calibration)) member.intrinsics = calibration.refined.bundle.intrinsics.front();
   member.points = target_points(target);
   member.symmetries = confusable_symmetries(target);
   member.poses = calibration.poses;

@@ -116,6 +116,14 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                        {"heldout_px", px(calibration.held_out.px)},
                        {"heldout_mm", calibration.held_out.mm},
                        {"heldout_deg", calibration.held_out.deg}};
+  json["lens"] = nullptr;
+  if (extrinsics.pixels) {
+    const data::CameraIntrinsics& lens = calibration.refined.bundle.intrinsics.front();
+    json["lens"] = {{"solved", calibration.unknowns.intrinsics > 0},
+                    {"focal_px", {lens.fx, lens.fy}},
+                    {"centre_px", {lens.cx, lens.cy}},
+                    {"distortion", lens.distortion}};
+  }
   json["depth"] = inputs.depth ? depth_json(*inputs.depth) : Json(nullptr);
   json["time_offset"] = inputs.time_offset ? Json{{"estimate_s", inputs.time_offset->estimate},
                                                   {"sd_s", inputs.time_offset->sd}}

@@ -62,6 +62,7 @@ namespace {
 /// Sums of one part of the views, predicted by a solution without them.
 struct HeldOutSums {
   double px = 0, mm = 0, deg = 0, corners = 0, views = 0;
+  std::vector<std::pair<int, double>> squares = {};  // pose, mean over its corners [px^2]
 };
 
 HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target,
@@ -80,7 +81,9 @@ HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometr
                     T_camera_target[static_cast<std::size_t>(view.pose)]);
     const Eigen::Vector3d centre = points.rowwise().mean();
     const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
-    sums.px += residuals(train, view, false).squaredNorm();
+    const double squares = residuals(train, view, false).squaredNorm();
+    sums.px += squares;
+    sums.squares.emplace_back(view.pose, squares / static_cast<double>(view.points.cols()));
     sums.mm += (1e3 * (predicted * centre - seen * centre)).squaredNorm();
     sums.deg += std::pow(angle * 180 / M_PI, 2);
     sums.corners += static_cast<double>(view.points.cols());
@@ -103,16 +106,28 @@ HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_c
         hold_out_part(bundle, T_camera_target, method, settings, result.fold, static_cast<int>(part));
   });
   HeldOutSums all;
+  result.squares.assign(static_cast<std::size_t>(count), 0);
   for (const HeldOutSums& part : sums) {
     all.px += part.px;
     all.mm += part.mm;
     all.deg += part.deg;
     all.corners += part.corners;
     all.views += part.views;
+    for (const auto& [pose, squares] : part.squares) result.squares[static_cast<std::size_t>(pose)] = squares;
   }
   result.px = std::sqrt(all.px / all.corners);
   result.mm = std::sqrt(all.mm / all.views);
   result.deg = std::sqrt(all.deg / all.views);
+  return result;
+}
+
+MeanDifference mean_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  MeanDifference result;
+  const auto count = static_cast<double>(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) result.mean += (a[i] - b[i]) / count;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    result.sd += std::pow(a[i] - b[i] - result.mean, 2) / (count * (count - 1));
+  result.sd = std::sqrt(result.sd);
   return result;
 }
 

@@ -8,11 +8,18 @@ namespace flash::calib {
 
 /// Residuals of views that took no part in the solution, predicted without a correction.
 struct HeldOut {
-  double px = 0;          ///< 2-D rms per corner
-  double mm = 0;          ///< rms distance of the target's centre from where the view alone puts it
-  double deg = 0;         ///< rms angle, likewise
-  std::vector<int> fold;  ///< of each pose
+  double px = 0;                ///< 2-D rms per corner
+  double mm = 0;                ///< rms distance of the target's centre from where the view alone puts it
+  double deg = 0;               ///< rms angle, likewise
+  std::vector<int> fold;        ///< of each pose
+  std::vector<double> squares;  ///< of px, mean over the corners of each pose; of pictures alone
 };
+
+/// The mean of paired differences and its standard error.
+struct MeanDifference {
+  double mean = 0, sd = 0;
+};
+MeanDifference mean_difference(const std::vector<double>& a, const std::vector<double>& b);
 
 enum class Method { park, shah, bundle, errors_in_variables };
 const char* to_string(Method method);
