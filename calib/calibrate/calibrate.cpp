@@ -335,8 +335,8 @@ MeanDifference fall_of_held_out(const Calibration& from, const Calibration& to) 
   for (std::size_t i = 0; i < from.used.size(); ++i) {
     const auto other = std::find(to.used.begin(), to.used.end(), from.used[i]);
     if (other == to.used.end()) continue;
-    before.push_back(from.held_out.squares[i]);
-    after.push_back(to.held_out.squares[static_cast<std::size_t>(other - to.used.begin())]);
+    before.push_back(from.held_out.squares[i][0]);
+    after.push_back(to.held_out.squares[static_cast<std::size_t>(other - to.used.begin())][0]);
   }
   return mean_difference(before, after);
 }

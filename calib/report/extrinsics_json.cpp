@@ -26,6 +26,16 @@ Json rows(const Matrix& m) {
   return values;
 }
 
+/// By how many standard errors over the folds the answer's squared residuals exceed another method's.
+Json behind_json(const HeldOut& answer, const HeldOut& other) {
+  Json behind = Json::object();
+  for (const auto& [measure, name] : {std::pair{0, "px"}, {1, "mm"}, {2, "deg"}}) {
+    const MeanDifference d = mean_difference(means_of_folds(answer, measure), means_of_folds(other, measure));
+    behind[name] = d.sd > 0 ? Json(d.mean / d.sd) : Json(nullptr);
+  }
+  return behind;
+}
+
 Json comparison_json(const Calibration& calibration) {
   const bool pixels = has_pixels(calibration);
   Json methods = Json::object();
@@ -37,6 +47,7 @@ Json comparison_json(const Calibration& calibration) {
       entry["heldout_px"] = pixels ? Json(method.held_out->px) : Json(nullptr);
       entry["heldout_mm"] = method.held_out->mm;
       entry["heldout_deg"] = method.held_out->deg;
+      if (pixels) entry["behind"] = behind_json(calibration.held_out, *method.held_out);
     }
     entry["wild"] = method.wild;
     entry["translation"] = list(method.poses.X.translation());

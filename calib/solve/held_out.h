@@ -8,12 +8,16 @@ namespace flash::calib {
 
 /// Residuals of views that took no part in the solution, predicted without a correction.
 struct HeldOut {
-  double px = 0;                ///< 2-D rms per corner
-  double mm = 0;                ///< rms distance of the target's centre from where the view alone puts it
-  double deg = 0;               ///< rms angle, likewise
-  std::vector<int> fold;        ///< of each pose
-  std::vector<double> squares;  ///< of px, mean over the corners of each pose; of pictures alone
+  double px = 0;          ///< 2-D rms per corner
+  double mm = 0;          ///< rms distance of the target's centre from where the view alone puts it
+  double deg = 0;         ///< rms angle, likewise
+  std::vector<int> fold;  ///< of each pose
+  /// Of px (mean over the corners), mm and deg of each pose, of solutions from pictures; else empty.
+  std::vector<Eigen::Vector3d> squares;
 };
+
+/// Mean of the squares over the poses of each fold. measure: 0 px, 1 mm, 2 deg.
+std::vector<double> means_of_folds(const HeldOut& held, int measure);
 
 /// The mean of paired differences and its standard error.
 struct MeanDifference {
