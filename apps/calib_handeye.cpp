@@ -29,8 +29,8 @@ struct HandEyeOptions {
   CalibCommonOptions common;
   DatasetChoice dataset;
   std::string setup;
-  bool refine_intrinsics = false, time_offset = false;
-  calib::TargetSize target_size = calib::TargetSize::automatic;
+  bool refine_intrinsics = false, stated_lens = false, time_offset = false;
+  double target_size_sd = calib::kPrintSd;
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2;
   std::string out, report;
@@ -145,10 +145,10 @@ int run_handeye(const HandEyeOptions& options) {
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
-  constexpr int kRefined = 9;  // fx fy cx cy k1 k2 p1 p2 k3
-  if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = kRefined;
+  if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = calib::kLensUnknowns;
+  settings.check_lens = !options.stated_lens;
   settings.closed_forms = calib::opencv_closed_forms();
-  settings.target_size = options.target_size;
+  settings.target_size_sd = options.target_size_sd;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = options.time_offset;
   const calib::ImageCalibration solved = solve(options, setup, dataset, settings, phases);
@@ -198,8 +198,12 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   verb->add_option("--setup", options->setup,
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
-  verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
-  add_target_size_option(*verb, options->target_size);
+  CLI::Option* refine =
+      verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
+  verb->add_flag("--stated-intrinsics", options->stated_lens,
+                 "Keep the lens as it is stated, whatever views left out say")
+      ->excludes(refine);
+  add_target_size_options(*verb, options->target_size_sd);
   verb->add_flag(
       "--time-offset", options->time_offset,
       "Solve for a constant time between pictures and poses, where the poses are a stream over time "

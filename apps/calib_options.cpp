@@ -4,7 +4,7 @@
 
 #include <filesystem>
 #include <iostream>
-#include <map>
+#include <limits>
 
 #include "apps/option_checks.h"
 #include "data/error.h"
@@ -42,16 +42,20 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");
 }
 
-void add_target_size_option(CLI::App& verb, calib::TargetSize& size) {
-  const std::map<std::string, calib::TargetSize> named = {{"automatic", calib::TargetSize::automatic},
-                                                          {"stated", calib::TargetSize::stated},
-                                                          {"solved", calib::TargetSize::solved}};
+void add_target_size_options(CLI::App& verb, double& sd) {
+  CLI::Option* known = verb.add_option("--target-size-sd", sd,
+                                       "How well the size of the target is known, one standard deviation as "
+                                       "a share of it; 0: as stated")
+                           ->check(CLI::Range(0.0, 1.0))
+                           ->capture_default_str();
   verb.add_option_function<std::string>(
-          "--target-size", [&size, named](const std::string& name) { size = named.at(name); },
-          "stated; solved for with the rest; or automatic: solved for where the data say clearly that "
-          "the print is off")
-      ->check(CLI::IsMember({"automatic", "stated", "solved"}))
-      ->default_str("automatic");
+          "--target-size",
+          [&sd](const std::string& name) {
+            sd = name == "stated" ? 0 : std::numeric_limits<double>::infinity();
+          },
+          "stated: as it is stated, to the last digit; solved: not known at all")
+      ->check(CLI::IsMember({"stated", "solved"}))
+      ->excludes(known);
 }
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {

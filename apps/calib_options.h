@@ -7,7 +7,7 @@
 #include "calib/dataset/detection.h"
 #include "calib/dataset/target.h"
 #include "calib/detect/detect.h"
-#include "calib/solve/target_size.h"
+#include "calib/uncertainty/target_size.h"
 
 namespace flash {
 
@@ -37,7 +37,7 @@ struct DatasetChoice {
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
 
 /// --target-size automatic|stated|solved
-void add_target_size_option(CLI::App& verb, calib::TargetSize& size);
+void add_target_size_options(CLI::App& verb, double& sd);
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
 

@@ -32,7 +32,7 @@ struct RegisterOptions {
   double depth_scale = 0.001;
   bool without_images = false, no_depth = false;
   bool refine_intrinsics = false;
-  calib::TargetSize target_size = calib::TargetSize::automatic;
+  double target_size_sd = calib::kPrintSd;
   std::string out;
 };
 
@@ -68,7 +68,7 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
       setup.empty() ? *dataset.setup : calib::parse_setup(setup, "command line", "--setup");
   const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
   calib::CalibrateSettings settings;
-  settings.target_size = options.target_size;
+  settings.target_size_sd = options.target_size_sd;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = time_offset;
   const calib::ImageCalibration solved = calib::calibrate_images(
@@ -91,7 +91,7 @@ std::string name_of(const std::string& path) {
 calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
   calib::RefineSettings settings;
   if (options.refine_intrinsics) settings.bundle.unknowns.intrinsics = kRefinedIntrinsics;
-  return calib::solve_cell(members, settings, options.target_size);
+  return calib::solve_cell(members, settings, options.target_size_sd);
 }
 
 calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
@@ -189,7 +189,7 @@ int run_register(const RegisterOptions& options) {
   calib::Cell cell =
       options.cameras.empty() ? cell_of_arms(options, doubts) : cell_of_cameras(options, doubts);
   cell.notices.insert(cell.notices.begin(), doubts.warnings.begin(), doubts.warnings.end());
-  const int exit_code = doubts.unusable ? exit_unusable : exit_done;
+  const int exit_code = doubts.unusable || !cell.usable ? exit_unusable : exit_done;
   std::optional<Eigen::Vector3d> workspace;
   if (!options.workspace.empty())
     workspace = Eigen::Vector3d(options.workspace[0], options.workspace[1], options.workspace[2]);
@@ -223,7 +223,7 @@ void add_register_verb(CLI::App& app, Action& action) {
       ->check(any_number());
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
   verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
-  add_target_size_option(*verb, options->target_size);
+  add_target_size_options(*verb, options->target_size_sd);
   verb->add_option("--depth-scale", options->depth_scale, "Metres a count of the depth pictures of --cameras")
       ->check(positive_number())
       ->capture_default_str();

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <tuple>
 
+#include "calib/calibrate/plausibility.h"
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
 #include "data/error.h"
@@ -177,23 +177,22 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
   for (;;) {
     const HandEyePoses seed = shah(pose_loops(result.setup, observations));
     Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
+    if (settings.target_size_sd > 0) plain.priors.scale_sd = settings.target_size_sd;
     result.refined = refine(plain, refine_settings);
     const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
     if (few || !drop_worst(result, observations, settings.surprise)) return plain;
   }
 }
 
-/// Errors that change smoothly with the robot's pose have a part that all views share: it comes on top.
-/// Returns by how much the variances have grown in the mean.
-double add_correlated_pose_errors(Calibration& result, const BundleSettings& settings) {
-  const SystematicUncertainty systematic = systematic_uncertainty(result.refined, settings);
+/// What errors that change smoothly with the robot's pose share comes on top of noise. Returns by how much
+/// the variances have grown in the mean.
+double add_systematic(Calibration& result, const SystematicUncertainty& systematic) {
   const CorrelatedPoseErrors& errors = result.pose_errors.emplace(systematic.arms.front());
-  if (!errors.found) return 1;
-  const Matrix6d noise = result.covariance;
+  const Matrix6d noise = result.refined.covariance.topLeftCorner<6, 6>();
+  result.shared_covariance = systematic.covariance;
   result.covariance = systematic.covariance.topLeftCorner<6, 6>();
-  const int scale = shared_columns(result.refined.bundle, settings.unknowns).scales.front();
-  if (result.scale && scale >= 0) result.scale->sd = std::sqrt(systematic.covariance(scale, scale));
-  const double grown = noise.ldlt().solve(result.covariance).trace() / 6;
+  const double grown = std::max(1.0, noise.ldlt().solve(result.covariance).trace() / 6);
+  if (!errors.found) return grown;
   char text[320];
   std::snprintf(
       text, sizeof text,
@@ -228,21 +227,11 @@ void check_splits(Calibration& result, const BundleSettings& settings, const Cal
   result.warnings.emplace_back(text);
 }
 
-void warn_of_scale(Calibration& result) {
-  if (!result.scale) return;
-  const double off = std::abs(result.scale->estimate - 1), sd = result.scale->sd;
-  if (!result.scale->solved && (off < 0.01 || off < 5 * sd)) return;
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "the data want a target %.4f +- %.4f (2 sd) times as large as stated: measure its squares, or the "
-      "intrinsics or the robot's unit are wrong%s",
-      result.scale->estimate, 2 * sd,
-      result.scale->solved ? "; the answer is for a target of that size (--target-size stated keeps "
-                             "the stated one)"
-                           : "");
-  result.warnings.insert(result.warnings.begin(), text);
-  if (off > 0.03) result.usable = false;
+void warn_of_size(Calibration& result, bool disputed) {
+  if (!result.size || !result.size->far_off()) return;
+  result.warnings.insert(result.warnings.begin(), size_sentence(*result.size));
+  // Who states a size that is to be kept is told, and served.
+  if (disputed && result.size->prior_sd > 0) result.usable = false;
 }
 
 void warn(Calibration& result) {
@@ -294,53 +283,94 @@ void finish(Calibration& result, const std::vector<Observation>& used) {
   result.diversity = rotation_diversity(robot);
   result.weakest = weakest_direction(result.covariance, median(distances), "camera");
   warn(result);
-  warn_of_scale(result);
+  const std::string implausible = implausibility(result, used);
+  if (implausible.empty()) return;
+  result.warnings.insert(result.warnings.begin(), implausible);
+  result.usable = false;
 }
 
-Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
-                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
-                      const CalibrateSettings& settings) {
+namespace {
+
+/// With the unknowns that the settings state.
+Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                  const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                  const CalibrateSettings& settings) {
   Calibration result;
   result.setup = setup;
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
 
   RefineSettings refine_settings = settings.refine;
-  refine_settings.bundle.unknowns.scales = settings.target_size == TargetSize::solved;
-  const auto start = std::tuple(observations, result.used, result.selection);
+  refine_settings.bundle.unknowns.scales = settings.target_size_sd > 0;
+  result.unknowns = refine_settings.bundle.unknowns;
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
-  const auto check_scale = [&] {
-    const std::vector<ScaleCheck> checks = check_scales(result.refined, refine_settings);
-    if (!checks.empty()) result.scale = checks.front();
-  };
-  check_scale();
-  if (settings.target_size == TargetSize::solved && !result.scale)
+  SizedRefinement sized = refine_sizes(std::move(result.refined), refine_settings);
+  result.refined = std::move(sized.refined);
+  result.size = sized.sizes.front();
+  if (std::isinf(settings.target_size_sd) && !result.size->wanted)
     throw data::InputError(
         "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
         "out, or add views farther apart");
-  if (settings.target_size == TargetSize::automatic && result.scale && clearly_off(*result.scale)) {
-    // Views that a wrong size made look wrong come back.
-    std::tie(observations, result.used, result.selection) = start;
-    refine_settings.bundle.unknowns.scales = true;
-    plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
-    check_scale();
-  }
-  if (result.scale) result.scale->solved = refine_settings.bundle.unknowns.scales;
   BundleSettings exact_robot = settings.refine.bundle;
-  exact_robot.unknowns.corrections = false;
+  exact_robot.unknowns.corrections = exact_robot.unknowns.scales = false;
   exact_robot.huber = 0;
   solve_bundle(plain, result.refined.noise, exact_robot);
 
   const Bundle& bundle = result.refined.bundle;
   result.poses = {bundle.cameras.front(), bundle.targets.front()};
-  result.covariance = result.refined.covariance.topLeftCorner<6, 6>();
   result.corner_rms = reprojection_rms(bundle, true);
   result.chain_rms = reprojection_rms(bundle, false);
   result.centre_rms = centre_rms(bundle, target_poses(observations));
   compare_methods(result, observations, plain, refine_settings, settings);
-  const double grown = add_correlated_pose_errors(result, refine_settings.bundle);
+  const double grown = add_systematic(result, sized.systematic);
   check_splits(result, refine_settings.bundle, settings, grown);
   finish(result, observations);
+  warn_of_size(result, sized.disputed);
   return result;
+}
+
+/// By how much the squared residuals of views left out fall from one solution to the other [px^2], over the
+/// views that both use.
+MeanDifference fall_of_held_out(const Calibration& from, const Calibration& to) {
+  std::vector<double> before, after;
+  for (std::size_t i = 0; i < from.used.size(); ++i) {
+    const auto other = std::find(to.used.begin(), to.used.end(), from.used[i]);
+    if (other == to.used.end()) continue;
+    before.push_back(from.held_out.squares[i][0]);
+    after.push_back(to.held_out.squares[static_cast<std::size_t>(other - to.used.begin())][0]);
+  }
+  return mean_difference(before, after);
+}
+
+}  // namespace
+
+Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                      const CalibrateSettings& settings) {
+  Calibration stated = solve(setup, camera, points, symmetries, all, settings);
+  // A size that nobody knows and a focal length that nobody knows look alike.
+  constexpr std::size_t kEnough = 8;
+  const bool asked = settings.refine.bundle.unknowns.intrinsics > 0;
+  if (asked || !settings.check_lens || std::isinf(settings.target_size_sd) || stated.used.size() < kEnough)
+    return stated;
+  CalibrateSettings with_lens = settings;
+  with_lens.refine.bundle.unknowns.intrinsics = kLensUnknowns;
+  Calibration solved = solve(setup, camera, points, symmetries, all, with_lens);
+  if (!solved.refined.converged || solved.used.size() < stated.used.size()) return stated;
+  const MeanDifference gain = fall_of_held_out(stated, solved);
+  constexpr double kClearly = 2, kMuch = 0.2;  // standard errors; of the squares that are left
+  if (!(gain.mean > kClearly * gain.sd && gain.mean > kMuch * stated.held_out.px * stated.held_out.px))
+    return stated;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the lens is not as stated: views left out are predicted to %.2f px with it solved for, to %.2f px "
+      "without (focal lengths %.1f %.1f px, stated %.1f %.1f); the answer is for the lens solved for: "
+      "calibrate it (flash-calib intrinsics)",
+      solved.held_out.px, stated.held_out.px, solved.refined.bundle.intrinsics.front().fx,
+      solved.refined.bundle.intrinsics.front().fy, camera.fx, camera.fy);
+  solved.lens_found = true;
+  solved.warnings.insert(solved.warnings.begin(), text);
+  return solved;
 }
 
 }  // namespace flash::calib

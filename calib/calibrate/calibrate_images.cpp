@@ -42,9 +42,9 @@ struct Problem {
   }
 };
 
-TimeOffset offset_left(const Refinement& refined, const Unknowns& unknowns) {
-  const int column = shared_columns(refined.bundle, unknowns).time_offsets.front();
-  return {refined.bundle.time_offsets.front(), std::sqrt(refined.covariance(column, column))};
+TimeOffset offset_left(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance) {
+  const int column = shared_columns(bundle, unknowns).time_offsets.front();
+  return {bundle.time_offsets.front(), std::sqrt(covariance(column, column))};
 }
 
 /// Warns where the poses' clock and the pictures' differ, in a solution that took them to be one.
@@ -62,7 +62,8 @@ void check_time(const Dataset& dataset, const CalibrateSettings& settings, Calib
     squares += bundle.poses[k].velocity.head<3>().squaredNorm();
   }
   if (squares < 1e-6 * static_cast<double>(bundle.poses.size())) return;  // slower than 1 mm/s
-  const TimeOffset offset = offset_left(refine(std::move(bundle), with_offset), with_offset.bundle.unknowns);
+  const Refinement refined = refine(std::move(bundle), with_offset);
+  const TimeOffset offset = offset_left(refined.bundle, with_offset.bundle.unknowns, refined.covariance);
   if (!(std::abs(offset.estimate) > 5 * offset.sd)) return;
   result.warnings.insert(
       result.warnings.begin(),
@@ -93,7 +94,7 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
           "leave --time-offset out");
     const bool last = round == kRounds;
     Calibration result = problem.solve(moved_views, last ? settings : quick);
-    const TimeOffset left = offset_left(result.refined, settings.refine.bundle.unknowns);
+    const TimeOffset left = offset_left(result.refined.bundle, result.unknowns, result.shared_covariance);
     offset.sd = left.sd;
     if (!(offset.sd < kUnknown))
       throw data::InputError(
@@ -103,9 +104,7 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
                     1e3 * speed, 1e3 * offset.sd));
     if (last) {
       offset.estimate += left.estimate;
-      // Widened as much as the transform's was.
-      offset.sd *=
-          std::sqrt(result.covariance.trace() / result.refined.covariance.topLeftCorner<6, 6>().trace());
+      offset.sd *= std::sqrt(result.covariance_factor);  // as the transform's
       for (const std::size_t i : beyond)
         result.selection.views[i].reason = result.views[i].reason =
             "its time lies beyond the poses of " + dataset.poses_path;
@@ -119,7 +118,7 @@ Calibration calibrate_stream(const Problem& problem, const Dataset& dataset,
 }
 
 /// What the solution says of the depth that took part, and what people should know of it.
-void report_depth(const DepthUse& use, const Unknowns& unknowns, ImageCalibration& result) {
+void report_depth(const DepthUse& use, ImageCalibration& result) {
   DepthUse& depth = result.depth.emplace(use);
   Calibration& calibration = result.calibration;
   for (const std::string& reason : depth.unreadable)
@@ -129,11 +128,11 @@ void report_depth(const DepthUse& use, const Unknowns& unknowns, ImageCalibratio
     return;
   }
   const Refinement& refined = calibration.refined;
-  const int column = shared_columns(refined.bundle, unknowns).depth_scales.front();
+  const int column = shared_columns(refined.bundle, calibration.unknowns).depth_scales.front();
   if (column < 0) return;
   depth.sigma = refined.noise.depth.front();
   depth.over_corners = refined.bundle.depth_scales.front();
-  depth.over_corners_sd = std::sqrt(refined.covariance(column, column));
+  depth.over_corners_sd = std::sqrt(calibration.shared_covariance(column, column));
   const double off = std::abs(depth.over_corners - 1);
   if (off > 0.01 && off > 5 * depth.over_corners_sd)
     calibration.warnings.push_back(
@@ -176,7 +175,7 @@ ImageCalibration calibrate_images(Setup setup, const Dataset& dataset, const Tar
   for (std::size_t i = 0; i < detections.size(); ++i)
     if (!detections[i].reason.empty()) best.calibration.views[i].reason = detections[i].reason;
   if (dataset.stream && !timed) check_time(dataset, settings, best.calibration);
-  if (depth) report_depth(depth->use, settings.refine.bundle.unknowns, best);
+  if (depth) report_depth(depth->use, best);
   return best;
 }
 

@@ -8,7 +8,6 @@
 #include <map>
 
 #include "calib/solve/linearization.h"
-#include "calib/uncertainty/correlated_pose_errors.h"
 #include "data/error.h"
 #include "data/text.h"
 
@@ -74,20 +73,12 @@ void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout
   }
 }
 
-std::string size_notice(const ScaleCheck& scale) {
-  char text[200];
-  std::snprintf(
-      text, sizeof text,
-      "a target is taken to be %.4f +- %.4f (2 sd) times as large as stated, as the data want it: measure it",
-      scale.estimate, 2 * scale.sd);
-  return text;
-}
-
 }  // namespace
 
 CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
                        const Target& target, const Calibration& calibration) {
   CellMember member{.arm = arm, .camera = camera, .setup = calibration.setup, .intrinsics = *dataset.camera};
+  if (has_pixels(calibration)) member.intrinsics = calibration.refined.bundle.intrinsics.front();
   member.points = target_points(target);
   member.symmetries = confusable_symmetries(target);
   member.poses = calibration.poses;
@@ -159,32 +150,27 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   return bundle;
 }
 
-Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& given, TargetSize size) {
+Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& given, double target_size_sd) {
   Cell cell{.joint = true};
   RefineSettings settings = given;
-  settings.bundle.unknowns.scales = size == TargetSize::solved;
-  const Bundle start = cell_bundle(members, &cell.notices);
-  Refinement refined = refine(start, settings);
-  cell.scales = check_scales(refined, settings);
-  if (size == TargetSize::automatic && std::any_of(cell.scales.begin(), cell.scales.end(), clearly_off)) {
-    settings.bundle.unknowns.scales = true;
-    refined = refine(start, settings);
-    cell.scales = check_scales(refined, settings);
-  }
-  if (size == TargetSize::solved && cell.scales.empty())
+  settings.bundle.unknowns.scales = target_size_sd > 0;
+  Bundle start = cell_bundle(members, &cell.notices);
+  if (target_size_sd > 0) start.priors.scale_sd = target_size_sd;
+  const SizedRefinement sized = refine_sizes(refine(std::move(start), settings), settings);
+  const Refinement& refined = sized.refined;
+  const SystematicUncertainty& systematic = sized.systematic;
+  cell.sizes = sized.sizes;
+  cell.usable = !sized.disputed || target_size_sd == 0;
+  const bool told = std::all_of(cell.sizes.begin(), cell.sizes.end(),
+                                [](const TargetSize& size) { return size.wanted.has_value(); });
+  if (std::isinf(target_size_sd) && !told)
     throw data::InputError(
         "the data do not tell the size of the targets: the robots move too little; leave --target-size "
         "solved out, or add views farther apart");
   if (!refined.converged) cell.notices.emplace_back("the joint refinement did not converge");
-  const SystematicUncertainty systematic = systematic_uncertainty(refined, settings.bundle);
+  for (const TargetSize& size : cell.sizes)
+    if (size.far_off()) cell.notices.push_back(size_sentence(size));
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
-  for (std::size_t i = 0; i < cell.scales.size(); ++i)
-    if (const int column = columns.scales[i]; column >= 0)
-      cell.scales[i].sd = std::sqrt(systematic.covariance(column, column));
-  for (ScaleCheck& scale : cell.scales) {
-    scale.solved = settings.bundle.unknowns.scales;
-    if (scale.solved) cell.notices.push_back(size_notice(scale));
-  }
   const std::vector<std::string> arms = names_of(members, &CellMember::arm);
   const std::vector<std::string> cameras = names_of(members, &CellMember::camera);
   const auto block = [&](int column) -> Matrix6d {

@@ -8,7 +8,7 @@
 #include "calib/dataset/dataset.h"
 #include "calib/dataset/symmetry.h"
 #include "calib/dataset/target.h"
-#include "calib/solve/target_size.h"
+#include "calib/uncertainty/target_size.h"
 
 namespace flash::calib {
 
@@ -39,7 +39,8 @@ struct Cell {
   bool joint = false;  ///< one solution from all images; otherwise composed of single calibrations
   std::vector<CellFrame> bases = {}, cameras = {};
   NoiseLevels noise = {};
-  std::vector<ScaleCheck> scales = {};   ///< of the targets; none where composed
+  std::vector<TargetSize> sizes = {};    ///< of the targets; none where composed
+  bool usable = true;                    ///< false: a size is far off, and the answer depends on it
   double corner_rms = 0, chain_rms = 0;  ///< with and without corrections, 2-D rms per corner [px]
   std::vector<std::string> notices = {};
 };
@@ -54,8 +55,9 @@ Cell compose_cell(const std::vector<std::string>& arms, const std::vector<Extrin
 Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::string>* notices = nullptr);
 
 /// Solved by errors in variables. Intrinsics: how many of fx fy cx cy ... of each camera are solved for.
+/// target_size_sd: as in CalibrateSettings.
 Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& settings = {},
-                TargetSize size = TargetSize::automatic);
+                double target_size_sd = kPrintSd);
 
 /// Covariance of where a point lies, p in the frame's child, seen from its parent [m^2].
 Eigen::Matrix3d point_covariance(const CellFrame& frame, const Eigen::Vector3d& p);

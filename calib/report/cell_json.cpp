@@ -44,8 +44,7 @@ Json to_json(const Cell& cell, const std::optional<Eigen::Vector3d>& workspace) 
                       {"robot_rotation_rad", cell.noise.rotation},
                       {"robot_translation_m", cell.noise.translation}};
     json["scales"] = Json::array();
-    for (const ScaleCheck& scale : cell.scales)
-      json["scales"].push_back({{"estimate", scale.estimate}, {"sd", scale.sd}, {"solved", scale.solved}});
+    for (const TargetSize& size : cell.sizes) json["scales"].push_back(to_json(size));
     json["residuals"] = {{"reprojection_rms_px", cell.chain_rms}, {"corner_rms_px", cell.corner_rms}};
   }
   json["notices"] = cell.notices;

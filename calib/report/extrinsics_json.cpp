@@ -26,6 +26,16 @@ Json rows(const Matrix& m) {
   return values;
 }
 
+/// By how many standard errors over the folds the answer's squared residuals exceed another method's.
+Json behind_json(const HeldOut& answer, const HeldOut& other) {
+  Json behind = Json::object();
+  for (const auto& [measure, name] : {std::pair{0, "px"}, {1, "mm"}, {2, "deg"}}) {
+    const MeanDifference d = mean_difference(means_of_folds(answer, measure), means_of_folds(other, measure));
+    behind[name] = d.sd > 0 ? Json(d.mean / d.sd) : Json(nullptr);
+  }
+  return behind;
+}
+
 Json comparison_json(const Calibration& calibration) {
   const bool pixels = has_pixels(calibration);
   Json methods = Json::object();
@@ -37,6 +47,7 @@ Json comparison_json(const Calibration& calibration) {
       entry["heldout_px"] = pixels ? Json(method.held_out->px) : Json(nullptr);
       entry["heldout_mm"] = method.held_out->mm;
       entry["heldout_deg"] = method.held_out->deg;
+      if (pixels) entry["behind"] = behind_json(calibration.held_out, *method.held_out);
     }
     entry["wild"] = method.wild;
     entry["translation"] = list(method.poses.X.translation());
@@ -84,6 +95,15 @@ Json to_json(const NamedTransform& transform) {
           {"rotation_xyzw", list(v.tail<4>())}};
 }
 
+Json to_json(const TargetSize& size) {
+  return {{"estimate", size.estimate},
+          {"sd", size.sd},
+          {"solved", size.prior_sd > 0},
+          {"prior_sd", std::isfinite(size.prior_sd) ? Json(size.prior_sd) : Json(nullptr)},
+          {"wanted", size.wanted ? Json(size.wanted->estimate) : Json(nullptr)},
+          {"wanted_sd", size.wanted ? Json(size.wanted->sd) : Json(nullptr)}};
+}
+
 Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code) {
   const Extrinsics extrinsics = extrinsics_of(calibration, inputs);
   const Vector6d sd = calibration.covariance.diagonal().cwiseSqrt();
@@ -107,6 +127,14 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                        {"heldout_px", px(calibration.held_out.px)},
                        {"heldout_mm", calibration.held_out.mm},
                        {"heldout_deg", calibration.held_out.deg}};
+  json["lens"] = nullptr;
+  if (extrinsics.pixels) {
+    const data::CameraIntrinsics& lens = calibration.refined.bundle.intrinsics.front();
+    json["lens"] = {{"solved", calibration.unknowns.intrinsics > 0},
+                    {"focal_px", {lens.fx, lens.fy}},
+                    {"centre_px", {lens.cx, lens.cy}},
+                    {"distortion", lens.distortion}};
+  }
   json["depth"] = inputs.depth ? depth_json(*inputs.depth) : Json(nullptr);
   json["time_offset"] = inputs.time_offset ? Json{{"estimate_s", inputs.time_offset->estimate},
                                                   {"sd_s", inputs.time_offset->sd}}
@@ -121,10 +149,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"weakest_mm", 1e3 * calibration.weakest.translation},
       {"weakest_deg", kDegrees * calibration.weakest.rotation}};
   json["convention_findings"] = Json::array();
-  json["scale"] = calibration.scale ? Json{{"estimate", calibration.scale->estimate},
-                                           {"sd", calibration.scale->sd},
-                                           {"solved", calibration.scale->solved}}
-                                    : Json(nullptr);
+  json["scale"] = calibration.size ? to_json(*calibration.size) : Json(nullptr);
   json["splits"] = nullptr;
   if (!calibration.splits.empty()) {
     json["splits"] = {{"covariance_factor", calibration.covariance_factor}};
@@ -136,12 +161,9 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   json["smooth_errors"] = nullptr;
   if (calibration.pose_errors) {
     const CorrelatedPoseErrors& errors = *calibration.pose_errors;
-    json["smooth_errors"] = {{"found", errors.found},
-                             {"gain", errors.gain},
-                             {"translation_m", errors.translation},
-                             {"rotation_rad", errors.rotation},
-                             {"about_base_rad", errors.about_base},
-                             {"reach", errors.reach}};
+    json["smooth_errors"] = {{"found", errors.found},           {"gain", errors.gain},
+                             {"share", errors.share},           {"translation_m", errors.translation},
+                             {"rotation_rad", errors.rotation}, {"reach", errors.reach}};
   }
   json["warnings"] = calibration.warnings;
   json["exit_code"] = exit_code;

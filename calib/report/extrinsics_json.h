@@ -9,6 +9,9 @@ namespace flash::calib {
 /// observability, findings, scale, warnings, provenance.
 nlohmann::ordered_json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code);
 
+/// {"estimate", "sd", "solved", "prior_sd", "wanted", "wanted_sd"}
+nlohmann::ordered_json to_json(const TargetSize& size);
+
 /// {"parent", "child", "translation": [x, y, z], "rotation_xyzw": [...]}
 nlohmann::ordered_json to_json(const NamedTransform& transform);
 

@@ -173,8 +173,8 @@ std::vector<std::string> next_steps(const Calibration& c) {
   constexpr double kWideTurn = 10, kSharpCorners = 0.3;  // [deg], [px]
   constexpr std::size_t kEnough = 15;
   std::vector<std::string> steps;
-  if (c.scale && (c.scale->solved || std::abs(c.scale->estimate - 1) > std::max(0.01, 5 * c.scale->sd))) {
-    const double larger = 100 * (c.scale->estimate - 1);
+  if (c.size && c.size->far_off()) {
+    const double larger = 100 * (c.size->wanted->estimate - 1);
     steps.push_back(
         sentence(larger > 0 ? "Measure the printed target: the data want it %.2f %% larger than stated."
                             : "Measure the printed target: the data want it %.2f %% smaller than stated.",

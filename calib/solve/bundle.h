@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <limits>
 #include <vector>
 
 #include "calib/dataset/observation.h"
@@ -27,6 +28,19 @@ struct BundleView {
                                   ///< none
 };
 
+/// What is known before a picture is taken: normal distributions about what is stated.
+struct Priors {
+  double scale_sd = std::numeric_limits<double>::infinity();  ///< of each target's scale; infinity: nothing
+  /// Of each target: full standard deviation of the scale that the pictures tell, over that of noise alone.
+  /// The prior weighs as much more against residuals that are taken for noise. Empty: 1.
+  std::vector<double> caution = {};
+};
+
+/// The standard deviation that the prior of a target's scale has among residuals of noise.
+inline double prior_scale_sd(const Priors& priors, std::size_t target) {
+  return priors.scale_sd / (priors.caution.empty() ? 1 : priors.caution[target]);
+}
+
 /// Everything that is known and looked for. One hand-eye calibration has one camera, arm and target; several
 /// arms on one camera, or several cameras on one arm, share them (see Chain).
 struct Bundle {
@@ -42,6 +56,7 @@ struct Bundle {
                                            ///< translation are independent [m]
   std::vector<RobotPose> poses;
   std::vector<BundleView> views;
+  Priors priors = {};
 };
 
 /// The bundle of one camera and one arm. points: the target's, 3 x N; poses: seed.

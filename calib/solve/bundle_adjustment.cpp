@@ -184,6 +184,20 @@ class CorrectionPrior final : public ceres::SizedCostFunction<6, 7> {
   Eigen::Vector3d pivot_;
 };
 
+/// What is known of a target's size beforehand.
+class ScalePrior final : public ceres::SizedCostFunction<1, 1> {
+ public:
+  explicit ScalePrior(double sd) : weight_(1 / sd) {}
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    *residual = weight_ * (*x[0] - 1);
+    if (jacobians && jacobians[0]) *jacobians[0] = weight_;
+    return true;
+  }
+
+ private:
+  double weight_;
+};
+
 /// The bundle as blocks of numbers, as Ceres wants it.
 struct Blocks {
   std::vector<PoseBlock> cameras, bases, targets, corrections;
@@ -272,8 +286,13 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     else if (!constant.empty())
       problem.SetManifold(block.data(), new ceres::SubsetManifold(kIntrinsics, constant));
   }
-  for (double& scale : blocks.scales)
-    if (!unknowns.scales) hold(problem, &scale);
+  for (std::size_t target = 0; target < blocks.scales.size(); ++target) {
+    double* scale = &blocks.scales[target];
+    if (!unknowns.scales)
+      hold(problem, scale);
+    else if (problem.HasParameterBlock(scale))
+      problem.AddResidualBlock(new ScalePrior(prior_scale_sd(bundle.priors, target)), nullptr, scale);
+  }
   for (double& tau : blocks.time_offsets)
     if (!unknowns.time_offsets) hold(problem, &tau);
   for (double& scale : blocks.depth_scales)

@@ -17,7 +17,7 @@ struct NoiseLevels {
 struct Unknowns {
   bool corrections = true;  ///< of robot poses, held by a prior of their noise: errors in variables
   int intrinsics = 0;       ///< how many of fx fy cx cy k1 k2 p1 p2 k3 ...
-  bool scales = false;
+  bool scales = false;      ///< of targets, held by Priors::scale_sd
   bool time_offsets = false;
   bool depth_scales = true;  ///< of cameras with depth: it tells shape and tilt, not how long a metre is
 };

@@ -62,6 +62,7 @@ namespace {
 /// Sums of one part of the views, predicted by a solution without them.
 struct HeldOutSums {
   double px = 0, mm = 0, deg = 0, corners = 0, views = 0;
+  std::vector<std::pair<int, Eigen::Vector3d>> squares = {};  // of a pose, as HeldOut has them
 };
 
 HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target,
@@ -80,10 +81,15 @@ HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometr
                     T_camera_target[static_cast<std::size_t>(view.pose)]);
     const Eigen::Vector3d centre = points.rowwise().mean();
     const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());
-    sums.px += residuals(train, view, false).squaredNorm();
-    sums.mm += (1e3 * (predicted * centre - seen * centre)).squaredNorm();
-    sums.deg += std::pow(angle * 180 / M_PI, 2);
-    sums.corners += static_cast<double>(view.points.cols());
+    const auto corners = static_cast<double>(view.points.cols());
+    const Eigen::Vector3d squares(residuals(train, view, false).squaredNorm() / corners,
+                                  (1e3 * (predicted * centre - seen * centre)).squaredNorm(),
+                                  std::pow(angle * 180 / M_PI, 2));
+    sums.squares.emplace_back(view.pose, squares);
+    sums.px += corners * squares[0];
+    sums.mm += squares[1];
+    sums.deg += squares[2];
+    sums.corners += corners;
     ++sums.views;
   }
   return sums;
@@ -103,16 +109,39 @@ HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_c
         hold_out_part(bundle, T_camera_target, method, settings, result.fold, static_cast<int>(part));
   });
   HeldOutSums all;
+  result.squares.assign(static_cast<std::size_t>(count), Eigen::Vector3d::Zero());
   for (const HeldOutSums& part : sums) {
     all.px += part.px;
     all.mm += part.mm;
     all.deg += part.deg;
     all.corners += part.corners;
     all.views += part.views;
+    for (const auto& [pose, squares] : part.squares) result.squares[static_cast<std::size_t>(pose)] = squares;
   }
   result.px = std::sqrt(all.px / all.corners);
   result.mm = std::sqrt(all.mm / all.views);
   result.deg = std::sqrt(all.deg / all.views);
+  return result;
+}
+
+std::vector<double> means_of_folds(const HeldOut& held, int measure) {
+  const int folds = held.fold.empty() ? 0 : *std::max_element(held.fold.begin(), held.fold.end()) + 1;
+  std::vector<double> means(static_cast<std::size_t>(folds), 0), counts = means;
+  for (std::size_t i = 0; i < held.squares.size(); ++i) {
+    means[static_cast<std::size_t>(held.fold[i])] += held.squares[i][measure];
+    ++counts[static_cast<std::size_t>(held.fold[i])];
+  }
+  for (std::size_t f = 0; f < means.size(); ++f) means[f] /= std::max(1.0, counts[f]);
+  return means;
+}
+
+MeanDifference mean_difference(const std::vector<double>& a, const std::vector<double>& b) {
+  MeanDifference result;
+  const auto count = static_cast<double>(a.size());
+  for (std::size_t i = 0; i < a.size(); ++i) result.mean += (a[i] - b[i]) / count;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    result.sd += std::pow(a[i] - b[i] - result.mean, 2) / (count * (count - 1));
+  result.sd = std::sqrt(result.sd);
   return result;
 }
 

@@ -12,7 +12,18 @@ struct HeldOut {
   double mm = 0;          ///< rms distance of the target's centre from where the view alone puts it
   double deg = 0;         ///< rms angle, likewise
   std::vector<int> fold;  ///< of each pose
+  /// Of px (mean over the corners), mm and deg of each pose, of solutions from pictures; else empty.
+  std::vector<Eigen::Vector3d> squares;
 };
+
+/// Mean of the squares over the poses of each fold. measure: 0 px, 1 mm, 2 deg.
+std::vector<double> means_of_folds(const HeldOut& held, int measure);
+
+/// The mean of paired differences and its standard error.
+struct MeanDifference {
+  double mean = 0, sd = 0;
+};
+MeanDifference mean_difference(const std::vector<double>& a, const std::vector<double>& b);
 
 enum class Method { park, shah, bundle, errors_in_variables };
 const char* to_string(Method method);

@@ -87,6 +87,20 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> prior_grams(const Eigen::Isometry3d&
   return {rotation.transpose() * rotation, translation.transpose() * translation};
 }
 
+/// Of what is known of the shared unknowns beforehand, in unit variance.
+Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns) {
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(columns.count + 1, columns.count + 1);
+  for (std::size_t target = 0; target < bundle.targets.size(); ++target) {
+    if (columns.scales[target] < 0) continue;
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(columns.count + 1);
+    const double sd = prior_scale_sd(bundle.priors, target);
+    row[columns.scales[target]] = 1 / sd;
+    row[columns.count] = (bundle.scales[target] - 1) / sd;
+    gram += row * row.transpose();
+  }
+  return gram;
+}
+
 }  // namespace
 
 SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
@@ -102,6 +116,7 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
   take(columns.targets, bundle.targets.size(), 6);
   take(columns.bases, bundle.bases.size(), 6, 1);
   take(columns.intrinsics, bundle.cameras.size(), unknowns.intrinsics);
+  columns.intrinsics_count = unknowns.intrinsics;
   take(columns.scales, bundle.targets.size(), unknowns.scales ? 1 : 0);
   take(columns.time_offsets, bundle.bases.size(), unknowns.time_offsets ? 1 : 0);
   columns.depth_scales.assign(bundle.cameras.size(), -1);
@@ -110,6 +125,31 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
     if (unknowns.depth_scales && view.depth_points.cols() > 0 && column < 0) column = columns.count++;
   }
   return columns;
+}
+
+void move_shared(Bundle& bundle, const SharedColumns& columns, const Eigen::VectorXd& step) {
+  const auto move_poses = [&](std::vector<Eigen::Isometry3d>& poses, const std::vector<int>& list) {
+    for (std::size_t i = 0; i < poses.size(); ++i)
+      if (list[i] >= 0) poses[i] = moved(poses[i], step.segment<6>(list[i]));
+  };
+  const auto move_numbers = [&](std::vector<double>& numbers, const std::vector<int>& list) {
+    for (std::size_t i = 0; i < numbers.size(); ++i)
+      if (list[i] >= 0) numbers[i] += step[list[i]];
+  };
+  move_poses(bundle.cameras, columns.cameras);
+  move_poses(bundle.targets, columns.targets);
+  move_poses(bundle.bases, columns.bases);
+  move_numbers(bundle.scales, columns.scales);
+  move_numbers(bundle.time_offsets, columns.time_offsets);
+  bundle.depth_scales.resize(bundle.cameras.size(), 1);
+  move_numbers(bundle.depth_scales, columns.depth_scales);
+  for (std::size_t camera = 0; camera < bundle.intrinsics.size(); ++camera) {
+    if (columns.intrinsics[camera] < 0) continue;
+    IntrinsicsVector intrinsics = to_vector(bundle.intrinsics[camera]);
+    intrinsics.head(columns.intrinsics_count) +=
+        step.segment(columns.intrinsics[camera], columns.intrinsics_count);
+    bundle.intrinsics[camera] = with_vector(bundle.intrinsics[camera], intrinsics);
+  }
 }
 
 std::vector<double> to_components(const NoiseLevels& noise) {
@@ -164,6 +204,7 @@ LinearModel linearize(const Bundle& bundle, const NoiseLevels& noise, const Bund
   model.components = 2 * cameras + 2 * arms;
   model.own = settings.unknowns.corrections ? kOwn : 0;
   model.shared = columns.count;
+  model.prior = shared_prior(bundle, columns);
   for (const BundleView& view : bundle.views) {
     const auto camera = static_cast<std::size_t>(view.camera);
     GramBlock corners{.group = view.pose, .component = view.camera, .gram = {}};

@@ -12,9 +12,13 @@ struct SharedColumns {
   std::vector<int> cameras, bases, targets;  ///< first of six, a right perturbation (dt, dtheta) each
   std::vector<int> intrinsics;               ///< first of Unknowns::intrinsics
   std::vector<int> scales, time_offsets, depth_scales;
+  int intrinsics_count = 0;  ///< of each camera
   int count = 0;
 };
 SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns);
+
+/// Moves the shared unknowns by a step in those columns.
+void move_shared(Bundle& bundle, const SharedColumns& columns, const Eigen::VectorXd& step);
 
 /// Components of variance in this order: corners and depths of each camera, rotation and translation of each
 /// arm.

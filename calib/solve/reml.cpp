@@ -62,6 +62,7 @@ LinearSolution solve_linear(const LinearModel& model, const std::vector<double>&
   // Eliminate each group: H_dd^-1 [H_ds b_d], and what is left on [s 1].
   LinearSolution solution;
   Eigen::MatrixXd reduced = Eigen::MatrixXd::Zero(s + 1, s + 1);
+  if (model.prior.size() > 0) reduced = model.prior;
   std::vector<Eigen::MatrixXd> eliminated(joint.size()), inverse_own(joint.size());
   for (std::size_t g = 0; g < joint.size(); ++g) {
     reduced += joint[g].bottomRightCorner(s + 1, s + 1);
@@ -104,6 +105,10 @@ LinearSolution solve_linear(const LinearModel& model, const std::vector<double>&
   }
   for (Eigen::Index c = 0; c < solution.squares.size(); ++c)
     solution.deviance += inverse_variance[static_cast<std::size_t>(c)] * solution.squares[c];
+  if (model.prior.size() > 0) {
+    const Eigen::VectorXd x = solution.shared.homogeneous();
+    solution.deviance += x.dot(model.prior * x);
+  }
   return solution;
 }
 

@@ -18,6 +18,7 @@ struct LinearModel {
   int own = 0;     ///< unknowns of a group
   int shared = 0;  ///< unknowns of all
   std::vector<GramBlock> blocks;
+  Eigen::MatrixXd prior = {};  ///< of the shared unknowns: [J_s r_0]^T [J_s r_0] of unit variance, or empty
 };
 
 /// The least squares solution for given standard deviations, group unknowns eliminated.

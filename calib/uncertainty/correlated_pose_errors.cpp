@@ -7,84 +7,59 @@
 #include <cmath>
 
 #include "calib/solve/linearization.h"
+#include "calib/uncertainty/pose_information.h"
 
 namespace flash::calib {
 namespace {
 
-constexpr int kOwn = 6;
-constexpr int kIndependent = 2, kComponents = 5;  // translation, rotation; and three fields
-constexpr double kReaches[] = {1, 2, 4};          // of the rms distance between two poses
-// Chi-square with 3 degrees of freedom, a size each. Sizes cannot fall below zero, which alone would make it
-// 5.4 (Self and Liang 1987); what is above that is for the choice of a reach.
+constexpr int kOwn = 6, kModes = 5;
+constexpr double kReaches[] = {0.5, 1, 2, 4, 8};  // of the rms distance between two poses
+// Turns [rad], a factor of two apart: 0.006 to 0.4 deg.
+constexpr double kSizes[] = {1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3};
+constexpr double kUsualSize = 0.1 * M_PI / 180, kSizeSpread = 1;  // of its logarithm
+constexpr double kOdds = 1;  // of errors that are smooth against errors that are not, before any view is seen
+// Chi-square with 3 degrees of freedom: a size, its reach, and the share of what is independent.
 constexpr double kOnceInTwenty = 7.815;
 constexpr std::size_t kEnough = 30;  // poses from which sizes are estimated
 
-using Rows6 = Eigen::Matrix<double, kOwn, Eigen::Dynamic>;
 using Columns = Eigen::Matrix<double, kOwn, 3>;
-using Variances = Eigen::Matrix<double, kComponents, 1>;
 
-/// What the pictures say of one pose's error xi (base axes, at the gripper) and of the shared unknowns s:
-/// half of xi^T H xi + 2 xi^T H_s s + s^T H_ss s + 2 xi^T g + 2 s^T g_s.
-struct PoseInformation {
-  Matrix6d H = Matrix6d::Zero();
-  Rows6 H_s;
-  Eigen::MatrixXd H_ss;
-  Vector6d g = Vector6d::Zero();
-  Eigen::VectorXd g_s;
-  Matrix6d prior = Matrix6d::Zero();  ///< information of the prior that the solution was made with
-};
-
-/// The ways in which an error moves the gripper, as columns of (dt, dtheta) in base axes. What is wrong at
-/// the wrist turns with the gripper, what is wrong at the base does not.
+/// The ways in which an error moves the gripper, as columns of (dt, dtheta) in base axes.
 struct PoseModes {
   Eigen::Vector3d place;
   Eigen::Matrix3d attitude;
-  Columns translation, rotation, about_base;
+  Columns translation, rotation;  ///< of independent errors, about the arm's pivot
+  std::array<Columns, kModes>
+      smooth;  ///< of a turn by one radian, and of lengths that are wrong in proportion
 };
 
-std::vector<PoseInformation> informations(const Refinement& refined, const BundleSettings& settings) {
-  const LinearModel model = linearize(refined.bundle, refined.noise, settings);
-  const std::vector<double> sigmas = to_components(refined.noise);
-  const int seen = 2 * static_cast<int>(refined.bundle.cameras.size());  // corners and depths come first
-  const Eigen::Index s = model.shared;
-  std::vector<Eigen::MatrixXd> joint(static_cast<std::size_t>(model.groups),
-                                     Eigen::MatrixXd::Zero(kOwn + s + 1, kOwn + s + 1));
-  std::vector<PoseInformation> result(joint.size());
-  for (const GramBlock& block : model.blocks) {
-    const auto pose = static_cast<std::size_t>(block.group);
-    const double weight = std::pow(sigmas[static_cast<std::size_t>(block.component)], -2);
-    if (block.component < seen)
-      joint[pose] += weight * block.gram;
-    else
-      result[pose].prior += weight * block.gram.topLeftCorner<kOwn, kOwn>();
-  }
-  for (std::size_t i = 0; i < joint.size(); ++i) {
-    const RobotPose& pose = refined.bundle.poses[i];
-    Vector6d xi;
-    xi << pose.correction.translation(), rotation_log(pose.correction.linear());
-    Matrix6d turn = Matrix6d::Zero();
-    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = pose.T_base_gripper.linear();
-    const Eigen::MatrixXd& G = joint[i];
-    PoseInformation& info = result[i];
-    info.H = turn * G.topLeftCorner<kOwn, kOwn>() * turn.transpose();
-    info.H_s = turn * G.block(0, kOwn, kOwn, s);
-    info.H_ss = G.block(kOwn, kOwn, s, s);
-    // Linearised at the correction found, asked of the whole error.
-    info.g = turn * (G.block(0, kOwn + s, kOwn, 1) - G.topLeftCorner<kOwn, kOwn>() * xi);
-    info.g_s = G.block(kOwn, kOwn + s, s, 1) - G.block(kOwn, 0, s, kOwn) * xi;
-    info.prior = (turn * info.prior * turn.transpose()).eval();
-  }
-  return result;
+/// arm: rms distance of the gripper from the base [m]. Lengths are taken to be wrong by as much as a turn
+/// makes them over half of it.
+PoseModes modes_of(const Bundle& bundle, std::size_t i, double arm) {
+  const RobotPose& pose = bundle.poses[i];
+  PoseModes modes;
+  modes.place = pose.T_base_gripper.translation();
+  modes.attitude = pose.T_base_gripper.linear();
+  const Eigen::Vector3d pivot = modes.attitude * bundle.pivots[static_cast<std::size_t>(pose.arm)];
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity(), O = Eigen::Matrix3d::Zero();
+  modes.translation << I, O;
+  modes.rotation << skew(pivot) * modes.attitude, modes.attitude;
+  auto& [wrist, base, shift, shift_of_wrist, stretch] = modes.smooth;
+  wrist = modes.rotation;
+  base << skew(-modes.place), I;
+  shift << 0.5 * arm * I, O;
+  shift_of_wrist << 0.5 * arm * modes.attitude, O;
+  stretch.setZero();
+  stretch.col(0).head<3>() = 0.5 * modes.place;
+  return modes;
 }
 
-PoseModes modes_of(const Bundle& bundle, std::size_t i) {
-  const RobotPose& pose = bundle.poses[i];
-  PoseModes modes{pose.T_base_gripper.translation(), pose.T_base_gripper.linear(), {}, {}, {}};
-  const Eigen::Vector3d pivot = modes.attitude * bundle.pivots[static_cast<std::size_t>(pose.arm)];
-  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
-  modes.translation << I, Eigen::Matrix3d::Zero();
-  modes.rotation << skew(pivot) * modes.attitude, modes.attitude;
-  modes.about_base << skew(-modes.place), I;
+std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::size_t>& poses) {
+  double squares = 0;
+  for (const std::size_t i : poses) squares += bundle.poses[i].T_base_gripper.translation().squaredNorm();
+  const double arm = std::sqrt(squares / static_cast<double>(poses.size()));
+  std::vector<PoseModes> modes;
+  for (const std::size_t i : poses) modes.push_back(modes_of(bundle, i, arm));
   return modes;
 }
 
@@ -115,29 +90,25 @@ Eigen::MatrixXd kernel(const Eigen::MatrixXd& squared, double reach) {
   });
 }
 
-/// Y (k x I_3) Y^T for Y = rows * modes, three columns a pose.
-Eigen::MatrixXd spread(const Eigen::MatrixXd& rows, const std::vector<PoseModes>& modes,
-                       Columns PoseModes::*mode, const Eigen::MatrixXd* k) {
-  const auto count = static_cast<Eigen::Index>(modes.size());
+/// Adds Y (k x I_3) Y^T to `sum` for Y = rows * columns, three columns a pose.
+void add_spread(const Eigen::MatrixXd& rows, const std::vector<Columns>& columns, const Eigen::MatrixXd* k,
+                Eigen::MatrixXd& sum) {
+  const auto count = static_cast<Eigen::Index>(columns.size());
   std::array<Eigen::MatrixXd, 3> Y;
   Y.fill(Eigen::MatrixXd(rows.rows(), count));
   for (Eigen::Index i = 0; i < count; ++i) {
-    const Eigen::MatrixXd y = rows.middleCols(kOwn * i, kOwn) * (modes[static_cast<std::size_t>(i)].*mode);
+    const Eigen::MatrixXd y = rows.middleCols(kOwn * i, kOwn) * columns[static_cast<std::size_t>(i)];
     for (std::size_t axis = 0; axis < 3; ++axis) Y[axis].col(i) = y.col(static_cast<Eigen::Index>(axis));
   }
-  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(rows.rows(), rows.rows());
   for (const Eigen::MatrixXd& y : Y) sum.noalias() += (k ? Eigen::MatrixXd(y * *k) : y) * y.transpose();
-  return sum;
 }
 
-/// Covariance of rows * xi for unit variance of each component.
-std::array<Eigen::MatrixXd, kComponents> spreads(const Eigen::MatrixXd& rows,
-                                                 const std::vector<PoseModes>& modes,
-                                                 const Eigen::MatrixXd& k) {
-  return {spread(rows, modes, &PoseModes::translation, nullptr),
-          spread(rows, modes, &PoseModes::rotation, nullptr),
-          spread(rows, modes, &PoseModes::translation, &k), spread(rows, modes, &PoseModes::rotation, &k),
-          spread(rows, modes, &PoseModes::about_base, &k)};
+template <class Mode>
+std::vector<Columns> columns_of(const std::vector<PoseModes>& modes, const Mode& mode) {
+  std::vector<Columns> columns;
+  columns.reserve(modes.size());
+  for (const PoseModes& pose : modes) columns.push_back(mode(pose));
+  return columns;
 }
 
 /// The errors of a set of poses as the pictures see them, shared unknowns eliminated: beta = G^T xi + e with
@@ -147,10 +118,10 @@ struct Seen {
   Eigen::VectorXd beta;
 };
 
-Seen seen_errors(const std::vector<const PoseInformation*>& poses) {
+Seen seen_errors(const std::vector<const PoseInformation*>& poses, const Eigen::MatrixXd& prior) {
   const Eigen::Index s = poses.front()->H_ss.rows(), n = kOwn * static_cast<Eigen::Index>(poses.size());
-  Eigen::MatrixXd F = Eigen::MatrixXd::Zero(n, n), H_s(n, s), H_ss = Eigen::MatrixXd::Zero(s, s);
-  Eigen::VectorXd g(n), g_s = Eigen::VectorXd::Zero(s);
+  Eigen::MatrixXd F = Eigen::MatrixXd::Zero(n, n), H_s(n, s), H_ss = prior.topLeftCorner(s, s);
+  Eigen::VectorXd g(n), g_s = prior.col(s).head(s);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Eigen::Index row = kOwn * static_cast<Eigen::Index>(i);
     F.block<kOwn, kOwn>(row, row) = poses[i]->H;
@@ -182,9 +153,10 @@ Seen seen_errors(const std::vector<const PoseInformation*>& poses) {
   return seen;
 }
 
+/// Variances of translation and rotation of errors that are independent.
 struct Fit {
-  Variances v = Variances::Zero();
-  Variances relative_variance = Variances::Zero();  ///< of each variance's estimate, over its square
+  Eigen::Vector2d v = Eigen::Vector2d::Zero();
+  Eigen::Vector2d relative_variance = Eigen::Vector2d::Zero();  ///< of each estimate, over its square
   double deviance = 0;
 };
 
@@ -192,60 +164,53 @@ double deviance_of(const Eigen::LLT<Eigen::MatrixXd>& llt, const Eigen::VectorXd
   return 2 * llt.matrixLLT().diagonal().array().log().sum() + beta.dot(llt.solve(beta));
 }
 
-/// beta ~ N(0, I + sum_k v_k M_k) by Newton's method with the average information (Gilmour, Thompson and
-/// Cullis 1995), kept at or above zero. Components from `free` on stay zero.
-Fit fit_variances(const Seen& seen, const std::array<Eigen::MatrixXd, kComponents>& M, Variances start,
-                  int free) {
-  const Eigen::Index n = seen.beta.size();
-  const auto covariance = [&](const Variances& v) {
-    Eigen::MatrixXd W = Eigen::MatrixXd::Identity(n, n);
-    for (int k = 0; k < free; ++k)
-      if (v[k] > 0) W += v[k] * M[static_cast<std::size_t>(k)];
-    return W;
+/// beta ~ N(0, W + v_0 M_0 + v_1 M_1) by Newton's method with the average information (Gilmour, Thompson and
+/// Cullis 1995), v kept at or above zero; `unit`: their usual sizes.
+Fit fit_variances(const Eigen::VectorXd& beta, const Eigen::MatrixXd& W,
+                  const std::array<Eigen::MatrixXd, 2>& M, const Eigen::Vector2d& unit) {
+  const Eigen::Index n = beta.size();
+  const auto covariance = [&](const Eigen::Vector2d& v) -> Eigen::MatrixXd {
+    return W + v[0] * M[0] + v[1] * M[1];
   };
   Fit fit;
-  fit.v = start;
-  fit.v.tail(kComponents - free).setZero();
+  fit.v = unit;
   Eigen::LLT<Eigen::MatrixXd> llt(covariance(fit.v));
-  fit.deviance = deviance_of(llt, seen.beta);
-  for (int iteration = 0; iteration < 200; ++iteration) {
+  fit.deviance = deviance_of(llt, beta);
+  for (int iteration = 0; iteration < 100; ++iteration) {
     const Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(n, n));
-    const Eigen::VectorXd y = inverse * seen.beta;
-    Eigen::MatrixXd My(n, free);
-    Eigen::VectorXd gradient(free);
-    for (int k = 0; k < free; ++k) {
-      const Eigen::MatrixXd& M_k = M[static_cast<std::size_t>(k)];
-      My.col(k) = M_k * y;
-      gradient[k] = inverse.cwiseProduct(M_k).sum() - y.dot(My.col(k));
+    const Eigen::VectorXd y = inverse * beta;
+    Eigen::MatrixXd My(n, 2);
+    Eigen::Vector2d gradient;
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto i = static_cast<Eigen::Index>(k);
+      My.col(i) = M[k] * y;
+      gradient[i] = inverse.cwiseProduct(M[k]).sum() - y.dot(My.col(i));
     }
-    Eigen::MatrixXd information =
-        My.transpose() * inverse * My;  // of half the deviance, doubled: its Hessian
     // Each in units of its own size; what wants below zero stays there.
-    const Eigen::VectorXd unit = start.head(free).cwiseMax(1e-300);
     gradient = gradient.cwiseProduct(unit).eval();
-    information = (unit.asDiagonal() * information * unit.asDiagonal()).eval();
-    for (int k = 0; k < free; ++k) {
+    Eigen::Matrix2d information = unit.asDiagonal() * (My.transpose() * inverse * My) * unit.asDiagonal();
+    for (Eigen::Index k = 0; k < 2; ++k) {
       if (fit.v[k] > 0 || gradient[k] < 0) continue;
       gradient[k] = 0;
       information.row(k).setZero();
       information.col(k).setZero();
       information(k, k) = 1;
     }
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-    const Eigen::VectorXd curvature =
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(information);
+    const Eigen::Vector2d curvature =
         eigen.eigenvalues().cwiseMax(1e-3 * std::max(1e-12, eigen.eigenvalues().maxCoeff()));
-    const Eigen::MatrixXd inverse_information =
+    const Eigen::Matrix2d inverse_information =
         eigen.eigenvectors() * curvature.cwiseInverse().asDiagonal() * eigen.eigenvectors().transpose();
-    for (int k = 0; k < free; ++k)
+    for (Eigen::Index k = 0; k < 2; ++k)
       if (fit.v[k] > 0)
         fit.relative_variance[k] = 2 * inverse_information(k, k) * std::pow(unit[k] / fit.v[k], 2);
-    Eigen::VectorXd step = -(inverse_information * gradient).cwiseProduct(unit);
+    Eigen::Vector2d step = -(inverse_information * gradient).cwiseProduct(unit);
     bool improved = false;
     for (int halving = 0; halving < 12 && !improved; ++halving, step *= 0.5) {
       Fit trial = fit;
-      trial.v.head(free) = (fit.v.head(free) + step).cwiseMax(0.0);
+      trial.v = (fit.v + step).cwiseMax(0.0);
       const Eigen::LLT<Eigen::MatrixXd> there(covariance(trial.v));
-      trial.deviance = deviance_of(there, seen.beta);
+      trial.deviance = deviance_of(there, beta);
       if (!(trial.deviance < fit.deviance)) continue;
       improved = fit.deviance - trial.deviance > 1e-7;
       fit = trial;
@@ -258,10 +223,11 @@ Fit fit_variances(const Seen& seen, const std::array<Eigen::MatrixXd, kComponent
 }
 
 /// Poses of one arm that were seen.
-std::vector<std::size_t> poses_of(const std::vector<PoseInformation>& all, const Bundle& bundle, int arm) {
+std::vector<std::size_t> poses_of(const std::vector<PoseInformation>& all, const Bundle& bundle,
+                                  std::size_t arm) {
   std::vector<std::size_t> poses;
   for (std::size_t i = 0; i < all.size(); ++i)
-    if (bundle.poses[i].arm == arm && all[i].H.trace() > 0) poses.push_back(i);
+    if (bundle.poses[i].arm == static_cast<int>(arm) && all[i].H.trace() > 0) poses.push_back(i);
   return poses;
 }
 
@@ -272,98 +238,118 @@ std::vector<std::size_t> thinned(const std::vector<std::size_t>& poses) {
   return result;
 }
 
-struct Reach {
-  double reach = 0;
+/// Fields of one size and reach, and the independent errors that fit beside them.
+struct Candidate {
+  double size = 0, reach = 0;
   Fit fit;
+  double weight = 0;  ///< probability
 };
 
-/// The fields of one arm for each reach; `errors` says whether they are worth their parameters.
-std::vector<Reach> fit_fields(const std::vector<PoseInformation>& all, const Refinement& refined, int arm,
-                              const std::vector<std::size_t>& poses, CorrelatedPoseErrors& errors) {
-  std::vector<const PoseInformation*> parts;
-  std::vector<PoseModes> modes;
-  for (const std::size_t i : thinned(poses)) {
-    parts.push_back(&all[i]);
-    modes.push_back(modes_of(refined.bundle, i));
-  }
-  const Seen seen = seen_errors(parts);
-  const double t = std::pow(refined.noise.translation[static_cast<std::size_t>(arm)], 2),
-               r = std::pow(refined.noise.rotation[static_cast<std::size_t>(arm)], 2);
-  const Eigen::MatrixXd squared = squared_distances(modes, t, r);
-  // What turns the gripper may be at the wrist or at the base: the likelihood has a maximum for each.
-  std::array<Variances, 2> starts;
-  starts[0] << 0.5 * t, 0.5 * r, 0.5 * t, 0.5 * r, 0.02 * r;
-  starts[1] << 0.5 * t, 0.5 * r, 0.1 * t, 0.1 * r, 0.5 * r;
-  std::vector<Reach> reaches;
-  double independent = 0, least = 0;
+struct Noise {
+  double translation2 = 0, rotation2 = 0;  ///< variances an axis, as the solution has them
+};
+
+std::vector<Candidate> candidates(const std::vector<PoseModes>& modes, const Seen& seen, const Noise& noise,
+                                  CorrelatedPoseErrors& errors) {
+  const Eigen::Index n = seen.beta.size();
+  const Eigen::Vector2d unit(noise.translation2, noise.rotation2);
+  std::array<Eigen::MatrixXd, 2> M;
+  M.fill(Eigen::MatrixXd::Zero(n, n));
+  add_spread(seen.G_transposed, columns_of(modes, [](const PoseModes& m) { return m.translation; }), nullptr,
+             M[0]);
+  add_spread(seen.G_transposed, columns_of(modes, [](const PoseModes& m) { return m.rotation; }), nullptr,
+             M[1]);
+  const Eigen::MatrixXd I = Eigen::MatrixXd::Identity(n, n);
+  const double independent = fit_variances(seen.beta, I, M, unit).deviance;
+  const Eigen::MatrixXd squared = squared_distances(modes, noise.translation2, noise.rotation2);
+  std::vector<Candidate> list;
   for (const double reach : kReaches) {
-    const auto M = spreads(seen.G_transposed, modes, kernel(squared, reach));
-    if (reaches.empty()) independent = least = fit_variances(seen, M, 2 * starts[0], kIndependent).deviance;
-    for (const Variances& start : starts) {
-      reaches.push_back({reach, fit_variances(seen, M, start, kComponents)});
-      least = std::min(least, reaches.back().fit.deviance);
+    const Eigen::MatrixXd k = kernel(squared, reach);
+    Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(n, n);
+    for (std::size_t mode = 0; mode < kModes; ++mode)
+      add_spread(seen.G_transposed, columns_of(modes, [mode](const PoseModes& m) { return m.smooth[mode]; }),
+                 &k, fields);
+    for (const double size : kSizes) {
+      Candidate& candidate = list.emplace_back(Candidate{size, reach, {}});
+      candidate.fit = fit_variances(seen.beta, I + size * size * fields, M, unit);
+      errors.gain = std::max(errors.gain, independent - candidate.fit.deviance);
+      const double unusual = std::log(size / kUsualSize) / kSizeSpread;
+      candidate.weight = 0.5 * (independent - candidate.fit.deviance - unusual * unusual);
     }
   }
-  errors.gain = independent - least;
-  errors.found = errors.gain > kOnceInTwenty;
-  return reaches;
+  double largest = 0;
+  for (const Candidate& candidate : list) largest = std::max(largest, candidate.weight);
+  double prior = 0, sum = std::exp(-largest);
+  for (const double size : kSizes)
+    prior += std::size(kReaches) * std::exp(-0.5 * std::pow(std::log(size / kUsualSize) / kSizeSpread, 2));
+  for (Candidate& candidate : list)
+    sum += candidate.weight = kOdds / prior * std::exp(candidate.weight - largest);
+  for (Candidate& candidate : list) candidate.weight /= sum;
+  return list;
+}
+
+/// Covariance of the errors of these poses over all candidates; independent ones are widened by how well they
+/// are known.
+Eigen::MatrixXd field_covariance(const std::vector<PoseModes>& modes, const std::vector<Candidate>& list,
+                                 const Noise& noise, CorrelatedPoseErrors& errors) {
+  const auto n = static_cast<Eigen::Index>(modes.size());
+  const Eigen::MatrixXd squared = squared_distances(modes, noise.translation2, noise.rotation2);
+  Eigen::Vector2d independent = Eigen::Vector2d::Zero();
+  Eigen::MatrixXd k = Eigen::MatrixXd::Zero(n, n);  // times the squares of the sizes
+  double squares = 0;
+  for (const double reach : kReaches) {
+    double size2 = 0;
+    for (const Candidate& candidate : list) {
+      if (candidate.reach != reach) continue;
+      size2 += candidate.weight * candidate.size * candidate.size;
+      errors.share += candidate.weight;
+      errors.reach += candidate.weight * reach;
+      // The mean of sigma^2 over log sigma, to second order and at most half a unit wide.
+      independent.array() += candidate.weight * candidate.fit.v.array() *
+                             (1 + (0.5 * candidate.fit.relative_variance.array()).min(0.5));
+    }
+    squares += size2;
+    k += size2 * kernel(squared, reach);
+  }
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(kOwn * n, kOwn * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const PoseModes& a = modes[static_cast<std::size_t>(i)];
+    for (Eigen::Index j = 0; j < n; ++j)
+      for (std::size_t mode = 0; mode < kModes; ++mode)
+        K.block<kOwn, kOwn>(kOwn * i, kOwn * j) +=
+            k(i, j) * a.smooth[mode] * modes[static_cast<std::size_t>(j)].smooth[mode].transpose();
+    K.block<kOwn, kOwn>(kOwn * i, kOwn * i) += independent[0] * a.translation * a.translation.transpose() +
+                                               independent[1] * a.rotation * a.rotation.transpose();
+  }
+  errors.reach /= errors.share;
+  errors.rotation = std::sqrt(squares / errors.share);
+  errors.translation = errors.rotation * modes.front().smooth[2](0, 0);
+  return K;
 }
 
 }  // namespace
 
-SystematicUncertainty systematic_uncertainty(const Refinement& refined, const BundleSettings& settings) {
-  SystematicUncertainty result{refined.covariance,
-                               std::vector<CorrelatedPoseErrors>(refined.bundle.bases.size())};
-  const std::vector<PoseInformation> all = informations(refined, settings);
-  const Eigen::Index s = refined.covariance.rows();
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(s, s);
-  std::vector<Eigen::MatrixXd> gains;  // of the shared unknowns by what the prior says of a pose
-  for (const PoseInformation& pose : all) {
-    const Eigen::LDLT<Matrix6d> ldlt(pose.H + pose.prior);
-    information += pose.H_ss - pose.H_s.transpose() * ldlt.solve(pose.H_s);
-    gains.push_back(pose.H_s.transpose() * ldlt.solve(pose.prior));
+PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& settings) {
+  const std::vector<PoseInformation> all = pose_informations(refined, settings);
+  const Eigen::MatrixXd prior = linearize(refined.bundle, refined.noise, settings).prior;
+  PoseErrorModel model;
+  model.arms.resize(refined.bundle.bases.size());
+  model.poses.resize(model.arms.size());
+  model.covariance.resize(model.arms.size());
+  for (std::size_t arm = 0; arm < model.arms.size(); ++arm) {
+    model.poses[arm] = poses_of(all, refined.bundle, arm);
+    if (model.poses[arm].size() < 8) continue;
+    const Noise noise{std::pow(refined.noise.translation[arm], 2), std::pow(refined.noise.rotation[arm], 2)};
+    const std::vector<std::size_t> some = thinned(model.poses[arm]);
+    std::vector<const PoseInformation*> parts;
+    for (const std::size_t i : some) parts.push_back(&all[i]);
+    CorrelatedPoseErrors& errors = model.arms[arm];
+    const std::vector<Candidate> list =
+        candidates(modes_of(refined.bundle, some), seen_errors(parts, prior), noise, errors);
+    errors.found = errors.gain > kOnceInTwenty;
+    model.covariance[arm] = field_covariance(modes_of(refined.bundle, model.poses[arm]), list, noise, errors);
   }
-  const Eigen::LDLT<Eigen::MatrixXd> shared(information);
-  for (int arm = 0; arm < static_cast<int>(result.arms.size()); ++arm) {
-    CorrelatedPoseErrors& errors = result.arms[static_cast<std::size_t>(arm)];
-    const std::vector<std::size_t> poses = poses_of(all, refined.bundle, arm);
-    if (poses.size() < 8) continue;
-    const std::vector<Reach> reaches = fit_fields(all, refined, arm, poses, errors);
-    if (!errors.found) continue;
-    std::vector<PoseModes> modes;
-    Eigen::MatrixXd rows(s, kOwn * static_cast<Eigen::Index>(poses.size()));
-    for (std::size_t i = 0; i < poses.size(); ++i) {
-      const Eigen::MatrixXd A = shared.solve(gains[poses[i]]);
-      rows.middleCols(kOwn * static_cast<Eigen::Index>(i), kOwn) = A;
-      modes.push_back(modes_of(refined.bundle, poses[i]));
-      // In place of the independent errors that the solution was made with.
-      result.covariance -= A * all[poses[i]].prior.ldlt().solve(A.transpose());
-    }
-    const auto index = static_cast<std::size_t>(arm);
-    const Eigen::MatrixXd squared = squared_distances(modes, std::pow(refined.noise.translation[index], 2),
-                                                      std::pow(refined.noise.rotation[index], 2));
-    const double least = std::min_element(reaches.begin(), reaches.end(), [](const Reach& a, const Reach& b) {
-                           return a.fit.deviance < b.fit.deviance;
-                         })->fit.deviance;
-    double weights = 0;
-    for (const Reach& reach : reaches) weights += std::exp(0.5 * (least - reach.fit.deviance));
-    Variances mean = Variances::Zero();
-    for (const Reach& reach : reaches) {
-      const double weight = std::exp(0.5 * (least - reach.fit.deviance)) / weights;
-      const auto parts = spreads(rows, modes, kernel(squared, reach.reach));
-      // Sizes are estimates: the mean of sigma^2 over log sigma, to second order and at most half a unit
-      // wide.
-      const Variances size = reach.fit.v.array() * (1 + (0.5 * reach.fit.relative_variance.array()).min(0.5));
-      for (std::size_t k = 0; k < parts.size(); ++k)
-        result.covariance += weight * size[static_cast<Eigen::Index>(k)] * parts[k];
-      mean += weight * reach.fit.v;
-      errors.reach += weight * reach.reach;
-    }
-    errors.translation = std::sqrt(mean[kIndependent]);
-    errors.rotation = std::sqrt(mean[kIndependent + 1]);
-    errors.about_base = std::sqrt(mean[kIndependent + 2]);
-  }
-  return result;
+  return model;
 }
 
 }  // namespace flash::calib

@@ -1,4 +1,5 @@
 #pragma once
+#include <Eigen/Core>
 #include <vector>
 
 #include "calib/solve/errors_in_variables.h"
@@ -11,21 +12,25 @@ namespace flash::calib {
 struct CorrelatedPoseErrors {
   double gain = 0;         ///< fall of -2 log restricted likelihood against errors that are independent
   bool found = false;      ///< the gain is more than chance gives once in twenty
-  double translation = 0;  ///< standard deviation per axis: of the gripper's place [m],
-  double rotation = 0;     ///< of its attitude, about the arm's pivot [rad],
-  double about_base = 0;   ///< and of a turn of the arm about its base [rad]
+  double share = 0;        ///< probability that there are any
+  double rotation = 0;     ///< standard deviation per axis of turns at the wrist and about the base [rad],
+  double translation = 0;  ///< and of shifts [m]
   double reach = 0;        ///< length over which they agree, over the rms distance between two poses
 };
 
-/// A covariance of the shared unknowns that knows of smooth errors, for the solution as it is.
-struct SystematicUncertainty {
-  Eigen::MatrixXd covariance;
+/// Errors of the poses of each arm: a mean over all that was tried, by its probability.
+struct PoseErrorModel {
   std::vector<CorrelatedPoseErrors> arms;
+  std::vector<std::vector<std::size_t>> poses;  ///< of each arm, those that were seen
+  /// Of their errors (base axes, at the gripper), six a pose, times `share`; empty: too few poses to tell.
+  std::vector<Eigen::MatrixXd> covariance;
 };
 
-/// Fits to each arm Gaussian random fields over place and attitude (Matern 5/2; Rasmussen and Williams 2006)
-/// beside its independent errors, by restricted maximum likelihood, and averages over their reach with the
-/// weight that each has by its likelihood. Arms whose data show no field keep what `refined` states.
-SystematicUncertainty systematic_uncertainty(const Refinement& refined, const BundleSettings& settings);
+/// Beside the independent errors of each arm stand Gaussian random fields over place and attitude (Matern
+/// 5/2; Rasmussen and Williams 2006) of one size, in all ways in which a wrong kinematic model moves a
+/// gripper: it is turned at the wrist, turned about the base, shifted in either's axes, and the arm is
+/// stretched. Each size and reach has the weight of its restricted likelihood times that of the size among
+/// arms in use, log-normal about 0.1 deg.
+PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& settings);
 
 }  // namespace flash::calib

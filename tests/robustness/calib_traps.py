@@ -106,6 +106,13 @@ def as_angles(columns, unit):
     return spoil
 
 
+def shuffled(poses):
+    """Each picture beside the pose of another."""
+    places = [pose[1:] for pose in poses]
+    random.Random(5).shuffle(places)
+    return [[pose[0], *place] for pose, place in zip(poses, places)]
+
+
 def first_views(count):
     def spoil(folder):
         for image in sorted((folder / "images").iterdir())[count:]:
@@ -158,6 +165,7 @@ def traps():
         yield Trap(f"{other}: inverted poses", sound, poses_changed(lambda p: [inverted(x) for x in p]), 2, "inverted")
         yield Trap(f"{other}: swapped setup", sound, swapped_setup, 2, f"the setup is {other}")
         yield Trap(f"{other}: pairing off by one", sound, poses_changed(shifted), 2, "paired off by one")
+        yield Trap(f"{other}: poses shuffled", sound, poses_changed(shuffled), 2, "do not tell of the same motion")
         yield Trap(f"{other}: angles as they should be", sound, as_angles("rx,ry,rz", 1), 0, used=16)
         yield Trap(f"{other}: degrees for radians", sound, as_angles("rx,ry,rz", math.degrees(1)), 2, "degrees?")
         yield Trap(f"{other}: radians for degrees", sound, as_angles("rx_deg,ry_deg,rz_deg", 1), 2,

@@ -6,7 +6,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "calib/uncertainty/correlated_pose_errors.h"
+#include "calib/uncertainty/systematic_uncertainty.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {
@@ -58,7 +58,8 @@ void study(const Row& row, int trials, unsigned first_seed) {
     bundled.add(bundle.cameras.front(), scene.truth.X);
     const Refinement refined = refine(bundle);
     corrected.add(refined.bundle.cameras.front(), scene.truth.X);
-    const Eigen::MatrixXd covariance = systematic_uncertainty(refined, {}).covariance;
+    const Eigen::MatrixXd covariance =
+        systematic_uncertainty(refined, {}, fit_pose_errors(refined, {})).covariance;
     nees += squared_distance(refined, scene.truth, covariance) / trials;
     corner += refined.noise.corner.front() / trials;
     rotation += refined.noise.rotation.front() * 180 / M_PI / trials;
@@ -88,7 +89,8 @@ void study_arms(Setup setup, const ArmErrors& errors, double reach, int trials, 
                        first_seed + static_cast<unsigned>(trial));
     const Refinement refined =
         refine(make_bundle(setup, scene.camera, scene.points, scene.observations, shah(loops_of(scene))));
-    const SystematicUncertainty systematic = systematic_uncertainty(refined, {});
+    const SystematicUncertainty systematic =
+        systematic_uncertainty(refined, {}, fit_pose_errors(refined, {}));
     off.add(refined.bundle.cameras.front(), scene.truth.X);
     noise_squared.push_back(squared_distance(refined, scene.truth, refined.covariance));
     squared.push_back(squared_distance(refined, scene.truth, systematic.covariance));

@@ -157,7 +157,8 @@ def sets_table(sets, table):
 
 def size(result):
     scale = result["scale"]
-    return "-" if not scale else (f"{scale['estimate']:.4f} +- {2 * scale['sd']:.4f}" + (", solved" if scale["solved"] else ""))
+    return "-" if not scale else (f"{scale['estimate']:.4f} +- {2 * scale['sd']:.4f}" +
+                                  (f" (wanted {scale['wanted']:.4f} +- {2 * scale['wanted_sd']:.4f})" if scale["wanted"] else ""))
 
 
 def verdict(result):

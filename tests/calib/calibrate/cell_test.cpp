@@ -125,9 +125,12 @@ TEST(Register, SizeOfATargetIsNotSolvedForWhereArmsOnlyTurn) {
   }
   CellMember member = member_of(scene, "arm", "camera");
   member.poses = scene.truth;
-  EXPECT_TRUE(solve_cell({member}).scales.empty());
+  const Cell cell = solve_cell({member});
+  ASSERT_EQ(cell.sizes.size(), 1U);
+  EXPECT_FALSE(cell.sizes.front().wanted);
+  EXPECT_NEAR(cell.sizes.front().sd, kPrintSd, 0.02 * kPrintSd);  // nothing but the prior tells it
   try {
-    solve_cell({member}, {}, TargetSize::solved);
+    solve_cell({member}, {}, std::numeric_limits<double>::infinity());
     FAIL() << "accepted";
   } catch (const data::InputError& error) {
     EXPECT_NE(std::string(error.what()).find("do not tell the size of the targets"), std::string::npos);

@@ -1,9 +1,12 @@
-#include "calib/solve/target_size.h"
+#include "calib/uncertainty/target_size.h"
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "calib/calibrate/calibrate.h"
 #include "calib/check/projection_check.h"
+#include "calib/solve/linearization.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {
@@ -23,9 +26,9 @@ HandEyeScene scene_of(Setup setup, double scale, unsigned seed) {
   return scene;
 }
 
-Calibration calibrated(const HandEyeScene& scene, TargetSize size) {
+Calibration calibrated(const HandEyeScene& scene, double size_sd = kPrintSd) {
   CalibrateSettings settings;
-  settings.target_size = size;
+  settings.target_size_sd = size_sd;
   return calibrate(scene.settings.setup, scene.camera, scene.points, grid_symmetries(scene.points),
                    scene.observations, settings);
 }
@@ -37,26 +40,26 @@ double millimetres_off(const Calibration& result, const HandEyeScene& scene) {
 class TargetSizes : public testing::TestWithParam<Setup> {};
 INSTANTIATE_TEST_SUITE_P(HandEye, TargetSizes, testing::Values(Setup::eye_in_hand, Setup::eye_to_hand));
 
-TEST_P(TargetSizes, PrintThatIsOffIsMeasuredAndNoLongerMovesTheCamera) {
+constexpr double kStated = 0, kUnknown = std::numeric_limits<double>::infinity();
+
+TEST_P(TargetSizes, SizeThatIsNotKnownIsMeasuredAndNoLongerMovesTheCamera) {
   const HandEyeScene scene = scene_of(GetParam(), 1.015, 21);
-  const Calibration result = calibrated(scene, TargetSize::automatic);
-  ASSERT_TRUE(result.scale && result.scale->solved);
-  EXPECT_NEAR(result.scale->estimate, 1.015, 4 * result.scale->sd);
+  const Calibration result = calibrated(scene, kUnknown);
+  ASSERT_TRUE(result.size);
+  EXPECT_NEAR(result.size->estimate, 1.015, 4 * result.size->sd);
   const Vector6d error = motion_between(result.poses.X, scene.truth.X);
   const Vector6d sd = result.covariance.diagonal().cwiseSqrt();
   EXPECT_TRUE((error.cwiseAbs().array() < 4 * sd.array()).all())
       << error.transpose() << " / " << sd.transpose();
   // As stated, every distance from the camera is short by 1.5 %.
   const double distance = scene.settings.distance * 1e3;
-  EXPECT_GT(millimetres_off(calibrated(scene, TargetSize::stated), scene), 0.2 * 0.015 * distance);
+  EXPECT_GT(millimetres_off(calibrated(scene, kStated), scene), 0.2 * 0.015 * distance);
   EXPECT_LT(millimetres_off(result, scene), 0.2 * 0.015 * distance);
-  ASSERT_FALSE(result.warnings.empty());
-  EXPECT_NE(result.warnings.front().find("times as large as stated"), std::string::npos);
 }
 
 TEST_P(TargetSizes, ValidationIsForTheSizeThatWasSolvedFor) {
   const HandEyeScene scene = scene_of(GetParam(), 1.015, 21);
-  const Calibration result = calibrated(scene, TargetSize::automatic);
+  const Calibration result = calibrated(scene, kUnknown);
   const double scale = result.refined.bundle.scales.front();
   const ProjectionCheck check =
       check_projection(scene.settings.setup, result.poses, scene.camera, parse_target("chessboard:9x6:0.025"),
@@ -64,20 +67,58 @@ TEST_P(TargetSizes, ValidationIsForTheSizeThatWasSolvedFor) {
   EXPECT_NEAR(check.corner_rms, result.chain_rms, 1e-9);  // the same sum, the other way round
 }
 
-TEST_P(TargetSizes, SizeThatIsRightStaysAsStated) {
-  const HandEyeScene scene = scene_of(GetParam(), 1, 22);
-  const Calibration result = calibrated(scene, TargetSize::automatic);
-  ASSERT_TRUE(result.scale);
-  EXPECT_FALSE(result.scale->solved);
-  EXPECT_NEAR(result.scale->estimate, 1, 4 * result.scale->sd);
-  EXPECT_EQ(result.refined.bundle.scales.front(), 1);
+TEST_P(TargetSizes, PriorAndPicturesCountByTheirVariances) {
+  const HandEyeScene scene = scene_of(GetParam(), 1.004, 22);
+  const TargetSize size = *calibrated(scene).size;
+  ASSERT_TRUE(size.wanted);
+  const double by_prior = std::pow(size.prior_sd, -2), by_pictures = std::pow(size.wanted->sd, -2);
+  const double expected = (by_prior + by_pictures * size.wanted->estimate) / (by_prior + by_pictures);
+  // The problem is linear to second order in the size's 0.4 %, and noise is estimated with each size anew.
+  EXPECT_NEAR(size.estimate, expected, 0.1 * std::abs(size.wanted->estimate - 1));
+  EXPECT_NEAR(size.sd, 1 / std::sqrt(by_prior + by_pictures), 0.1 * size.sd);
 }
 
-TEST_P(TargetSizes, WhatIsTooFarOffForAPrintIsNotTrusted) {
-  const Calibration result = calibrated(scene_of(GetParam(), 1.13, 23), TargetSize::automatic);
-  ASSERT_TRUE(result.scale);
-  EXPECT_FALSE(result.scale->solved);
+TEST_P(TargetSizes, AnswerGoesFromStatedToUnknownWithoutAJump) {
+  const HandEyeScene scene = scene_of(GetParam(), 1.01, 24);
+  double last = 1;
+  for (const double sd : {1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 0.1}) {
+    const double estimate = calibrated(scene, sd).size->estimate;
+    EXPECT_GE(estimate, last - 1e-6) << sd;
+    last = estimate;
+  }
+  const TargetSize free = *calibrated(scene, kUnknown).size;
+  EXPECT_NEAR(last, free.estimate, 0.1 * free.sd);
+  EXPECT_NEAR(calibrated(scene, 1e-4).size->estimate, 1, 1e-4);
+}
+
+TEST_P(TargetSizes, SizeFarOffIsNamedAndRefusedUnlessItIsStatedToBeRight) {
+  const HandEyeScene scene = scene_of(GetParam(), 1.08, 23);
+  const Calibration result = calibrated(scene);
+  ASSERT_TRUE(result.size && result.size->far_off());
   EXPECT_FALSE(result.usable);
+  EXPECT_TRUE(result.warnings.front().starts_with("the data want a target 1.0")) << result.warnings.front();
+  const Calibration stated = calibrated(scene, kStated);
+  EXPECT_TRUE(stated.usable);
+  EXPECT_EQ(stated.refined.bundle.scales.front(), 1);
+  EXPECT_TRUE(stated.warnings.front().starts_with("the data want a target 1.0")) << stated.warnings.front();
+}
+
+// The linearised prior against differences of its residual, (s - 1) / sd.
+TEST(SizePrior, StandsInTheLinearModelAsItsResidualDoes) {
+  Bundle bundle = seeded_bundle(scene_of(Setup::eye_in_hand, 1, 25));
+  bundle.priors.scale_sd = 0.004;
+  bundle.priors.caution = {2.0};
+  bundle.scales = {1.01};
+  BundleSettings settings;
+  settings.unknowns.scales = true;
+  const LinearModel model = linearize(bundle, uniform_noise(bundle, 0.1, 1e-3, 1e-3, 1e-3), settings);
+  const int column = shared_columns(bundle, settings.unknowns).scales.front();
+  const auto squared = [](double s) { return std::pow((s - 1) / 0.002, 2); };
+  constexpr double kStep = 1e-4;
+  const double gradient = (squared(1.01 + kStep) - squared(1.01 - kStep)) / (2 * kStep);
+  EXPECT_NEAR(2 * model.prior(column, model.shared), gradient, 1e-6 * gradient);
+  EXPECT_NEAR(model.prior(column, column), std::pow(0.002, -2), 1e-6 * std::pow(0.002, -2));
+  EXPECT_NEAR(model.prior(model.shared, model.shared), squared(1.01), 1e-9);
 }
 
 }  // namespace

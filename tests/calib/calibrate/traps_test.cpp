@@ -1,11 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 
 #include "calib/calibrate/calibrate.h"
 #include "calib/dataset/pose_file.h"
 #include "data/error.h"
-#include "tests/calib/hand_eye_scene.h"
+#include "tests/calib/arm_scene.h"
 
 namespace flash::calib {
 namespace {
@@ -119,15 +120,74 @@ TEST_P(Traps, DegreesForRadiansAndOrdersOfAnglesAreNamed) {
   }
 }
 
+/// Refused, or an answer that says of itself that it is none.
+bool refused(const HandEyeScene& scene, const CalibrateSettings& settings = {}) {
+  try {
+    const Calibration result = calibrated(scene, settings);
+    return !result.usable && !result.warnings.empty();
+  } catch (const data::InputError&) {
+    return true;
+  }
+}
+
+/// An arm that turns little about each axis: its poses, mixed up, still close to a few degrees.
+HandEyeScene small_turns(Setup setup, unsigned seed) {
+  SceneSettings settings = protocol_settings(setup);
+  settings.robot_deg = 0.05;
+  settings.robot_mm = 0.3;
+  return make_arm_scene(settings, {.zero_deg = 0.1, .length_mm = 0.3}, 0.15, board_points(), seed);
+}
+
+TEST_P(Traps, PosesInAnyOrderAreNoAnswer) {
+  for (unsigned seed = 61; seed < 65; ++seed) {
+    HandEyeScene scene = small_turns(GetParam(), seed);
+    ASSERT_FALSE(refused(scene)) << seed;
+    std::vector<Eigen::Isometry3d> poses;
+    for (const Observation& o : scene.observations) poses.push_back(o.T_base_gripper);
+    std::mt19937 random(seed);
+    std::shuffle(poses.begin(), poses.end(), random);
+    for (std::size_t i = 0; i < poses.size(); ++i) scene.observations[i].T_base_gripper = poses[i];
+    EXPECT_TRUE(refused(scene)) << seed;
+  }
+}
+
+TEST_P(Traps, AnglesInWrongColumnsAreNoAnswer) {
+  // A about z, then B about the new y, then C about the new x, read as turns about fixed x, y, z.
+  for (unsigned seed = 71; seed < 75; ++seed) {
+    HandEyeScene scene = small_turns(GetParam(), seed);
+    CalibrateSettings settings;
+    for (Observation& o : scene.observations) {
+      const Eigen::Vector3d kuka = o.T_base_gripper.linear().eulerAngles(2, 1, 0);
+      settings.angles.push_back(kuka);
+      o.T_base_gripper.linear() = rotation_from_angles(kuka);
+    }
+    EXPECT_TRUE(refused(scene, settings)) << seed;
+  }
+}
+
+TEST_P(Traps, NumbersAtRandomAreNoAnswer) {
+  for (unsigned seed = 81; seed < 85; ++seed) {
+    HandEyeScene scene = scene_of(GetParam(), seed);
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    for (Observation& o : scene.observations) {
+      Vector6d wrong;
+      for (int k = 0; k < 6; ++k) wrong[k] = normal(random) * (k < 3 ? 0.1 : 0.2);
+      o.T_base_gripper = moved(scene.true_poses.front(), wrong);
+    }
+    EXPECT_TRUE(refused(scene)) << seed;
+  }
+}
+
 TEST_P(Traps, WrongSquareSizeIsMeasured) {
   HandEyeScene scene = scene_of(GetParam(), 7);
   scene.points /= 1.08;
   for (Observation& o : scene.observations) o.T_camera_target.front().translation() /= 1.08;
   const Calibration result = calibrated(scene);
   EXPECT_FALSE(result.usable);
-  ASSERT_TRUE(result.scale);
-  EXPECT_NEAR(result.scale->estimate, 1.08, 4 * result.scale->sd);
-  EXPECT_LT(result.scale->sd, 0.01);
+  ASSERT_TRUE(result.size && result.size->wanted);
+  EXPECT_NEAR(result.size->wanted->estimate, 1.08, 4 * result.size->wanted->sd);
+  EXPECT_LT(result.size->wanted->sd, 0.01);
   EXPECT_TRUE(result.warnings.front().starts_with("the data want a target 1.0")) << result.warnings.front();
 }
 
@@ -169,7 +229,8 @@ TEST_P(Traps, CopiesCountOnce) {
   const Calibration twice = calibrated(scene);
   EXPECT_EQ(twice.used.size(), 20U);
   EXPECT_EQ(twice.views[20].reason, "a copy of 0.png");
-  EXPECT_LT((once.covariance - twice.covariance).norm(), 1e-6 * once.covariance.norm());
+  // The seed differs, and noise levels are iterated until the deviance stands still to 1e-3.
+  EXPECT_LT((once.covariance - twice.covariance).norm(), 1e-3 * once.covariance.norm());
 }
 
 TEST_P(Traps, OneAxisIsRefusedWithItsName) {

@@ -1,0 +1,78 @@
+#include "calib/calibrate/plausibility.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace flash::calib {
+namespace {
+
+constexpr double kDegree = M_PI / 180;
+
+/// Rms distance of places and rms angle between the poses and their mean.
+struct Motion {
+  double translation = 0, rotation = 0;  ///< [m], [rad]
+  double over(double distance) const { return std::hypot(rotation, translation / distance); }
+};
+
+Motion motion_of(const std::vector<Eigen::Isometry3d>& poses) {
+  const Eigen::Isometry3d mean = mean_pose(poses);
+  Motion motion;
+  for (const Eigen::Isometry3d& pose : poses) {
+    motion.translation += (pose.translation() - mean.translation()).squaredNorm();
+    motion.rotation += std::pow(rotation_angle(mean.linear().transpose() * pose.linear()), 2);
+  }
+  const auto count = static_cast<double>(poses.size());
+  return {std::sqrt(motion.translation / count), std::sqrt(motion.rotation / count)};
+}
+
+template <class... Values>
+std::string formatted(const char* format, const Values&... values) {
+  char text[400];
+  std::snprintf(text, sizeof text, format, values...);
+  return text;
+}
+
+}  // namespace
+
+std::string implausibility(const Calibration& calibration, const std::vector<Observation>& used,
+                           const PlausibilitySettings& settings) {
+  constexpr const char* kAdvice =
+      "check that each picture stands beside its pose, and what the columns of the poses mean";
+  std::vector<Eigen::Isometry3d> robot, target;
+  double distance = 0;
+  for (const Observation& view : used) {
+    robot.push_back(view.T_base_gripper);
+    target.push_back(view.T_camera_target.front());
+    distance += view.T_camera_target.front().translation().norm() / static_cast<double>(used.size());
+  }
+  const double place = std::sqrt(calibration.covariance.topLeftCorner<3, 3>().trace() / 3),
+               turn = std::sqrt(calibration.covariance.bottomRightCorner<3, 3>().trace() / 3);
+  const Motion still = motion_of(target);  // of the target in the camera, whose middle a fixed pose would be
+  const Motion left{1e-3 * calibration.held_out.mm, kDegree * calibration.held_out.deg};
+  if (!(left.over(distance) < settings.held_out * still.over(distance)))
+    return formatted(
+        "robot and camera do not tell of the same motion: views left out are predicted to %.1f mm and %.2f "
+        "deg, "
+        "where taking the target to stand still before the camera is as good as %.1f mm and %.2f deg; %s",
+        1e3 * left.translation, left.rotation / kDegree, 1e3 * still.translation, still.rotation / kDegree,
+        kAdvice);
+  const Motion moved = motion_of(robot);
+  const NoiseLevels& levels = calibration.refined.noise;
+  const Motion noise{std::sqrt(3) * levels.translation.front(), std::sqrt(3) * levels.rotation.front()};
+  if (!(noise.over(distance) < settings.noise * moved.over(distance)))
+    return formatted(
+        "robot and camera do not tell of the same motion: the robot's poses would have to be wrong by %.1f "
+        "mm and "
+        "%.2f deg, of %.1f mm and %.2f deg that it moved; %s",
+        1e3 * noise.translation, noise.rotation / kDegree, 1e3 * moved.translation, moved.rotation / kDegree,
+        kAdvice);
+  if (!(place < settings.deviation * distance && turn < settings.deviation))
+    return formatted(
+        "the camera's place is known to no better than %.0f mm and %.1f deg, at %.0f mm from the target: "
+        "that is no "
+        "answer; add views that tilt by 20 to 40 deg about two axes; %s",
+        1e3 * place, turn / kDegree, 1e3 * distance, kAdvice);
+  return {};
+}
+
+}  // namespace flash::calib

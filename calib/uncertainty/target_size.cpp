@@ -1,0 +1,101 @@
+#include "calib/uncertainty/target_size.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "calib/solve/linearization.h"
+
+namespace flash::calib {
+namespace {
+
+/// Of each target's size at this solution. Lengths that the robot only seems to move, three a view with the
+/// size of its noise, look like knowledge of the size and pull it down by their share: `least` times as much
+/// must be left.
+bool told(const Refinement& refined, const BundleSettings& settings, const std::vector<int>& columns,
+          double least) {
+  const double seeming = 3 * static_cast<double>(refined.bundle.poses.size());
+  const Eigen::MatrixXd information =
+      solve_linear(linearize(refined.bundle, refined.noise, settings), to_components(refined.noise))
+          .information;
+  const Eigen::LDLT<Eigen::MatrixXd> factor(information);
+  return std::all_of(columns.begin(), columns.end(), [&](int column) {
+    const double variance = factor.solve(Eigen::VectorXd::Unit(information.rows(), column))[column];
+    return variance > 0 && variance * least * seeming < 1;
+  });
+}
+
+/// The solution with nothing known of the sizes; none where the data do not tell them.
+std::optional<Refinement> without_prior(Refinement refined, RefineSettings settings) {
+  settings.estimate_pivots = false;
+  settings.noise = refined.noise;
+  settings.bundle.unknowns.scales = true;
+  refined.bundle.priors.scale_sd = std::numeric_limits<double>::infinity();
+  const std::vector<int> columns = shared_columns(refined.bundle, settings.bundle.unknowns).scales;
+  // A size that is badly wrong reads as noise of the robot until it is free: first only what cannot be
+  // solved.
+  if (!told(refined, settings.bundle, columns, 1)) return std::nullopt;
+  Refinement scaled = refine(refined.bundle, settings);
+  const bool collapsed = std::any_of(scaled.bundle.scales.begin(), scaled.bundle.scales.end(),
+                                     [](double scale) { return !(scale > 0.5 && scale < 2); });
+  if (collapsed || !told(scaled, settings.bundle, columns, 100)) return std::nullopt;
+  return scaled;
+}
+
+}  // namespace
+
+bool TargetSize::far_off() const {
+  constexpr double kFar = 3;
+  return wanted && std::isfinite(prior_sd) &&
+         std::abs(wanted->estimate - 1) > kFar * std::hypot(wanted->sd, prior_sd);
+}
+
+SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings) {
+  const bool unknown = settings.bundle.unknowns.scales;
+  const PoseErrorModel errors = fit_pose_errors(refined, settings.bundle);
+  SizedRefinement result{std::move(refined), {}, {}};
+  result.systematic = systematic_uncertainty(result.refined, settings.bundle, errors);
+  if (unknown && std::isfinite(result.refined.bundle.priors.scale_sd)) {
+    RefineSettings again = settings;
+    again.estimate_pivots = false;
+    again.noise = result.refined.noise;
+    result.refined.bundle.priors.caution = result.systematic.caution;
+    result.refined = refine(std::move(result.refined.bundle), again);
+    result.systematic = systematic_uncertainty(result.refined, settings.bundle, errors);
+  }
+  const std::optional<Refinement> free = without_prior(result.refined, settings);
+  Unknowns with_scales = settings.bundle.unknowns;
+  with_scales.scales = true;
+  const Bundle& bundle = result.refined.bundle;
+  const std::vector<int> columns = shared_columns(bundle, with_scales).scales;
+  for (std::size_t target = 0; target < bundle.scales.size(); ++target) {
+    TargetSize& size = result.sizes.emplace_back();
+    const int column = columns[target];
+    size.estimate = bundle.scales[target];
+    size.prior_sd = unknown ? bundle.priors.scale_sd : 0;
+    if (unknown) size.sd = std::sqrt(result.systematic.covariance(column, column));
+    if (free)
+      size.wanted = {free->bundle.scales[target],
+                     result.systematic.caution[target] * std::sqrt(free->covariance(column, column))};
+    if (!size.far_off()) continue;
+    constexpr double kChiSquare95 = 12.592;  // 6 degrees of freedom
+    const Vector6d apart = motion_between(bundle.cameras.front(), free->bundle.cameras.front());
+    const Matrix6d covariance = result.systematic.covariance.topLeftCorner<6, 6>();
+    result.disputed = result.disputed || apart.dot(covariance.ldlt().solve(apart)) > kChiSquare95;
+  }
+  return result;
+}
+
+std::string size_sentence(const TargetSize& size) {
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "the data want a target %.4f +- %.4f (2 sd) times as large as stated, which is known to %g %%: "
+      "measure its squares, or the intrinsics or the robot's unit are wrong; the answer is for %.4f "
+      "times (--target-size solved takes what the data want)",
+      size.wanted->estimate, 2 * size.wanted->sd, 100 * size.prior_sd, size.estimate);
+  return text;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,47 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/uncertainty/systematic_uncertainty.h"
+
+namespace flash::calib {
+
+/// How well the size of a print is known where nothing better is stated, as a share: of printers, and of
+/// rulers across a whole sheet.
+constexpr double kPrintSd = 0.003;
+
+/// What pictures and robot tell of the size of a target, over the size stated. It moves the camera by as
+/// large a share of its distance.
+struct TargetSize {
+  double estimate = 1;  ///< that the answer is for: prior and pictures together
+  double sd = 0;
+  double prior_sd = 0;  ///< 0: taken as stated; infinity: nothing was known
+  /// Of pictures and robot alone. None where they do not tell it, as those of a robot that turns and never
+  /// moves along, without depth.
+  struct Wanted {
+    double estimate = 1, sd = 0;
+  };
+  std::optional<Wanted> wanted = {};
+
+  /// The pictures want a size that the prior all but excludes.
+  bool far_off() const;
+};
+
+/// A solution with what is known of its targets' sizes (Priors::scale_sd), and its whole uncertainty.
+struct SizedRefinement {
+  Refinement refined;
+  SystematicUncertainty systematic;
+  std::vector<TargetSize> sizes;  ///< of each target
+  bool disputed = false;          ///< a size is far off, and without its prior the answer would be another
+};
+
+/// The size as one more unknown beside its prior. Errors that views share make pictures look surer of it than
+/// they are: the prior weighs more by as much as they add to its deviation, so that both count by their whole
+/// variances. refined: the solution where it does not; settings: those it was made with.
+SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings);
+
+/// "the data want a target 1.0400 +- 0.0080 (2 sd) times as large as stated ...", of a size that is far off.
+std::string size_sentence(const TargetSize& size);
+
+}  // namespace flash::calib
