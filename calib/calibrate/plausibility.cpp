@@ -52,8 +52,8 @@ std::string implausibility(const Calibration& calibration, const std::vector<Obs
   if (!(left.over(distance) < settings.held_out * still.over(distance)))
     return formatted(
         "robot and camera do not tell of the same motion: views left out are predicted to %.1f mm and %.2f "
-        "deg, "
-        "where taking the target to stand still before the camera is as good as %.1f mm and %.2f deg; %s",
+        "deg, where taking the target to stand still before the camera is as good as %.1f mm and %.2f deg; "
+        "%s",
         1e3 * left.translation, left.rotation / kDegree, 1e3 * still.translation, still.rotation / kDegree,
         kAdvice);
   const Motion moved = motion_of(robot);
@@ -62,15 +62,13 @@ std::string implausibility(const Calibration& calibration, const std::vector<Obs
   if (!(noise.over(distance) < settings.noise * moved.over(distance)))
     return formatted(
         "robot and camera do not tell of the same motion: the robot's poses would have to be wrong by %.1f "
-        "mm and "
-        "%.2f deg, of %.1f mm and %.2f deg that it moved; %s",
+        "mm and %.2f deg, of %.1f mm and %.2f deg that it moved; %s",
         1e3 * noise.translation, noise.rotation / kDegree, 1e3 * moved.translation, moved.rotation / kDegree,
         kAdvice);
   if (!(place < settings.deviation * distance && turn < settings.deviation))
     return formatted(
         "the camera's place is known to no better than %.0f mm and %.1f deg, at %.0f mm from the target: "
-        "that is no "
-        "answer; add views that tilt by 20 to 40 deg about two axes; %s",
+        "that is no answer; add views that tilt by 20 to 40 deg about two axes; %s",
         1e3 * place, turn / kDegree, 1e3 * distance, kAdvice);
   return {};
 }

@@ -12,8 +12,11 @@ std::shared_ptr<const Schedule> make_schedule(std::span<const data::Trajectory> 
   Schedule schedule{.start = start, .time_step = time_step, .frames = {}};
   for (const data::Trajectory& trajectory : trajectories) {
     std::vector<Isometry3d>& poses = schedule.frames.emplace_back();
-    for (int k = 0; k <= steps; ++k) poses.push_back(data::pose_at(trajectory, start + k * time_step));
     // The last pose stays for good: a long rest takes no memory.
+    const double end = trajectory.times.empty() ? start : trajectory.times.back();
+    const double last = std::clamp(std::ceil((end - start) / time_step), 0.0, static_cast<double>(steps));
+    for (int k = 0; k <= static_cast<int>(last); ++k)
+      poses.push_back(data::pose_at(trajectory, start + k * time_step));
     while (poses.size() > 1 && poses.back().matrix() == poses[poses.size() - 2].matrix()) poses.pop_back();
     poses.shrink_to_fit();
   }
