@@ -43,6 +43,9 @@ int run_repeatability(const CLI::App& verb, const RepeatabilityOptions& options)
   if (verb.count("--from") > 0) settings.score_from = options.from;
   if (verb.count("--to") > 0) settings.score_to = options.to;
   const sysid::Repeatability found = sysid::measure_repeatability(recordings[0], recordings[1], settings);
+  for (const std::string& name : found.bounds_hit)
+    warn(name + " between the trials is at its bound in " + recordings[0].source +
+         ": the distance is larger than that of shape and motion");
   if (options.common.json) {
     std::cout << data::format_json(json_of(found, recordings));
     return exit_done;

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "data/error.h"
+#include "data/text.h"
 
 namespace flash::sysid {
 namespace {
@@ -291,6 +292,31 @@ Registration fit_registration(const Trial& first, const Trial& second, const dat
   return functor.at(best);
 }
 
+std::vector<std::string> bounds_hit(const Registration& registration, const data::NuisanceBounds& nuisance) {
+  constexpr const char* kNames[] = {"offset_x", "offset_y", "offset_z", "yaw", "time"};
+  const std::array<double, 5> bounds = DistanceFunctor::bounds_of(nuisance);
+  const double values[] = {registration.offset[0], registration.offset[1], registration.offset[2],
+                           registration.yaw, registration.time_offset};
+  std::vector<std::string> hit;
+  for (std::size_t k = 0; k < bounds.size(); ++k)
+    if (bounds[k] > 0 && std::abs(values[k]) > 0.99 * bounds[k]) hit.emplace_back(kNames[k]);
+  return hit;
+}
+
+double diagonal_of(const Points& rest) {
+  return (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).norm();
+}
+
+void check_same_sheet(const data::Recording& first, const data::Recording& second) {
+  constexpr double kSame = 0.02;  // of the diagonal: meshes of one cloth may be cut to whole cells
+  const double one = diagonal_of(first.mesh.vertices), other = diagonal_of(second.mesh.vertices);
+  if (std::abs(one - other) > kSame * one)
+    throw data::input_error(second.source, "object.mesh",
+                            "found a sheet of " + data::format_short(other) +
+                                " m from corner to corner, expected " + data::format_short(one) +
+                                " m as in " + first.source + ": two trials are of one cloth");
+}
+
 void add_distances(const Trial& from, const RepeatabilitySettings& settings,
                    const std::function<VectorXd(const Seen&)>& distances_of, Repeatability& result) {
   for (const Seen& seen : from.keyframes) {
@@ -308,6 +334,10 @@ void add_distances(const Trial& from, const RepeatabilitySettings& settings,
 
 Repeatability measure_repeatability(const data::Recording& first, const data::Recording& second,
                                     const RepeatabilitySettings& settings) {
+  if (!(settings.score_from < settings.score_to))
+    throw data::InputError("--from, --to: found " + data::format_short(settings.score_from) + " to " +
+                           data::format_short(settings.score_to) + " s, expected --from below --to");
+  check_same_sheet(first, second);
   const Trial a = trial_of(first, settings), b = trial_of(second, settings);
   Registration start;
   start.pivot = first.start.colwise().mean().transpose();
@@ -315,6 +345,7 @@ Repeatability measure_repeatability(const data::Recording& first, const data::Re
   Repeatability result;
   result.registration = fit_registration(a, b, first.nuisance, settings, start);
   const Registration& r = result.registration;
+  result.bounds_hit = bounds_hit(r, first.nuisance);
   add_distances(
       a, settings,
       [&](const Seen& seen) { return b.distances(in_second(seen.points, r), seen.time + r.time_offset); },

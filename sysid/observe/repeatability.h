@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "data/recording.h"
@@ -28,6 +29,7 @@ struct Repeatability {
   double distance = 0;                   ///< mean over `keyframes` [m]
   std::vector<TrialDistance> keyframes;  ///< those of the first trial, then those of the second
   Registration registration;             ///< of the second trial to the first
+  std::vector<std::string> bounds_hit;   ///< "offset_x", "yaw", "time", ...: the distance is too large then
 };
 
 /// The distance between two trials, by the measure of a score: points of a keyframe to the surface that the
@@ -35,7 +37,7 @@ struct Repeatability {
 /// Between two keyframes the distances to both are interpolated. A point counts where the other trial saw the
 /// cloth within three times its spacing. Offset, yaw and clock of the second trial are fitted inside the
 /// bounds of the first recording, so that the distance is that of shape and motion. Throws data::InputError
-/// where the trials have no keyframe in common.
+/// where the sheets are of two sizes or no keyframe is in common.
 Repeatability measure_repeatability(const data::Recording& first, const data::Recording& second,
                                     const RepeatabilitySettings& settings);
 

@@ -73,6 +73,15 @@ TEST(Repeatability, SeesAnotherCloth) {
   EXPECT_GT(other, 2 * same);
 }
 
+TEST(Repeatability, ABoundThatIsReachedIsToldAndAnotherSheetRefused) {
+  const data::TemporaryFolder folder;
+  data::Recording first = trial(folder, 1, 2e-4, Eigen::Vector3d(0.02, 0, 0)), second = trial(folder, 2);
+  first.nuisance.offset = {0.005, 0, 0};
+  EXPECT_EQ(measure_repeatability(first, second, {}).bounds_hit, std::vector<std::string>{"offset_x"});
+  second.mesh.vertices *= 1.1;
+  EXPECT_THROW(measure_repeatability(first, second, {}), data::InputError);
+}
+
 TEST(Repeatability, TrialsWithoutACommonTimeAreRefused) {
   const data::TemporaryFolder folder;
   RepeatabilitySettings settings;
