@@ -16,8 +16,8 @@ struct HoldWatch {
   void see(const Environment& environment);
 };
 
-/// What is wrong with the holds of an environment after a run: those that never closed, and those that two
-/// vertices obeyed.
+/// What is wrong with the holds of an environment after a whole run: those that never closed, and the first
+/// vertex that two of them carried.
 std::vector<std::string> hold_warnings(const HoldWatch& watch, const Environment& environment);
 
 /// The name of the hold that a vertex obeys; "a support" where it has none of its own.

@@ -308,7 +308,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     throw;
   }
   write_tables();
-  for (std::size_t b = 0; b < bodies.size() && summary.steps > 0; ++b)
+  for (std::size_t b = 0; b < bodies.size() && !summary.interrupted && summary.steps > 0; ++b)
     for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
       summary.warnings.push_back(bodies[b].name + ": " + warning);
   summary.held_penetration_max = held.penetration.depth;
