@@ -48,7 +48,7 @@ data::Trajectory lift_of(const Eigen::Vector3d& corner) {
 Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
                              const std::shared_ptr<const Schedule>& schedule, int index) {
   Environment environment;
-  data::SheetMaterial& material = environment.material;
+  data::SheetMaterial& material = environment.materials[0];
   material.membrane_stiffness = between(benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max,
                                         (index + 0.5) / benchmark.environments);
   material.bending_rigidity =
@@ -56,7 +56,7 @@ Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
   material.poissons_ratio = benchmark.poissons_ratio;
   material.areal_density = benchmark.areal_density;
   material.friction = benchmark.friction;
-  environment.obstacles.push_back({Plane{}, -1.0});
+  environment.obstacles.push_back({Plane{}});
   environment.state.positions = sheet.rest.vertices;
   environment.state.velocities = data::Points::Zero(sheet.rest.vertices.rows(), 3);
   Hold corner{.name = "gripper", .frame = 0};
@@ -155,14 +155,14 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
       1e3 * result.wall_seconds * std::min(benchmark.threads, benchmark.environments) / total;
   if (total < 1) return result;
 
-  const data::SheetMaterial material =
-      lift_environment(benchmark, plan->sheet, schedule, benchmark.environments / 2).material;
-  const BendingOperator& bending = bending_operator(*plan, material.bending_model, material.poissons_ratio);
+  const Environment typical = lift_environment(benchmark, plan->sheet, schedule, benchmark.environments / 2);
+  const BodyLaw law = body_laws(*plan, typical).front();
+  const data::SheetMaterial& material = law.material;
   data::Points y = data::Points::Zero(x.rows(), 3);
   BlockValues<double> values;
   const auto assemble = [&](Curvature curvature) {
     values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, bending, material, x, 1.0, curvature, values);
+    add_elastic_hessian(*plan, law, x, 1.0, curvature, values);
     for (int i = 0; i < plan->pattern.size; ++i)
       for (int c = 0; c < 3; ++c)
         values[9L * i + 4 * c] +=
@@ -173,15 +173,15 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   const auto add = [&](const char* name, double calls, const std::function<void()>& phase) {
     result.phases.push_back({name, calls, milliseconds_of(phase)});
   };
-  add("energy and forces", result.iterations + 1,
-      [&] { add_elastic_gradient(*plan, bending, material, x, y); });
+  add("energy and forces", result.iterations + 1, [&] { add_elastic_gradient(*plan, law, x, y); });
   add("matrix", result.iterations, [&] {
     assemble(Curvature::exact);
-    product.assign(plan->triangle_product, values, bending.elimination_stiffness, material.bending_rigidity);
+    product.assign(plan->triangle_product, values,
+                   {{&law.bending.elimination_stiffness, material.bending_rigidity}});
   });
   add("factorization", factorizations, [&] {
     assemble(Curvature::positive);
-    add_bending_stand_in(bending, material.bending_rigidity, values);
+    add_bending_stand_in(law.bending, material.bending_rigidity, values);
     factor.factorize(values);
   });
   Eigen::VectorXf from = Eigen::VectorXf::Ones(4 * y.rows()), to = from;

@@ -45,7 +45,7 @@ std::vector<Group> group_rows(const Matrix& matrix) {
 
 }  // namespace
 
-RowGroups row_groups(const Matrix& matrix, const std::vector<int>& position) {
+RowGroups row_groups(const Matrix& matrix, std::span<const int> position) {
   RowGroups result;
   result.starts.push_back(0);
   std::vector<std::pair<int, std::array<double, 4>>> entries;

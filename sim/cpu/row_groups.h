@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/SparseCore>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "sim/cpu/instruction_level.h"
@@ -22,7 +23,7 @@ struct RowGroups {
 
 /// Groups the rows of `matrix`; `position` numbers the vertices of the result.
 RowGroups row_groups(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix,
-                     const std::vector<int>& position);
+                     std::span<const int> position);
 
 /// y += scale * S x. Four numbers a vertex, of which the last is any.
 template <typename Scalar>

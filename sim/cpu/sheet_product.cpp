@@ -1,5 +1,7 @@
 #include "sim/cpu/sheet_product.h"
 
+#include <utility>
+
 #include "sim/cpu/kernels.h"
 
 namespace flash::sim {
@@ -34,10 +36,9 @@ ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
 
 template <typename Scalar>
 void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValues<double>& values,
-                                  const RowGroups& scalar_part, double scale) {
+                                  std::vector<ScalarPart> scalar_parts) {
   pattern_ = &pattern;
-  scalar_part_ = &scalar_part;
-  scale_ = static_cast<Scalar>(scale);
+  scalar_parts_ = std::move(scalar_parts);
   blocks_.resize(12 * pattern.sources.size());
   linear<Scalar>(*kernels_).copy_blocks(static_cast<int>(pattern.sources.size()), pattern.sources.data(),
                                         pattern.transposed.data(), values.data(), blocks_.data());
@@ -48,7 +49,8 @@ void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
   const BlockRows rows = {static_cast<int>(pattern_->starts.size()) - 1, pattern_->starts.data(),
                           pattern_->columns.data()};
   linear<Scalar>(*kernels_).multiply_blocks(rows, blocks_.data(), x, y);
-  add_product(*kernels_, *scalar_part_, scale_, x, y);
+  for (const ScalarPart& part : scalar_parts_)
+    add_product(*kernels_, *part.matrix, static_cast<Scalar>(part.scale), x, y);
 }
 
 template class SheetProduct<float>;

@@ -20,24 +20,29 @@ struct ProductPattern {
 ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
                                const std::vector<int>& elimination_position);
 
-/// y = (B + s S) x over the vertices of a sheet in elimination order, four numbers a vertex, the last of them
-/// zero: B of 3 x 3 blocks, S scalar. A block is three columns of four numbers, so that a column is one
-/// vector multiply-add.
+/// `scale` times a scalar matrix.
+struct ScalarPart {
+  const RowGroups* matrix;
+  double scale;
+};
+
+/// y = (B + sum s S) x over the vertices of a sheet in elimination order, four numbers a vertex, the last of
+/// them zero: B of 3 x 3 blocks, each S scalar. A block is three columns of four numbers, so that a column is
+/// one vector multiply-add.
 template <typename Scalar>
 class SheetProduct {
  public:
   explicit SheetProduct(const Kernels& kernels) : kernels_(&kernels) {}
 
-  /// The scalar part may be empty; the arguments but `values` have to outlive the product.
-  void assign(const ProductPattern& pattern, const BlockValues<double>& values, const RowGroups& scalar_part,
-              double scale);
+  /// The pattern and the matrices of the scalar parts have to outlive the product.
+  void assign(const ProductPattern& pattern, const BlockValues<double>& values,
+              std::vector<ScalarPart> scalar_parts);
   void multiply(const Scalar* x, Scalar* y);
 
  private:
   const Kernels* kernels_;
   const ProductPattern* pattern_ = nullptr;
-  const RowGroups* scalar_part_ = nullptr;
-  Scalar scale_ = 0;
+  std::vector<ScalarPart> scalar_parts_;
   AlignedStorage<Scalar> blocks_;  ///< 12 numbers each
 };
 

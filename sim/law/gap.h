@@ -15,7 +15,6 @@ struct MovingObstacle {
   Real radius{};                 ///< of a cylinder [m]
   Frame<Real> start{}, end{};    ///< at the start and at the end of the step
   bool moves = false;            ///< whether the two differ
-  Real friction{};               ///< Coulomb coefficient
 };
 
 /// How a point stands against an obstacle.

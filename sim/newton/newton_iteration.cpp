@@ -31,7 +31,8 @@ bool couples_friction(const StepProblem& problem, const SolverSettings& settings
 /// Factorizes the positive Hessian at w.now. Returns false where it is not positive definite after all.
 bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
   problem.potential.assemble(w.now.positions, Curvature::positive, false, w.values);
-  add_bending_stand_in(problem.bending, problem.potential.effective_rigidity(), w.values);
+  for (const BodyLaw& law : problem.laws)
+    add_bending_stand_in(law.bending, problem.potential.effective_rigidity(law), w.values);
   add_slip_stiffness(w.now.contacts, w.values);
   restrict_matrix(w.plan->pattern, w.now.contacts, w.values);
   return w.matrix.factorize(w.values);
@@ -40,13 +41,17 @@ bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
 /// Assembles the Hessian at w.now as the matrix of the linear problem: exact, or `positive`.
 void assemble_matrix(const StepProblem& problem, bool positive, NewtonWorkspace& w) {
   const double h = problem.contacts.time_step;
-  const bool sparse = problem.bending.model != data::BendingModel::hinge;
+  bool sparse = true;
+  std::vector<ScaledBending> bending;
+  for (const BodyLaw& law : problem.laws) {
+    sparse = sparse && !law.bends_at_hinges();
+    bending.push_back({law.bending, problem.potential.effective_rigidity(law)});
+  }
   problem.potential.assemble(w.now.positions, positive ? Curvature::positive : Curvature::exact, sparse,
                              w.values);
   add_slip_stiffness(w.now.contacts, w.values);
   if (!positive) add_surface_curvature(w.now.contacts, w.values);
-  w.matrix.assign(w.values, sparse, problem.bending, problem.potential.effective_rigidity(),
-                  problem.potential.mass().minCoeff() / (h * h));
+  w.matrix.assign(w.values, sparse, bending, problem.potential.mass().minCoeff() / (h * h));
 }
 
 /// Finds w.direction and the contacts that go with it, w.linear: solves the linear problem and exchanges its
@@ -61,10 +66,9 @@ void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWor
   w.refactor = false;
   for (int solved = 0; solved < linear_problems; ++solved) {
     w.force = w.now.force;
-    const int solves = coupled
-                           ? w.matrix.solve_coupled(w.linear, friction_couplings(problem.contacts, w.linear),
-                                                    w.gradient, enough, w.direction, w.force)
-                           : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
+    const int solves = coupled ? w.matrix.solve_coupled(w.linear, friction_couplings(w.linear), w.gradient,
+                                                        enough, w.direction, w.force)
+                               : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
     report.solves += solves;
     w.refactor = w.refactor || solves > w.settings.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.

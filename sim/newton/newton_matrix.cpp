@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace flash::sim {
 
@@ -37,17 +38,21 @@ NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
       single_product_(*plan_->kernels),
       double_product_(*plan_->kernels) {}
 
-void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse, const BendingOperator& bending,
-                          double rigidity, double least_eigenvalue) {
+void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse,
+                          const std::vector<ScaledBending>& bending, double least_eigenvalue) {
   // Only blocks between vertices count: friction's stiffness, large where slip starts, rounds in its own
   // vertex's block alone.
-  double largest = rigidity * bending.largest_entry;
+  double largest = 0;
+  std::vector<ScalarPart> scalar_parts;
+  for (const auto& [operator_of_body, rigidity] : bending) {
+    largest = std::max(largest, rigidity * operator_of_body.largest_entry);
+    scalar_parts.push_back({&operator_of_body.elimination_stiffness, rigidity});
+  }
   for (size_t k = plan_->pattern.size; k < plan_->pattern.size + plan_->edge_count; ++k)
     for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(blocks[9 * k + 4 * c]));
   single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < little * least_eigenvalue;
   const ProductPattern& pattern = sparse ? plan_->triangle_product : plan_->full_product;
-  with_product(
-      [&](auto& product) { product.assign(pattern, blocks, bending.elimination_stiffness, rigidity); });
+  with_product([&](auto& product) { product.assign(pattern, blocks, std::move(scalar_parts)); });
 }
 
 template <typename Scalar>

@@ -8,6 +8,12 @@
 
 namespace flash::sim {
 
+/// The bending of a body with the rigidity that it has in a step [N m].
+struct ScaledBending {
+  const BendingOperator& bending;
+  double rigidity;
+};
+
 /// The matrix of a Newton iteration, its preconditioner and the solution of its linear problem.
 ///
 /// A direction needs a digit or two, so single precision does, at half the traffic. The condition is that
@@ -20,9 +26,9 @@ class NewtonMatrix {
   /// Factorizes the preconditioner, which has to be positive definite. Returns false where it is not.
   bool factorize(const BlockValues<double>& positive) { return factor_.factorize(positive); }
 
-  /// The matrix: blocks, and `rigidity` times the stiffness of a quadratic bending model. `sparse`: all
-  /// blocks across a hinge are zero. `least_eigenvalue`: of the mass [N/m].
-  void assign(const BlockValues<double>& blocks, bool sparse, const BendingOperator& bending, double rigidity,
+  /// The matrix: blocks, and the stiffness of quadratic bending models. `sparse`: all blocks across a hinge
+  /// are zero. `least_eigenvalue`: of the mass [N/m].
+  void assign(const BlockValues<double>& blocks, bool sparse, const std::vector<ScaledBending>& bending,
               double least_eigenvalue);
 
   /// Sets `direction` to the solution of matrix * direction = -gradient over the free directions, and to the

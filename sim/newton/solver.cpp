@@ -21,11 +21,13 @@ constexpr double gap_tolerance = 1e-9;       ///< on gaps and complementarity [m
 ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWorkspace& w) {
   const Environment& environment = problem.contacts.environment;
   const Points& start = environment.state.positions;
-  if (w.now.material == environment.material && w.now.positions.rows() == start.rows() &&
+  if (w.now.materials == environment.materials && w.now.positions.rows() == start.rows() &&
       w.now.positions == start)
     return w.now.elastic;
   Points force = Points::Zero(start.rows(), 3);
-  return add_elastic_gradient(*w.plan, problem.bending, environment.material, start, force);
+  ElasticEnergy elastic;
+  for (const BodyLaw& law : problem.laws) elastic += add_elastic_gradient(*w.plan, law, start, force);
+  return elastic;
 }
 
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:

@@ -7,15 +7,14 @@ namespace flash::sim {
 
 StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
                          const WayOut<double>& way_out)
-    : bending(
-          bending_operator(plan, environment.material.bending_model, environment.material.poissons_ratio)),
-      potential(plan, bending, environment, time_step),
-      contacts(environment, time_step, way_out),
+    : laws(body_laws(plan, environment)),
+      potential(plan, laws, environment, time_step),
+      contacts(plan.sheet, environment, time_step, way_out),
       gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81),
       force_scale(potential.mass().norm() * gravity) {}
 
 void StepProblem::evaluate(Iterate& iterate) const {
-  iterate.material = contacts.environment.material;
+  iterate.materials = contacts.environment.materials;
   iterate.incremental_potential = potential.evaluate(iterate.positions, iterate.force, iterate.elastic);
   update_contacts(contacts, iterate.positions, iterate.force, iterate.contacts);
   iterate.residual = iterate.force;

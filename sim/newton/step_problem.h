@@ -10,14 +10,14 @@ struct Iterate {
   data::Points force;      ///< what each vertex needs from outside [N]
   data::Points residual;   ///< what the constraints leave of it [N]
   ContactSet contacts;
-  data::SheetMaterial material;  ///< of `elastic`
+  std::vector<data::SheetMaterial> materials;  ///< of `elastic`
   ElasticEnergy elastic;
   double incremental_potential = 0;  ///< [J]
 };
 
 /// One implicit Euler step as a problem: its potential, its contacts and the scale of its forces.
 struct StepProblem {
-  const BendingOperator& bending;
+  std::vector<BodyLaw> laws;
   IncrementalPotential potential;
   ContactStep contacts;
   double gravity;      ///< [m/s^2]; 9.81 without
@@ -26,6 +26,7 @@ struct StepProblem {
   /// The arguments but `way_out` have to outlive the problem.
   StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
               const WayOut<double>& way_out);
+  StepProblem(const StepProblem&) = delete;  // the potential refers to the laws
 
   /// Fills in an iterate from its positions.
   void evaluate(Iterate& iterate) const;

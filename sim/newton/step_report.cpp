@@ -97,9 +97,10 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
       report.kinetic - kinetic_at_start + stored_at_end - stored_at_start - falls - report.work;
   const double there = kinetic_at_start + stored_at_start + std::max(0.0, falls) + std::max(0.0, report.work);
   // The allowance covers the rounding of positions and the work of the weight over a nanometre.
-  const double rounding =
-      1e-9 * mass.sum() * problem.gravity +
-      1e-14 * environment.material.membrane_stiffness * mass.sum() / environment.material.areal_density;
+  double rounding = 1e-9 * mass.sum() * problem.gravity;
+  for (const BodyLaw& law : problem.laws)
+    rounding += 1e-14 * law.material.membrane_stiffness * rows_of(law.place.body, mass).sum() /
+                law.material.areal_density;
   if (!(gain <= energy_tolerance * there + unbalanced + rounding)) return false;
   if (!start_is_feasible) return true;
   return end.incremental_potential <=

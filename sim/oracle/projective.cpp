@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <list>
 #include <map>
 
 #include "sim/oracle/anderson.h"
@@ -25,19 +26,15 @@ Eigen::Map<const VectorXd> flat(const Points& x) { return {x.data(), x.size()}; 
 }  // namespace
 
 struct ProjectiveSolver::Workspace {
-  using SystemKey = std::pair<std::array<double, 6>, std::pair<data::Constitutive, data::BendingModel>>;
-
   std::shared_ptr<const SheetPlan> plan;
   ProjectiveSettings settings;
-  std::map<SystemKey, ProjectiveSystem> systems;
+  std::list<std::pair<std::vector<data::SheetMaterial>, ProjectiveSystem>> systems;
 
-  ProjectiveSystem& system_of(const data::SheetMaterial& m) {
-    const SystemKey key = {{m.membrane_stiffness, m.poissons_ratio, m.areal_density, m.bending_rigidity,
-                            m.air_drag, m.stiffness_damping},
-                           {m.constitutive, m.bending_model}};
-    const auto found = systems.find(key);
-    if (found != systems.end()) return found->second;
-    return systems.emplace(key, ProjectiveSystem(*plan, m, settings.time_step)).first->second;
+  ProjectiveSystem& system_of(const std::vector<data::SheetMaterial>& materials) {
+    for (auto& [known, system] : systems)
+      if (known == materials) return system;
+    systems.emplace_back(materials, ProjectiveSystem(*plan, materials, settings.time_step));
+    return systems.back().second;
   }
 };
 
@@ -145,14 +142,14 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   Workspace& w = *workspace_;
   const ProjectiveSettings& settings = w.settings;
   const double h = settings.time_step, time = environment.state.time + h;
-  const BendingOperator& bending =
-      bending_operator(*w.plan, environment.material.bending_model, environment.material.poissons_ratio);
-  ProjectiveSystem& system = w.system_of(environment.material);
+  const std::vector<BodyLaw> laws = body_laws(*w.plan, environment);
+  ProjectiveSystem& system = w.system_of(environment.materials);
   update_holds(environment, time);
-  const IncrementalPotential step(*w.plan, bending, environment, h);
+  const IncrementalPotential step(*w.plan, laws, environment, h);
 
   Points x = environment.state.positions + h * environment.state.velocities;
-  const ContactStep contact_step(environment, h, {.speed = std::numeric_limits<double>::infinity()});
+  const ContactStep contact_step(w.plan->sheet, environment, h,
+                                 {.speed = std::numeric_limits<double>::infinity()});
   const ContactSet holds = begin_step(contact_step, x);
   project_to_feasible(contact_step, holds, x);
   const Index n = x.rows();
@@ -191,9 +188,9 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
       continue;
     }
     const Points free_motion = system.solve(-h * h * (force - reaction));
-    contacts =
-        find_contacts(environment, time, h, x, 2 * free_motion.rowwise().norm() + VectorXd::Constant(n, 1e-6),
-                      free_axes, settings.tangent_angle);
+    contacts = find_contacts(w.plan->sheet, environment, time, h, x,
+                             2 * free_motion.rowwise().norm() + VectorXd::Constant(n, 1e-6), free_axes,
+                             settings.tangent_angle);
     multiplier = VectorXd::Zero(3 * contacts.size());
     for (std::size_t k = 0; k < contacts.size(); ++k) {
       const auto found = known.find({contacts[k].vertex, contacts[k].obstacle});

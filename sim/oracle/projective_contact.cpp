@@ -25,9 +25,10 @@ Vector3d moved_against(const Environment& environment, const Gap& gap, const dat
 
 }  // namespace
 
-std::vector<VertexContact> find_contacts(const Environment& environment, double time, double time_step,
-                                         const data::Points& positions, const Eigen::VectorXd& reach,
-                                         const std::vector<Vector3d>& free_axes, double tangent_angle) {
+std::vector<VertexContact> find_contacts(const Sheet& sheet, const Environment& environment, double time,
+                                         double time_step, const data::Points& positions,
+                                         const Eigen::VectorXd& reach, const std::vector<Vector3d>& free_axes,
+                                         double tangent_angle) {
   const std::vector<MovingObstacle<double>> obstacles = moving_obstacles(environment, time - time_step, time);
   std::vector<VertexContact> contacts;
   for (Index i = 0; i < positions.rows(); ++i) {
@@ -42,7 +43,8 @@ std::vector<VertexContact> find_contacts(const Environment& environment, double 
       contact.directions.row(2) = std::cos(tangent_angle) * second - std::sin(tangent_angle) * first;
       contact.gap = contact.directions * moved_against(environment, gap, positions, i);
       contact.gap[0] = gap.distance;
-      contact.friction = obstacles[k].friction;
+      contact.friction =
+          friction_between(environment, environment.obstacles[k], body_of(sheet, contact.vertex));
       contacts.push_back(contact);
     }
   }

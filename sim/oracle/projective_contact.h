@@ -19,8 +19,9 @@ struct VertexContact {
 
 /// Contacts nearer than `reach` [m] (one a vertex), sorted by (vertex, obstacle). Vertices held along all
 /// axes take no part, nor do contacts whose normal runs along held axes.
-std::vector<VertexContact> find_contacts(const Environment& environment, double time, double time_step,
-                                         const data::Points& positions, const Eigen::VectorXd& reach,
+std::vector<VertexContact> find_contacts(const Sheet& sheet, const Environment& environment, double time,
+                                         double time_step, const data::Points& positions,
+                                         const Eigen::VectorXd& reach,
                                          const std::vector<Eigen::Vector3d>& free_axes, double tangent_angle);
 
 /// H^T lambda [N], vertices x 3.

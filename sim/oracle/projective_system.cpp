@@ -13,37 +13,54 @@ namespace flash::sim {
 
 using Eigen::VectorXd;
 
-struct ProjectiveSystem::Factor {
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt;
-};
+namespace {
 
-ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const data::SheetMaterial& material,
-                                   double time_step)
-    : mass_(material.areal_density * plan.sheet.vertex_area), factor_(std::make_unique<Factor>()) {
-  const double h = time_step;
+/// Turns the areas in `mass` into masses for one body, and adds its part of the matrix.
+void add_body(const Sheet& sheet, const Body& body, const data::SheetMaterial& material, double h,
+              VectorXd& mass, std::vector<Eigen::Triplet<double>>& entries) {
+  rows_of(body, mass) *= material.areal_density;
   const double stiffness_scale = h * h + h * material.stiffness_damping;
   const SheetLame lame = sheet_lame(material.membrane_stiffness, material.poissons_ratio);
   const double weight = material.constitutive == data::Constitutive::tri_arap
                             ? 2 * lame.mu
                             : 2 * lame.mu + 2 * std::max(lame.lambda, 0.0);
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int i = 0; i < mass_.size(); ++i) entries.emplace_back(i, i, mass_[i] * (1 + h * material.air_drag));
-  for (const RestTriangle& triangle : plan.sheet.triangles) {
+  const int first = body.first_vertex;
+  for (int i = first; i < first + body.vertex_count; ++i)
+    entries.emplace_back(i, i, mass[i] * (1 + h * material.air_drag));
+  const Sheet alone = body_alone(sheet, body);
+  for (const RestTriangle& triangle : alone.triangles) {
     Eigen::Matrix<double, 3, 2> gradient;
     gradient.bottomRows<2>() = triangle.inverse_edges;
     gradient.row(0) = -gradient.row(1) - gradient.row(2);
     const Eigen::Matrix3d local = stiffness_scale * weight * triangle.area * gradient * gradient.transpose();
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
-        entries.emplace_back(triangle.vertices[a], triangle.vertices[b], local(a, b));
+        entries.emplace_back(first + triangle.vertices[a], first + triangle.vertices[b], local(a, b));
   }
+  const Eigen::SparseMatrix<double> bending =
+      material.bending_model == data::BendingModel::plate
+          ? plate_bending_stiffness(alone, material.poissons_ratio, 1e-2)
+          : isometric_bending_stiffness(alone);
+  for (int column = 0; column < bending.outerSize(); ++column)
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(bending, column); entry; ++entry)
+      entries.emplace_back(first + static_cast<int>(entry.row()), first + column,
+                           stiffness_scale * material.bending_rigidity * entry.value());
+}
+
+}  // namespace
+
+struct ProjectiveSystem::Factor {
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt;
+};
+
+ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const std::vector<data::SheetMaterial>& materials,
+                                   double time_step)
+    : mass_(plan.sheet.vertex_area), factor_(std::make_unique<Factor>()) {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t b = 0; b < materials.size(); ++b)
+    add_body(plan.sheet, plan.sheet.bodies[b], materials[b], time_step, mass_, entries);
   matrix_.resize(mass_.size(), mass_.size());
   matrix_.setFromTriplets(entries.begin(), entries.end());
-  const double D = stiffness_scale * material.bending_rigidity;
-  if (material.bending_model == data::BendingModel::plate)
-    matrix_ += D * plate_bending_stiffness(plan.sheet, material.poissons_ratio, 1e-2);
-  else
-    matrix_ += D * isometric_bending_stiffness(plan.sheet);
   factor_->llt.compute(matrix_);
   if (factor_->llt.info() != Eigen::Success)
     throw data::InputError(

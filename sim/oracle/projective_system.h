@@ -19,7 +19,9 @@ namespace flash::sim {
 /// hinges. Factored once a material; everything else here follows from it.
 class ProjectiveSystem {
  public:
-  ProjectiveSystem(const SheetPlan& plan, const data::SheetMaterial& material, double time_step);
+  /// `materials`: of each body of the plan.
+  ProjectiveSystem(const SheetPlan& plan, const std::vector<data::SheetMaterial>& materials,
+                   double time_step);
   ~ProjectiveSystem();
   ProjectiveSystem(ProjectiveSystem&&) noexcept;
 

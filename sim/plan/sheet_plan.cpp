@@ -20,11 +20,12 @@ int pair_index(PairIndex& index, BlockPattern& pattern, int i, int j) {
   return entry->second;
 }
 
-/// The triangles from `first` on, up to eight. slot(row, column) is the place of a block, row > column.
+/// The triangles from `first` on, up to eight of those before `end`. slot(row, column) is the place of a
+/// block, row > column.
 template <typename Slot>
-TriangleGroup group_of(const std::vector<RestTriangle>& triangles, size_t first, const Slot& slot) {
+TriangleGroup group_of(const std::vector<RestTriangle>& triangles, int first, int end, const Slot& slot) {
   TriangleGroup group;
-  group.count = static_cast<int>(std::min<size_t>(triangle_group_size, triangles.size() - first));
+  group.count = std::min(triangle_group_size, end - first);
   for (int lane = 0; lane < triangle_group_size; ++lane) {
     const RestTriangle& triangle = triangles[first + std::min(lane, group.count - 1)];
     Eigen::Matrix<double, 3, 2> gradients;
@@ -44,26 +45,33 @@ TriangleGroup group_of(const std::vector<RestTriangle>& triangles, size_t first,
   return group;
 }
 
-std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, data::BendingModel model,
+std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, const Body& body,
+                                                             data::BendingModel model,
                                                              double poissons_ratio) {
   auto bending = std::make_shared<BendingOperator>();
   bending->model = model;
   bending->kernels = plan.kernels;
   if (model == data::BendingModel::hinge) return bending;
-  const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(plan.sheet);
+  const Sheet alone = body_alone(plan.sheet, body);
+  const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(alone);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
-      model == data::BendingModel::plate ? plate_bending_stiffness(plan.sheet, poissons_ratio) : isometric;
+      model == data::BendingModel::plate ? plate_bending_stiffness(alone, poissons_ratio) : isometric;
   bending->largest_entry = stiffness.coeffs().abs().maxCoeff();
-  std::vector<int> as_numbered(plan.pattern.size);
+  std::vector<int> as_numbered(body.vertex_count);
   std::iota(as_numbered.begin(), as_numbered.end(), 0);
   bending->stiffness = row_groups(stiffness, as_numbered);
-  bending->elimination_stiffness = row_groups(stiffness, plan.symbolic->position);
+  bending->elimination_stiffness =
+      row_groups(stiffness, std::span(plan.symbolic->position).subspan(body.first_vertex));
   // Against the plate the isometric stiffness has its eigenvalues between 0.5 and 4.6 (regular meshes, nu =
   // 0.3). Scaled, they lie around 1, where those of the membrane and the mass are.
   const double scale = model == data::BendingModel::plate ? 0.6 : 1.0;
-  for (int i = 0; i < plan.pattern.size; ++i) bending->stand_in.push_back(scale * isometric.coeff(i, i));
-  for (const auto& [row, column] : plan.pattern.pairs)
-    bending->stand_in.push_back(scale * isometric.coeff(row, column));
+  const auto entry = [&](int row, int column) {
+    const int i = row - body.first_vertex, j = column - body.first_vertex;
+    return 0 <= i && i < body.vertex_count && 0 <= j && j < body.vertex_count ? scale * isometric.coeff(i, j)
+                                                                              : 0.0;
+  };
+  for (int i = 0; i < plan.pattern.size; ++i) bending->stand_in.push_back(entry(i, i));
+  for (const auto& [row, column] : plan.pattern.pairs) bending->stand_in.push_back(entry(row, column));
   return bending;
 }
 
@@ -79,14 +87,30 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, Instruction
   const auto slot = [&](int row, int column) {
     return BlockSlot{plan->pattern.size + pair_index(index, plan->pattern, row, column), row < column};
   };
-  for (size_t first = 0; first < sheet.triangles.size(); first += triangle_group_size)
-    plan->triangle_groups.push_back(
-        group_of(sheet.triangles, first, [&](int row, int column) { return slot(row, column).block; }));
+  for (const Body& body : sheet.bodies) {
+    BodyPlan own{.body = body, .first_group = static_cast<int>(plan->triangle_groups.size())};
+    const int end = body.first_triangle + body.triangle_count;
+    for (int first = body.first_triangle; first < end; first += triangle_group_size)
+      plan->triangle_groups.push_back(group_of(sheet.triangles, first, end,
+                                               [&](int row, int column) { return slot(row, column).block; }));
+    own.group_count = static_cast<int>(plan->triangle_groups.size()) - own.first_group;
+    plan->bodies.push_back(own);
+  }
   plan->edge_count = plan->pattern.pairs.size();
   for (const Hinge& hinge : plan->hinges) {
     const auto& v = hinge.vertices;
     plan->hinge_slots.push_back({slot(v[1], v[0]), slot(v[2], v[0]), slot(v[2], v[1]), slot(v[3], v[0]),
                                  slot(v[3], v[1]), slot(v[3], v[2])});
+  }
+  // Hinges are in the order of their lowest vertices, and so in that of the bodies.
+  int first_hinge = 0;
+  for (BodyPlan& own : plan->bodies) {
+    const int end_vertex = own.body.first_vertex + own.body.vertex_count;
+    own.first_hinge = first_hinge;
+    while (first_hinge < static_cast<int>(plan->hinges.size()) &&
+           plan->hinges[first_hinge].vertices[0] < end_vertex)
+      ++first_hinge;
+    own.hinge_count = first_hinge - own.first_hinge;
   }
   plan->symbolic = analyze(plan->pattern);
   const std::vector<int>& position = plan->symbolic->position;
@@ -96,11 +120,11 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, Instruction
 }
 
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
-                                        double poissons_ratio) {
+                                        double poissons_ratio, int body) {
   const double key = model == data::BendingModel::plate ? poissons_ratio : 0.0;
   const std::lock_guard lock(plan.bending->mutex);
-  auto& entry = plan.bending->made[{model, key}];
-  if (!entry) entry = make_bending_operator(plan, model, poissons_ratio);
+  auto& entry = plan.bending->made[{body, model, key}];
+  if (!entry) entry = make_bending_operator(plan, plan.bodies[body].body, model, poissons_ratio);
   return *entry;
 }
 

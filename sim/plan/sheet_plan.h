@@ -3,7 +3,8 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <utility>
+#include <span>
+#include <tuple>
 #include <vector>
 
 #include "data/material.h"
@@ -22,20 +23,27 @@ struct BlockSlot {
   bool transposed;  ///< the stored block is that of (column, row)
 };
 
-/// Bending of a sheet for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
+/// Bending of a body for D = 1. Quadratic models act through `stiffness` on each coordinate alike.
 struct BendingOperator {
   data::BendingModel model;
   const Kernels* kernels;           ///< as in the plan
-  RowGroups stiffness;              ///< empty for the hinge model
-  RowGroups elimination_stiffness;  ///< the same in elimination order
+  RowGroups stiffness;              ///< from the body's first vertex on; empty for the hinge model
+  RowGroups elimination_stiffness;  ///< the same in elimination order of all vertices
   double largest_entry = 0;         ///< of the stiffness, in magnitude [1/m^2]
   std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 
-/// Bending operators made so far for a sheet, shared by its environments.
+/// Bending operators made so far for the bodies of a sheet, shared by its environments.
 struct BendingOperators {
   std::mutex mutex;
-  std::map<std::pair<data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
+  std::map<std::tuple<int, data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
+};
+
+/// The part of a plan that belongs to one body.
+struct BodyPlan {
+  Body body;  ///< as in the sheet
+  int first_group = 0, group_count = 0;
+  int first_hinge = 0, hinge_count = 0;
 };
 
 /// Sparsity, ordering and places of the elements in the system matrix: what depends on the mesh alone, and
@@ -48,7 +56,8 @@ struct SheetPlan {
   size_t edge_count = 0;  ///< how many of the pattern's pairs lie over an edge
   std::shared_ptr<const SymbolicFactor> symbolic;
   ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
-  std::vector<TriangleGroup> triangle_groups;
+  std::vector<BodyPlan> bodies;
+  std::vector<TriangleGroup> triangle_groups;  ///< each of triangles of one body
   std::vector<std::array<BlockSlot, 6>>
       hinge_slots;  ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
   std::shared_ptr<BendingOperators> bending = std::make_shared<BendingOperators>();
@@ -57,10 +66,10 @@ struct SheetPlan {
 std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet,
                                                  InstructionLevel level = highest_instruction_level());
 
-/// The bending operator of a model, made once a Poisson's ratio and kept with the plan; threads may ask at
-/// once. Throws data::InputError where the model needs a flat rest shape and the sheet has none.
+/// The bending operator of a model and a body, made once a Poisson's ratio and kept with the plan; threads
+/// may ask at once. Throws data::InputError where the model needs a flat rest shape and the body has none.
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
-                                        double poissons_ratio);
+                                        double poissons_ratio, int body = 0);
 
 /// Bending operators that were made for a plan so far.
 std::size_t count_bending_operators(const SheetPlan& plan);

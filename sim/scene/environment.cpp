@@ -24,7 +24,9 @@ double distance_to_box(const Vector3d& half_extents, const Vector3d& point) {
 std::vector<int> vertices_in_reach(const Hold& hold, const State& state, const Isometry3d& frame_from_base) {
   std::vector<int> vertices;
   double nearest = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < static_cast<int>(state.positions.rows()); ++i) {
+  const int end = hold.reach->vertex_count < 0 ? static_cast<int>(state.positions.rows())
+                                               : hold.reach->first_vertex + hold.reach->vertex_count;
+  for (int i = hold.reach->first_vertex; i < end; ++i) {
     const Vector3d point = frame_from_base * Vector3d(state.positions.row(i));
     const double distance = distance_to_box(hold.reach->half_extents, point);
     nearest = std::min(nearest, distance);
@@ -53,6 +55,12 @@ HeldVertices take(const Hold& hold, const State& state, const Isometry3d& frame,
 }
 
 }  // namespace
+
+double friction_between(const Environment& environment, const Obstacle& obstacle, int body) {
+  const auto index = static_cast<std::size_t>(body);
+  const bool told = index < obstacle.friction.size() && obstacle.friction[index] >= 0;
+  return told ? obstacle.friction[index] : environment.materials[index].friction;
+}
 
 Isometry3d frame_pose(const Environment& environment, int frame, double time) {
   return frame == base_frame ? Isometry3d::Identity() : pose_at(*environment.schedule, frame, time);

@@ -34,7 +34,8 @@ struct Cylinder {
 /// A rigid shape that a sheet meets.
 struct Obstacle {
   std::variant<Plane, Box, Cylinder> shape = {};
-  double friction = -1.0;  ///< Coulomb coefficient; below zero: the material's
+  std::vector<double> friction =
+      {};                  ///< Coulomb coefficient on each body; missing or below zero: the material's
   std::string name = {};   ///< under which the force is told
   int frame = base_frame;  ///< of the schedule, in which the shape stands
 };
@@ -52,10 +53,10 @@ struct State {
   std::vector<HeldVertices> held;  ///< by each hold of the environment
 };
 
-/// One simulated world: its own material, motion and state over a shared Sheet.
+/// One simulated world: its own materials, motion and state over a shared Sheet.
 struct Environment {
-  data::SheetMaterial material;
-  Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
+  std::vector<data::SheetMaterial> materials = {{}};  ///< of each body of the sheet
+  Eigen::Vector3d gravity{0, 0, -9.81};               ///< [m/s^2]
   std::vector<Obstacle> obstacles;
   std::vector<Hold> holds;
   std::vector<Load> loads;
@@ -63,6 +64,9 @@ struct Environment {
       schedule;  ///< of the frames that holds and obstacles name; none: all at rest
   State state;
 };
+
+/// Coulomb coefficient between an obstacle and the vertices of a body.
+double friction_between(const Environment& environment, const Obstacle& obstacle, int body);
 
 /// Pose of a frame of the environment's schedule at `time` [s]; that of the base frame is the identity.
 Eigen::Isometry3d frame_pose(const Environment& environment, int frame, double time);

@@ -15,7 +15,8 @@ inline constexpr int base_frame = -1;
 
 /// The vertices within `threshold` of a box about the origin of a frame: what an open end effector can take.
 struct Reach {
-  std::string object = {};                                         ///< name of what it takes, for messages
+  std::string object = {};                  ///< name of the body that it takes, for messages
+  int first_vertex = 0, vertex_count = -1;  ///< of the body; below zero: all from the first on
   Eigen::Vector3d half_extents = Eigen::Vector3d::Constant(0.01);  ///< [m]
   double threshold = 0.01;                                         ///< [m]
 };

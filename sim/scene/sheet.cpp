@@ -11,8 +11,13 @@
 
 namespace flash::sim {
 
-Sheet make_sheet(const data::TriangleMesh& rest) {
-  Sheet sheet{rest, {}, Eigen::VectorXd::Zero(rest.vertices.rows())};
+Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name) {
+  Sheet sheet{rest,
+              {},
+              Eigen::VectorXd::Zero(rest.vertices.rows()),
+              {{.name = name,
+                .vertex_count = static_cast<int>(rest.vertices.rows()),
+                .triangle_count = static_cast<int>(rest.triangles.rows())}}};
   std::map<std::array<int, 3>, int> seen;
   const double extent = rest.vertices.rows() > 0
                             ? (rest.vertices.colwise().maxCoeff() - rest.vertices.colwise().minCoeff()).norm()
@@ -42,6 +47,64 @@ Sheet make_sheet(const data::TriangleMesh& rest) {
     if (sheet.vertex_area[i] == 0)
       throw data::input_error("mesh", "vertex " + std::to_string(i), "belongs to no triangle");
   return sheet;
+}
+
+Sheet joined(std::span<const Sheet> sheets) {
+  Sheet whole;
+  Eigen::Index vertices = 0, triangles = 0;
+  for (const Sheet& sheet : sheets) {
+    vertices += sheet.rest.vertices.rows();
+    triangles += sheet.rest.triangles.rows();
+  }
+  whole.rest.vertices.resize(vertices, 3);
+  whole.rest.triangles.resize(triangles, 3);
+  whole.vertex_area.resize(vertices);
+  int first_vertex = 0, first_triangle = 0;
+  for (const Sheet& sheet : sheets) {
+    const Eigen::Index own_vertices = sheet.rest.vertices.rows(), own_triangles = sheet.rest.triangles.rows();
+    whole.rest.vertices.middleRows(first_vertex, own_vertices) = sheet.rest.vertices;
+    whole.rest.triangles.middleRows(first_triangle, own_triangles) =
+        sheet.rest.triangles.array() + first_vertex;
+    whole.vertex_area.segment(first_vertex, own_vertices) = sheet.vertex_area;
+    for (RestTriangle triangle : sheet.triangles) {
+      triangle.vertices.array() += first_vertex;
+      whole.triangles.push_back(triangle);
+    }
+    for (Body body : sheet.bodies) {
+      body.first_vertex += first_vertex;
+      body.first_triangle += first_triangle;
+      whole.bodies.push_back(body);
+    }
+    first_vertex += static_cast<int>(own_vertices);
+    first_triangle += static_cast<int>(own_triangles);
+  }
+  return whole;
+}
+
+Sheet body_alone(const Sheet& sheet, const Body& body) {
+  Sheet alone;
+  alone.rest.vertices = rows_of(body, sheet.rest.vertices);
+  alone.rest.triangles =
+      sheet.rest.triangles.middleRows(body.first_triangle, body.triangle_count).array() - body.first_vertex;
+  alone.vertex_area = sheet.vertex_area.segment(body.first_vertex, body.vertex_count);
+  for (int t = 0; t < body.triangle_count; ++t) {
+    alone.triangles.push_back(sheet.triangles[body.first_triangle + t]);
+    alone.triangles.back().vertices.array() -= body.first_vertex;
+  }
+  alone.bodies = {body};
+  alone.bodies.front().first_vertex = alone.bodies.front().first_triangle = 0;
+  return alone;
+}
+
+int body_of(const Sheet& sheet, int vertex) {
+  int body = 0;
+  while (vertex >= sheet.bodies[body].first_vertex + sheet.bodies[body].vertex_count) ++body;
+  return body;
+}
+
+std::string vertex_name(const Sheet& sheet, int vertex) {
+  const Body& body = sheet.bodies[body_of(sheet, vertex)];
+  return (body.name.empty() ? "" : body.name + ": ") + "vertex " + std::to_string(vertex - body.first_vertex);
 }
 
 }  // namespace flash::sim

@@ -18,13 +18,7 @@ namespace {
 constexpr double smoothing =
     1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
 
-double friction_of(const ContactStep& step, const Touch& touch) {
-  return step.obstacles[touch.obstacle].friction;
-}
-
-double friction_bound_of(const ContactStep& step, const Touch& touch) {
-  return friction_of(step, touch) * touch.normal_force;
-}
+double friction_bound_of(const Touch& touch) { return touch.friction_coefficient * touch.normal_force; }
 
 /// Length of a slip as friction takes it, smooth where it starts [m].
 double smooth_length(double length) { return std::sqrt(length * length + smoothing * smoothing); }
@@ -49,14 +43,11 @@ double find_slips(const Vector3d& way, std::span<Touch> touches) {
 }
 
 /// Normal forces of the touches of a vertex that needs `needed` [N]. Each of several that it slips on rubs.
-void find_normal_forces(const ContactStep& step, const Vector3d& needed, bool slipped,
-                        std::span<Touch> touches) {
+void find_normal_forces(const Vector3d& needed, bool slipped, std::span<Touch> touches) {
   const auto eligible = [](const Touch& touch) { return touch.touches(); };
   if (!slipped || std::count_if(touches.begin(), touches.end(), eligible) < 2)
     return share_force(touches, needed, eligible);
-  std::vector<double> friction;
-  for (const Touch& touch : touches) friction.push_back(friction_of(step, touch));
-  share_force_rubbing(touches, friction, needed, eligible);
+  share_force_rubbing(touches, needed, eligible);
 }
 
 /// The constraint of a vertex that touches surfaces; it is free where none of them has to push.
@@ -65,11 +56,11 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   VertexConstraint constraint;
   constraint.vertex = i;
   const bool slipped = find_slips(way_of(step, positions, i), touches) > resting_slip;
-  find_normal_forces(step, needed, slipped, touches);
+  find_normal_forces(needed, slipped, touches);
   int held = 0;
   for (const Touch& touch : touches) {
     if (!touch.holds) continue;
-    constraint.friction_bound += friction_bound_of(step, touch);
+    constraint.friction_bound += friction_bound_of(touch);
     constraint.slip_direction = touch.slip_direction;
     ++held;
   }
@@ -83,8 +74,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
     constraint.free.setZero();
     constraint.reaction = needed;
     for (Touch& touch : touches)
-      if (touch.holds && bound > 0)
-        touch.friction = friction_bound_of(step, touch) / bound * needed_tangential;
+      if (touch.holds && bound > 0) touch.friction = friction_bound_of(touch) / bound * needed_tangential;
     return constraint;
   }
   constraint.freedom = Freedom::slip;
@@ -97,7 +87,7 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
   }
   for (Touch& touch : touches) {
     if (!touch.holds) continue;
-    const double own_bound = friction_bound_of(step, touch);
+    const double own_bound = friction_bound_of(touch);
     const Vector3d& direction = slipped ? touch.slip_direction : constraint.slip_direction;
     touch.friction = -own_bound * direction;
     constraint.reaction += touch.normal_force * touch.normal + touch.friction;
@@ -117,9 +107,10 @@ bool stand_beside(const std::vector<Obstacle>& obstacles) {
 
 }  // namespace
 
-ContactStep::ContactStep(const Environment& environment_in, double time_step_in,
+ContactStep::ContactStep(const Sheet& sheet_in, const Environment& environment_in, double time_step_in,
                          const WayOut<double>& way_out_in)
-    : environment(environment_in),
+    : sheet(sheet_in),
+      environment(environment_in),
       time(environment_in.state.time + time_step_in),
       time_step(time_step_in),
       way_out(way_out_in),
@@ -196,14 +187,17 @@ void find_clearance(const ContactStep& step, const Points& positions, std::vecto
 }
 
 void add_touches(const ContactStep& step, const Points& positions, int i, std::vector<Touch>& touches) {
+  const int body = body_of(step.sheet, i);
   for (int k = 0; k < static_cast<int>(step.obstacles.size()); ++k) {
     const SurfaceGap<double> gap = step.gap(k, positions, i);
-    touches.push_back({.obstacle = k,
-                       .gap = gap.distance,
-                       .starts_inside = gap.starts_inside,
-                       .normal = vector3d(gap.normal),
-                       .curvature_direction = vector3d(gap.curvature_direction),
-                       .surface_moved = vector3d(gap.surface_moved)});
+    touches.push_back(
+        {.obstacle = k,
+         .gap = gap.distance,
+         .starts_inside = gap.starts_inside,
+         .friction_coefficient = friction_between(step.environment, step.environment.obstacles[k], body),
+         .normal = vector3d(gap.normal),
+         .curvature_direction = vector3d(gap.curvature_direction),
+         .surface_moved = vector3d(gap.surface_moved)});
   }
 }
 
@@ -233,7 +227,7 @@ void update_contacts(const ContactStep& step, const Points& positions, const Poi
   }
 }
 
-std::vector<Matrix3d> friction_couplings(const ContactStep& step, const ContactSet& contacts) {
+std::vector<Matrix3d> friction_couplings(const ContactSet& contacts) {
   std::vector<Matrix3d> couplings;
   for (size_t k = 0; k < contacts.constraints.size(); ++k) {
     Matrix3d normals = Matrix3d::Zero(), rubs = Matrix3d::Zero(), gram = Matrix3d::Identity();
@@ -242,7 +236,7 @@ std::vector<Matrix3d> friction_couplings(const ContactStep& step, const ContactS
       for (const Touch& touch : contacts.touches_of(k)) {
         if (!touch.holds) continue;
         normals.col(count) = touch.normal;
-        rubs.col(count++) = friction_of(step, touch) * touch.slip_direction;
+        rubs.col(count++) = touch.friction_coefficient * touch.slip_direction;
       }
     }
     gram.topLeftCorner(count, count) =
@@ -263,7 +257,7 @@ double friction_potential(const ContactStep& step, const ContactSet& contacts, c
       const Vector3<double> moved = vector3(way_of(step, positions, constraint.vertex)) - gap.surface_moved;
       const double slip = norm(moved - dot(gap.normal, moved) * gap.normal);
       potential +=
-          friction_bound_of(step, touch) * (constraint.slip_stiffness.isZero(0) ? slip : smooth_length(slip));
+          friction_bound_of(touch) * (constraint.slip_stiffness.isZero(0) ? slip : smooth_length(slip));
     }
   }
   return potential;
@@ -279,7 +273,7 @@ Vector3d slip_of(const ContactStep& step, const Points& positions, int vertex,
   for (const Touch& touch : touches) {
     if (!touch.holds) continue;
     const SurfaceGap<double> gap = step.gap(touch.obstacle, positions, vertex);
-    const double weight = friction_bound_of(step, touch) + least_weight;
+    const double weight = friction_bound_of(touch) + least_weight;
     surfaces_moved += weight * vector3d(gap.surface_moved);
     weights += weight;
     normals[count++] = vector3d(gap.normal);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "sim/scene/environment.h"
+#include "sim/scene/sheet.h"
 #include "sim/step/moving_obstacles.h"
 #include "sim/step/touch.h"
 
@@ -15,8 +16,11 @@ inline constexpr double resting_slip = 1e-13;
 
 /// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
 struct ContactStep {
-  ContactStep(const Environment& environment, double time_step, const WayOut<double>& way_out);
+  /// Sheet and environment have to outlive the step.
+  ContactStep(const Sheet& sheet, const Environment& environment, double time_step,
+              const WayOut<double>& way_out);
 
+  const Sheet& sheet;
   const Environment& environment;
   double time, time_step;  ///< [s]
   WayOut<double> way_out;  ///< how vertices that start inside an obstacle leave it
@@ -105,7 +109,7 @@ void update_contacts(const ContactStep& step, const data::Points& positions, con
 /// How the friction forces of slipping vertices change with the force on them, a matrix for each constraint:
 /// the sum of mu_k d_k l_k^T. Here d_k is the direction of slip and l_k . f the normal force of surface k
 /// under the force f. The matrix is zero for all others.
-std::vector<Eigen::Matrix3d> friction_couplings(const ContactStep& step, const ContactSet& contacts);
+std::vector<Eigen::Matrix3d> friction_couplings(const ContactSet& contacts);
 
 /// sum mu lambda_n |slip| of the held vertices at frozen normal forces: the potential of friction over the
 /// step [J].

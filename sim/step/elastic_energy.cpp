@@ -25,36 +25,35 @@ PaddedPoints padded_vertices(const Points& x) {
 
 }  // namespace
 
-ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator& bending,
-                                   const data::SheetMaterial& material, const data::Points& positions,
-                                   data::Points& gradient) {
+ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, const Points& positions,
+                                   Points& gradient) {
   ElasticEnergy energy;
-  const Membrane membrane = membrane_of(material);
-  energy.membrane = plan.kernels->add_membrane_gradient(
-      membrane.law, membrane.lame, plan.triangle_groups.data(),
-      static_cast<long>(plan.triangle_groups.size()), positions.data(), gradient.data());
-  if (bending.model == data::BendingModel::hinge) {
-    energy.bending = add_hinge_gradient(plan.hinges, material.bending_rigidity, positions, gradient);
+  const BodyPlan& place = law.place;
+  const Membrane membrane = membrane_of(law.material);
+  energy.membrane = plan.kernels->add_membrane_gradient(membrane.law, membrane.lame,
+                                                        plan.triangle_groups.data() + place.first_group,
+                                                        place.group_count, positions.data(), gradient.data());
+  if (law.bends_at_hinges()) {
+    energy.bending =
+        add_hinge_gradient(hinges_of(place, plan.hinges), law.material.bending_rigidity, positions, gradient);
     return energy;
   }
   // Far from the origin positions would round the energy: its differences between them are all that counts.
-  const Points relative = positions.rowwise() - positions.row(0);
-  Points bent = Points::Zero(positions.rows(), 3);
-  add_bending_product(bending, material.bending_rigidity, relative, bent);
-  gradient += bent;
+  const Points relative = rows_of(place.body, positions).rowwise() - positions.row(place.body.first_vertex);
+  const Points bent = bending_product(law.bending, law.material.bending_rigidity, relative);
+  rows_of(place.body, gradient) += bent;
   energy.bending = 0.5 * bent.cwiseProduct(relative).sum();
   return energy;
 }
 
-void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
-                         const data::SheetMaterial& material, const data::Points& positions, double scale,
+void add_elastic_hessian(const SheetPlan& plan, const BodyLaw& law, const Points& positions, double scale,
                          Curvature curvature, BlockValues<double>& values) {
-  const Membrane membrane = membrane_of(material);
-  plan.kernels->add_membrane_hessian(membrane.law, membrane.lame, plan.triangle_groups.data(),
-                                     static_cast<long>(plan.triangle_groups.size()), positions.data(), scale,
-                                     curvature == Curvature::positive, values.data());
-  if (bending.model == data::BendingModel::hinge)
-    add_hinge_hessian(plan, plan.hinges, scale * material.bending_rigidity, positions, values);
+  const Membrane membrane = membrane_of(law.material);
+  plan.kernels->add_membrane_hessian(
+      membrane.law, membrane.lame, plan.triangle_groups.data() + law.place.first_group, law.place.group_count,
+      positions.data(), scale, curvature == Curvature::positive, values.data());
+  if (law.bends_at_hinges())
+    add_hinge_hessian(plan, law.place, plan.hinges, scale * law.material.bending_rigidity, positions, values);
 }
 
 void add_bending_stand_in(const BendingOperator& bending, double rigidity, BlockValues<double>& values) {
@@ -62,12 +61,12 @@ void add_bending_stand_in(const BendingOperator& bending, double rigidity, Block
     for (int c = 0; c < 3; ++c) values[9 * block + 4 * c] += rigidity * bending.stand_in[block];
 }
 
-void add_bending_product(const BendingOperator& bending, double rigidity, const Points& x, Points& y) {
-  if (bending.stiffness.empty()) return;
+Points bending_product(const BendingOperator& bending, double rigidity, const Points& x) {
+  if (bending.stiffness.empty()) return Points::Zero(x.rows(), 3);
   const PaddedPoints padded = padded_vertices(x);
   PaddedPoints product = PaddedPoints::Zero(x.rows(), 4);
   add_product(*bending.kernels, bending.stiffness, rigidity, padded.data(), product.data());
-  y += product.leftCols<3>();
+  return product.leftCols<3>();
 }
 
 }  // namespace flash::sim

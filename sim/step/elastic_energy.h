@@ -1,31 +1,36 @@
 #pragma once
 #include "data/material.h"
 #include "sim/law/membrane.h"
-#include "sim/plan/sheet_plan.h"
+#include "sim/step/body_law.h"
 
 namespace flash::sim {
 
 struct ElasticEnergy {
   double membrane = 0.0;  ///< [J]
   double bending = 0.0;   ///< [J]
+
+  ElasticEnergy& operator+=(const ElasticEnergy& other) {
+    membrane += other.membrane;
+    bending += other.bending;
+    return *this;
+  }
 };
 
-/// Elastic energy of the sheet at `positions`; adds its gradient to `gradient` (vertices x 3) [N].
-ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BendingOperator& bending,
-                                   const data::SheetMaterial& material, const data::Points& positions,
+/// Elastic energy of a body at `positions` of all vertices; adds its gradient to `gradient` (vertices x 3)
+/// [N].
+ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, const data::Points& positions,
                                    data::Points& gradient);
 
-/// Adds `scale` times the Hessian of the membrane and the Gauss-Newton Hessian of hinges. `positive`: the
-/// negative eigenvalues of each triangle are set to zero.
-void add_elastic_hessian(const SheetPlan& plan, const BendingOperator& bending,
-                         const data::SheetMaterial& material, const data::Points& positions, double scale,
-                         Curvature curvature, BlockValues<double>& values);
+/// Adds `scale` times the Hessian of a body's membrane and the Gauss-Newton Hessian of its hinges.
+/// `positive`: the negative eigenvalues of each triangle are set to zero.
+void add_elastic_hessian(const SheetPlan& plan, const BodyLaw& law, const data::Points& positions,
+                         double scale, Curvature curvature, BlockValues<double>& values);
 
 /// Adds `rigidity` times the stand-in for the Hessian of a quadratic bending model.
 void add_bending_stand_in(const BendingOperator& bending, double rigidity, BlockValues<double>& values);
 
-/// y += rigidity * stiffness * x: the Hessian itself of a quadratic bending model, for other models nothing.
-void add_bending_product(const BendingOperator& bending, double rigidity, const data::Points& x,
-                         data::Points& y);
+/// rigidity * stiffness * x over the vertices of the body alone: the Hessian itself of a quadratic bending
+/// model, for other models zero.
+data::Points bending_product(const BendingOperator& bending, double rigidity, const data::Points& x);
 
 }  // namespace flash::sim

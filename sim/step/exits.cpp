@@ -66,10 +66,12 @@ std::vector<WayOut<double>> exits_of(const ContactStep& step, const std::vector<
 
 bool exits_gently(const ContactStep& step, const SheetPlan& plan, const std::vector<std::vector<int>>& inside,
                   const Points& end) {
-  const data::SheetMaterial& material = step.environment.material;
   const Points& start = step.environment.state.positions;
   const Points& rest = plan.sheet.rest.vertices;
-  const double limit = step.way_out.speed * std::sqrt(material.areal_density / material.membrane_stiffness);
+  const auto strain_limit = [&](int vertex) {
+    const data::SheetMaterial& material = step.environment.materials[body_of(step.sheet, vertex)];
+    return step.way_out.speed * std::sqrt(material.areal_density / material.membrane_stiffness);
+  };
   std::vector<bool> exiting(static_cast<size_t>(start.rows()), false);
   for (const std::vector<int>& vertices : inside)
     for (const int i : vertices) exiting[i] = true;
@@ -80,7 +82,7 @@ bool exits_gently(const ContactStep& step, const SheetPlan& plan, const std::vec
       return std::abs((x.row(i) - x.row(j)).norm() / (rest.row(i) - rest.row(j)).norm() - 1);
     };
     const double strain_at_end = strain(end);
-    if (!(strain_at_end <= limit || strain_at_end <= strain(start))) return false;
+    if (!(strain_at_end <= strain_limit(i) || strain_at_end <= strain(start))) return false;
   }
   return true;
 }

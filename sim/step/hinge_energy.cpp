@@ -20,7 +20,11 @@ void add_block(BlockValues<double>& values, BlockSlot slot, const Matrix3d& bloc
 
 }  // namespace
 
-double add_hinge_gradient(const std::vector<Hinge>& hinges, double rigidity, const Points& positions,
+std::span<const Hinge> hinges_of(const BodyPlan& place, const std::vector<Hinge>& hinges) {
+  return std::span(hinges).subspan(place.first_hinge, place.hinge_count);
+}
+
+double add_hinge_gradient(std::span<const Hinge> hinges, double rigidity, const Points& positions,
                           Points& gradient) {
   double energy = 0;
   for (const Hinge& hinge : hinges) {
@@ -35,9 +39,9 @@ double add_hinge_gradient(const std::vector<Hinge>& hinges, double rigidity, con
   return energy;
 }
 
-void add_hinge_hessian(const SheetPlan& plan, const std::vector<Hinge>& hinges, double rigidity,
-                       const Points& positions, BlockValues<double>& values) {
-  for (size_t e = 0; e < hinges.size(); ++e) {
+void add_hinge_hessian(const SheetPlan& plan, const BodyPlan& place, const std::vector<Hinge>& hinges,
+                       double rigidity, const Points& positions, BlockValues<double>& values) {
+  for (int e = place.first_hinge; e < place.first_hinge + place.hinge_count; ++e) {
     const Hinge& hinge = hinges[e];
     HingePositions x, hinge_gradient;
     for (int k = 0; k < 4; ++k) x.col(k) = positions.row(hinge.vertices[k]);

@@ -1,6 +1,7 @@
 #include "sim/step/incremental_potential.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "sim/step/hinge_energy.h"
 #include "sim/step/membrane_damping.h"
@@ -11,22 +12,18 @@ namespace flash::sim {
 using data::Points;
 using Eigen::Vector3d;
 
-IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const BendingOperator& bending,
+IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const std::vector<BodyLaw>& laws,
                                            const Environment& environment, double time_step)
-    : plan_(plan),
-      bending_(bending),
-      environment_(environment),
-      h_(time_step),
-      damping_share_(environment.material.stiffness_damping / time_step) {
+    : plan_(plan), laws_(laws), environment_(environment), h_(time_step), mass_(plan.sheet.vertex_area) {
   const State& start = environment.state;
-  mass_ = environment.material.areal_density * plan.sheet.vertex_area;
+  for (const BodyLaw& law : laws) rows_of(law.place.body, mass_) *= law.material.areal_density;
   target_ = start.positions + h_ * start.velocities;
   target_.rowwise() += h_ * h_ * environment.gravity.transpose();
   loads_ = Points::Zero(start.positions.rows(), 3);
   for (const Load& load : environment.loads) loads_.row(load.vertex) += load.force.transpose();
-  if (damping_share_ == 0) return;
+  const auto damped = [](const BodyLaw& law) { return law.material.stiffness_damping > 0; };
+  if (std::none_of(laws.begin(), laws.end(), damped)) return;
   start_metrics_ = triangle_metrics(plan, start.positions);
-  if (bending.model != data::BendingModel::hinge) return;
   start_hinges_ = plan.hinges;
   for (Hinge& hinge : start_hinges_) {
     HingePositions x;
@@ -35,22 +32,24 @@ IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const BendingO
   }
 }
 
-SheetLame IncrementalPotential::damping_lame() const {
-  const data::SheetMaterial& material = environment_.material;
-  SheetLame lame = sheet_lame(damping_share_ * material.membrane_stiffness, material.poissons_ratio);
+SheetLame IncrementalPotential::damping_lame(const BodyLaw& law) const {
+  const data::SheetMaterial& material = law.material;
+  SheetLame lame = sheet_lame(damping_share(law) * material.membrane_stiffness, material.poissons_ratio);
   if (material.constitutive == data::Constitutive::tri_arap) lame.lambda = 0;
   return lame;
 }
 
 double IncrementalPotential::evaluate(const Points& positions, Points& force, ElasticEnergy& elastic) const {
   const Points inertial = positions - target_, moved = positions - environment_.state.positions;
-  const double drag = environment_.material.air_drag / h_;
-  force = mass_.asDiagonal() * (inertial / (h_ * h_) + drag * moved) - loads_;
-  double potential = 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() +
-                     0.5 * drag * (mass_.asDiagonal() * moved).cwiseProduct(moved).sum() -
+  force = mass_.asDiagonal() * (inertial / (h_ * h_)) - loads_;
+  double potential = 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() -
                      loads_.cwiseProduct(moved).sum();
-  if (damping_share_ > 0) potential += add_damping(positions, force);
-  elastic = add_elastic_gradient(plan_, bending_, environment_.material, positions, force);
+  elastic = {};
+  for (const BodyLaw& law : laws_) {
+    potential += add_drag(law, moved, force);
+    if (law.material.stiffness_damping > 0) potential += add_damping(law, positions, force);
+    elastic += add_elastic_gradient(plan_, law, positions, force);
+  }
   return potential + elastic.membrane + elastic.bending;
 }
 
@@ -60,41 +59,55 @@ double IncrementalPotential::at_start(const ElasticEnergy& elastic) const {
          elastic.bending;
 }
 
-double IncrementalPotential::add_damping(const Points& positions, Points& force) const {
-  const double rigidity = damping_share_ * environment_.material.bending_rigidity;
+double IncrementalPotential::add_drag(const BodyLaw& law, const Points& moved, Points& force) const {
+  if (law.material.air_drag == 0) return 0;
+  const auto own_moved = rows_of(law.place.body, moved);
+  const Points dragged =
+      law.material.air_drag / h_ * (rows_of(law.place.body, mass_).asDiagonal() * own_moved);
+  rows_of(law.place.body, force) += dragged;
+  return 0.5 * dragged.cwiseProduct(own_moved).sum();
+}
+
+double IncrementalPotential::add_damping(const BodyLaw& law, const Points& positions, Points& force) const {
+  const Body& body = law.place.body;
+  const double rigidity = damping_share(law) * law.material.bending_rigidity;
   const double potential =
-      add_membrane_damping_gradient(plan_, start_metrics_, damping_lame(), positions, force);
-  if (bending_.model == data::BendingModel::hinge)
-    return potential + add_hinge_gradient(start_hinges_, rigidity, positions, force);
-  // Quadratic models know positions, not angles: what the sheet turned by as a whole is taken out.
-  const RigidTurn turn(mass_, environment_.state.positions, positions);
-  const Points bent = positions - turn.turned();
-  Points damped = Points::Zero(positions.rows(), 3);
-  add_bending_product(bending_, rigidity, bent, damped);
+      add_membrane_damping_gradient(plan_, law.place, start_metrics_, damping_lame(law), positions, force);
+  if (law.bends_at_hinges())
+    return potential + add_hinge_gradient(hinges_of(law.place, start_hinges_), rigidity, positions, force);
+  // Quadratic models know positions, not angles: what the body turned by as a whole is taken out.
+  const Points own = rows_of(body, positions);
+  const RigidTurn turn(rows_of(body, mass_), rows_of(body, environment_.state.positions), own);
+  const Points bent = own - turn.turned();
+  const Points damped = bending_product(law.bending, rigidity, bent);
   Vector3d torque = Vector3d::Zero();
-  for (Eigen::Index i = 0; i < positions.rows(); ++i)
+  for (Eigen::Index i = 0; i < own.rows(); ++i)
     torque -= turn.turned().row(i).transpose().cross(damped.row(i).transpose());
-  force += damped + turn.gradient(torque);
+  rows_of(body, force) += damped + turn.gradient(torque);
   return potential + 0.5 * damped.cwiseProduct(bent).sum();
 }
 
-double IncrementalPotential::effective_rigidity() const {
-  return environment_.material.bending_rigidity * (1 + damping_share_);
+double IncrementalPotential::effective_rigidity(const BodyLaw& law) const {
+  return law.material.bending_rigidity * (1 + damping_share(law));
 }
 
 void IncrementalPotential::assemble(const Points& positions, Curvature curvature, bool sparse,
                                     BlockValues<double>& values) const {
   values.assign(9 * (plan_.pattern.size + (sparse ? plan_.edge_count : plan_.pattern.pairs.size())), 0.0);
-  add_elastic_hessian(plan_, bending_, environment_.material, positions, 1.0, curvature, values);
-  if (damping_share_ > 0) {
-    add_membrane_damping_hessian(plan_, start_metrics_, damping_lame(), positions, curvature, values);
-    if (bending_.model == data::BendingModel::hinge)
-      add_hinge_hessian(plan_, start_hinges_, damping_share_ * environment_.material.bending_rigidity,
-                        positions, values);
+  for (const BodyLaw& law : laws_) {
+    add_elastic_hessian(plan_, law, positions, 1.0, curvature, values);
+    if (law.material.stiffness_damping > 0) {
+      add_membrane_damping_hessian(plan_, law.place, start_metrics_, damping_lame(law), positions, curvature,
+                                   values);
+      if (law.bends_at_hinges())
+        add_hinge_hessian(plan_, law.place, start_hinges_, damping_share(law) * law.material.bending_rigidity,
+                          positions, values);
+    }
+    const double per_mass = 1 / (h_ * h_) + law.material.air_drag / h_;
+    const Body& body = law.place.body;
+    for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i)
+      for (int c = 0; c < 3; ++c) values[9L * i + 4 * c] += mass_[i] * per_mass;
   }
-  const double per_mass = 1 / (h_ * h_) + environment_.material.air_drag / h_;
-  for (int i = 0; i < plan_.pattern.size; ++i)
-    for (int c = 0; c < 3; ++c) values[9L * i + 4 * c] += mass_[i] * per_mass;
 }
 
 }  // namespace flash::sim

@@ -12,24 +12,24 @@ namespace flash::sim {
 ///
 ///   |x - s|^2_M / (2 h^2) + E(x) - f.x + a / (2 h) |x - x_0|^2_M + b / h E_0(x),   s = x_0 + h v_0 + h^2 g
 ///
-/// with the elastic energy E, loads f, `air_drag` a and `stiffness_damping` b. E_0 is the elastic energy of
-/// what changed since the start of the step: strains, angles of hinges, and positions of a quadratic bending
-/// model, less the rotation of the sheet as a whole. Its forces are b K v for small motions (Kelvin-Voigt). A
-/// sheet that turns rigidly feels no torque from them, stressed or not. The arguments of the constructor have
-/// to outlive the potential.
+/// with the elastic energy E, loads f, `air_drag` a and `stiffness_damping` b of each body. E_0 is the
+/// elastic energy of what changed since the start of the step: strains, angles of hinges, and positions of a
+/// quadratic bending model, less the rotation of the body as a whole. Its forces are b K v for small motions
+/// (Kelvin-Voigt). A sheet that turns rigidly feels no torque from them, stressed or not. The arguments of
+/// the constructor have to outlive the potential.
 class IncrementalPotential {
  public:
-  IncrementalPotential(const SheetPlan& plan, const BendingOperator& bending, const Environment& environment,
-                       double time_step);
+  IncrementalPotential(const SheetPlan& plan, const std::vector<BodyLaw>& laws,
+                       const Environment& environment, double time_step);
 
   /// Mass of each vertex [kg].
   const Eigen::VectorXd& mass() const { return mass_; }
 
   /// Potential [J] at `positions`; `force` becomes its gradient: what every vertex needs from outside [N].
-  /// `elastic`: the energy of the sheet alone.
+  /// `elastic`: the energy of the bodies alone.
   double evaluate(const data::Points& positions, data::Points& force, ElasticEnergy& elastic) const;
 
-  /// Potential at the start of the step, where the energy of the sheet is `elastic` [J].
+  /// Potential at the start of the step, where the energy of the bodies is `elastic` [J].
   double at_start(const ElasticEnergy& elastic) const;
 
   /// Hessian of the potential, without the stiffness of a quadratic bending model. Of hinges it has the
@@ -38,24 +38,30 @@ class IncrementalPotential {
   void assemble(const data::Points& positions, Curvature curvature, bool sparse,
                 BlockValues<double>& values) const;
 
-  /// What the stiffness of a quadratic bending model enters the Hessian with: D (1 + b / h) [N m].
-  double effective_rigidity() const;
+  /// What the stiffness of a body's quadratic bending model enters the Hessian with: D (1 + b / h) [N m].
+  double effective_rigidity(const BodyLaw& law) const;
 
  private:
-  /// Moduli of the membrane times b / h.
-  SheetLame damping_lame() const;
+  /// b / h of a body.
+  double damping_share(const BodyLaw& law) const { return law.material.stiffness_damping / h_; }
 
-  /// Adds the gradient of b / h E_0 to `force` and returns its value [J].
-  double add_damping(const data::Points& positions, data::Points& force) const;
+  /// Moduli of a body's membrane times b / h.
+  SheetLame damping_lame(const BodyLaw& law) const;
+
+  /// Adds the gradient of a body's a / (2 h) |x - x_0|^2_M to `force` and returns its value [J]; `moved`:
+  /// x - x_0.
+  double add_drag(const BodyLaw& law, const data::Points& moved, data::Points& force) const;
+
+  /// Adds the gradient of a body's b / h E_0 to `force` and returns its value [J].
+  double add_damping(const BodyLaw& law, const data::Points& positions, data::Points& force) const;
 
   const SheetPlan& plan_;
-  const BendingOperator& bending_;
+  const std::vector<BodyLaw>& laws_;
   const Environment& environment_;
   double h_;
-  double damping_share_;  ///< b / h
   Eigen::VectorXd mass_;
   data::Points target_, loads_;
-  // Strains and angles at the start of the step; kept with damping alone.
+  // Strains and angles of all bodies at the start of the step; kept where any of them is damped.
   std::vector<Eigen::Matrix2d> start_metrics_;
   std::vector<Hinge> start_hinges_;
 };

@@ -19,11 +19,13 @@ struct Triangle {
   Matrix32 F;
 };
 
-/// Calls use(index, triangle) for each triangle at `positions`.
+/// Calls use(index, triangle) for each triangle of a body at `positions`.
 template <typename Use>
-void for_each_triangle(const SheetPlan& plan, const Points& positions, const Use& use) {
-  size_t index = 0;
-  for (const TriangleGroup& group : plan.triangle_groups)
+void for_each_triangle(const SheetPlan& plan, const BodyPlan& place, const Points& positions,
+                       const Use& use) {
+  size_t index = place.body.first_triangle;
+  for (int g = place.first_group; g < place.first_group + place.group_count; ++g) {
+    const TriangleGroup& group = plan.triangle_groups[g];
     for (int lane = 0; lane < group.count; ++lane) {
       Triangle triangle;
       for (int k = 0; k < 3; ++k) {
@@ -39,6 +41,7 @@ void for_each_triangle(const SheetPlan& plan, const Points& positions, const Use
         triangle.F += positions.row(triangle.vertices[k]).transpose() * triangle.w[k].transpose();
       use(index++, triangle);
     }
+  }
 }
 
 /// Second Piola-Kirchhoff stress of a strain: 2 mu E + lambda tr(E) I.
@@ -50,16 +53,18 @@ Matrix2d stress_of(const SheetLame& lame, const Matrix2d& strain) {
 
 std::vector<Matrix2d> triangle_metrics(const SheetPlan& plan, const Points& positions) {
   std::vector<Matrix2d> metrics;
-  for_each_triangle(plan, positions, [&](size_t, const Triangle& triangle) {
-    metrics.push_back(triangle.F.transpose() * triangle.F);
-  });
+  for (const BodyPlan& place : plan.bodies)
+    for_each_triangle(plan, place, positions, [&](size_t, const Triangle& triangle) {
+      metrics.push_back(triangle.F.transpose() * triangle.F);
+    });
   return metrics;
 }
 
-double add_membrane_damping_gradient(const SheetPlan& plan, const std::vector<Matrix2d>& start_metrics,
-                                     const SheetLame& lame, const Points& positions, Points& gradient) {
+double add_membrane_damping_gradient(const SheetPlan& plan, const BodyPlan& place,
+                                     const std::vector<Matrix2d>& start_metrics, const SheetLame& lame,
+                                     const Points& positions, Points& gradient) {
   double potential = 0;
-  for_each_triangle(plan, positions, [&](size_t index, const Triangle& triangle) {
+  for_each_triangle(plan, place, positions, [&](size_t index, const Triangle& triangle) {
     const Matrix2d strain = 0.5 * (triangle.F.transpose() * triangle.F - start_metrics[index]);
     const Matrix2d stress = stress_of(lame, strain);
     potential += 0.5 * triangle.area * stress.cwiseProduct(strain).sum();
@@ -69,10 +74,10 @@ double add_membrane_damping_gradient(const SheetPlan& plan, const std::vector<Ma
   return potential;
 }
 
-void add_membrane_damping_hessian(const SheetPlan& plan, const std::vector<Matrix2d>& start_metrics,
-                                  const SheetLame& lame, const Points& positions, Curvature curvature,
-                                  BlockValues<double>& values) {
-  for_each_triangle(plan, positions, [&](size_t index, const Triangle& triangle) {
+void add_membrane_damping_hessian(const SheetPlan& plan, const BodyPlan& place,
+                                  const std::vector<Matrix2d>& start_metrics, const SheetLame& lame,
+                                  const Points& positions, Curvature curvature, BlockValues<double>& values) {
+  for_each_triangle(plan, place, positions, [&](size_t index, const Triangle& triangle) {
     const Matrix32& F = triangle.F;
     Matrix2d stress = stress_of(lame, 0.5 * (F.transpose() * F - start_metrics[index]));
     if (curvature == Curvature::positive) {

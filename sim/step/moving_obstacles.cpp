@@ -61,7 +61,6 @@ std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environm
     moving.moves = obstacle.frame != base_frame;
     moving.start = frame_of(moving.moves ? frame_pose(environment, obstacle.frame, start) * place : place);
     moving.end = moving.moves ? frame_of(frame_pose(environment, obstacle.frame, end) * place) : moving.start;
-    moving.friction = obstacle.friction >= 0 ? obstacle.friction : environment.material.friction;
     all.push_back(moving);
   }
   return all;

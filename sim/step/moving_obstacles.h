@@ -22,7 +22,7 @@ struct Gap {
 };
 Gap gap_of(const SurfaceGap<double>& gap);
 
-/// The obstacles of an environment between the times `start` and `end` [s], their friction on its sheet.
+/// The obstacles of an environment between the times `start` and `end` [s].
 std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environment, double start,
                                                      double end);
 

@@ -59,12 +59,11 @@ void share_force(std::span<Touch> touches, const Vector3d& needed, bool (*eligib
   set_forces(Surfaces(touches, needed, eligible), touches);
 }
 
-void share_force_rubbing(std::span<Touch> touches, const std::vector<double>& friction,
-                         const Vector3d& needed, bool (*eligible)(const Touch&)) {
+void share_force_rubbing(std::span<Touch> touches, const Vector3d& needed, bool (*eligible)(const Touch&)) {
   Surfaces surfaces(touches, needed, eligible);
   for (size_t k = 0; k < surfaces.those.size(); ++k) {
-    const size_t touch = surfaces.those[k];
-    surfaces.directions[k] = surfaces.normals[k] - friction[touch] * vector3(touches[touch].slip_direction);
+    const Touch& touch = touches[surfaces.those[k]];
+    surfaces.directions[k] = surfaces.normals[k] - touch.friction_coefficient * vector3(touch.slip_direction);
   }
   set_forces(surfaces, touches);
 }

@@ -15,8 +15,9 @@ struct Touch {
   bool released = false;       ///< in this iterate's linear problem, where the surface would have had to pull
   double gap = 0.0;            ///< [m]
   bool starts_inside = false;  ///< whether the vertex starts the step inside
-  double normal_force = 0;     ///< lambda_n of an obstacle that holds [N]
-  double slip = 0.0;           ///< length of the slip against it in this step, as friction takes it [m]
+  double friction_coefficient = 0;  ///< mu of the obstacle on this vertex
+  double normal_force = 0;          ///< lambda_n of an obstacle that holds [N]
+  double slip = 0.0;                ///< length of the slip against it in this step, as friction takes it [m]
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   Eigen::Vector3d curvature_direction = Eigen::Vector3d::Zero();  ///< as in Gap [m^-1/2]
   Eigen::Vector3d surface_moved = Eigen::Vector3d::Zero();        ///< motion of the surface over the step [m]
@@ -32,9 +33,9 @@ struct Touch {
 void share_force(std::span<Touch> touches, const Eigen::Vector3d& needed, bool (*eligible)(const Touch&));
 
 /// Shares the force among surfaces that each rub against the vertex's own slip: the reaction is the sum of
-/// lambda_k (n_k - mu_k d_k). `friction`: mu of each touch.
-void share_force_rubbing(std::span<Touch> touches, const std::vector<double>& friction,
-                         const Eigen::Vector3d& needed, bool (*eligible)(const Touch&));
+/// lambda_k (n_k - mu_k d_k).
+void share_force_rubbing(std::span<Touch> touches, const Eigen::Vector3d& needed,
+                         bool (*eligible)(const Touch&));
 
 /// Projector on the directions along all surfaces that hold the vertex: space without any, a plane, the edge
 /// of two, or nothing.

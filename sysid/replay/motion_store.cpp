@@ -93,7 +93,7 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
   bytes.add_matrix(world.state.positions);
   bytes.add_matrix(world.state.velocities);
   bytes.add_matrix(world.gravity);
-  const data::SheetMaterial& m = world.material;
+  const data::SheetMaterial& m = world.materials[0];
   for (const double value :
        {static_cast<double>(m.constitutive), static_cast<double>(m.bending_model), m.membrane_stiffness,
         m.poissons_ratio, m.areal_density, m.bending_rigidity, m.friction, m.air_drag, m.stiffness_damping,

@@ -165,7 +165,7 @@ sim::Environment make_environment(const Replay& replay, const ReplayCandidate& c
   const Eigen::RowVector3d raise = nuisance.table_height * replay.up.transpose();
 
   sim::Environment environment;
-  environment.material = candidate.material;
+  environment.materials[0] = candidate.material;
   environment.gravity = recording.gravity;
   environment.state.time = replay.start;
   environment.state.positions = flat.rowwise() + raise;

@@ -11,8 +11,7 @@ void energy_and_forces(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
   data::Points force = data::Points::Zero(towel.positions.rows(), 3);
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        add_elastic_gradient(*towel.plan, towel.bending(), towel.material, towel.positions, force));
+    benchmark::DoNotOptimize(add_elastic_gradient(*towel.plan, towel.law(), towel.positions, force));
   state.SetItemsProcessed(state.iterations() * static_cast<long>(towel.plan->sheet.triangles.size()));
 }
 
@@ -44,8 +43,8 @@ void triangular_solves(benchmark::State& state) {
 void matrix_product(benchmark::State& state) {
   const Towel towel(static_cast<int>(state.range(0)));
   SheetProduct<float> product(*towel.plan->kernels);
-  product.assign(towel.plan->triangle_product, towel.values, towel.bending().elimination_stiffness,
-                 towel.material.bending_rigidity);
+  product.assign(towel.plan->triangle_product, towel.values,
+                 {{&towel.bending().elimination_stiffness, towel.material.bending_rigidity}});
   Eigen::VectorXf x = Eigen::VectorXf::Ones(4 * towel.positions.rows()), y = x;
   for (auto _ : state) product.multiply(x.data(), y.data());
   const size_t blocks = towel.plan->triangle_product.sources.size(),

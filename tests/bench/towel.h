@@ -31,10 +31,12 @@ struct Towel {
     return bending_operator(*plan, material.bending_model, material.poissons_ratio);
   }
 
+  BodyLaw law() const { return {plan->bodies[0], material, bending()}; }
+
   void assemble(Curvature curvature) {
     const double time_step = 0.01;
     values.assign(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, bending(), material, positions, 1.0, curvature, values);
+    add_elastic_hessian(*plan, law(), positions, 1.0, curvature, values);
     add_bending_stand_in(bending(), material.bending_rigidity, values);
     for (int i = 0; i < plan->pattern.size; ++i)
       for (int c = 0; c < 3; ++c)

@@ -14,8 +14,8 @@ namespace {
 /// A sheet that is lifted by a corner off a table, on which it slips.
 Environment lifted(const Sheet& sheet, double stiffness) {
   Environment environment = environment_of(sheet);
-  environment.material.membrane_stiffness = stiffness;
-  environment.material.friction = 0.2;
+  environment.materials[0].membrane_stiffness = stiffness;
+  environment.materials[0].friction = 0.2;
   environment.obstacles.push_back({Plane{}});
   data::Trajectory gripper;
   for (int k = 0; k <= 2; ++k) {
@@ -124,7 +124,7 @@ TEST(Batch, WhatAWorkerThrowsReachesTheCaller) {
     curved.vertices(i, 2) = 5 * curved.vertices(i, 0) * curved.vertices(i, 0);
   const Sheet sheet = make_sheet(curved);
   Environment environment = environment_of(sheet);
-  environment.material.bending_model = data::BendingModel::plate;
+  environment.materials[0].bending_model = data::BendingModel::plate;
   for (const int threads : {1, 2, 4}) {
     Batch batch(make_sheet_plan(sheet), std::vector(4, environment), {.steps = 2, .threads = threads});
     EXPECT_THROW(batch.advance(2), data::InputError) << threads;

@@ -12,7 +12,7 @@ namespace {
 using Eigen::Vector3d;
 
 double weight_of(const Sheet& sheet, const Environment& environment) {
-  return environment.material.areal_density * sheet.vertex_area.sum() * 9.81;
+  return environment.materials[0].areal_density * sheet.vertex_area.sum() * 9.81;
 }
 
 /// The gap to an obstacle where it stands at the start.
@@ -69,8 +69,8 @@ TEST(Contact, SheetOnAPegNeitherSinksNorCreeps) {
   // 0.4 m over a peg of 30 mm: a narrow line of contact carries everything.
   const Sheet sheet = make_sheet(data::rectangle({.width = 0.4, .height = 0.1, .cells_x = 32, .cells_y = 8}));
   Environment environment = environment_of(sheet);
-  environment.material.friction = 0.4;
-  environment.material.bending_rigidity = 1e-5;
+  environment.materials[0].friction = 0.4;
+  environment.materials[0].bending_rigidity = 1e-5;
   environment.obstacles.push_back({Cylinder{{0.2, 0, -0.03}, Vector3d::UnitY(), 0.03}});
   Solver solver(sheet, {.tolerance = 1e-5});
   StepReport report;
@@ -81,9 +81,9 @@ TEST(Contact, SheetOnAPegNeitherSinksNorCreeps) {
       penetration = std::max(penetration, report.penetration_max);
     }
   };
-  environment.material.air_drag = 10;
+  environment.materials[0].air_drag = 10;
   run(200);
-  environment.material.air_drag = 0;
+  environment.materials[0].air_drag = 0;
   const data::Points settled = environment.state.positions;
   run(100);
   EXPECT_LT(penetration, 1e-9);
@@ -115,7 +115,7 @@ TEST(Contact, TheCapstanHoldsUpToItsRatio) {
   for (const double share : {0.94, 1.06}) {
     Environment environment = environment_of(sheet);
     environment.gravity.setZero();
-    environment.material = {
+    environment.materials[0] = {
         .membrane_stiffness = 2000, .bending_rigidity = 1e-9, .friction = friction, .air_drag = 5};
     environment.obstacles.push_back({Cylinder{{0, 0, 0}, Vector3d::UnitY(), radius}});
     for (int i = 0; i < sheet.rest.vertices.rows(); ++i) {
@@ -150,7 +150,7 @@ TEST(Contact, TheCapstanHoldsUpToItsRatio) {
 TEST(Contact, AMovingBoxCarriesTheSheet) {
   const Sheet sheet = small_sheet(6, 0.06);
   Environment environment = environment_of(sheet);
-  environment.material.friction = 0.5;
+  environment.materials[0].friction = 0.5;
   Box tray{.half_extents = {0.1, 0.1, 0.01}};
   data::Trajectory path;
   for (int k = 0; k <= 100; ++k) {
@@ -183,7 +183,7 @@ TEST(Contact, ABoxThatStandsOnATablePushesASheetAlongIt) {
   const Sheet sheet = small_sheet(6, 0.06);
   for (const double height : {0.05, 0.04, 0.06, 0.1}) {
     Environment environment = pushed_by_a_box(sheet, height);
-    environment.material.friction = 0.3;
+    environment.materials[0].friction = 0.3;
     Solver solver(sheet, {});
     for (int n = 0; n < 100; ++n) EXPECT_TRUE(solver.step(environment).converged) << n;
     // The face of the box has come from -0.03 to 0.17.
@@ -204,8 +204,8 @@ TEST(Contact, ASheetThatSlidIntoAWallRestsOnFloorAndWall) {
   const Sheet sheet = small_sheet(6, 0.12);
   for (const double friction : {0.0, 0.1}) {
     Environment environment = environment_of(sheet);
-    environment.material.friction = friction;
-    environment.material.bending_rigidity = 1e-3;  // does not buckle under its own weight
+    environment.materials[0].friction = friction;
+    environment.materials[0].bending_rigidity = 1e-3;  // does not buckle under its own weight
     environment.state.positions.col(0).array() += 0.02;
     const double slope = 0.5;
     environment.gravity = 9.81 * Vector3d(-std::sin(slope), 0, -std::cos(slope));
@@ -231,9 +231,9 @@ TEST(Contact, AStripFallenIntoAGrooveIsCarriedByBothSides) {
   const Sheet sheet =
       make_sheet(data::rectangle({.width = 0.1, .height = 0.04, .cells_x = 10, .cells_y = 4}));
   Environment environment = environment_of(sheet);
-  environment.material.friction = 0.3;
-  environment.material.bending_rigidity = 1e-6;
-  environment.material.air_drag = 5;
+  environment.materials[0].friction = 0.3;
+  environment.materials[0].bending_rigidity = 1e-6;
+  environment.materials[0].air_drag = 5;
   environment.state.positions.col(0).array() -= 0.05;
   environment.state.positions.col(2).array() += 0.05;
   environment.obstacles = {{Plane{Vector3d::Zero(), Vector3d(1, 0, 1).normalized()}},
@@ -355,8 +355,8 @@ TEST(Contact, ASheetInACornerOfThreeSurfacesIsSolved) {
   const Sheet sheet = small_sheet(6, 0.12);
   for (const double friction : {0.0, 0.3}) {
     Environment environment = environment_of(sheet);
-    environment.material.friction = friction;
-    environment.material.bending_rigidity = 1e-4;
+    environment.materials[0].friction = friction;
+    environment.materials[0].bending_rigidity = 1e-4;
     environment.gravity = 9.81 * Vector3d(-0.5, -0.4, -0.7).normalized();
     environment.state.positions.array() += 0.02;
     environment.obstacles = {{Plane{}},
@@ -381,10 +381,10 @@ TEST(Contact, NoEnergyComesOfAnImpactOfAStiffSheetInLongSteps) {
   const Sheet sheet = small_sheet(6, 0.12);
   for (const double stiffness : {1e3, 1e5}) {
     Environment environment = environment_of(sheet);
-    environment.material = {.constitutive = data::Constitutive::tri_arap,
-                            .membrane_stiffness = stiffness,
-                            .bending_rigidity = 1e-5,
-                            .friction = 0};
+    environment.materials[0] = {.constitutive = data::Constitutive::tri_arap,
+                                .membrane_stiffness = stiffness,
+                                .bending_rigidity = 1e-5,
+                                .friction = 0};
     environment.obstacles = {{Plane{}}};
     const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.2, Vector3d(1, 0.3, 0).normalized()).matrix();
     environment.state.positions = environment.state.positions * turn.transpose();
@@ -393,7 +393,7 @@ TEST(Contact, NoEnergyComesOfAnImpactOfAStiffSheetInLongSteps) {
     Solver solver(sheet, {.time_step = 0.02});
     double energy = 0.5 * weight_of(sheet, environment) / 9.81;
     for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
-      energy += environment.material.areal_density * sheet.vertex_area[i] * 9.81 *
+      energy += environment.materials[0].areal_density * sheet.vertex_area[i] * 9.81 *
                 environment.state.positions(i, 2);
     for (int n = 0; n < 40; ++n) {
       const StepReport report = solver.step(environment);

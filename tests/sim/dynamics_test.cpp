@@ -35,7 +35,7 @@ TEST(Dynamics, AirDragFollowsTheDiscreteLaw) {
   const Sheet sheet = small_sheet();
   Environment environment = environment_of(sheet);
   environment.gravity.setZero();
-  environment.material.air_drag = 2.0;
+  environment.materials[0].air_drag = 2.0;
   environment.state.velocities.col(0).setOnes();
   Solver solver(sheet, {.tolerance = 1e-12});
   for (int n = 0; n < 30; ++n) solver.step(environment);
@@ -45,7 +45,7 @@ TEST(Dynamics, AirDragFollowsTheDiscreteLaw) {
 /// Velocity of the tangential slide on a plane tilted by `angle`, from the rotated gravity.
 Environment on_incline(const Sheet& sheet, double angle, double tangent_direction, double friction) {
   Environment environment = environment_of(sheet);
-  environment.material.friction = friction;
+  environment.materials[0].friction = friction;
   environment.gravity = g * Vector3d(std::sin(angle) * std::cos(tangent_direction),
                                      std::sin(angle) * std::sin(tangent_direction), -std::cos(angle));
   environment.obstacles.push_back({Plane{}});

@@ -269,7 +269,7 @@ RandomScene random_scene(unsigned long seed) {
   scene.mesh = draw_mesh(lot, side);
   scene.sheet = make_sheet(data::parse_mesh_spec(scene.mesh));
   scene.settings.time_step = lot.log_uniform(0.001, 0.03);
-  scene.environment.material = draw_material(lot);
+  scene.environment.materials[0] = draw_material(lot);
   scene.environment.state.positions = scene.sheet.rest.vertices;
   scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
   draw_scene(lot, side, scene);
@@ -286,7 +286,7 @@ RandomScene random_deep_start(unsigned long seed) {
   scene.settings.time_step = lot.log_uniform(0.001, 0.03);
   scene.steps = static_cast<int>(0.4 / scene.settings.time_step);
   Environment& environment = scene.environment;
-  environment.material = draw_material(lot);
+  environment.materials[0] = draw_material(lot);
   environment.state.positions = scene.sheet.rest.vertices;
   environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
   if (lot.chance(0.5)) environment.gravity.setZero();
@@ -329,7 +329,7 @@ SceneFindings observe(RandomScene scene) {
     const State before = environment.state;
     if (!energy_known) {
       // The elastic energy of the start is that of the rest shape.
-      const Eigen::VectorXd mass = environment.material.areal_density * scene.sheet.vertex_area;
+      const Eigen::VectorXd mass = environment.materials[0].areal_density * scene.sheet.vertex_area;
       energy = 0.5 * (mass.asDiagonal() * before.velocities).cwiseProduct(before.velocities).sum();
       for (int i = 0; i < mass.size(); ++i)
         energy -= mass[i] * environment.gravity.dot(before.positions.row(i));
@@ -386,7 +386,7 @@ SceneFindings observe(RandomScene scene) {
     put_in += std::max(work, 0.0);
     const double falls = std::max(0.0, [&] {
       double drop = 0;
-      const Eigen::VectorXd mass = environment.material.areal_density * scene.sheet.vertex_area;
+      const Eigen::VectorXd mass = environment.materials[0].areal_density * scene.sheet.vertex_area;
       for (int i = 0; i < mass.size(); ++i)
         drop += mass[i] * environment.gravity.dot(after.positions.row(i) - before.positions.row(i));
       return drop;
@@ -394,7 +394,7 @@ SceneFindings observe(RandomScene scene) {
     put_in += falls;
     if (report.converged && scene.kind != SceneKind::deep) {
       // What the weight does over a nanometre is rounding.
-      const double weight = environment.material.areal_density * scene.sheet.vertex_area.sum() * 9.81;
+      const double weight = environment.materials[0].areal_density * scene.sheet.vertex_area.sum() * 9.81;
       found.energy_gain = std::max(found.energy_gain, gain);
       found.energy_gain_share = std::max(found.energy_gain_share, gain / std::max(put_in, 1e-9 * weight));
     }

@@ -92,7 +92,7 @@ data::SheetMaterial material_of(const json& scene) {
 struct ReferenceRun {
   explicit ReferenceRun(const json& scene)
       : sheet(make_sheet(reference_mesh(scene.at("mesh")))), plan(make_sheet_plan(sheet)) {
-    environment.material = material_of(scene);
+    environment.materials[0] = material_of(scene);
     for (int c = 0; c < 3; ++c) environment.gravity[c] = scene.at("gravity")[c];
     environment.state.positions = sheet.rest.vertices;
     environment.state.velocities = data::Points::Zero(sheet.rest.vertices.rows(), 3);
@@ -145,10 +145,11 @@ struct ReferenceRun {
 
   // Force of the supports at rest, and the energies.
   data::Points support_forces(ElasticEnergy& energy) const {
-    const data::SheetMaterial& m = environment.material;
+    const data::SheetMaterial& m = environment.materials[0];
     data::Points force = data::Points::Zero(sheet.rest.vertices.rows(), 3);
-    energy = add_elastic_gradient(*plan, bending_operator(*plan, m.bending_model, m.poissons_ratio), m,
-                                  environment.state.positions, force);
+    energy = add_elastic_gradient(
+        *plan, {plan->bodies[0], m, bending_operator(*plan, m.bending_model, m.poissons_ratio)},
+        environment.state.positions, force);
     return force - m.areal_density * sheet.vertex_area * environment.gravity.transpose();
   }
 
@@ -279,7 +280,7 @@ TEST_P(Cantilever, DropsAsTheElastica) {
     drop -= x(v, 2) / double(tips.size());
     along += x(v, 0) / double(tips.size());
   }
-  const data::SheetMaterial& m = run.environment.material;
+  const data::SheetMaterial& m = run.environment.materials[0];
   const double weight = m.areal_density * 9.81;
   expect_positions(scene, run);
   judge("tip drop / L_eff", {drop / length});

@@ -31,9 +31,9 @@ TEST_P(Patch, UniaxialStretchGivesBackYoungsModulusAndPoissonsRatio) {
   const Sheet sheet = make_sheet(data::delaunay_rectangle(width, height, 0.012, 3));
   Environment environment = environment_of(sheet);
   environment.gravity.setZero();
-  environment.material.constitutive = GetParam();
-  environment.material.membrane_stiffness = 120;
-  environment.material.poissons_ratio = 0.3;
+  environment.materials[0].constitutive = GetParam();
+  environment.materials[0].membrane_stiffness = 120;
+  environment.materials[0].poissons_ratio = 0.3;
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i) {
     const auto x = sheet.rest.vertices.row(i);
     const bool left = x[0]<1e-9, right = x[0]> width - 1e-9;
@@ -57,9 +57,9 @@ TEST_P(Patch, ShearGivesBackTheShearModulus) {
   const Sheet sheet = make_sheet(data::delaunay_rectangle(side, side, 0.012, 5));
   Environment environment = environment_of(sheet);
   environment.gravity.setZero();
-  environment.material.constitutive = GetParam();
-  environment.material.membrane_stiffness = 120;
-  environment.material.poissons_ratio = 0.3;
+  environment.materials[0].constitutive = GetParam();
+  environment.materials[0].membrane_stiffness = 120;
+  environment.materials[0].poissons_ratio = 0.3;
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i) {
     const Eigen::Vector3d x = sheet.rest.vertices.row(i);
     const bool border = x.head<2>().minCoeff() < 1e-9 || x.head<2>().maxCoeff() > side - 1e-9;
@@ -80,11 +80,11 @@ TEST(Statics, AHangingStripStretchesByItsOwnWeight) {
   const Sheet sheet =
       make_sheet(data::rectangle({.width = length, .height = width, .cells_x = 50, .cells_y = 2}));
   Environment environment = environment_of(sheet);
-  environment.material = {.membrane_stiffness = 200,
-                          .poissons_ratio = 0,
-                          .areal_density = 0.2,
-                          .bending_rigidity = 1e-8,
-                          .air_drag = 5};
+  environment.materials[0] = {.membrane_stiffness = 200,
+                              .poissons_ratio = 0,
+                              .areal_density = 0.2,
+                              .bending_rigidity = 1e-8,
+                              .air_drag = 5};
   environment.gravity = {g, 0, 0};
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
     if (sheet.rest.vertices(i, 0) < 1e-9)
@@ -115,11 +115,11 @@ TEST_P(HeavyElastica, TipDropsAsTheBoundaryValueProblemSays) {
   const double effective = length + cell / 2;
   for (const Elastica& row : {Elastica{1, 0.12347}, {10, 0.70020}, {50, 0.90792}, {100, 0.93752}}) {
     Environment environment = environment_of(sheet);
-    environment.material = {.membrane_stiffness = 2e3 * density * g * length,
-                            .poissons_ratio = 0,
-                            .areal_density = density,
-                            .bending_rigidity = density * g * std::pow(effective, 3) / row.gamma,
-                            .air_drag = 5};
+    environment.materials[0] = {.membrane_stiffness = 2e3 * density * g * length,
+                                .poissons_ratio = 0,
+                                .areal_density = density,
+                                .bending_rigidity = density * g * std::pow(effective, 3) / row.gamma,
+                                .air_drag = 5};
     for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
       if (sheet.rest.vertices(i, 0) < 1e-3)
         environment.holds.push_back(support(i, {true, true, true}, sheet.rest.vertices.row(i)));

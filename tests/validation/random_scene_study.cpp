@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
   std::map<std::string, Sum> sums;
   for (std::size_t k = 0; k < count; ++k) {
     const sim::SceneFindings& found = findings[k];
-    const auto& material = scenes[k].environment.material;
+    const auto& material = scenes[k].environment.materials[0];
     const bool gains = found.energy_gain_share > 1e-2, unseen = found.unseen_depth > 1e-4;
     if (list && (found.unconverged > 0 || !found.finite || gains || found.crossed > 0 || unseen || deep))
       std::printf(

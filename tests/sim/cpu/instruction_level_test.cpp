@@ -100,17 +100,18 @@ TEST(InstructionLevel, MembranesAreThoseOfTheFormulasForOneTriangle) {
       material.constitutive = constitutive;
       const BendingOperator& bending =
           bending_operator(*plan, material.bending_model, material.poissons_ratio);
+      const BodyLaw law{plan->bodies[0], material, bending};
       const Points x = 1.02 * sheet.rest.vertices + noise(size, 2e-3, 4);
       for (const Curvature curvature : {Curvature::exact, Curvature::positive}) {
         const BruteForce expected(sheet, material, x, curvature);
         Points gradient = Points::Zero(size, 3);
         material.bending_rigidity = 0;
-        const ElasticEnergy energy = add_elastic_gradient(*plan, bending, material, x, gradient);
+        const ElasticEnergy energy = add_elastic_gradient(*plan, law, x, gradient);
         EXPECT_NEAR(energy.membrane, expected.energy, roundings * expected.energies);
         EXPECT_TRUE(
             ((gradient - expected.gradient).array().abs() <= roundings * expected.forces.array()).all());
         BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-        add_elastic_hessian(*plan, bending, material, x, 1.0, curvature, values);
+        add_elastic_hessian(*plan, law, x, 1.0, curvature, values);
         const Eigen::MatrixXd difference = dense(plan->pattern, values) - expected.hessian;
         EXPECT_TRUE((difference.array().abs() <= roundings * expected.stiffnesses.array()).all())
             << difference.cwiseAbs().cwiseQuotient(expected.stiffnesses.cwiseMax(1e-300)).maxCoeff() /
@@ -132,9 +133,8 @@ void expect_matrix_products(const Kernels& kernels) {
   BlockValues<double> values(9 * (size + plan->pattern.pairs.size()));
   for (double& value : values) value = entry(random);
   const Eigen::MatrixXd matrix = dense(plan->pattern, values);
-  const RowGroups none;
   SheetProduct<Scalar> product(kernels);
-  product.assign(plan->full_product, values, none, 1.0);
+  product.assign(plan->full_product, values, {});
   Eigen::Matrix<Scalar, Eigen::Dynamic, 1> x = Eigen::Matrix<Scalar, Eigen::Dynamic, 1>::Zero(4 * size),
                                            y = x;
   Eigen::VectorXd in_order(3 * size), result(3 * size);
@@ -184,8 +184,8 @@ TEST(InstructionLevel, SheetsTakeTheSameIterations) {
   for (const InstructionLevel level : instruction_levels()) {
     SCOPED_TRACE(to_string(level));
     Environment environment = environment_of(sheet);
-    environment.material.bending_rigidity = 1e-2;
-    environment.material.air_drag = 1;
+    environment.materials[0].bending_rigidity = 1e-2;
+    environment.materials[0].air_drag = 1;
     for (int i = 0; i < sheet.rest.vertices.rows(); ++i)
       if (sheet.rest.vertices(i, 0) == 0)
         environment.holds.push_back(support(i, {true, true, true}, sheet.rest.vertices.row(i)));

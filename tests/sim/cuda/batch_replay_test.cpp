@@ -143,7 +143,7 @@ struct Trajectory {
 
 Trajectory by_processor(const Scene& scene, double tolerance) {
   Environment environment;
-  environment.material = scene.environment.material;
+  environment.materials[0] = scene.environment.material;
   environment.gravity = scene.environment.gravity;
   environment.loads = scene.environment.loads;
   environment.state.positions = scene.environment.positions;

@@ -88,12 +88,13 @@ struct Bench {
   }
 
   const BendingOperator& bending() const { return bending_operator(*plan, data::BendingModel::plate, 0.3); }
+  BodyLaw law(int e) const { return {plan->bodies[0], materials[e], bending()}; }
 
   /// Hessian of membrane and inertia; `positive` with the stand-in for bending.
   BlockValues<double> values(int e, bool positive) const {
     BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, bending(), materials[e], positions[e], 1.0,
-                        positive ? Curvature::positive : Curvature::exact, values);
+    add_elastic_hessian(*plan, law(e), positions[e], 1.0, positive ? Curvature::positive : Curvature::exact,
+                        values);
     if (positive) add_bending_stand_in(bending(), materials[e].bending_rigidity, values);
     for (int i = 0; i < plan->pattern.size; ++i)
       for (int c = 0; c < 3; ++c)
@@ -166,8 +167,7 @@ TEST(BatchSystem, EnergiesAndGradientsAreThoseOfTheProcessor) {
     const std::vector<ElasticEnergies> energies = bench.batch.energies();
     for (int e = 0; e < bench.batch.size(); ++e) {
       Points expected = Points::Zero(plan->pattern.size, 3);
-      const ElasticEnergy energy =
-          add_elastic_gradient(*plan, bench.bending(), bench.materials[e], bench.positions[e], expected);
+      const ElasticEnergy energy = add_elastic_gradient(*plan, bench.law(e), bench.positions[e], expected);
       // Places of order one, rounded a few dozen times on the way to a stress.
       const Eigen::VectorXd bound = 32 * double_epsilon * bench.stiffness_bound(e, bench.positions[e]);
       expect_within(bench.batch.gradient(e), expected, bound);
@@ -261,7 +261,7 @@ struct Direction {
 Direction processors_direction(const Bench& bench, int e, const ContactSet& contacts, double tolerance) {
   NewtonMatrix matrix(bench.plan);
   EXPECT_TRUE(matrix.factorize(bench.values(e, true)));
-  matrix.assign(bench.values(e, false), true, bench.bending(), bench.materials[e].bending_rigidity,
+  matrix.assign(bench.values(e, false), true, {{bench.bending(), bench.materials[e].bending_rigidity}},
                 numbers_of(bench.materials[e]).inertia_density * bench.plan->sheet.vertex_area.minCoeff());
   Direction result;
   result.change = Points::Zero(bench.plan->pattern.size, 3);

@@ -27,7 +27,6 @@ struct Example {
   long size = 3L * plan->pattern.size;
   BlockValues<double> values;
   MatrixXd dense = MatrixXd::Zero(size, size);
-  RowGroups no_scalar_part;
   SheetProduct<Scalar> product{*plan->kernels};
   BlockCholesky<float> preconditioner{plan->symbolic, *plan->kernels};
 
@@ -42,7 +41,7 @@ struct Example {
       put(i, i, block * block.transpose() + 30 * (1 + i % 7) * Matrix3d::Identity());
     }
     for (const auto& [i, j] : plan->pattern.pairs) put(i, j, noise());
-    product.assign(plan->full_product, values, no_scalar_part, 0);
+    product.assign(plan->full_product, values, {});
     // The factor of the identity: far enough from the matrix to take several iterations.
     BlockValues<double> identity(values.size(), 0.0);
     for (int i = 0; i < plan->pattern.size; ++i)
@@ -123,7 +122,7 @@ TEST(Krylov, ConjugateGradientsStopWhereTheMatrixCurvesDown) {
   Example<double> example;
   BlockValues<double> down = example.values;
   for (double& value : down) value = -value;
-  example.product.assign(example.plan->full_product, down, example.no_scalar_part, 0);
+  example.product.assign(example.plan->full_product, down, {});
   const VectorXd right = VectorXd::LinSpaced(example.size, -1, 2);
   const RestrictedProblem<double> problem{example.product,
                                           example.preconditioner,

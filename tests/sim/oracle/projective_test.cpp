@@ -35,7 +35,7 @@ void lay_on(const Plane& plane, Environment& environment) {
 }
 
 double total_mass(const Sheet& sheet, const Environment& environment) {
-  return environment.material.areal_density * sheet.vertex_area.sum();
+  return environment.materials[0].areal_density * sheet.vertex_area.sum();
 }
 
 Vector3d mean(const Points& x) { return x.colwise().mean(); }
@@ -66,7 +66,7 @@ TEST(Projective, InclineSticksAndSlipsToAThousandthInBothTangentBases) {
       const Plane plane = incline(slope);
       lay_on(plane, environment);
       const Points start = environment.state.positions;
-      environment.obstacles.push_back({plane, critical + offset});
+      environment.obstacles.push_back({plane, {critical + offset}});
       ProjectiveSettings settings;
       settings.tolerance = 1e-8;
       settings.tangent_angle = tangents;
@@ -94,7 +94,7 @@ TEST(Projective, SlidingStopsAfterVSquaredOverTwoMuG) {
   const Sheet sheet = square_sheet(0.1, 3);
   for (const double angle : {0.0, 0.7}) {
     Environment environment = environment_of(sheet);
-    environment.obstacles.push_back({Plane{}, 0.4});
+    environment.obstacles.push_back({Plane{}, {0.4}});
     const Vector3d v(0.5 * std::cos(angle), 0.5 * std::sin(angle), 0);
     environment.state.velocities.rowwise() = v.transpose();
     ProjectiveSettings settings;
@@ -118,7 +118,7 @@ TEST(Projective, EveryNamedSolverAndBothComplementaritiesGiveTheSameStep) {
       Environment environment = environment_of(sheet);
       environment.state.positions.col(2).array() += 1e-3;
       environment.state.velocities.col(0).setConstant(0.3);
-      environment.obstacles.push_back({Plane{}, 0.3});
+      environment.obstacles.push_back({Plane{}, {0.3}});
       ProjectiveSettings settings;
       settings.iterations = 60;
       settings.tolerance = 1e-8;
@@ -135,11 +135,11 @@ TEST(Projective, EveryNamedSolverAndBothComplementaritiesGiveTheSameStep) {
 /// A sheet hung over a thin horizontal rail at its middle row, at rest: few contacts carry all of it.
 Environment over_a_peg(const Sheet& sheet, double friction) {
   Environment environment = environment_of(sheet);
-  environment.material.membrane_stiffness = 200;
-  environment.material.bending_rigidity = 1e-4;
+  environment.materials[0].membrane_stiffness = 200;
+  environment.materials[0].bending_rigidity = 1e-4;
   const double size = sheet.rest.vertices.col(0).maxCoeff(), radius = 0.01;
   environment.obstacles.push_back(
-      {Cylinder{Vector3d(size / 2, 0, -radius), Vector3d::UnitY(), radius}, friction});
+      {Cylinder{Vector3d(size / 2, 0, -radius), Vector3d::UnitY(), radius}, {friction}});
   return environment;
 }
 
@@ -157,7 +157,7 @@ TEST(Projective, SheetOnAPegNeitherSinksNorCreepsWithTheFullMetric) {
   const Sheet sheet = square_sheet(0.2, 10);
   Environment environment = over_a_peg(sheet, 0.5);
   environment.gravity = g * Vector3d(0, std::sin(0.2), -std::cos(0.2));  // the peg slopes by 0.2 rad
-  environment.material.air_drag = 10;
+  environment.materials[0].air_drag = 10;
   ProjectiveSolver solver(sheet, {});
   ProjectiveReport report;
   double slid = 0;
@@ -182,7 +182,7 @@ TEST(Projective, TheInertiaMetricSinksAndCreepsAsDocumentedAndSaysSo) {
   for (const int iterations : {10, 30}) {
     Environment environment = over_a_peg(sheet, 0.5);
     environment.gravity = g * Vector3d(0, std::sin(0.2), -std::cos(0.2));
-    environment.material.air_drag = 10;
+    environment.materials[0].air_drag = 10;
     ProjectiveSettings settings;
     settings.metric = ContactMetric::inertia;
     settings.iterations = iterations;
@@ -210,14 +210,14 @@ TEST(Projective, ConvergesToTheStepThatNewtonsMethodFinds) {
          {data::BendingModel::plate, data::BendingModel::isometric, data::BendingModel::hinge}) {
       if (constitutive != data::Constitutive::tri_corotated && bending != data::BendingModel::plate) continue;
       Environment a = environment_of(sheet);
-      a.material.constitutive = constitutive;
-      a.material.bending_model = bending;
-      a.material.membrane_stiffness = 60;
-      a.material.bending_rigidity = 1e-4;
-      a.material.air_drag = 0.5;
-      a.material.stiffness_damping = 1e-3;
-      a.material.friction = 0.3;
-      a.obstacles.push_back({Plane{}, -1});
+      a.materials[0].constitutive = constitutive;
+      a.materials[0].bending_model = bending;
+      a.materials[0].membrane_stiffness = 60;
+      a.materials[0].bending_rigidity = 1e-4;
+      a.materials[0].air_drag = 0.5;
+      a.materials[0].stiffness_damping = 1e-3;
+      a.materials[0].friction = 0.3;
+      a.obstacles.push_back({Plane{}});
       a.loads.push_back({24, {0.01, 0, 0.005}});
       // A corner is lifted off the table and dragged.
       data::Trajectory gripper;
@@ -269,16 +269,14 @@ TEST(Projective, EveryNamedSolverSolvesTheMetricOfARealSheet) {
   const Sheet sheet = square_sheet(0.2, 8);
   const auto plan = make_sheet_plan(sheet);
   Environment environment = environment_of(sheet);
-  environment.material.membrane_stiffness = 300;
+  environment.materials[0].membrane_stiffness = 300;
   environment.obstacles.push_back({Box{.half_extents = {0.051, 0.051, 0.01},
                                        .pose = Eigen::Isometry3d(Eigen::Translation3d(0.1, 0.1, -0.01))},
-                                   0.3});
-  const auto bending =
-      bending_operator(*plan, environment.material.bending_model, environment.material.poissons_ratio);
-  ProjectiveSystem system(*plan, environment.material, h);
+                                   {0.3}});
+  ProjectiveSystem system(*plan, environment.materials, h);
   system.hold({std::vector<int>{0, 8}, {0}, {0, 8, 40}});
   std::vector<Vector3d> free_axes(81, Vector3d::Ones());
-  const auto contacts = find_contacts(environment, h, h, environment.state.positions,
+  const auto contacts = find_contacts(sheet, environment, h, h, environment.state.positions,
                                       Eigen::VectorXd::Constant(81, 1e-6), free_axes, 0.3);
   ASSERT_EQ(contacts.size(), 25u);
   const Eigen::MatrixXd W = full_metric(contacts, system);

@@ -17,7 +17,7 @@ struct Run {
   Environment environment = draw_world(sheet);
   int steps = 20;
   SolverSettings settings{.time_step = draw_log(2e-3, 2e-2), .tolerance = draw_log(1e-6, 1e-3)};
-  Eigen::VectorXd mass = masses_of(sheet, environment.material);
+  Eigen::VectorXd mass = masses_of(sheet, environment.materials[0]);
   Solver solver{sheet, settings};
 };
 
@@ -57,10 +57,10 @@ RC_GTEST_PROP(Properties, ReportedForcesBalanceWeightAndInertia, ()) {
     const State before = environment.state;
     const StepReport report = run.solver.step(environment);
     // In a step in parts the air acts at velocities that only its parts know.
-    if (!report.converged || (report.substeps > 1 && environment.material.air_drag > 0)) continue;
+    if (!report.converged || (report.substeps > 1 && environment.materials[0].air_drag > 0)) continue;
     const data::Points& v = environment.state.velocities;
     Vector3d asked = ((run.mass.asDiagonal() * (v - before.velocities)) / run.settings.time_step +
-                      environment.material.air_drag * (run.mass.asDiagonal() * v))
+                      environment.materials[0].air_drag * (run.mass.asDiagonal() * v))
                          .colwise()
                          .sum()
                          .transpose();
@@ -89,7 +89,7 @@ RC_GTEST_PROP(Properties, ForcesOfPlanesAreInTheConeOfFriction, ()) {
       const Obstacle& obstacle = run.environment.obstacles[k];
       const auto* plane = std::get_if<Plane>(&obstacle.shape);
       if (plane == nullptr) continue;
-      const double friction = obstacle.friction < 0 ? run.environment.material.friction : obstacle.friction;
+      const double friction = friction_between(run.environment, obstacle, 0);
       const double normal = report.obstacle_forces[k].dot(plane->normal);
       const double along = (report.obstacle_forces[k] - normal * plane->normal).norm();
       const double unbalanced = unbalanced_sum(run.environment, run.mass, report);

@@ -24,7 +24,8 @@ data::Trajectory even_path(const Vector3d& start, const Vector3d& velocity) {
 
 Obstacle draw_obstacle(Environment& environment) {
   const Vector3d place(draw(0, 0.2), draw(0, 0.2), 0);
-  const double friction = draw_chance(0.3) ? draw(0, 1) : -1;
+  std::vector<double> friction;
+  if (draw_chance(0.3)) friction.push_back(draw(0, 1));
   const int kind = draw_below(3);
   if (kind == 0) {
     Vector3d normal = draw_direction();
@@ -92,7 +93,7 @@ data::SheetMaterial draw_material() {
 
 Environment draw_flight(const Sheet& sheet) {
   Environment environment = environment_of(sheet);
-  environment.material = draw_material();
+  environment.materials[0] = draw_material();
   environment.gravity = (draw_chance(0.9) ? 9.81 : 0.0) * draw_direction();
   const double cell = std::sqrt(sheet.vertex_area.mean());
   data::Points& x = environment.state.positions;

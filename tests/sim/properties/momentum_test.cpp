@@ -13,7 +13,7 @@ using Eigen::Vector3d;
 data::Points remaining_forces(const Environment& before, const Environment& after,
                               const Eigen::VectorXd& mass, double time_step) {
   data::Points force = (after.state.velocities - before.state.velocities) / time_step +
-                       after.material.air_drag * after.state.velocities;
+                       after.materials[0].air_drag * after.state.velocities;
   force.rowwise() -= after.gravity.transpose();
   force = mass.asDiagonal() * force;
   for (const Load& load : after.loads) force.row(load.vertex) -= load.force.transpose();
@@ -25,9 +25,9 @@ data::Points remaining_forces(const Environment& before, const Environment& afte
 RC_GTEST_PROP(Properties, InternalForcesNeitherPushNorTurn, ()) {
   const Sheet sheet = draw_sheet();
   Environment environment = draw_flight(sheet);
-  environment.material.stiffness_damping = 0;
+  environment.materials[0].stiffness_damping = 0;
   if (draw_chance(0.3)) environment.loads.push_back({0, draw(0, 0.05) * draw_direction()});
-  const Eigen::VectorXd mass = masses_of(sheet, environment.material);
+  const Eigen::VectorXd mass = masses_of(sheet, environment.materials[0]);
   const SolverSettings settings{.time_step = draw_log(1e-3, 2e-2), .tolerance = draw_log(1e-6, 1e-3)};
   Solver solver(sheet, settings);
   for (int step = 0; step < 6; ++step) {
@@ -54,9 +54,9 @@ RC_GTEST_PROP(Properties, InternalForcesNeitherPushNorTurn, ()) {
 RC_GTEST_PROP(Properties, DampingDoesNotPush, ()) {
   const Sheet sheet = draw_sheet();
   Environment environment = draw_flight(sheet);
-  environment.material.air_drag = 0;
-  environment.material.stiffness_damping = draw_log(1e-4, 1e-2);
-  const Eigen::VectorXd mass = masses_of(sheet, environment.material);
+  environment.materials[0].air_drag = 0;
+  environment.materials[0].stiffness_damping = draw_log(1e-4, 1e-2);
+  const Eigen::VectorXd mass = masses_of(sheet, environment.materials[0]);
   const SolverSettings settings{.time_step = draw_log(1e-3, 2e-2), .tolerance = draw_log(1e-6, 1e-3)};
   Solver solver(sheet, settings);
   for (int step = 0; step < 6; ++step) {

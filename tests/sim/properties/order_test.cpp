@@ -70,13 +70,13 @@ RC_GTEST_PROP(Properties, NumbersOfVerticesAndTrianglesDoNotMatter, ()) {
   const int count = static_cast<int>(sheet.rest.vertices.rows());
   Environment environment = draw_flight(sheet);
   environment.gravity = {1, 0, -9.81};
-  environment.material.friction = 0;
+  environment.materials[0].friction = 0;
   if (draw_chance(0.5)) {
     const double lowest = environment.state.positions.col(2).minCoeff();
     environment.obstacles.push_back({Plane{{0, 0, lowest}, Eigen::Vector3d::UnitZ()}});
   }
   const double h = draw_log(1e-3, 5e-3);
-  data::SheetMaterial& material = environment.material;
+  data::SheetMaterial& material = environment.materials[0];
   material.membrane_stiffness =
       draw_log(0.005, 0.5) * material.areal_density * sheet.vertex_area.minCoeff() / (h * h);
   material.bending_rigidity = std::min(material.bending_rigidity, material.membrane_stiffness * 1e-4 / 12);

@@ -61,7 +61,7 @@ data::Trajectory still_gripper(const Vector3d& position) {
 }
 
 Eigen::VectorXd masses(const Sheet& sheet, const Environment& environment) {
-  return environment.material.areal_density * sheet.vertex_area;
+  return environment.materials[0].areal_density * sheet.vertex_area;
 }
 
 Vector3d momentum(const Sheet& sheet, const Environment& environment) {
@@ -98,8 +98,8 @@ TYPED_TEST(Grasping, HeldVerticesFollowTheGripperRigidly) {
 TYPED_TEST(Grasping, ReactionIsWeightPlusInertiaInEveryStep) {
   const Sheet sheet = small_sheet();
   Environment environment = environment_of(sheet);
-  environment.material.stiffness_damping = 1e-3;
-  environment.material.bending_rigidity = 1e-3;  // projective dynamics does not converge on a limp one
+  environment.materials[0].stiffness_damping = 1e-3;
+  environment.materials[0].bending_rigidity = 1e-3;  // projective dynamics does not converge on a limp one
   environment.holds = {gripped(environment, near_corner(sheet, 0.035), swinging_gripper(0.5))};
   auto solver = Tight<TypeParam>::make(sheet);
   const double mass = masses(sheet, environment).sum();
@@ -115,8 +115,8 @@ TYPED_TEST(Grasping, ReactionIsWeightPlusInertiaInEveryStep) {
 TYPED_TEST(Grasping, AtRestTheGripperCarriesTheWeight) {
   const Sheet sheet = small_sheet(4);
   Environment environment = environment_of(sheet);
-  environment.material.air_drag = 20;
-  environment.material.bending_rigidity = 1e-3;
+  environment.materials[0].air_drag = 20;
+  environment.materials[0].bending_rigidity = 1e-3;
   environment.holds = {gripped(environment, near_corner(sheet, 0.05), still_gripper(Vector3d::Zero()))};
   auto solver = Tight<TypeParam>::make(sheet);
   StepReport report;
@@ -168,9 +168,9 @@ TYPED_TEST(Grasping, TwoEndEffectorsPullWithTheTensionOfTheSheet) {
   const Sheet sheet = small_sheet(6, side);
   Environment environment = environment_of(sheet);
   environment.gravity.setZero();
-  environment.material.membrane_stiffness = stiffness;
-  environment.material.poissons_ratio = 0;
-  environment.material.air_drag = 200;
+  environment.materials[0].membrane_stiffness = stiffness;
+  environment.materials[0].poissons_ratio = 0;
+  environment.materials[0].air_drag = 200;
   std::vector<int> left, right;
   for (int i = 0; i < sheet.rest.vertices.rows(); ++i) {
     if (sheet.rest.vertices(i, 0) < 1e-9) left.push_back(i);
@@ -223,8 +223,8 @@ TYPED_TEST(Grasping, ZeroLengthPullsToTheGripperWhereKeptOffsetsDoNot) {
 TYPED_TEST(Grasping, AHeldCornerOverATableSharesTheWeightWithIt) {
   const Sheet sheet = small_sheet();
   Environment environment = environment_of(sheet);
-  environment.obstacles.push_back({Plane{}, 0.3});
-  environment.material.air_drag = 5;
+  environment.obstacles.push_back({Plane{}, {0.3}});
+  environment.materials[0].air_drag = 5;
   environment.holds = {gripped(environment, near_corner(sheet, 0.025),
                                straight_path(Vector3d::Zero(), Vector3d(0.01, 0.01, 0.03), 0.3))};
   auto solver = Tight<TypeParam>::make(sheet);
@@ -234,7 +234,7 @@ TYPED_TEST(Grasping, AHeldCornerOverATableSharesTheWeightWithIt) {
     const StepReport report = solver.step(environment);
     EXPECT_TRUE(report.converged) << n;
     EXPECT_LE(report.penetration_max, 1e-7);
-    const Vector3d drag = -environment.material.air_drag * momentum(sheet, environment);
+    const Vector3d drag = -environment.materials[0].air_drag * momentum(sheet, environment);
     const Vector3d expected =
         (momentum(sheet, environment) - before) / h - mass.sum() * environment.gravity - drag;
     const Vector3d found = report.hold_forces[0] + report.obstacle_forces[0];

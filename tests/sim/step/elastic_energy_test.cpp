@@ -40,15 +40,16 @@ TEST(ElasticEnergy, GradientIsTheDerivativeOfTheEnergy) {
     for (const BendingModel model : bendings) {
       const data::SheetMaterial material = material_of(constitutive, model);
       const BendingOperator& bending = bending_operator(*plan, model, material.poissons_ratio);
+      const BodyLaw law{plan->bodies[0], material, bending};
       const Points x = sheet.rest.vertices + noise(sheet.rest.vertices.rows(), 2e-3, 4);
       const Points along = noise(x.rows(), 1, 5);
       const auto energy = [&](double step) {
         Points unused = Points::Zero(x.rows(), 3);
-        const ElasticEnergy e = add_elastic_gradient(*plan, bending, material, x + step * along, unused);
+        const ElasticEnergy e = add_elastic_gradient(*plan, law, x + step * along, unused);
         return e.membrane + e.bending;
       };
       Points gradient = Points::Zero(x.rows(), 3);
-      add_elastic_gradient(*plan, bending, material, x, gradient);
+      add_elastic_gradient(*plan, law, x, gradient);
       const double step = 1e-6;  // central differences: step^2 truncation against 1e-16 / step rounding
       const double slope = (energy(step) - energy(-step)) / (2 * step);
       EXPECT_NEAR(gradient.cwiseProduct(along).sum(), slope, 1e-5 * std::abs(slope));
@@ -66,9 +67,10 @@ TEST(ElasticEnergy, BendingIsTheSameFarFromTheOrigin) {
   for (const BendingModel model : {BendingModel::plate, BendingModel::isometric}) {
     const data::SheetMaterial material = material_of(Constitutive::tri_corotated, model);
     const BendingOperator& bending = bending_operator(*plan, model, material.poissons_ratio);
+    const BodyLaw law{plan->bodies[0], material, bending};
     Points unused = Points::Zero(x.rows(), 3);
-    const double here = add_elastic_gradient(*plan, bending, material, back, unused).bending;
-    const double there = add_elastic_gradient(*plan, bending, material, far, unused).bending;
+    const double here = add_elastic_gradient(*plan, law, back, unused).bending;
+    const double there = add_elastic_gradient(*plan, law, far, unused).bending;
     EXPECT_EQ(there, here);  // differences of such places are exact
   }
 }
@@ -93,17 +95,18 @@ TEST(ElasticEnergy, HessianOfAStretchedSheetIsTheDerivativeOfTheGradient) {
   for (const Constitutive constitutive : membranes) {
     const data::SheetMaterial material = material_of(constitutive, BendingModel::plate);
     const BendingOperator& bending = bending_operator(*plan, material.bending_model, material.poissons_ratio);
+    const BodyLaw law{plan->bodies[0], material, bending};
     const Points x = 1.1 * sheet.rest.vertices + noise(sheet.rest.vertices.rows(), 2e-4, 4);
     const Points along = noise(x.rows(), 1, 6);
     BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-    add_elastic_hessian(*plan, bending, material, x, 1.0, Curvature::exact, values);
+    add_elastic_hessian(*plan, law, x, 1.0, Curvature::exact, values);
     Points product = Points::Zero(x.rows(), 3);
     add_block_product(plan->pattern, values, along, product);
-    add_bending_product(bending, material.bending_rigidity, along, product);
+    product += bending_product(bending, material.bending_rigidity, along);
     const double step = 1e-7;
     Points ahead = Points::Zero(x.rows(), 3), behind = ahead;
-    add_elastic_gradient(*plan, bending, material, x + step * along, ahead);
-    add_elastic_gradient(*plan, bending, material, x - step * along, behind);
+    add_elastic_gradient(*plan, law, x + step * along, ahead);
+    add_elastic_gradient(*plan, law, x - step * along, behind);
     const Points expected = (ahead - behind) / (2 * step);
     EXPECT_LT((product - expected).norm(), 1e-6 * expected.norm());
   }
@@ -118,8 +121,9 @@ TEST(ElasticEnergy, RigidMotionCostsNothing) {
     for (const BendingModel model : bendings) {
       const data::SheetMaterial material = material_of(constitutive, model);
       const BendingOperator& bending = bending_operator(*plan, model, material.poissons_ratio);
+      const BodyLaw law{plan->bodies[0], material, bending};
       Points gradient = Points::Zero(moved.rows(), 3);
-      const ElasticEnergy energy = add_elastic_gradient(*plan, bending, material, moved, gradient);
+      const ElasticEnergy energy = add_elastic_gradient(*plan, law, moved, gradient);
       EXPECT_NEAR(energy.membrane, 0, 1e-12);
       // A quadratic model sums products of entries and places that cancel.
       double entries = 0;

@@ -25,7 +25,7 @@ double solid_side(const Journey& journey) { return journey.name.starts_with("und
 /// Where the sheet ends over one box, or over two that meet at x = 0 in its place.
 data::Points end_of(const Journey& journey, const Sheet& sheet, bool two) {
   Environment environment = environment_of(sheet);
-  environment.material.friction = journey.friction;
+  environment.materials[0].friction = journey.friction;
   environment.gravity = journey.gravity;
   environment.state.positions.rowwise() += journey.start.transpose();
   environment.state.velocities.rowwise() = journey.velocity.transpose();
@@ -91,7 +91,7 @@ TEST(FlushBoxes, ASheetThatCatchesAtAStepStaysOnTop) {
   const Sheet sheet = small_sheet(6, 0.06);
   for (const double step : {1e-5, 1e-4, 1e-3}) {
     Environment environment = environment_of(sheet);
-    environment.material.friction = 0;
+    environment.materials[0].friction = 0;
     environment.state.positions.col(0).array() -= 0.065;
     environment.state.velocities.col(0).setConstant(0.1);
     for (const double side : {-1.0, 1.0}) {

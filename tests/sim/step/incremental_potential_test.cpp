@@ -28,11 +28,11 @@ Points noise(Eigen::Index rows, double size, unsigned seed) {
 /// A crumpled, stretched sheet on its way, damped.
 Environment moving_environment(const Sheet& sheet, BendingModel model) {
   Environment environment = environment_of(sheet);
-  environment.material = {.bending_model = model,
-                          .membrane_stiffness = 200,
-                          .bending_rigidity = 1e-3,
-                          .air_drag = 2,
-                          .stiffness_damping = 0.05};
+  environment.materials[0] = {.bending_model = model,
+                              .membrane_stiffness = 200,
+                              .bending_rigidity = 1e-3,
+                              .air_drag = 2,
+                              .stiffness_damping = 0.05};
   environment.state.positions = 1.05 * sheet.rest.vertices + noise(sheet.rest.vertices.rows(), 3e-3, 1);
   environment.state.velocities = noise(sheet.rest.vertices.rows(), 0.3, 2);
   environment.loads.push_back({3, {0.1, -0.2, 0.3}});
@@ -44,7 +44,8 @@ TEST(IncrementalPotential, TheForceIsItsGradient) {
   const auto plan = make_sheet_plan(sheet);
   for (const BendingModel model : bendings) {
     const Environment environment = moving_environment(sheet, model);
-    const IncrementalPotential potential(*plan, bending_operator(*plan, model, 0.3), environment, 0.01);
+    const std::vector<BodyLaw> laws = body_laws(*plan, environment);
+    const IncrementalPotential potential(*plan, laws, environment, 0.01);
     const Points x = environment.state.positions + noise(sheet.rest.vertices.rows(), 2e-3, 3),
                  along = noise(x.rows(), 1, 4);
     Points force, unused;
@@ -67,7 +68,7 @@ TEST(IncrementalPotential, TheMembraneDampingsHessianIsTheDerivativeOfItsGradien
   const SheetLame lame = sheet_lame(200, 0.3);
   const Points x = start + noise(start.rows(), 2e-3, 3), along = noise(x.rows(), 1, 4);
   BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-  add_membrane_damping_hessian(*plan, metrics, lame, x, Curvature::exact, values);
+  add_membrane_damping_hessian(*plan, plan->bodies[0], metrics, lame, x, Curvature::exact, values);
   Points product = Points::Zero(x.rows(), 3);
   for (int i = 0; i < plan->pattern.size; ++i)
     product.row(i) += along.row(i) * Eigen::Map<const Eigen::Matrix3d>(values.data() + 9 * i).transpose();
@@ -79,8 +80,8 @@ TEST(IncrementalPotential, TheMembraneDampingsHessianIsTheDerivativeOfItsGradien
   }
   const double step = 1e-7;
   Points ahead = Points::Zero(x.rows(), 3), behind = ahead;
-  add_membrane_damping_gradient(*plan, metrics, lame, x + step * along, ahead);
-  add_membrane_damping_gradient(*plan, metrics, lame, x - step * along, behind);
+  add_membrane_damping_gradient(*plan, plan->bodies[0], metrics, lame, x + step * along, ahead);
+  add_membrane_damping_gradient(*plan, plan->bodies[0], metrics, lame, x - step * along, behind);
   const Points expected = (ahead - behind) / (2 * step);
   EXPECT_LT((product - expected).norm(), 1e-6 * expected.norm());
 }
@@ -91,10 +92,11 @@ TEST(IncrementalPotential, DampingPutsNoTorqueAndNoForceOnAStressedSheetThatTurn
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.4, Vector3d(1, -2, 3).normalized()).matrix();
   for (const BendingModel model : bendings) {
     Environment environment = moving_environment(sheet, model), undamped = environment;
-    undamped.material.stiffness_damping = 0;
-    const BendingOperator& bending = bending_operator(*plan, model, 0.3);
-    const IncrementalPotential damped_potential(*plan, bending, environment, 0.01),
-        undamped_potential(*plan, bending, undamped, 0.01);
+    undamped.materials[0].stiffness_damping = 0;
+    const std::vector<BodyLaw> laws = body_laws(*plan, environment),
+                               undamped_laws = body_laws(*plan, undamped);
+    const IncrementalPotential damped_potential(*plan, laws, environment, 0.01),
+        undamped_potential(*plan, undamped_laws, undamped, 0.01);
     const auto damping_at = [&](const Points& x) {
       Points with, without;
       ElasticEnergy elastic;
@@ -130,12 +132,12 @@ Swing swing_of(const Sheet& sheet, BendingModel model, double damping) {
   constexpr double time_step = 1e-3, clamped = 0.0068;
   Environment environment = environment_of(sheet);
   environment.gravity.setZero();
-  environment.material = {.bending_model = model,
-                          .membrane_stiffness = 1e4,
-                          .poissons_ratio = 0,
-                          .areal_density = 0.1,
-                          .bending_rigidity = 1e-3,
-                          .stiffness_damping = damping};
+  environment.materials[0] = {.bending_model = model,
+                              .membrane_stiffness = 1e4,
+                              .poissons_ratio = 0,
+                              .areal_density = 0.1,
+                              .bending_rigidity = 1e-3,
+                              .stiffness_damping = damping};
   Eigen::VectorXd mode = Eigen::VectorXd::Zero(sheet.rest.vertices.rows());
   for (int i = 0; i < mode.size(); ++i) {
     const double x = sheet.rest.vertices(i, 0);
