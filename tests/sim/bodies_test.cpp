@@ -142,13 +142,18 @@ TEST_P(Bodies, EachMovesAsItDoesAlone) {
   EXPECT_GT(slid, 10 * stuck);  // friction is each one's own
 }
 
+constexpr auto plate = data::BendingModel::plate, hinge = data::BendingModel::hinge,
+               isometric = data::BendingModel::isometric;
+
 INSTANTIATE_TEST_SUITE_P(Models, Bodies,
-                         testing::Values(std::array{data::BendingModel::plate, data::BendingModel::plate,
-                                                    data::BendingModel::plate},
-                                         std::array{data::BendingModel::hinge, data::BendingModel::hinge,
-                                                    data::BendingModel::hinge},
-                                         std::array{data::BendingModel::plate, data::BendingModel::hinge,
-                                                    data::BendingModel::isometric}));
+                         testing::Values(std::array{plate, plate, plate}, std::array{hinge, hinge, hinge},
+                                         std::array{plate, hinge, isometric}),
+                         [](const auto& models) {
+                           std::string name;
+                           for (const data::BendingModel model : models.param)
+                             name += model == plate ? "Plate" : model == hinge ? "Hinge" : "Isometric";
+                           return name;
+                         });
 
 TEST(BodiesTogether, ThePublishedMethodHasAMatrixBlockForEach) {
   const Worlds worlds = three_sheets();
