@@ -60,7 +60,8 @@ void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWor
                  StepReport& report) {
   assemble_matrix(problem, stuck, w);
   const Linearization iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
-  const double enough = linear_tolerance * w.settings.tolerance * problem.force_scale;
+  const double lightest = *std::min_element(problem.force_scales.begin(), problem.force_scales.end());
+  const double enough = linear_tolerance * w.settings.tolerance * lightest;
   w.linear = w.now.contacts;
   w.gradient = w.now.residual;
   w.refactor = false;

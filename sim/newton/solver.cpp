@@ -41,7 +41,7 @@ bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& repo
   problem.evaluate(w.now);
   iterate_to_balance(problem, w, report);
 
-  report.residual = w.now.residual.norm() / problem.force_scale;
+  report.residual = problem.relative_residual(w.now);
   report_contacts(problem, w.now, report);
   const bool energy_is_sound = account_for_energy(problem, elastic_at_start, w.now, report);
   const bool sound = report.complementarity <= gap_tolerance && energy_is_sound;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "data/worst.h"
+
 namespace flash::sim {
 
 StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
@@ -10,8 +12,17 @@ StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, 
     : laws(body_laws(plan, environment)),
       potential(plan, laws, environment, time_step),
       contacts(plan.sheet, environment, time_step, way_out),
-      gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81),
-      force_scale(potential.mass().norm() * gravity) {}
+      gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81) {
+  for (const BodyLaw& law : laws)
+    force_scales.push_back(rows_of(law.place.body, potential.mass()).norm() * gravity);
+}
+
+double StepProblem::relative_residual(const Iterate& iterate) const {
+  double largest = 0;
+  for (std::size_t b = 0; b < laws.size(); ++b)
+    largest = data::worst(largest, rows_of(laws[b].place.body, iterate.residual).norm() / force_scales[b]);
+  return largest;
+}
 
 void StepProblem::evaluate(Iterate& iterate) const {
   iterate.materials = contacts.environment.materials;
@@ -23,19 +34,24 @@ void StepProblem::evaluate(Iterate& iterate) const {
 }
 
 bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
-  constexpr double vertex_tolerance = 30;  ///< tolerance of a vertex as a multiple of the sheet's
-  double squared_rounding = 0;
-  for (int i = 0; i < iterate.residual.rows(); ++i) {
-    const VertexConstraint* c = iterate.contacts.find(i);
-    const double rounding = c == nullptr ? 0
-                                         : std::numeric_limits<double>::epsilon() *
-                                               iterate.positions.row(i).norm() * c->slip_stiffness.norm();
-    if (!(iterate.residual.row(i).norm() <=
-          vertex_tolerance * tolerance * potential.mass()[i] * gravity + rounding))
+  constexpr double vertex_tolerance = 30;  ///< tolerance of a vertex as a multiple of the body's
+  for (std::size_t b = 0; b < laws.size(); ++b) {
+    const Body& body = laws[b].place.body;
+    double squared_rounding = 0;
+    for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i) {
+      const VertexConstraint* c = iterate.contacts.find(i);
+      const double rounding = c == nullptr ? 0
+                                           : std::numeric_limits<double>::epsilon() *
+                                                 iterate.positions.row(i).norm() * c->slip_stiffness.norm();
+      if (!(iterate.residual.row(i).norm() <=
+            vertex_tolerance * tolerance * potential.mass()[i] * gravity + rounding))
+        return false;
+      squared_rounding += rounding * rounding;
+    }
+    if (!(rows_of(body, iterate.residual).norm() <= tolerance * force_scales[b] + std::sqrt(squared_rounding)))
       return false;
-    squared_rounding += rounding * rounding;
   }
-  return iterate.residual.norm() <= tolerance * force_scale + std::sqrt(squared_rounding);
+  return true;
 }
 
 }  // namespace flash::sim

@@ -20,8 +20,8 @@ struct StepProblem {
   std::vector<BodyLaw> laws;
   IncrementalPotential potential;
   ContactStep contacts;
-  double gravity;      ///< [m/s^2]; 9.81 without
-  double force_scale;  ///< |M g| [N]
+  double gravity;                    ///< [m/s^2]; 9.81 without
+  std::vector<double> force_scales;  ///< |M g| of each body [N]
 
   /// The arguments but `way_out` have to outlive the problem.
   StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
@@ -31,9 +31,12 @@ struct StepProblem {
   /// Fills in an iterate from its positions.
   void evaluate(Iterate& iterate) const;
 
-  /// Whether |r| <= tolerance |M g|, and no vertex misses its weight by more than 30 times as much. The
-  /// rounding of positions turns the friction of a vertex that starts to slide: that much more may be
-  /// missing.
+  /// The largest |r| / |M g| of a body.
+  double relative_residual(const Iterate& iterate) const;
+
+  /// Whether |r| <= tolerance |M g| for each body, and no vertex misses its weight by more than 30 times as
+  /// much. The rounding of positions turns the friction of a vertex that starts to slide: that much more may
+  /// be missing.
   bool balanced(const Iterate& iterate, double tolerance) const;
 };
 

@@ -9,7 +9,7 @@ namespace flash::sim {
 
 /// How one step of one environment went.
 struct StepReport {
-  double residual = 0;  ///< |r| / |M g|; without gravity as if it were 9.81 m/s^2
+  double residual = 0;  ///< largest |r| / |M g| of a body; without gravity as if it were 9.81 m/s^2
   int iterations = 0;   ///< of Newton's method
   int solves = 0;       ///< solves with a factor: iterations of the linear solver
   int factorizations = 0;

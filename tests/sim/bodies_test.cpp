@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "sim/newton/step_problem.h"
 #include "sim/oracle/projective_system.h"
-#include "sim/step/body_law.h"
 #include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
@@ -168,6 +168,28 @@ TEST(BodiesTogether, ThePublishedMethodHasAMatrixBlockForEach) {
         Eigen::MatrixXd(alone.matrix());
   }
   EXPECT_EQ(left.cwiseAbs().maxCoeff(), 0);
+}
+
+TEST(BodiesTogether, EachIsSolvedToTheToleranceOfItsOwnWeight) {
+  Worlds worlds = three_sheets();
+  worlds.environments[0].materials[0].areal_density = 1e-3;
+  JoinedWorld whole = join(worlds);
+  update_holds(whole.environment, time_step);
+  const auto plan = make_sheet_plan(whole.sheet);
+  const StepProblem problem(*plan, whole.environment, time_step, {.speed = 1});
+  Iterate iterate;
+  iterate.positions = whole.environment.state.positions;
+  iterate.contacts = begin_step(problem.contacts, iterate.positions);
+  problem.evaluate(iterate);
+  for (const Body& body : whole.sheet.bodies) {
+    const double weight = 9.81 * rows_of(body, problem.potential.mass()).norm();
+    const Points random = Points::Random(body.vertex_count, 3);
+    iterate.residual.setZero();
+    rows_of(body, iterate.residual) = 2e-3 * weight / random.norm() * random;
+    EXPECT_NEAR(problem.relative_residual(iterate), 2e-3, 1e-15);
+    EXPECT_FALSE(problem.balanced(iterate, 1.9e-3));
+    EXPECT_TRUE(problem.balanced(iterate, 2.1e-3));
+  }
 }
 
 TEST(BodiesTogether, APlanMakesABendingOperatorForABodyAndAPoissonsRatio) {
