@@ -22,6 +22,14 @@ struct Gap {
 };
 Gap gap_of(const SurfaceGap<double>& gap);
 
+/// An obstacle as it stands in the frame that carries it, in both of its frames. `friction`: of the sheet.
+MovingObstacle<double> obstacle_in_frame(const Obstacle& obstacle, double friction);
+
+/// Whether a box stands beside another obstacle, so that one may continue the other.
+bool stand_beside(const std::vector<Obstacle>& obstacles);
+
+Frame<double> frame_of(const Eigen::Isometry3d& pose);
+
 /// The obstacles of an environment between the times `start` and `end` [s], their friction on its sheet.
 std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environment, double start,
                                                      double end);
