@@ -2,10 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <tuple>
 
 #include "sim/cuda/device_arena.h"
@@ -55,6 +57,7 @@ void check(const SheetPlan& plan, const std::vector<ReplayEnvironment>& environm
             "every environment needs a position and a velocity for each vertex");
     require(e.holds == nullptr || std::ssize(*e.holds) >= settings.steps - settings.first_step,
             "what is held has to be given for each step");
+    require(e.hold_count == environments.front().hold_count, "all environments need as many holds");
     require(e.obstacles.size() <= most_obstacles, "an environment may have 8 obstacles");
     for (const Obstacle& obstacle : e.obstacles)
       require(obstacle.frame == base_frame || (e.schedule != nullptr && obstacle.frame >= 0 &&
@@ -134,7 +137,8 @@ struct FlatMotions {
         held_in[held.vertex] = k;
         holds.push_back({position[held.vertex],
                          int{held.axes[0]} | 2 * int{held.axes[1]} | 4 * int{held.axes[2]},
-                         {held.target.x(), held.target.y(), held.target.z()}});
+                         {held.target.x(), held.target.y(), held.target.z()},
+                         {held.holds[0], held.holds[1], held.holds[2]}});
       }
       most = std::max(most, static_cast<int>(holds.size()) - starts.back());
     }
@@ -206,6 +210,7 @@ struct BatchReplay::Memory {
   SheetLayout layout;
   DevicePlan plan;
   cudaStream_t stream = nullptr;
+  int* stop = nullptr;  ///< of the host, read by the device
 
   DeviceArray<ReplayMaterial> materials;
   DeviceArray<Point> positions, velocities, loads;
@@ -214,7 +219,7 @@ struct BatchReplay::Memory {
   DeviceArray<PlacedObstacle> obstacles;
   DeviceArray<FramePose> poses;
   DeviceArray<ReplayStats> stats;
-  DeviceArray<double> kept;
+  DeviceArray<double> kept, hold_forces;
   DeviceArray<char> arena;
   DeviceArray<TeamMemory> team_memory;
   int teams = 0;
@@ -245,7 +250,9 @@ struct BatchReplay::Memory {
     numbers.fronts = plan.fronts;
     numbers.sheet = plan.sheet;
     numbers.teams = team_memory.data();
-    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), 0};
+    check(cudaMallocHost(&stop, sizeof(int)));
+    *stop = 0;
+    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), stop, 0};
     place_on_chip(settings.precision, numbers);
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
@@ -267,6 +274,9 @@ struct BatchReplay::Memory {
     numbers.positions = positions.data();
     numbers.velocities = velocities.data();
     numbers.stats = stats.data();
+    numbers.hold_count = environments.front().hold_count;
+    hold_forces = DeviceArray<double>(3 * stats.size() * static_cast<std::size_t>(numbers.hold_count));
+    numbers.hold_forces = hold_forces.data();
     numbers.kept_index = kept_index.data();
     numbers.kept_count = static_cast<int>(settings.kept_steps.size());
     numbers.order = order.data();
@@ -275,6 +285,7 @@ struct BatchReplay::Memory {
     keep_start(environments);
   }
   ~Memory() {
+    cudaFreeHost(stop);
     if (stream != nullptr) cudaStreamDestroy(stream);
   }
 
@@ -410,7 +421,13 @@ int BatchReplay::size() const { return memory_->count; }
 int BatchReplay::step() const { return memory_->step; }
 int BatchReplay::teams() const { return memory_->teams; }
 void BatchReplay::advance(int steps) { memory_->advance(steps); }
-void BatchReplay::synchronize() { cuda::check(cudaStreamSynchronize(memory_->stream)); }
+void BatchReplay::synchronize(const std::atomic<bool>* stop) {
+  const Memory& m = *memory_;
+  while (stop != nullptr && !*stop && cudaStreamQuery(m.stream) == cudaErrorNotReady)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  if (stop != nullptr && *stop) *m.stop = 1;
+  cuda::check(cudaStreamSynchronize(m.stream));
+}
 
 Points BatchReplay::positions(int environment) const {
   return memory_->points(memory_->positions, environment);
@@ -426,6 +443,14 @@ Points BatchReplay::kept_positions(int environment, int index) const {
       static_cast<std::size_t>(environment) * m.settings.kept_steps.size() + static_cast<std::size_t>(index);
   const std::vector<double> numbers = m.kept.read(place * 3 * m.size(), 3 * m.size());
   return Eigen::Map<const Points>(numbers.data(), m.layout.size, 3);
+}
+
+std::vector<double> BatchReplay::hold_forces(int environment) const {
+  const Memory& m = *memory_;
+  cuda::check(cudaStreamSynchronize(m.stream));
+  const std::size_t each =
+      3 * static_cast<std::size_t>(m.numbers.stats_each) * static_cast<std::size_t>(m.numbers.hold_count);
+  return m.hold_forces.read(static_cast<std::size_t>(environment) * each, each);
 }
 
 std::vector<double> BatchReplay::phases() const {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -17,7 +18,10 @@ namespace flash::sim::cuda {
 struct HeldVertex {
   int vertex;
   std::array<bool, 3> axes = {true, true, true};
-  Eigen::Vector3d target;  ///< places of the held axes [m]
+  Eigen::Vector3d target;                ///< places of the held axes [m]
+  std::array<int, 3> holds = {0, 0, 0};  ///< number of the hold that each axis obeys
+
+  bool operator==(const HeldVertex&) const = default;
 };
 
 /// What is held in each step, no vertex twice in one.
@@ -29,6 +33,7 @@ struct ReplayEnvironment {
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
   std::vector<Load> loads;
   std::shared_ptr<const HoldMotion> holds;  ///< by step, from first_step on
+  int hold_count = 1;                       ///< all environments have as many
   std::vector<Obstacle> obstacles;
   std::shared_ptr<const Schedule> schedule;  ///< of the frames that obstacles name; none: all at rest
   double time = 0;                           ///< at which it stands [s]
@@ -81,11 +86,15 @@ class BatchReplay {
 
   /// Queues the next steps of all environments and returns; what reads results waits for them.
   void advance(int steps);
-  void synchronize();
+  /// Waits for what is queued. Once `stop` is set the device ends after the steps that its teams are at, and
+  /// the results are of no use.
+  void synchronize(const std::atomic<bool>* stop = nullptr);
 
   data::Points positions(int environment) const;   ///< [m]
   data::Points velocities(int environment) const;  ///< [m/s]
   data::Points kept_positions(int environment, int index) const;
+  /// Forces of the holds on the sheet, mean over each step: steps from first_step on x holds x 3 [N].
+  std::vector<double> hold_forces(int environment) const;
   std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on
   /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions, rest.
   std::vector<double> phases() const;

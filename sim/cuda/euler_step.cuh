@@ -10,6 +10,7 @@ namespace flash::sim::cuda {
 struct StepMotion {
   const HeldPlace* held;  ///< vertices at its end
   int held_count;
+  double* hold_forces;  ///< on the sheet, three numbers a hold, for which this step has zeros [N]
   const PlacedObstacle* obstacles;
   int obstacle_count;
   bool several;            ///< whether a box stands beside another obstacle
@@ -59,6 +60,23 @@ __device__ inline void predict(const Work& w, const StepProblem& step, const Ste
       const double from = w.memory.hold_starts[3 * k + axis], to = held.target[axis];
       if (held.axes >> axis & 1) *places[axis] = share == 1 ? to : from + share * (to - from);
     }
+  }
+}
+
+/// Adds what the holds exert in a share of the step.
+__device__ inline void add_hold_forces(const Work& w, const StepMotion& motion, double share) {
+  for (int hold = 0; hold < w.replay.hold_count; ++hold) {
+    double sums[3] = {};
+    for (int k = static_cast<int>(threadIdx.x); k < motion.held_count; k += team_threads) {
+      const HeldPlace& held = motion.held[k];
+      for (int axis = 0; axis < 3; ++axis)
+        if ((held.axes >> axis & 1) != 0 && held.holds[axis] == hold)
+          sums[axis] += w.now.force[3 * held.place + axis];
+    }
+    sum_over_team(sums, shared_memory<double>());
+    if (threadIdx.x == 0)
+      for (int axis = 0; axis < 3; ++axis) motion.hold_forces[3 * hold + axis] += share * sums[axis];
+    __syncthreads();
   }
 }
 
@@ -175,6 +193,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   const double residual = judged.finite ? w.now.residual / step.material->force_scale : INFINITY;
   if (!(residual <= stats.residual)) stats.residual = residual;
   ++stats.substeps;
+  add_hold_forces(w, motion, end - begin);
   stats.penetration = worse_of(stats.penetration, judged.penetration);
   stats.converged = judged.sound && balanced(step, w.now, tolerance);
   for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {

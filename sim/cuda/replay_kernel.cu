@@ -59,12 +59,15 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
     if (at % replay.restart_interval == 0) w.refactor = true;
     const long row = static_cast<long>(material.motion) * replay.motion_steps + (at - replay.stats_begin);
     const int* starts = replay.hold_starts + row;
-    const StepMotion motion = {replay.holds + starts[0],
-                               starts[1] - starts[0],
-                               replay.obstacles + static_cast<long>(replay.most_obstacles_each) * e,
-                               material.obstacle_count,
-                               material.several,
-                               replay.poses + row * replay.frames};
+    const StepMotion motion = {
+        replay.holds + starts[0],
+        starts[1] - starts[0],
+        replay.hold_forces +
+            3L * replay.hold_count * (static_cast<long>(replay.stats_each) * e + at - replay.stats_begin),
+        replay.obstacles + static_cast<long>(replay.most_obstacles_each) * e,
+        material.obstacle_count,
+        material.several,
+        replay.poses + row * replay.frames};
     step.restrictions.count = step.held_count = motion.held_count;
     const ReplayStats stats = advance_step<Stored>(w, step, motion, positions, velocities);
     const long place = at - replay.stats_begin;

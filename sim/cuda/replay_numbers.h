@@ -47,6 +47,7 @@ struct HeldPlace {
   int place;
   int axes;  ///< bits 1, 2 and 4: x, y and z
   double target[3];
+  int holds[3];  ///< number of the hold that each axis obeys
 };
 
 /// How one step of one environment went.
@@ -91,8 +92,9 @@ struct WorkQueue {
   int* entries;  ///< -1 where nothing stands yet
   int* taken;
   int* added;
-  int* steps;  ///< where each environment stands
-  int size;    ///< entries in all
+  int* steps;       ///< where each environment stands
+  const int* stop;  ///< of the host: once set no team takes another environment
+  int size;         ///< entries in all
 };
 
 struct ReplayNumbers {
@@ -121,6 +123,8 @@ struct ReplayNumbers {
   double exit_speed;              ///< [m/s]
   Point *positions, *velocities;  ///< state of each environment
   ReplayStats* stats;
+  double* hold_forces;  ///< environments x steps x holds x 3, from stats_begin on, zero at first [N]
+  int hold_count;
   const int* kept_index;  ///< of each step from stats_begin on, -1 where it is not kept
   int kept_count;
   const int* order;  ///< vertex at each place
