@@ -195,6 +195,8 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
                   arena.take<VertexTouch>(size * obstacles), arena.take<double>(size)};
     m.obstacles = arena.take<MovingObstacle<double>>(obstacles);
     m.own_blocks = arena.take<float>(9 * size);
+    m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),
+                 arena.take<float>(3 * size * most_directions), arena.take<double>(small_numbers)};
   }
   m.hold_starts = arena.take<double>(3 * held);
   m.clocks = arena.take<long long>(replay_phases + 1);

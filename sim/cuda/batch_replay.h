@@ -69,8 +69,7 @@ struct ReplayStep {
 /// has. A block of threads takes an environment through up to `restart_interval` steps and then another one
 /// that waits. So none waits for the others, and what an environment gets depends on its own numbers alone,
 /// bitwise. Linear problems are in single precision, energies, residuals, contact and positions in double. A
-/// held vertex moves on a straight line within a step that has to be halved. Friction does not follow the
-/// normal forces within an iteration, and a sheet that starts inside obstacles leaves them by the first exit.
+/// held vertex moves on a straight line within a step that has to be halved.
 class BatchReplay {
  public:
   /// Throws std::invalid_argument where environments do not fit the plan, have not the same bending operator,
@@ -96,7 +95,8 @@ class BatchReplay {
   /// Forces of the holds on the sheet, mean over each step: steps from first_step on x holds x 3 [N].
   std::vector<double> hold_forces(int environment) const;
   std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on
-  /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions, rest.
+  /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions,
+  /// contact, rest.
   std::vector<double> phases() const;
 
  private:

@@ -45,13 +45,15 @@ __device__ inline void copy_contacts(const SheetTables& tables, const StepProble
 }
 
 /// Fills in what may not move freely: held vertices, and those that `contacts` hold. Their order does not
-/// matter. `count`: on chip.
+/// matter. `left`: null, or the matrices of sim/cuda/generalized_residuals.cuh. `count`: on chip.
 __device__ inline void gather_restrictions(const SheetTables& tables, StepProblem& step,
                                            const ContactSet& contacts, VertexRestriction* list, int* of_place,
-                                           int* count) {
+                                           float* left, int* count) {
   if (step.obstacles.count == 0) return;
   __syncthreads();
   if (threadIdx.x == 0) *count = step.held_count;
+  for (int k = static_cast<int>(threadIdx.x); k < step.held_count && left != nullptr; k += team_threads)
+    for (int e = 0; e < 9; ++e) left[9 * k + e] = list[k].free[e];
   __syncthreads();
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     if (step.held_axes[i] != 0) continue;
@@ -69,6 +71,12 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
     const int at = atomicAdd(count, 1);
     list[at] = restriction;
     of_place[i] = at;
+    if (left == nullptr) continue;
+    for (int c = 0; c < 3; ++c) {
+      const Triple coupling = friction_coupling(step.obstacles, contact, step.touches_of(contacts, i), c);
+      for (int r = 0; r < 3; ++r)
+        left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
+    }
   }
   __syncthreads();
   step.restrictions.count = *count;

@@ -1,4 +1,5 @@
 #pragma once
+#include "sim/cuda/exits.cuh"
 #include "sim/cuda/newton_iteration.cuh"
 #include "sim/cuda/obstacle_motion.cuh"
 
@@ -84,6 +85,7 @@ struct StepEnd {
   bool sound;          ///< whether its energy came from somewhere, and contact is complementary
   bool finite;         ///< whether all positions are
   double penetration;  ///< deepest vertex below a surface [m]
+  double start_depth;  ///< deepest that started inside an obstacle [m]
 };
 
 /// The end of a step, its energy as account_for_energy of the CPU has it.
@@ -136,10 +138,10 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
   const double allowed = energy_tolerance * there + sums[unbalanced] + rounding;
   const bool finite = isfinite(sums[kinetic]);
   const bool complementary = contact.complementarity <= gap_tolerance;
-  if (!(gain <= allowed) || !complementary) return {false, finite, contact.penetration};
+  if (!(gain <= allowed) || !complementary) return {false, finite, contact.penetration, contact.start_depth};
   const bool falls_below_start =
       w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + allowed;
-  return {!start_is_feasible || falls_below_start, finite, contact.penetration};
+  return {!start_is_feasible || falls_below_start, finite, contact.penetration, contact.start_depth};
 }
 
 /// What damping measures from, at the start of a step of h.
@@ -171,22 +173,59 @@ __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const S
   step.numbers.own_blocks = w.memory.own_blocks;
 }
 
+struct PartEnd {
+  StepEnd end;
+  bool solved;  ///< as well as halves would be
+};
+
+/// Solves a part of a step, of which w.now becomes the end, at `share` of the whole.
+template <typename Stored>
+__device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const StepMotion& motion, double share,
+                                           ReplayStats& stats) {
+  constexpr double rounding_tolerance = 1e-6;
+  predict(w, step, motion, share);
+  project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
+  evaluate(w, step, nullptr, w.now);
+  iterate_to_balance<Stored>(w, step, stats);
+  const double tolerance = w.replay.tolerance;
+  const StepEnd end = judge_end(w, step);
+  return {end, end.sound &&
+                   balanced(step, w.now, tolerance > rounding_tolerance ? tolerance : rounding_tolerance)};
+}
+
+/// A sheet that starts inside obstacles takes the first exit that does not tear it: each vertex leaves on its
+/// own side, then all by the shortest way, then both slowly; at last it stays. `part`: by the first exit.
+template <typename Stored>
+__device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, const StepMotion& motion,
+                                                double share, ReplayStats& stats, PartEnd part) {
+  constexpr double slow_share = 0.125;
+  const SheetTables& tables = w.replay.sheet;
+  const double speed = w.replay.exit_speed;
+  const Triple direction = shortest_way_out(tables, step, shared_memory<double>());
+  const int ways = is_zero(direction) ? 1 : 2, last = 2 * ways;
+  for (int k = 1; k <= last; ++k) {
+    if (part.solved && exits_gently(tables, step, w.now.positions, speed)) break;
+    // A slower exit does not help an unsolved step, which costs the most: only staying is tried.
+    if (!part.solved && k > 1) k = last;
+    const double own_speed = k == last ? 0 : k < ways ? speed : slow_share * speed;
+    step.obstacles.way_out = {own_speed, k < last && k % ways == 1 ? direction : Triple{}};
+    w.refactor = true;
+    part = solve_part<Stored>(w, step, motion, share, stats);
+  }
+  return part;
+}
+
 /// The part of a step from the share `begin` to `end` of it, as a whole. The state advances where it is
 /// solved or this is the `last_try`. Returns whether it is solved.
 template <typename Stored>
 __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, double begin, double end,
                          Point* positions, Point* velocities, ReplayStats& stats, bool last_try) {
-  constexpr double rounding_tolerance = 1e-6;
   begin_damping(w, step);
   begin_obstacles(w, step, motion, begin, end);
-  predict(w, step, motion, end);
-  project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
-  evaluate(w, step, nullptr, w.now);
-  iterate_to_balance<Stored>(w, step, stats);
-  const double tolerance = w.replay.tolerance;
-  const StepEnd judged = judge_end(w, step);
-  const bool solved =
-      judged.sound && balanced(step, w.now, tolerance > rounding_tolerance ? tolerance : rounding_tolerance);
+  PartEnd part = solve_part<Stored>(w, step, motion, end, stats);
+  if (part.end.start_depth > 0) part = leave_obstacles<Stored>(w, step, motion, end, stats, part);
+  const bool solved = part.solved;
+  const StepEnd& judged = part.end;
   if (!solved) w.refactor = true;
   if (!solved && !last_try) return false;
   // A sheet that is not finite stands still instead.
@@ -195,7 +234,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   ++stats.substeps;
   add_hold_forces(w, motion, end - begin);
   stats.penetration = worse_of(stats.penetration, judged.penetration);
-  stats.converged = judged.sound && balanced(step, w.now, tolerance);
+  stats.converged = judged.sound && balanced(step, w.now, w.replay.tolerance);
   for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
     const Triple moved = triple(w.now.positions[i]) - triple(positions[i]), speed = (1 / step.h) * moved;
     velocities[i] = {judged.finite ? speed.x : 0, judged.finite ? speed.y : 0, judged.finite ? speed.z : 0,

@@ -2,6 +2,7 @@
 #include "sim/cuda/conjugate_gradients.cuh"
 #include "sim/cuda/contact.cuh"
 #include "sim/cuda/front_factor.cuh"
+#include "sim/cuda/generalized_residuals.cuh"
 #include "sim/cuda/incremental_potential.cuh"
 #include "sim/cuda/membrane_hessian.cuh"
 
@@ -49,10 +50,11 @@ __device__ inline void write_parts(const Work& w, const StepProblem& step, bool 
   __syncthreads();
 }
 
-/// What the linear problem may not move freely.
-__device__ inline void restrict_by(const Work& w, const ContactSet& contacts, StepProblem& step) {
+/// What the linear problem may not move freely; with `coupled`, how friction follows the normal forces.
+__device__ inline void restrict_by(const Work& w, const ContactSet& contacts, bool coupled,
+                                   StepProblem& step) {
   gather_restrictions(w.replay.sheet, step, contacts, w.memory.restrictions, w.memory.restriction_of,
-                      shared_memory<int>());
+                      coupled ? w.memory.coupled.left : nullptr, shared_memory<int>());
 }
 
 __device__ inline HingeMatrix hinges_of(const Work& w) {
@@ -73,7 +75,7 @@ __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& s
 template <typename Stored>
 __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
   float* chip = shared_memory<float>();
-  restrict_by(w, w.now.contacts, step);
+  restrict_by(w, w.now.contacts, false, step);
   write_parts(w, step, true);
   assemble_blocks(w.replay.sheet, step.numbers, step.restrictions, hinges_of(w), w.memory.shares,
                   w.memory.blocks, chip);
@@ -90,9 +92,9 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
 inline constexpr int linear_partial_bytes = 64;
 static_assert(linear_partial_bytes >= team_warps * static_cast<int>(sizeof(float)));
 
-/// Solves the linear problem by conjugate gradients. Returns their number of solves.
+/// Solves the linear problem. Returns the number of solves with the factor.
 template <typename Stored>
-__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step) {
+__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step, bool coupled) {
   constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
@@ -114,8 +116,12 @@ __device__ __noinline__ int find_direction(const Work& w, const StepProblem& ste
       m.search,
       on_chip(w.replay.search_at, m.search),
       {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
-  const int solves = conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction, m.change,
-                                         reinterpret_cast<float*>(chip), chip + linear_partial_bytes);
+  float* partial = reinterpret_cast<float*>(chip);
+  char* rest = chip + linear_partial_bytes;
+  const int solves = coupled ? generalized_residuals(w.replay.fronts, tables, problem, vectors, m.coupled,
+                                                     m.direction, m.change, partial, rest)
+                             : conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction,
+                                                   m.change, partial, rest);
   count_phase(m, ReplayPhase::directions);
   return solves;
 }
@@ -123,7 +129,7 @@ __device__ __noinline__ int find_direction(const Work& w, const StepProblem& ste
 /// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
 /// its contacts in turn. `stuck`: with the positive Hessian, whose direction leads down.
 template <typename Stored>
-__device__ void linear_step(Work& w, StepProblem& step, bool stuck, ReplayStats& stats) {
+__device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled, ReplayStats& stats) {
   constexpr int linear_problems = 6;
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
@@ -133,14 +139,19 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, ReplayStats&
   if (touches) copy_contacts(tables, step, w.now.contacts, w.linear);
   __syncthreads();
   w.refactor = false;
+  count_phase(m, ReplayPhase::rest);
   for (int solved = 1;; ++solved) {
-    restrict_by(w, w.linear, step);
-    const int solves = find_direction<Stored>(w, step);
+    restrict_by(w, w.linear, coupled, step);
+    count_phase(m, ReplayPhase::contact);
+    const int solves = find_direction<Stored>(w, step, coupled);
     stats.solves += solves;
     w.refactor = w.refactor || solves > w.replay.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.
     if (!touches || solved == linear_problems) return;
-    if (!exchange_contacts(tables, step, w.now, m.direction, m.change, stuck, w.linear, m.gradient)) return;
+    const bool changed =
+        exchange_contacts(tables, step, w.now, m.direction, m.change, stuck, w.linear, m.gradient);
+    count_phase(m, ReplayPhase::contact);
+    if (!changed) return;
   }
 }
 
@@ -161,7 +172,9 @@ __device__ inline void move(const Work& w, const StepProblem& step, double lengt
     const float* way = w.memory.direction + 3 * i;
     to.positions[i] = {from.x + length * way[0], from.y + length * way[1], from.z + length * way[2], 0};
   }
+  count_phase(w.memory, ReplayPhase::rest);
   project_to_feasible(w.replay.sheet, step, &w.linear, to.positions);
+  count_phase(w.memory, ReplayPhase::contact);
   evaluate(w, step, &w.now.contacts, to);
 }
 
@@ -176,18 +189,19 @@ __device__ inline void swap_iterates(Iterate& a, Iterate& b) {
 
 /// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
 /// Near the solution it falls by less than its rounding. So a smaller residual does as well.
-__device__ inline bool acceptable(const Work& w, double slope, double length) {
+__device__ inline bool acceptable(const Work& w, bool coupled, double slope, double length) {
   constexpr double armijo_share = 1e-4, residual_share = 0.1;
-  return potential_on_line(w.trial) <= w.now.potential + w.now.friction + armijo_share * length * slope ||
+  return (!coupled &&
+          potential_on_line(w.trial) <= w.now.potential + w.now.friction + armijo_share * length * slope) ||
          w.trial.residual <= (1 - residual_share * length) * w.now.residual;
 }
 
 /// Halves a whole step until it is acceptable or too short; returns its length.
-__device__ inline double line_search(Work& w, const StepProblem& step, double slope) {
+__device__ inline double line_search(Work& w, const StepProblem& step, bool coupled, double slope) {
   constexpr double least_length = 1e-3;
   double length = 1;
   move(w, step, length, w.trial);
-  while (!acceptable(w, slope, length) && length > least_length) {
+  while (!acceptable(w, coupled, slope, length) && length > least_length) {
     length *= 0.5;
     move(w, step, length, w.trial);
   }
@@ -218,7 +232,7 @@ __device__ inline void lengthen(Work& w, const StepProblem& step, double slope, 
 /// From w.now to balance or until it cannot go on. Counts its work in `stats`.
 template <typename Stored>
 __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stats) {
-  constexpr int most_forced_moves = 6;
+  constexpr int most_forced_moves = 6, coupled_after = 20;
   bool stuck = false;
   int forced_moves = 0;
   for (int iterations = 0; iterations < w.replay.max_iterations && !balanced(step, w.now, w.replay.tolerance);
@@ -229,11 +243,15 @@ __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stat
       ++stats.factorizations;
     }
     assemble_matrix(w, step, stuck);
-    linear_step<Stored>(w, step, stuck, stats);
+    // In the parts of a step that could not be solved as one, friction at the normal forces of the iterate
+    // goes round in circles at times. Then both are solved at once, guided by the residual.
+    const bool coupled =
+        !stuck && step.obstacles.count > 0 && step.h < w.replay.time_step && iterations + 1 > coupled_after;
+    linear_step<Stored>(w, step, stuck, coupled, stats);
 
     const double slope = slope_at(w, w.now);
-    const double length = line_search(w, step, slope);
-    if (!acceptable(w, slope, length)) {
+    const double length = line_search(w, step, coupled, slope);
+    if (!acceptable(w, coupled, slope, length)) {
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
         stuck = w.refactor = true;
@@ -243,7 +261,7 @@ __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stat
       if (++forced_moves > most_forced_moves || !isfinite(w.trial.potential)) return;
     }
     stuck = false;
-    lengthen(w, step, slope, length);
+    if (!coupled) lengthen(w, step, slope, length);
     swap_iterates(w.now, w.trial);
   }
 }

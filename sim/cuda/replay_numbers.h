@@ -59,8 +59,24 @@ struct ReplayStats {
 };
 
 /// Where the time of a step goes.
-enum class ReplayPhase { evaluation, matrix, preconditioner, factorization, directions, rest };
-inline constexpr int replay_phases = 6;
+enum class ReplayPhase { evaluation, matrix, preconditioner, factorization, directions, contact, rest };
+inline constexpr int replay_phases = 7;
+
+/// Directions that the generalized minimal residual method keeps, all of them.
+inline constexpr int most_directions = 40;
+
+/// Memory of a team for that method.
+struct CoupledMemory {
+  float* left;        ///< a matrix for each restriction, nine numbers, column after column
+  float* basis;       ///< most_directions + 1 vectors, three numbers a vertex
+  float* directions;  ///< most_directions of them
+  double* small;      ///< small_numbers
+};
+
+/// Numbers of its small problem: the triangle, the rotations, the right-hand side and the weights.
+inline constexpr int small_columns = most_directions + 1;
+inline constexpr int small_numbers =
+    most_directions * small_columns + 2 * most_directions + 2 * small_columns;
 
 /// Memory of a team. Vectors have three numbers a vertex where nothing is said.
 struct TeamMemory {
@@ -69,8 +85,9 @@ struct TeamMemory {
   double* residuals[3];    ///< what the constraints leave of it [N]
   ContactSet contacts[4];  ///< of the iterates and of the linear problem; null without obstacles
   MovingObstacle<double>* obstacles;
-  float* own_blocks;  ///< what contact adds to the diagonal of the matrix, nine numbers a vertex
-  int* held_axes;     ///< by place: bits 1, 2 and 4 for x, y and z
+  float* own_blocks;      ///< what contact adds to the diagonal of the matrix, nine numbers a vertex
+  int* held_axes;         ///< by place: bits 1, 2 and 4 for x, y and z
+  CoupledMemory coupled;  ///< null without obstacles
   float *gradient, *direction, *change;
   float *residual, *image, *forward, *passed;
   Four<float>* search;

@@ -278,6 +278,33 @@ FLASH_HOST_DEVICE inline bool hold(int count, const Vector3<double>& way, double
   return any;
 }
 
+/// How the friction force of a slipping vertex changes with the force on it: the sum of mu_k d_k l_k^T, where
+/// d_k is the direction of slip and l_k . f the normal force of surface k under the force f. Returns its
+/// column `axis`; zero for all other vertices.
+FLASH_HOST_DEVICE inline Vector3<double> friction_coupling(const ObstacleStep<double>& step,
+                                                           const VertexContact& contact,
+                                                           const VertexTouch* touches, int axis) {
+  if (contact.freedom != Freedom::slip) return {};
+  Vector3<double> normals[3], rubs[3];
+  int count = 0;
+  for (int k = 0; k < step.count && count < 3; ++k) {
+    if (!touches[k].holds) continue;
+    normals[count] = touches[k].normal;
+    rubs[count++] = step.obstacles[k].friction * touches[k].slip_direction;
+  }
+  FewEquations<double> equations;
+  equations.size = count;
+  for (int r = 0; r < count; ++r) {
+    equations.right[r] = normals[r][axis];
+    for (int c = 0; c < count; ++c) equations.matrix[r][c] = dot(normals[r], normals[c] - rubs[c]);
+  }
+  double forces[3];
+  if (!solve(equations, 0.0, forces)) return {};
+  Vector3<double> sum{};
+  for (int k = 0; k < count; ++k) sum = sum + forces[k] * rubs[k];
+  return sum;
+}
+
 /// Whether the vertex is to land on the surface that held it at the iterate. The step has to be long enough
 /// to bring it down, and must not have taken it beyond the end of that surface.
 FLASH_HOST_DEVICE inline bool lands(const VertexTouch& touch, const SurfaceGap<double>& gap) {

@@ -120,6 +120,15 @@ std::vector<Scene> scenes() {
     e.state.velocities.col(0).setConstant(0.3);
     e.state.velocities.col(1).setConstant(0.3);
   });
+  add("starts below a table", -0.003, 6, [](Environment& e) { e.obstacles = {{Plane{}}}; });
+  add("starts in a box", 0.0, 6, [&](Environment& e) {
+    Box box{.half_extents = {0.05, 0.04, 0.01}};
+    box.pose = Isometry3d(Eigen::Translation3d(middle.x() + 0.01, middle.y(), -0.003));
+    e.obstacles = {{box}};
+  });
+  add("starts in a cylinder", 0.0, 6, [&](Environment& e) {
+    e.obstacles = {{Cylinder{{middle.x(), middle.y() + 0.01, 0.001}, Vector3d::UnitX(), 0.012}}};
+  });
   return scenes;
 }
 
@@ -213,13 +222,13 @@ TEST(BatchContact, TrajectoriesAreThoseOfTheProcessorAndCloserAsTheToleranceFall
                            by_device(scene.plan, {for_device(scene)}, settings_of(scene.steps, tolerance))[0],
                        processor = by_processor(scene, tolerance);
       int unconverged = 0;
-      for (std::size_t k = 0; k < device.steps.size(); ++k) {
-        // Where the processor solves a step the device does.
+      // Where the processor solves a step the device does.
+      for (std::size_t k = 0; k < device.steps.size(); ++k)
         unconverged += processor.steps[k].converged && !device.steps[k].converged;
-        EXPECT_LE(device.steps[k].penetration_max, 1e-9);
-      }
+      for (std::size_t k = 0; k < common_steps(device, processor); ++k)
+        EXPECT_NEAR(device.steps[k].penetration_max, processor.steps[k].penetration_max, 1e-6);
       EXPECT_EQ(unconverged, 0);
-      EXPECT_GE(common_steps(device, processor), 8);
+      EXPECT_GE(common_steps(device, processor), 5);
       EXPECT_LE(distance(scene, device, processor), tolerance == 1e-3 ? 1e-4 : 1e-6);
       // Each is within the residual of its step; what a hold carries beyond is of the positions.
       ASSERT_EQ(device.forces.size(), processor.forces.size());

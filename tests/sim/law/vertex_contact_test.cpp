@@ -107,6 +107,7 @@ TEST(VertexContact, IsDecidedAsInAContactSet) {
     project_to_feasible(step, linear, trial);
     const double potential = friction_potential(step, set, trial);
     double own_potential = 0;
+    const std::vector<Matrix3d> couplings = friction_couplings(step, set);
 
     for (int i = 0; i < vertices; ++i) {
       const Vector3<double> from = vector3(start, i);
@@ -132,6 +133,9 @@ TEST(VertexContact, IsDecidedAsInAContactSet) {
         ++seen[static_cast<int>(contact.freedom)];
         on_several +=
             contact.free.xx + contact.free.yy + contact.free.zz < 1.5 && contact.freedom == Freedom::slip;
+        for (int axis = 0; axis < 3; ++axis)
+          expect_near(friction_coupling(view, contact, touches, axis),
+                      couplings[static_cast<std::size_t>(set.place[i])].col(axis));
         own_potential += friction_potential_of(view, from, vector3(trial, i), contact, touches);
       }
       // The linear problem.
