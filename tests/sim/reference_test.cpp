@@ -100,8 +100,8 @@ struct ReferenceRun {
       for (int c = 0; c < 3; ++c)
         environment.state.velocities.col(c).setConstant(scene["v0"][c].get<double>());
     if (scene.contains("plane") && scene["plane"].is_object())
-      environment.obstacles.push_back(
-          {Plane{{0, 0, scene["plane"].at("z")}, Eigen::Vector3d::UnitZ()}, scene["plane"].at("friction")});
+      environment.obstacles.push_back({Plane{{0, 0, scene["plane"].at("z")}, Eigen::Vector3d::UnitZ()},
+                                       {scene["plane"].at("friction").get<double>()}});
   }
 
   // Holds vertices at `share` of the way from the rest shape to their prescribed places.
