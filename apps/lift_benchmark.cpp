@@ -114,6 +114,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   settings.steps = benchmark.steps;
   settings.kept_steps = {benchmark.steps / 2};
   settings.threads = benchmark.threads;
+  settings.device = benchmark.device;
 
   struct Counts {
     long iterations = 0, solves = 0, factorizations = 0, converged = 0;
@@ -142,15 +143,19 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   result.wall_seconds = seconds_since(start);
   result.vertices = plan->pattern.size;
   const double total = double(benchmark.environments) * benchmark.steps;
-  double solves = 0, factorizations = 0, converged = 0;
+  double converged = 0;
   for (const Counts& c : counts) {
     result.iterations += double(c.iterations) / total;
-    solves += double(c.solves) / total;
-    factorizations += double(c.factorizations) / total;
+    result.solves += double(c.solves) / total;
+    result.factorizations += double(c.factorizations) / total;
     converged += double(c.converged);
     result.residual_max = data::worst(result.residual_max, c.residual_max);
   }
   result.converged_share = converged / total;
+  if (benchmark.device == Device::cuda) {
+    result.step_milliseconds = 1e3 * result.wall_seconds / benchmark.steps;
+    return result;
+  }
   result.step_milliseconds =
       1e3 * result.wall_seconds * std::min(benchmark.threads, benchmark.environments) / total;
   if (total < 1) return result;
@@ -179,14 +184,14 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     product.assign(plan->triangle_product, values,
                    {{&law.bending.elimination_stiffness, material.bending_rigidity}});
   });
-  add("factorization", factorizations, [&] {
+  add("factorization", result.factorizations, [&] {
     assemble(Curvature::positive);
     add_bending_stand_in(law.bending, material.bending_rigidity, values);
     factor.factorize(values);
   });
   Eigen::VectorXf from = Eigen::VectorXf::Ones(4 * y.rows()), to = from;
-  add("triangular solves", solves, [&] { factor.solve_in_order(to.data()); });
-  add("matrix products", solves, [&] { product.multiply(from.data(), to.data()); });
+  add("triangular solves", result.solves, [&] { factor.solve_in_order(to.data()); });
+  add("matrix products", result.solves, [&] { product.multiply(from.data(), to.data()); });
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sim/cpu/instruction_level.h"
+#include "sim/device.h"
 
 namespace flash::sim {
 
@@ -14,7 +15,8 @@ struct LiftBenchmark {
   int environments = 64;
   int steps = 250;
   int threads = 1;
-  InstructionLevel level = highest_instruction_level();              ///< of the kernels
+  InstructionLevel level = highest_instruction_level();  ///< of the kernels
+  Device device = Device::cpu;
   double time_step = 0.01;                                           ///< [s]
   double tolerance = 1e-3;                                           ///< on |r| / |M g|
   double membrane_stiffness_min = 10, membrane_stiffness_max = 300;  ///< E t [N/m]
@@ -34,12 +36,14 @@ struct BenchmarkPhase {
 struct LiftBenchmarkResult {
   int vertices = 0;
   double wall_seconds = 0;
-  double step_milliseconds = 0;  ///< wall time a step and environment, times the threads at work
+  double step_milliseconds = 0;  ///< wall time a step and environment, times the threads at work; on a device
+                                 ///< a step of all environments
   double converged_share = 0;    ///< of environment-steps
   double residual_max = 0;
-  double iterations = 0;  ///< Newton's, a step
+  double iterations = 0;                  ///< Newton's, a step
+  double solves = 0, factorizations = 0;  ///< a step
   std::vector<BenchmarkPhase>
-      phases;  ///< their sum leaves contact, line search and the rest of step_milliseconds
+      phases;  ///< of the CPU: their sum leaves contact, line search and the rest of step_milliseconds
 };
 
 /// Throws data::InputError where a range ends below its start, or where the solvers at work need more memory

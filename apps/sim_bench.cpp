@@ -9,6 +9,7 @@
 #include "apps/lift_benchmark.h"
 #include "apps/option_checks.h"
 #include "apps/sim_verbs.h"
+#include "data/error.h"
 
 namespace flash {
 namespace {
@@ -16,6 +17,7 @@ namespace {
 struct BenchOptions {
   sim::LiftBenchmark benchmark;
   std::string level = sim::to_string(sim::highest_instruction_level());
+  std::string device = "auto";
   bool json = false;
 };
 
@@ -24,22 +26,47 @@ int bench(BenchOptions options) {
   if (benchmark.threads == 0) benchmark.threads = int(std::max(1u, std::thread::hardware_concurrency()));
   for (const sim::InstructionLevel level : sim::instruction_levels())
     if (sim::to_string(level) == options.level) benchmark.level = level;
+  if (options.device == "cuda") {
+    if (const std::string why = sim::why_no_cuda(); !why.empty())
+      throw data::InputError("--device cuda: " + why + "; use --device cpu or auto");
+    benchmark.device = sim::Device::cuda;
+  }
+  const bool on_device = benchmark.device == sim::Device::cuda;
   const sim::LiftBenchmarkResult result = sim::run_lift_benchmark(benchmark, stop_on_signals());
   double accounted = 0;
   for (const sim::BenchmarkPhase& phase : result.phases)
     accounted += phase.calls_per_step * phase.milliseconds_per_call;
   if (options.json) {
-    nlohmann::ordered_json json = {
-        {"schema", "flash-sim-bench/1"},          {"vertices", result.vertices},
-        {"environments", benchmark.environments}, {"steps", benchmark.steps},
-        {"threads", benchmark.threads},           {"level", sim::to_string(benchmark.level)},
-        {"wall_seconds", result.wall_seconds},    {"step_ms", result.step_milliseconds},
-        {"iterations", result.iterations},        {"converged_share", result.converged_share},
-        {"residual_max", result.residual_max},    {"phases", nlohmann::ordered_json::array()}};
+    nlohmann::ordered_json json = {{"schema", "flash-sim-bench/1"},
+                                   {"vertices", result.vertices},
+                                   {"environments", benchmark.environments},
+                                   {"steps", benchmark.steps},
+                                   {"threads", benchmark.threads},
+                                   {"level", sim::to_string(benchmark.level)},
+                                   {"device", on_device ? "cuda" : "cpu"},
+                                   {"wall_seconds", result.wall_seconds},
+                                   {"step_ms", result.step_milliseconds},
+                                   {"iterations", result.iterations},
+                                   {"converged_share", result.converged_share},
+                                   {"solves", result.solves},
+                                   {"factorizations", result.factorizations},
+                                   {"residual_max", result.residual_max},
+                                   {"phases", nlohmann::ordered_json::array()}};
     for (const sim::BenchmarkPhase& phase : result.phases)
       json["phases"].push_back(
           {{"name", phase.name}, {"calls", phase.calls_per_step}, {"call_ms", phase.milliseconds_per_call}});
     std::cout << json.dump(2) << '\n';
+    return exit_done;
+  }
+  if (on_device) {
+    std::printf("%d vertices, %d environments, %d steps on the CUDA device: %.2f s, %.3f ms a step of all\n",
+                result.vertices, benchmark.environments, benchmark.steps, result.wall_seconds,
+                result.step_milliseconds);
+    std::printf(
+        "converged %.2f %% of the steps, worst residual %.2g; a step %.2f Newton iterations, %.2f solves, "
+        "%.2f factorizations\n",
+        100 * result.converged_share, result.residual_max, result.iterations, result.solves,
+        result.factorizations);
     return exit_done;
   }
   std::printf("%d vertices, %d environments, %d steps, %d threads, kernels for %s: %.1f s\n", result.vertices,
@@ -88,6 +115,9 @@ void add_bench_verb(CLI::App& app, Action& action) {
   for (const sim::InstructionLevel level : sim::instruction_levels()) levels.push_back(sim::to_string(level));
   verb.add_option("--level", options->level, "Instructions of the kernels, of those that this machine has")
       ->check(CLI::IsMember(levels))
+      ->capture_default_str();
+  verb.add_option("--device", options->device, "Where the simulation runs; auto: the CPU")
+      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
       ->capture_default_str();
   verb.add_flag("--json", options->json, "Print the result as JSON");
   verb.callback([&action, options] { action = [options] { return bench(*options); }; });

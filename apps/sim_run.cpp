@@ -118,7 +118,7 @@ void say_what_is_left(const sim::SceneSummary& summary, int steps, const std::st
 
 int run(const RunOptions& options) {
   if (options.device == "cuda")
-    throw data::InputError("--device cuda: this program has no CUDA backend; use --device cpu or auto");
+    throw data::InputError("--device cuda: scenes run on the CPU alone; use --device cpu or auto");
   namespace fs = std::filesystem;
   data::check_folder_free(options.out, options.force);
   std::optional<SaidWhenSlow> phase;

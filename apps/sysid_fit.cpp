@@ -147,7 +147,7 @@ nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::Fit
 
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   stop_on_signals();
-  choose_device(options.common);
+  require_cpu(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const sysid::Summary found = sysid::load_search_folder(options.start).summary;
   const data::Asset asset =

@@ -204,8 +204,7 @@ class AnswerLine {
 // Judges what was found and writes the answer.
 int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
              const sysid::GridSettings& settings, const sysid::ResultsStore& store,
-             const GridOptions& options, const std::string& device,
-             std::chrono::steady_clock::time_point begin) {
+             const GridOptions& options, sim::Device device, std::chrono::steady_clock::time_point begin) {
   sysid::GridResults results = store.results();
   sysid::AnswerSettings asked;
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
@@ -219,7 +218,7 @@ int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
   }();
   sysid::Summary summary = sysid::summarize(results, answer, replays, settings, asked);
   summary.asset = fs::absolute(asset.source).lexically_normal().string();
-  summary.device = device;
+  summary.device = device == sim::Device::cuda ? "cuda" : "cpu";
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   write_results(summary, results, keep_best(results, summary, replays, settings, options.out), options);
 
@@ -236,15 +235,16 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   stop_on_signals();
   check_options(options);
   const auto begin = std::chrono::steady_clock::now();
-  const std::string device = choose_device(options.common);
+  const sim::Device device = choose_device(options.common);
   const std::string grid_file = (fs::path(options.out) / "grid.json").string();
   const bool goes_on = options.resume && fs::exists(grid_file);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   if (goes_on) order_as(sysid::load_grid_file(grid_file).recordings, recordings);
   const data::Asset asset = load_asset_for(options.asset, recordings.front());
   const int threads = thread_count(options.common);
-  std::vector<sysid::Replay> replays =
-      make_replays(recordings, replay_settings(verb, options.replay, threads), options.common);
+  sysid::ReplaySettings simulated = replay_settings(verb, options.replay, threads);
+  simulated.device = device;
+  std::vector<sysid::Replay> replays = make_replays(recordings, simulated, options.common);
 
   std::vector<std::string> notices;
   const sysid::GridSettings settings = grid_settings(
@@ -270,7 +270,8 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
       data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) + " candidates, " +
           data::format_count(static_cast<std::size_t>(replays.front().sheet().rest.vertices.rows())) +
           " vertices, " + std::to_string(threads) + " threads, about " +
-          data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) + " MB of memory");
+          data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) +
+          " MB of memory, on the " + (device == sim::Device::cuda ? "CUDA device" : "CPU"));
   if (!settings.rollouts.empty()) {
     const sysid::AnswerWork most = sysid::most_work(settings, replays.size(), !options.no_solver_check);
     say(options.common, "then the answer: at most " +

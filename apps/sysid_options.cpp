@@ -239,10 +239,16 @@ int thread_count(const CommonOptions& options) {
                              : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-std::string choose_device(const CommonOptions& options) {
+sim::Device choose_device(const CommonOptions& options) {
+  if (options.device != "cuda") return sim::Device::cpu;
+  if (const std::string why = sim::why_no_cuda(); !why.empty())
+    throw data::InputError("--device cuda: " + why + "; use --device cpu or auto");
+  return sim::Device::cuda;
+}
+
+void require_cpu(const CommonOptions& options) {
   if (options.device == "cuda")
-    throw data::InputError("--device cuda: this program has no CUDA backend; use --device cpu or auto");
-  return "cpu";
+    throw data::InputError("--device cuda: this verb simulates on the CPU alone; use --device cpu or auto");
 }
 
 std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "data/asset.h"
+#include "sim/device.h"
 #include "sysid/emulate/grid_search.h"
 #include "sysid/infer/answer_work.h"
 #include "sysid/replay/replay.h"
@@ -68,9 +69,10 @@ void warn_of_camera(const data::Recording& recording);
 
 int thread_count(const CommonOptions& options);
 
-/// The device a search runs on. Throws data::InputError for cuda where the program has none; auto takes the
-/// CPU.
-std::string choose_device(const CommonOptions& options);
+/// Where a search runs; auto takes the CPU. Throws data::InputError for cuda where there is no such device.
+sim::Device choose_device(const CommonOptions& options);
+/// For verbs that no device simulates for yet. Throws data::InputError for cuda.
+void require_cpu(const CommonOptions& options);
 
 /// The recordings in the folders, told apart by name (a warning says where one was renamed). Throws
 /// data::InputError where two of them are the same.

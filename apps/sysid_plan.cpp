@@ -75,7 +75,7 @@ nlohmann::ordered_json plan_json(const std::vector<sysid::PlannedExperiment>& ex
 
 int run_plan(const CLI::App& verb, const PlanOptions& options) {
   stop_on_signals();
-  choose_device(options.common);
+  require_cpu(options.common);
   const int threads = thread_count(options.common);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const data::Asset asset = load_asset_for(options.asset, recordings.front());

@@ -140,11 +140,12 @@ nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const s
 
 int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   stop_on_signals();
-  choose_device(options.common);
+  const sim::Device device = choose_device(options.common);
   const data::Recording recording = data::load_recording(options.recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
-  const sysid::Replay replay =
-      sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common)));
+  sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
+  simulated.device = device;
+  const sysid::Replay replay = sysid::make_replay(recording, simulated);
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;

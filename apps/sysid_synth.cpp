@@ -88,7 +88,7 @@ Eigen::Vector3d vector_of(const std::vector<double>& numbers) {
 
 int run_synth(SynthOptions options) {
   stop_on_signals();
-  choose_device(options.common);
+  require_cpu(options.common);
   const data::Asset asset = data::load_asset(options.asset);
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
   const data::TriangleMesh mesh = options.mesh.empty()            ? data::load_rest_mesh(asset)

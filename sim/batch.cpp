@@ -7,6 +7,7 @@
 
 #include "data/error.h"
 #include "data/parallel.h"
+#include "sim/device_batch.h"
 
 namespace flash::sim {
 
@@ -44,6 +45,24 @@ struct Batch::Storage {
               positions.data() + e * 3 * vertices);
     std::copy(state.velocities.data(), state.velocities.data() + 3 * vertices,
               velocities.data() + e * 3 * vertices);
+  }
+
+  /// Takes the next steps of all environments on the device.
+  void advance_on_device(int before, int count, const std::function<void(int)>& finished) {
+    DeviceResults results;
+    results.stepped = [&](const DeviceSteps& taken) {
+      const std::ptrdiff_t place = taken.environment * steps() + taken.first - settings.first_step;
+      std::copy(taken.stats.begin(), taken.stats.end(), stats.begin() + place);
+      std::copy(taken.hold_forces.begin(), taken.hold_forces.end(), hold_forces.begin() + 3 * place * holds);
+    };
+    results.kept = [&](int e, int index, const Points& x) {
+      std::copy(x.data(), x.data() + x.size(), kept_at(e, index));
+    };
+    results.finished = [&](int e) {
+      show(e);
+      if (finished) finished(e);
+    };
+    sim::advance_on_device(plan, environments, settings, before, count, results);
   }
 
   void take_step(int e, int before) {
@@ -146,6 +165,12 @@ void Batch::advance(int steps, const std::function<void(int)>& finished) {
     if (stop != nullptr && *stop) throw data::Stopped();
   };
   const int first = std::exchange(s.step, -1);
+  if (s.settings.device == Device::cuda) {
+    throw_if_stopped();
+    s.advance_on_device(first, steps, finished);
+    s.step = first + steps;
+    return;
+  }
   data::for_each_in_parallel(s.environments.size(), s.settings.threads, [&](std::size_t index) {
     const int e = static_cast<int>(index);
     throw_if_stopped();

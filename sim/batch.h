@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "sim/device.h"
 #include "sim/newton/solver.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
@@ -31,7 +32,8 @@ struct BatchSettings {
   int steps = 0;                  ///< last step of the whole replay
   std::vector<int> kept_steps{};  ///< steps whose positions are kept, ascending; step 0 is the start
   int first_step = 0;             ///< step at which the states of the environments stand
-  int threads = 1;                ///< 0: one a processor
+  int threads = 1;                ///< 0: one a processor; on a device they take the results
+  Device device = Device::cpu;
 };
 
 /// Steps after which a solver forgets what it holds besides the state of its environment. A replay that goes
@@ -39,7 +41,8 @@ struct BatchSettings {
 inline constexpr int restart_interval = 50;
 
 /// Many environments over one plan, each with its own material, for a whole replay. Environment e of a batch
-/// equals the same environment alone, bitwise, on any number of threads and however often it advances.
+/// equals the same environment alone, bitwise, on any number of threads and however often it advances. On a
+/// device that holds where it advances by multiples of restart_interval.
 class Batch {
  public:
   /// Throws std::invalid_argument where the environments do not have the plan's vertices and the same number

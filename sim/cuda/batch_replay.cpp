@@ -1,15 +1,20 @@
 #include "sim/cuda/batch_replay.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <thread>
+#include <tuple>
 
 #include "sim/cuda/device_arena.h"
 #include "sim/cuda/device_plan.h"
 #include "sim/cuda/replay_kernel.h"
 #include "sim/law/membrane.h"
+#include "sim/step/moving_obstacles.h"
 
 namespace flash::sim::cuda {
 
@@ -52,6 +57,12 @@ void check(const SheetPlan& plan, const std::vector<ReplayEnvironment>& environm
             "every environment needs a position and a velocity for each vertex");
     require(e.holds == nullptr || std::ssize(*e.holds) >= settings.steps - settings.first_step,
             "what is held has to be given for each step");
+    require(e.hold_count == environments.front().hold_count, "all environments need as many holds");
+    require(e.obstacles.size() <= most_obstacles, "an environment may have 8 obstacles");
+    for (const Obstacle& obstacle : e.obstacles)
+      require(obstacle.frame == base_frame || (e.schedule != nullptr && obstacle.frame >= 0 &&
+                                               obstacle.frame < std::ssize(e.schedule->frames)),
+              "an obstacle names a frame that the schedule does not have");
     for (const Load& load : e.loads) require(load.vertex >= 0 && load.vertex < size, "a load's vertex");
   }
 }
@@ -72,18 +83,50 @@ ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& envir
           {environment.gravity.x(), environment.gravity.y(), environment.gravity.z()},
           weight_factor,
           m.areal_density * plan.sheet.vertex_area.norm() * weight_factor,
-          motion};
+          motion,
+          static_cast<int>(environment.obstacles.size()),
+          stand_beside(environment.obstacles)};
 }
 
+/// Poses of a schedule's frames at the start of a replay and after each step.
+std::vector<FramePose> frame_poses(const ReplayEnvironment& environment, double time_step, int steps,
+                                   int frames) {
+  std::vector<FramePose> poses;
+  for (int k = 0; k <= steps; ++k)
+    for (int f = 0; f < frames; ++f) {
+      FramePose pose{frame_of(Eigen::Isometry3d::Identity()), {}};
+      if (environment.schedule != nullptr && f < std::ssize(environment.schedule->frames)) {
+        const Eigen::Isometry3d from = pose_at(*environment.schedule, f, environment.time + k * time_step),
+                                to =
+                                    pose_at(*environment.schedule, f, environment.time + (k + 1) * time_step);
+        const Eigen::AngleAxisd turn(to.linear() * from.linear().transpose());
+        pose = {frame_of(from), vector3(Eigen::Vector3d(turn.angle() * turn.axis()))};
+      }
+      poses.push_back(pose);
+    }
+  return poses;
+}
+
+/// What environments with the same motion share.
+using MotionKey = std::tuple<const HoldMotion*, const Schedule*, double>;
+
+MotionKey motion_of(const ReplayEnvironment& e) { return {e.holds.get(), e.schedule.get(), e.time}; }
+
 /// Motions one after the other, each once.
-struct FlatHolds {
+struct FlatMotions {
   std::vector<int> starts;
   std::vector<HeldPlace> holds;
-  std::map<const HoldMotion*, int> motions;
-  int most = 0;  ///< held in one step
+  std::vector<FramePose> poses;
+  std::map<MotionKey, int> motions;
+  int frames = 0;  ///< of the schedules, at most
+  int most = 0;    ///< held in one step
 
-  void add(const HoldMotion* motion, int steps, const std::vector<int>& position) {
-    if (!motions.emplace(motion, static_cast<int>(motions.size())).second) return;
+  void add(const ReplayEnvironment& environment, double time_step, int steps,
+           const std::vector<int>& position) {
+    if (!motions.emplace(motion_of(environment), static_cast<int>(motions.size())).second) return;
+    const std::vector<FramePose> own = frame_poses(environment, time_step, steps, frames);
+    poses.insert(poses.end(), own.begin(), own.end());
+    const HoldMotion* motion = environment.holds.get();
     std::vector<int> held_in(position.size(), -1);
     for (int k = 0; k < steps; ++k) {
       starts.push_back(static_cast<int>(holds.size()));
@@ -94,7 +137,8 @@ struct FlatHolds {
         held_in[held.vertex] = k;
         holds.push_back({position[held.vertex],
                          int{held.axes[0]} | 2 * int{held.axes[1]} | 4 * int{held.axes[2]},
-                         {held.target.x(), held.target.y(), held.target.z()}});
+                         {held.target.x(), held.target.y(), held.target.z()},
+                         {held.holds[0], held.holds[1], held.holds[2]}});
       }
       most = std::max(most, static_cast<int>(holds.size()) - starts.back());
     }
@@ -108,7 +152,7 @@ struct TeamSizes {
   const SheetLayout& layout;
   FactorPrecision precision;
   bool damped;
-  int most_held;
+  int most_held, most_obstacles;
 };
 
 TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
@@ -141,8 +185,19 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
     m.bent = arena.take<Point>(size);
     m.damped = arena.take<double>(3 * size);
   }
-  m.restrictions = arena.take<VertexRestriction>(held);
+  for (double*& residual : m.residuals) residual = arena.take<double>(3 * size);
+  m.held_axes = arena.take<int>(size);
+  m.restrictions = arena.take<VertexRestriction>(sizes.most_obstacles > 0 ? size : held);
   m.restriction_of = arena.take<int>(size);
+  if (const std::size_t obstacles = number(sizes.most_obstacles); obstacles > 0) {
+    for (ContactSet& contacts : m.contacts)
+      contacts = {arena.take<int>(size), arena.take<VertexContact>(size),
+                  arena.take<VertexTouch>(size * obstacles), arena.take<double>(size)};
+    m.obstacles = arena.take<MovingObstacle<double>>(obstacles);
+    m.own_blocks = arena.take<float>(9 * size);
+    m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),
+                 arena.take<float>(3 * size * most_directions), arena.take<double>(small_numbers)};
+  }
   m.hold_starts = arena.take<double>(3 * held);
   m.clocks = arena.take<long long>(replay_phases + 1);
   return m;
@@ -157,13 +212,16 @@ struct BatchReplay::Memory {
   SheetLayout layout;
   DevicePlan plan;
   cudaStream_t stream = nullptr;
+  int* stop = nullptr;  ///< of the host, read by the device
 
   DeviceArray<ReplayMaterial> materials;
   DeviceArray<Point> positions, velocities, loads;
   DeviceArray<int> hold_starts, kept_index, order, entries, counters, steps;
   DeviceArray<HeldPlace> holds;
+  DeviceArray<PlacedObstacle> obstacles;
+  DeviceArray<FramePose> poses;
   DeviceArray<ReplayStats> stats;
-  DeviceArray<double> kept;
+  DeviceArray<double> kept, hold_forces;
   DeviceArray<char> arena;
   DeviceArray<TeamMemory> team_memory;
   int teams = 0;
@@ -184,7 +242,8 @@ struct BatchReplay::Memory {
     upload_kept_steps();
     const bool damped = std::any_of(environments.begin(), environments.end(),
                                     [](const auto& e) { return e.material.stiffness_damping != 0; });
-    lay_out_teams({front_plan, layout, settings.precision, damped, most_held});
+    const int most_obstacles_each = upload_obstacles(environments);
+    lay_out_teams({front_plan, layout, settings.precision, damped, most_held, most_obstacles_each});
     const int parts = all_steps / settings.restart_interval + 2;
     entries = DeviceArray<int>(static_cast<std::size_t>(count) * static_cast<std::size_t>(parts));
     counters = DeviceArray<int>(2);
@@ -193,7 +252,9 @@ struct BatchReplay::Memory {
     numbers.fronts = plan.fronts;
     numbers.sheet = plan.sheet;
     numbers.teams = team_memory.data();
-    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), 0};
+    check(cudaMallocHost(&stop, sizeof(int)));
+    *stop = 0;
+    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), stop, 0};
     place_on_chip(settings.precision, numbers);
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
@@ -208,9 +269,16 @@ struct BatchReplay::Memory {
     numbers.hold_starts = hold_starts.data();
     numbers.motion_steps = all_steps + 1;
     numbers.holds = holds.data();
+    numbers.obstacles = obstacles.data();
+    numbers.most_obstacles_each = most_obstacles_each;
+    numbers.poses = poses.data();
+    numbers.exit_speed = settings.exit_speed;
     numbers.positions = positions.data();
     numbers.velocities = velocities.data();
     numbers.stats = stats.data();
+    numbers.hold_count = environments.front().hold_count;
+    hold_forces = DeviceArray<double>(3 * stats.size() * static_cast<std::size_t>(numbers.hold_count));
+    numbers.hold_forces = hold_forces.data();
     numbers.kept_index = kept_index.data();
     numbers.kept_count = static_cast<int>(settings.kept_steps.size());
     numbers.order = order.data();
@@ -219,6 +287,7 @@ struct BatchReplay::Memory {
     keep_start(environments);
   }
   ~Memory() {
+    cudaFreeHost(stop);
     if (stream != nullptr) cudaStreamDestroy(stream);
   }
 
@@ -248,16 +317,35 @@ struct BatchReplay::Memory {
 
   /// Returns how many vertices are held at once at most.
   int upload_motions(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments) {
-    FlatHolds flat;
+    FlatMotions flat;
+    for (const ReplayEnvironment& e : environments)
+      if (e.schedule != nullptr)
+        flat.frames = std::max(flat.frames, static_cast<int>(e.schedule->frames.size()));
+    numbers.frames = flat.frames;
     std::vector<ReplayMaterial> all;
     for (const ReplayEnvironment& e : environments) {
-      flat.add(e.holds.get(), settings.steps - settings.first_step, front_plan.position);
-      all.push_back(material_of(sheet, e, flat.motions.at(e.holds.get())));
+      flat.add(e, settings.time_step, settings.steps - settings.first_step, front_plan.position);
+      all.push_back(material_of(sheet, e, flat.motions.at(motion_of(e))));
     }
+    poses = DeviceArray<FramePose>(flat.poses);
     materials = DeviceArray<ReplayMaterial>(all);
     hold_starts = DeviceArray<int>(flat.starts);
     holds = DeviceArray<HeldPlace>(flat.holds);
     return flat.most;
+  }
+
+  /// Returns how many obstacles an environment has at most.
+  int upload_obstacles(const std::vector<ReplayEnvironment>& environments) {
+    std::size_t most = 0;
+    for (const ReplayEnvironment& e : environments) most = std::max(most, e.obstacles.size());
+    std::vector<PlacedObstacle> all;
+    for (const ReplayEnvironment& e : environments) {
+      for (const Obstacle& obstacle : e.obstacles)
+        all.push_back({obstacle_in_frame(obstacle, e.material.friction), obstacle.frame});
+      all.resize((static_cast<std::size_t>(&e - environments.data()) + 1) * most);
+    }
+    obstacles = DeviceArray<PlacedObstacle>(all);
+    return static_cast<int>(most);
   }
 
   void upload_kept_steps() {
@@ -335,7 +423,13 @@ int BatchReplay::size() const { return memory_->count; }
 int BatchReplay::step() const { return memory_->step; }
 int BatchReplay::teams() const { return memory_->teams; }
 void BatchReplay::advance(int steps) { memory_->advance(steps); }
-void BatchReplay::synchronize() { cuda::check(cudaStreamSynchronize(memory_->stream)); }
+void BatchReplay::synchronize(const std::atomic<bool>* stop) {
+  const Memory& m = *memory_;
+  while (stop != nullptr && !*stop && cudaStreamQuery(m.stream) == cudaErrorNotReady)
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  if (stop != nullptr && *stop) *m.stop = 1;
+  cuda::check(cudaStreamSynchronize(m.stream));
+}
 
 Points BatchReplay::positions(int environment) const {
   return memory_->points(memory_->positions, environment);
@@ -351,6 +445,14 @@ Points BatchReplay::kept_positions(int environment, int index) const {
       static_cast<std::size_t>(environment) * m.settings.kept_steps.size() + static_cast<std::size_t>(index);
   const std::vector<double> numbers = m.kept.read(place * 3 * m.size(), 3 * m.size());
   return Eigen::Map<const Points>(numbers.data(), m.layout.size, 3);
+}
+
+std::vector<double> BatchReplay::hold_forces(int environment) const {
+  const Memory& m = *memory_;
+  cuda::check(cudaStreamSynchronize(m.stream));
+  const std::size_t each =
+      3 * static_cast<std::size_t>(m.numbers.stats_each) * static_cast<std::size_t>(m.numbers.hold_count);
+  return m.hold_forces.read(static_cast<std::size_t>(environment) * each, each);
 }
 
 std::vector<double> BatchReplay::phases() const {
@@ -376,7 +478,8 @@ std::vector<ReplayStep> BatchReplay::stats(int environment) const {
   const auto each = static_cast<std::size_t>(m.numbers.stats_each);
   std::vector<ReplayStep> steps;
   for (const ReplayStats& s : m.stats.read(static_cast<std::size_t>(environment) * each, each))
-    steps.push_back({s.residual, s.iterations, s.solves, s.factorizations, s.substeps, s.converged != 0});
+    steps.push_back(
+        {s.residual, s.penetration, s.iterations, s.solves, s.factorizations, s.substeps, s.converged != 0});
   return steps;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <atomic>
 #include <memory>
 #include <vector>
 
@@ -17,19 +18,26 @@ namespace flash::sim::cuda {
 struct HeldVertex {
   int vertex;
   std::array<bool, 3> axes = {true, true, true};
-  Eigen::Vector3d target;  ///< places of the held axes [m]
+  Eigen::Vector3d target;                ///< places of the held axes [m]
+  std::array<int, 3> holds = {0, 0, 0};  ///< number of the hold that each axis obeys
+
+  bool operator==(const HeldVertex&) const = default;
 };
 
 /// What is held in each step, no vertex twice in one.
 using HoldMotion = std::vector<std::vector<HeldVertex>>;
 
-/// One environment: a sheet without obstacles, its start and what holds it. Environments may share a motion.
+/// One environment: a sheet, its start, what holds it and what it meets. Environments may share motions.
 struct ReplayEnvironment {
   data::SheetMaterial material;
   Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
   std::vector<Load> loads;
   std::shared_ptr<const HoldMotion> holds;  ///< by step, from first_step on
-  data::Points positions, velocities;       ///< [m], [m/s]
+  int hold_count = 1;                       ///< all environments have as many
+  std::vector<Obstacle> obstacles;
+  std::shared_ptr<const Schedule> schedule;  ///< of the frames that obstacles name; none: all at rest
+  double time = 0;                           ///< at which it stands [s]
+  data::Points positions, velocities;        ///< [m], [m/s]
 };
 
 struct ReplaySettings {
@@ -38,7 +46,8 @@ struct ReplaySettings {
   int max_iterations = 60;      ///< Newton iterations a step
   double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
   int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
-  int halvings = 8;             ///< a step that cannot be solved is repeated in two halves, so often
+  double exit_speed = 1.0;  ///< greatest speed at which vertices leave an obstacle that they start in [m/s]
+  int halvings = 8;         ///< a step that cannot be solved is repeated in two halves, so often
 
   int first_step = 0;             ///< at which the environments stand
   int steps = 0;                  ///< the last one
@@ -50,7 +59,8 @@ struct ReplaySettings {
 
 /// How one step of one environment went, as in StepReport.
 struct ReplayStep {
-  double residual = 0;  ///< |r| / |M g|
+  double residual = 0;         ///< |r| / |M g|
+  double penetration_max = 0;  ///< deepest vertex below a surface [m]
   int iterations = 0, solves = 0, factorizations = 0, substeps = 0;
   bool converged = false;
 };
@@ -58,12 +68,12 @@ struct ReplayStep {
 /// Replays of many environments of one sheet on the device, each step to the tolerance that the CPU's Solver
 /// has. A block of threads takes an environment through up to `restart_interval` steps and then another one
 /// that waits. So none waits for the others, and what an environment gets depends on its own numbers alone,
-/// bitwise. Linear problems are in single precision, energies, residuals and positions in double. A held
-/// vertex moves on a straight line within a step that has to be halved.
+/// bitwise. Linear problems are in single precision, energies, residuals, contact and positions in double. A
+/// held vertex moves on a straight line within a step that has to be halved.
 class BatchReplay {
  public:
   /// Throws std::invalid_argument where environments do not fit the plan, have not the same bending operator,
-  /// or miss holds for a step; std::runtime_error with the device's message.
+  /// miss holds for a step, or have more than most_obstacles; std::runtime_error with the device's message.
   BatchReplay(std::shared_ptr<const SheetPlan> plan, const std::vector<ReplayEnvironment>& environments,
               ReplaySettings settings);
   ~BatchReplay();
@@ -75,13 +85,18 @@ class BatchReplay {
 
   /// Queues the next steps of all environments and returns; what reads results waits for them.
   void advance(int steps);
-  void synchronize();
+  /// Waits for what is queued. Once `stop` is set the device ends after the steps that its teams are at, and
+  /// the results are of no use.
+  void synchronize(const std::atomic<bool>* stop = nullptr);
 
   data::Points positions(int environment) const;   ///< [m]
   data::Points velocities(int environment) const;  ///< [m/s]
   data::Points kept_positions(int environment, int index) const;
+  /// Forces of the holds on the sheet, mean over each step: steps from first_step on x holds x 3 [N].
+  std::vector<double> hold_forces(int environment) const;
   std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on
-  /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions, rest.
+  /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions,
+  /// contact, rest.
   std::vector<double> phases() const;
 
  private:

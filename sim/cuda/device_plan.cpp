@@ -62,6 +62,8 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
       upload(std::vector<float>(layout.group_values.begin(), layout.group_values.end()), floats_);
   sheet.stand_in = upload(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end()), floats_);
   sheet.vertex_area = upload(layout.vertex_area, doubles_);
+  sheet.edge_count = static_cast<int>(layout.edge_lengths.size());
+  sheet.edge_lengths = upload(layout.edge_lengths, doubles_);
   sheet.hinge_count = layout.hinge_count;
   sheet.hinge_vertices = upload(layout.hinge_vertices, ints_);
   sheet.hinge_weights = upload(layout.hinge_weights, doubles_);

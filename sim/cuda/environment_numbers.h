@@ -8,10 +8,11 @@ namespace flash::sim::cuda {
 struct EnvironmentNumbers {
   MembraneLaw law = MembraneLaw::corotated;
   SheetLame lame{};
-  double rigidity = 0;         ///< D [N m]
-  double inertia_density = 0;  ///< areal density over h^2, and what air drag adds [kg/m^2/s^2]
-  SheetLame damping{};         ///< moduli of the damped membrane times b / h
-  double damping_share = 0;    ///< b / h
+  double rigidity = 0;                ///< D [N m]
+  double inertia_density = 0;         ///< areal density over h^2, and what air drag adds [kg/m^2/s^2]
+  SheetLame damping{};                ///< moduli of the damped membrane times b / h
+  double damping_share = 0;           ///< b / h
+  const float* own_blocks = nullptr;  ///< added to the diagonal, nine numbers a vertex; null: nothing
 
   /// What the stiffness of bending enters the matrix with.
   FLASH_HOST_DEVICE double effective_rigidity() const { return rigidity * (1 + damping_share); }

@@ -1,24 +1,32 @@
 #pragma once
+#include "sim/cuda/exits.cuh"
 #include "sim/cuda/newton_iteration.cuh"
+#include "sim/cuda/obstacle_motion.cuh"
 
 namespace flash::sim::cuda {
 
 // One time step of an environment as in sim/newton/solver.h, whole or in halves.
 
-/// What holds an environment's vertices at the end of a step.
-struct StepHolds {
-  const HeldPlace* list;
-  int count;
+/// What moves by itself in a step.
+struct StepMotion {
+  const HeldPlace* held;  ///< vertices at its end
+  int held_count;
+  double* hold_forces;  ///< on the sheet, three numbers a hold, for which this step has zeros [N]
+  const PlacedObstacle* obstacles;
+  int obstacle_count;
+  bool several;            ///< whether a box stands beside another obstacle
+  const FramePose* poses;  ///< of the frames at its start; those at its end follow
 };
 
-/// Notes what is held and where it is now; clear_holds takes it back.
-__device__ inline void begin_holds(const Work& w, const StepHolds& holds, const Point* positions) {
-  for (int k = static_cast<int>(threadIdx.x); k < holds.count; k += team_threads) {
-    const HeldPlace& held = holds.list[k];
+/// Notes what is held and where it is now; forget_restrictions takes it back.
+__device__ inline void begin_holds(const Work& w, const StepMotion& motion, const Point* positions) {
+  for (int k = static_cast<int>(threadIdx.x); k < motion.held_count; k += team_threads) {
+    const HeldPlace& held = motion.held[k];
     VertexRestriction restriction = {held.place, {}, {}};
     for (int axis = 0; axis < 3; ++axis) restriction.free[4 * axis] = held.axes >> axis & 1 ? 0.0f : 1.0f;
     w.memory.restrictions[k] = restriction;
     w.memory.restriction_of[held.place] = k;
+    w.memory.held_axes[held.place] = held.axes;
     const Point from = positions[held.place];
     w.memory.hold_starts[3 * k] = from.x;
     w.memory.hold_starts[3 * k + 1] = from.y;
@@ -27,22 +35,25 @@ __device__ inline void begin_holds(const Work& w, const StepHolds& holds, const 
   __syncthreads();
 }
 
-__device__ inline void clear_holds(const Work& w, const StepHolds& holds) {
+__device__ inline void forget_restrictions(const Work& w) {
   __syncthreads();
-  for (int k = static_cast<int>(threadIdx.x); k < holds.count; k += team_threads)
-    w.memory.restriction_of[holds.list[k].place] = -1;
+  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+    w.memory.restriction_of[i] = -1;
+    w.memory.held_axes[i] = 0;
+  }
   __syncthreads();
 }
 
 /// The positions without forces, held vertices where they have to be: `share` of their way of the whole step.
-__device__ inline void predict(const Work& w, const StepProblem& step, const StepHolds& holds, double share) {
+__device__ inline void predict(const Work& w, const StepProblem& step, const StepMotion& motion,
+                               double share) {
   for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
     const Triple x = triple(step.start[i]) + step.h * triple(step.velocities[i]);
     w.now.positions[i] = {x.x, x.y, x.z, 0};
   }
   __syncthreads();
-  for (int k = static_cast<int>(threadIdx.x); k < holds.count; k += team_threads) {
-    const HeldPlace& held = holds.list[k];
+  for (int k = static_cast<int>(threadIdx.x); k < motion.held_count; k += team_threads) {
+    const HeldPlace& held = motion.held[k];
     Point& own = w.now.positions[held.place];
     double* places[3] = {&own.x, &own.y, &own.z};
 #pragma unroll
@@ -53,14 +64,33 @@ __device__ inline void predict(const Work& w, const StepProblem& step, const Ste
   }
 }
 
+/// Adds what the holds exert in a share of the step.
+__device__ inline void add_hold_forces(const Work& w, const StepMotion& motion, double share) {
+  for (int hold = 0; hold < w.replay.hold_count; ++hold) {
+    double sums[3] = {};
+    for (int k = static_cast<int>(threadIdx.x); k < motion.held_count; k += team_threads) {
+      const HeldPlace& held = motion.held[k];
+      for (int axis = 0; axis < 3; ++axis)
+        if ((held.axes >> axis & 1) != 0 && held.holds[axis] == hold)
+          sums[axis] += w.now.force[3 * held.place + axis];
+    }
+    sum_over_team(sums, shared_memory<double>());
+    if (threadIdx.x == 0)
+      for (int axis = 0; axis < 3; ++axis) motion.hold_forces[3 * hold + axis] += share * sums[axis];
+    __syncthreads();
+  }
+}
+
 struct StepEnd {
-  bool energy_is_sound;  ///< whether it came from somewhere
-  bool finite;           ///< whether all positions are
+  bool sound;          ///< whether its energy came from somewhere, and contact is complementary
+  bool finite;         ///< whether all positions are
+  double penetration;  ///< deepest vertex below a surface [m]
+  double start_depth;  ///< deepest that started inside an obstacle [m]
 };
 
 /// The end of a step, its energy as account_for_energy of the CPU has it.
 __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
-  constexpr double energy_tolerance = 1e-2;
+  constexpr double energy_tolerance = 1e-2, gap_tolerance = 1e-9;
   const SheetTables& tables = w.replay.sheet;
   const ReplayMaterial& material = *step.material;
   enum {
@@ -78,19 +108,24 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     const double mass = step.mass(tables, i);
     const Triple way = triple(w.now.positions[i]) - triple(step.start[i]), speed = triple(step.velocities[i]),
-                 force = force_at(w.now.force, i), residual = step.residual(i, force),
-                 inertial = step.inertial(i, {0, 0, 0}), held_way = way - step.residual(i, way);
+                 residual = force_at(w.now.residuals, i), inertial = step.inertial(i, {0, 0, 0}),
+                 held_way = step.held_part(i, way);
     sums[kinetic] += 0.5 * mass * dot(way, way);
     sums[kinetic_at_start] += 0.5 * mass * dot(speed, speed);
     sums[falls] += mass * dot(step.gravity(), way) + dot(step.load(i), way);
     sums[unbalanced] += fabs(dot(residual, way));
-    sums[work] += dot(force - residual, way);
+    sums[work] += dot(force_at(w.now.force, i), held_way);
     sums[moved_holds] += dot(held_way, held_way) > 0 ? 1 : 0;
     sums[inertial_at_start] += 0.5 * mass * dot(inertial, inertial);
     sums[mass_sum] += mass;
   }
   sum_over_team(sums, shared_memory<double>());
   __syncthreads();
+  const ContactEnd contact = judge_contacts(tables, step, w.now, shared_memory<double>());
+  sums[work] += contact.work;
+  bool start_is_feasible = sums[moved_holds] == 0 && contact.start_depth == 0;
+  for (int k = 0; k < step.obstacles.count; ++k)
+    start_is_feasible = start_is_feasible && !step.obstacles.obstacles[k].moves;
   const double per_step = 1 / (step.h * step.h);
   const double stored_at_start = step.at_start.membrane + step.at_start.bending,
                stored_at_end = w.now.elastic.membrane + w.now.elastic.bending;
@@ -102,9 +137,11 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
                           1e-14 * material.membrane_stiffness * sums[mass_sum] / material.areal_density;
   const double allowed = energy_tolerance * there + sums[unbalanced] + rounding;
   const bool finite = isfinite(sums[kinetic]);
-  if (!(gain <= allowed)) return {false, finite};
-  if (sums[moved_holds] > 0) return {true, finite};
-  return {w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + allowed, finite};
+  const bool complementary = contact.complementarity <= gap_tolerance;
+  if (!(gain <= allowed) || !complementary) return {false, finite, contact.penetration, contact.start_depth};
+  const bool falls_below_start =
+      w.now.potential <= per_step * sums[inertial_at_start] + stored_at_start + allowed;
+  return {!start_is_feasible || falls_below_start, finite, contact.penetration, contact.start_depth};
 }
 
 /// What damping measures from, at the start of a step of h.
@@ -125,32 +162,86 @@ __device__ inline void begin_damping(const Work& w, StepProblem& step) {
   __syncthreads();
 }
 
-/// One step of step.h as a whole; the state advances in any case. Returns whether the step is solved.
+/// The obstacles from a share of the step to another one.
+__device__ inline void begin_obstacles(const Work& w, StepProblem& step, const StepMotion& motion,
+                                       double begin, double end) {
+  if (motion.obstacle_count == 0) return;
+  place_obstacles(motion.obstacles, motion.obstacle_count, motion.poses, w.replay.frames, begin, end,
+                  w.memory.obstacles);
+  step.obstacles = {
+      w.memory.obstacles, motion.obstacle_count, motion.several, step.h, {w.replay.exit_speed, {}}};
+  step.numbers.own_blocks = w.memory.own_blocks;
+}
+
+struct PartEnd {
+  StepEnd end;
+  bool solved;  ///< as well as halves would be
+};
+
+/// Solves a part of a step, of which w.now becomes the end, at `share` of the whole.
 template <typename Stored>
-__device__ bool try_step(Work& w, StepProblem& step, const StepHolds& holds, double share, Point* positions,
-                         Point* velocities, ReplayStats& stats, bool last_try) {
+__device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const StepMotion& motion, double share,
+                                           ReplayStats& stats) {
   constexpr double rounding_tolerance = 1e-6;
-  begin_damping(w, step);
-  predict(w, step, holds, share);
-  evaluate(w, step, w.now);
+  predict(w, step, motion, share);
+  project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
+  evaluate(w, step, nullptr, w.now);
   iterate_to_balance<Stored>(w, step, stats);
   const double tolerance = w.replay.tolerance;
   const StepEnd end = judge_end(w, step);
-  const bool solved = end.energy_is_sound &&
-                      balanced(step, w.now, tolerance > rounding_tolerance ? tolerance : rounding_tolerance);
+  return {end, end.sound &&
+                   balanced(step, w.now, tolerance > rounding_tolerance ? tolerance : rounding_tolerance)};
+}
+
+/// A sheet that starts inside obstacles takes the first exit that does not tear it: each vertex leaves on its
+/// own side, then all by the shortest way, then both slowly; at last it stays. `part`: by the first exit.
+template <typename Stored>
+__device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, const StepMotion& motion,
+                                                double share, ReplayStats& stats, PartEnd part) {
+  constexpr double slow_share = 0.125;
+  const SheetTables& tables = w.replay.sheet;
+  const double speed = w.replay.exit_speed;
+  const Triple direction = shortest_way_out(tables, step, shared_memory<double>());
+  const int ways = is_zero(direction) ? 1 : 2, last = 2 * ways;
+  for (int k = 1; k <= last; ++k) {
+    if (part.solved && exits_gently(tables, step, w.now.positions, speed)) break;
+    // A slower exit does not help an unsolved step, which costs the most: only staying is tried.
+    if (!part.solved && k > 1) k = last;
+    const double own_speed = k == last ? 0 : k < ways ? speed : slow_share * speed;
+    step.obstacles.way_out = {own_speed, k < last && k % ways == 1 ? direction : Triple{}};
+    w.refactor = true;
+    part = solve_part<Stored>(w, step, motion, share, stats);
+  }
+  return part;
+}
+
+/// The part of a step from the share `begin` to `end` of it, as a whole. The state advances where it is
+/// solved or this is the `last_try`. Returns whether it is solved.
+template <typename Stored>
+__device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, double begin, double end,
+                         Point* positions, Point* velocities, ReplayStats& stats, bool last_try) {
+  begin_damping(w, step);
+  begin_obstacles(w, step, motion, begin, end);
+  PartEnd part = solve_part<Stored>(w, step, motion, end, stats);
+  if (part.end.start_depth > 0) part = leave_obstacles<Stored>(w, step, motion, end, stats, part);
+  const bool solved = part.solved;
+  const StepEnd& judged = part.end;
   if (!solved) w.refactor = true;
   if (!solved && !last_try) return false;
   // A sheet that is not finite stands still instead.
-  const double residual = end.finite ? w.now.residual / step.material->force_scale : INFINITY;
+  const double residual = judged.finite ? w.now.residual / step.material->force_scale : INFINITY;
   if (!(residual <= stats.residual)) stats.residual = residual;
   ++stats.substeps;
-  stats.converged = end.energy_is_sound && balanced(step, w.now, tolerance);
+  add_hold_forces(w, motion, end - begin);
+  stats.penetration = worse_of(stats.penetration, judged.penetration);
+  stats.converged = judged.sound && balanced(step, w.now, w.replay.tolerance);
   for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
     const Triple moved = triple(w.now.positions[i]) - triple(positions[i]), speed = (1 / step.h) * moved;
-    velocities[i] = {end.finite ? speed.x : 0, end.finite ? speed.y : 0, end.finite ? speed.z : 0, 0};
-    if (end.finite) positions[i] = w.now.positions[i];
+    velocities[i] = {judged.finite ? speed.x : 0, judged.finite ? speed.y : 0, judged.finite ? speed.z : 0,
+                     0};
+    if (judged.finite) positions[i] = w.now.positions[i];
   }
-  if (end.finite) step.at_start = w.now.elastic;
+  if (judged.finite) step.at_start = w.now.elastic;
   __syncthreads();
   return solved;
 }
@@ -158,11 +249,11 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepHolds& holds, dou
 /// One time step, in halves where it cannot be solved as a whole, so often as `halvings` says. Once a half
 /// has failed the other is not divided any more.
 template <typename Stored>
-__device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepHolds& holds, Point* positions,
+__device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion& motion, Point* positions,
                                     Point* velocities) {
   constexpr int most_halvings = 16;
   ReplayStats stats = {};
-  begin_holds(w, holds, positions);
+  begin_holds(w, motion, positions);
   // Of each part of a part, from the whole step on: halves that it may be divided into still.
   int halvings[most_halvings + 1], level = 0;
   unsigned second = 0, first_converged = 0;  // a bit a level
@@ -173,7 +264,7 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepHolds&
     step.h = length * w.replay.time_step;
     const bool last_try = halvings[level] == 0;
     const bool solved =
-        try_step<Stored>(w, step, holds, begin + length, positions, velocities, stats, last_try);
+        try_step<Stored>(w, step, motion, begin, begin + length, positions, velocities, stats, last_try);
     if (!solved && !last_try) {
       halvings[level + 1] = halvings[level] - 1;
       ++level;
@@ -193,7 +284,7 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepHolds&
     second |= 1u << level;
     if (!converged) halvings[level] = 0;
   }
-  clear_holds(w, holds);
+  forget_restrictions(w);
   return stats;
 }
 

@@ -14,6 +14,9 @@ struct StepProblem {
   EnvironmentNumbers numbers;               ///< of this h
   const Point *start, *velocities, *loads;  ///< `loads` null without
   Restrictions restrictions;
+  const int* held_axes;  ///< by place: bits 1, 2 and 4 for x, y and z
+  int held_count;        ///< the first so many restrictions are of held vertices
+  ObstacleStep<double> obstacles;
   StepStart damped_since;
   ElasticEnergies at_start;
 
@@ -28,14 +31,13 @@ struct StepProblem {
   __device__ Triple inertial(int i, const Triple& moved) const {
     return moved - h * triple(velocities[i]) - (h * h) * gravity();
   }
-  /// What the constraints leave of a force. Restrictions of axes alone: their projectors are exact.
-  __device__ Triple residual(int i, const Triple& force) const {
-    const int k = restrictions.of_place[i];
-    if (k < 0) return force;
-    const float* p = restrictions.list[k].free;
-    return {p[0] * force.x + p[3] * force.y + p[6] * force.z,
-            p[1] * force.x + p[4] * force.y + p[7] * force.z,
-            p[2] * force.x + p[5] * force.y + p[8] * force.z};
+  /// The part of a vector along the axes that holds carry.
+  __device__ Triple held_part(int i, const Triple& v) const {
+    const int axes = held_axes[i];
+    return {axes & 1 ? v.x : 0, axes & 2 ? v.y : 0, axes & 4 ? v.z : 0};
+  }
+  __device__ VertexTouch* touches_of(const ContactSet& contacts, int i) const {
+    return contacts.touches + static_cast<long>(i) * obstacles.count;
   }
 };
 
@@ -43,10 +45,15 @@ struct StepProblem {
 struct Iterate {
   Point* positions;
   double* force;
+  double* residuals;
+  ContactSet contacts;
   ElasticEnergies elastic;
-  double potential;  ///< [J]
-  double residual;   ///< norm [N]
-  double worst;      ///< largest residual of a vertex, as a share of its weight
+  double potential;      ///< [J]
+  double friction;       ///< potential of friction at its own normal forces [J]
+  double line_friction;  ///< at those of the iterate from which the line leads here [J]
+  double residual;       ///< norm [N]
+  double rounding;       ///< of it, by that of positions where friction turns [N]
+  double worst;          ///< largest residual of a vertex beyond its rounding, as a share of its weight
 };
 
 __device__ inline Triple force_at(const double* force, int i) {
@@ -119,10 +126,44 @@ __device__ inline double add_turned_damping(const SheetTables& tables, const Ste
   return totals[0];
 }
 
-/// Fills in an iterate from its positions.
+/// What obstacles do to a vertex.
+struct ContactResponse {
+  Triple reaction;                 ///< [N]
+  double friction, line_friction;  ///< as in Iterate [J]
+  double rounding;                 ///< of the reaction, by that of positions where friction turns [N]
+};
+
+/// Decides what the obstacles do to vertex i, which needs `force`.
+__device__ __noinline__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
+                                                       const ContactSet* line, int i, const Triple& point,
+                                                       const Triple& force) {
+  constexpr double epsilon = 2.220446049250313e-16;
+  const Triple start = triple(step.start[i]);
+  ContactResponse response = {};
+  if (line != nullptr && line->listed[i] != 0)
+    response.line_friction =
+        friction_potential_of(step.obstacles, start, point, line->contacts[i], step.touches_of(*line, i));
+  const double clearance = clearance_of(step.obstacles, start, point);
+  contacts.clearance[i] = clearance;
+  contacts.listed[i] = 0;
+  if (clearance > touching_gap) return response;
+  VertexTouch* touches = step.touches_of(contacts, i);
+  find_touches(step.obstacles, start, point, touches);
+  const VertexContact contact = decide_contact(step.obstacles, start, point, force, touches);
+  if (contact.freedom == Freedom::free) return response;
+  contacts.contacts[i] = contact;
+  contacts.listed[i] = 1;
+  response.reaction = contact.reaction;
+  response.friction = friction_potential_of(step.obstacles, start, point, contact, touches);
+  response.rounding = epsilon * norm(point) * norm(contact.slip_stiffness);
+  return response;
+}
+
+/// Fills in an iterate from its positions. `line`: contacts of the iterate from which a line leads here, null
+/// without.
 template <bool places_on_chip>
 __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProblem& step,
-                                      const TeamMemory& memory, Iterate& at) {
+                                      const TeamMemory& memory, const ContactSet* line, Iterate& at) {
   double* partial = shared_memory<double>();
   double* force = at.force;
   const Point* positions = at.positions;
@@ -133,44 +174,53 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
   if (step.damped_since.metrics != nullptr && tables.group_count > 0)
     damping += add_turned_damping(tables, step, memory, positions, force, partial);
   const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
-  double potential = 0, squares = 0, worst = 0;
+  // Potential, squared residuals, friction, friction along the line, squared rounding.
+  double sums[5] = {}, worst = 0;
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     const double mass = step.mass(tables, i);
     const Triple moved = triple(positions[i]) - triple(step.start[i]), inertial = step.inertial(i, moved),
                  load = step.load(i);
     const Triple own = force_at(force, i) + mass * (per_step * inertial + drag * moved) - load;
-    potential +=
+    sums[0] +=
         0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
     force[3 * i] = own.x;
     force[3 * i + 1] = own.y;
     force[3 * i + 2] = own.z;
-    const Triple residual = step.residual(i, own);
-    const double squared = dot(residual, residual), share = squared / (mass * mass);
-    squares += squared;
-    // What is not a number counts as the worst.
-    if (!(share <= worst)) worst = share;
+    Triple reaction = step.held_part(i, own);
+    double rounding = 0;
+    if (step.obstacles.count > 0 && step.held_axes[i] == 0) {
+      const ContactResponse contact = update_contact(step, at.contacts, line, i, triple(positions[i]), own);
+      reaction = contact.reaction;
+      rounding = contact.rounding;
+      sums[2] += contact.friction;
+      sums[3] += contact.line_friction;
+    }
+    const Triple residual = own - reaction;
+    at.residuals[3 * i] = residual.x;
+    at.residuals[3 * i + 1] = residual.y;
+    at.residuals[3 * i + 2] = residual.z;
+    const double squared = dot(residual, residual);
+    sums[1] += squared;
+    sums[4] += rounding * rounding;
+    worst = worse_of(worst, (sqrt(squared) - rounding) / mass);
   }
-  for (int offset = 16; offset > 0; offset /= 2) {
-    const double other = __shfl_xor_sync(0xffffffffu, worst, offset);
-    if (!(other <= worst)) worst = other;
-  }
-  double sums[2] = {potential, squares};
-  __syncthreads();
-  if (lane() == 0) partial[2 * team_warps + warp()] = worst;
   sum_over_team(sums, partial);
-  worst = 0;
-  for (int w = 0; w < team_warps; ++w)
-    if (!(partial[2 * team_warps + w] <= worst)) worst = partial[2 * team_warps + w];
+  worst = worst_over_team(worst, partial);
   at.potential = sums[0] + damping + at.elastic.membrane + at.elastic.bending;
   at.residual = sqrt(sums[1]);
-  at.worst = sqrt(worst) / step.material->weight_factor;
+  at.friction = sums[2];
+  at.line_friction = sums[3];
+  at.rounding = sqrt(sums[4]);
+  at.worst = worst / step.material->weight_factor;
   __syncthreads();
 }
 
-/// Whether |r| <= tolerance |M g|, and no vertex misses its weight by more than 30 times as much.
+/// Whether |r| <= tolerance |M g|, and no vertex misses its weight by more than 30 times as much. The
+/// rounding of positions turns the friction of a vertex that starts to slide: that much more may be missing.
 __device__ inline bool balanced(const StepProblem& step, const Iterate& at, double tolerance) {
   constexpr double vertex_tolerance = 30;
-  return at.worst <= vertex_tolerance * tolerance && at.residual <= tolerance * step.material->force_scale;
+  return at.worst <= vertex_tolerance * tolerance &&
+         at.residual <= tolerance * step.material->force_scale + at.rounding;
 }
 
 }  // namespace flash::sim::cuda

@@ -5,7 +5,7 @@
 
 namespace flash::sim::cuda {
 
-/// Throws std::runtime_error with the device's message.
+/// Throws std::runtime_error with the device's message; OutOfMemory where that is why.
 void check(cudaError_t status);
 
 /// On-chip memory that a block may ask for [bytes].

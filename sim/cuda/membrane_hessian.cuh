@@ -131,6 +131,11 @@ __device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumb
   for (int e = 0; e < 9; ++e)
     symmetric.numbers[e] =
         0.5f * (diagonal.numbers[e] + diagonal.numbers[e % 3 * 3 + e / 3]) + (e % 4 == 0 ? inertia : 0.0f);
+  if (environment.own_blocks != nullptr) {
+    const float* own = environment.own_blocks + 9 * min(vertex, tables.size - 1);
+#pragma unroll
+    for (int e = 0; e < 9; ++e) symmetric.numbers[e] += own[e];
+  }
   return symmetric;
 }
 

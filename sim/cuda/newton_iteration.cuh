@@ -1,6 +1,8 @@
 #pragma once
 #include "sim/cuda/conjugate_gradients.cuh"
+#include "sim/cuda/contact.cuh"
 #include "sim/cuda/front_factor.cuh"
+#include "sim/cuda/generalized_residuals.cuh"
 #include "sim/cuda/incremental_potential.cuh"
 #include "sim/cuda/membrane_hessian.cuh"
 
@@ -14,6 +16,7 @@ struct Work {
   const TeamMemory& memory;
   bool refactor;  ///< whether the next solve needs a new factor
   Iterate now, trial, longer;
+  ContactSet linear;  ///< of the linear problem, to which the direction is the solution
 };
 
 /// Counts the time since the last call to a phase.
@@ -24,12 +27,12 @@ __device__ inline void count_phase(const TeamMemory& memory, ReplayPhase phase) 
   memory.clocks[replay_phases] = now;
 }
 
-__device__ inline void evaluate(const Work& w, const StepProblem& step, Iterate& at) {
+__device__ inline void evaluate(const Work& w, const StepProblem& step, const ContactSet* line, Iterate& at) {
   count_phase(w.memory, ReplayPhase::rest);
   if (w.replay.places_on_chip)
-    evaluate<true>(w.replay.sheet, step, w.memory, at);
+    evaluate<true>(w.replay.sheet, step, w.memory, line, at);
   else
-    evaluate<false>(w.replay.sheet, step, w.memory, at);
+    evaluate<false>(w.replay.sheet, step, w.memory, line, at);
   count_phase(w.memory, ReplayPhase::evaluation);
 }
 
@@ -42,7 +45,16 @@ __device__ inline void write_parts(const Work& w, const StepProblem& step, bool 
     write_hinge_matrix(tables, step.numbers.effective_rigidity(),
                        [&](int vertex) { return triple(w.now.positions[vertex]); },
                        {w.memory.hinge_matrix, w.memory.hinge_products});
+  if (step.obstacles.count > 0)
+    write_own_blocks(tables, step, w.now.contacts, !positive, w.memory.own_blocks);
   __syncthreads();
+}
+
+/// What the linear problem may not move freely; with `coupled`, how friction follows the normal forces.
+__device__ inline void restrict_by(const Work& w, const ContactSet& contacts, bool coupled,
+                                   StepProblem& step) {
+  gather_restrictions(w.replay.sheet, step, contacts, w.memory.restrictions, w.memory.restriction_of,
+                      coupled ? w.memory.coupled.left : nullptr, shared_memory<int>());
 }
 
 __device__ inline HingeMatrix hinges_of(const Work& w) {
@@ -61,8 +73,9 @@ __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& s
 
 /// Factorizes the positive Hessian at the iterate. Returns false where it is not positive definite after all.
 template <typename Stored>
-__device__ __noinline__ bool factorize(const Work& w, const StepProblem& step) {
+__device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
   float* chip = shared_memory<float>();
+  restrict_by(w, w.now.contacts, false, step);
   write_parts(w, step, true);
   assemble_blocks(w.replay.sheet, step.numbers, step.restrictions, hinges_of(w), w.memory.shares,
                   w.memory.blocks, chip);
@@ -79,19 +92,12 @@ __device__ __noinline__ bool factorize(const Work& w, const StepProblem& step) {
 inline constexpr int linear_partial_bytes = 64;
 static_assert(linear_partial_bytes >= team_warps * static_cast<int>(sizeof(float)));
 
-/// Finds the direction by conjugate gradients. Returns their number of solves.
+/// Solves the linear problem. Returns the number of solves with the factor.
 template <typename Stored>
-__device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) {
+__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step, bool coupled) {
   constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
-    const Triple residual = step.residual(i, force_at(w.now.force, i));
-    m.gradient[3 * i] = static_cast<float>(residual.x);
-    m.gradient[3 * i + 1] = static_cast<float>(residual.y);
-    m.gradient[3 * i + 2] = static_cast<float>(residual.z);
-  }
-  __syncthreads();
   const LinearProblem<Stored> problem = {
       m.block_rows,
       static_cast<float>(step.numbers.effective_rigidity()),
@@ -110,33 +116,70 @@ __device__ __noinline__ int linear_step(const Work& w, const StepProblem& step) 
       m.search,
       on_chip(w.replay.search_at, m.search),
       {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
-  const int solves = conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction, m.change,
-                                         reinterpret_cast<float*>(chip), chip + linear_partial_bytes);
+  float* partial = reinterpret_cast<float*>(chip);
+  char* rest = chip + linear_partial_bytes;
+  const int solves = coupled ? generalized_residuals(w.replay.fronts, tables, problem, vectors, m.coupled,
+                                                     m.direction, m.change, partial, rest)
+                             : conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction,
+                                                   m.change, partial, rest);
   count_phase(m, ReplayPhase::directions);
   return solves;
 }
 
-/// The slope of the potential along the direction, at an iterate [J].
-__device__ inline double slope_at(const Work& w, const StepProblem& step, const Iterate& at) {
-  double slope[1] = {};
-  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
-    const float* way = w.memory.direction + 3 * i;
-    slope[0] += dot(step.residual(i, force_at(at.force, i)), Triple{way[0], way[1], way[2]});
+/// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
+/// its contacts in turn. `stuck`: with the positive Hessian, whose direction leads down.
+template <typename Stored>
+__device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled, ReplayStats& stats) {
+  constexpr int linear_problems = 6;
+  const SheetTables& tables = w.replay.sheet;
+  const TeamMemory& m = w.memory;
+  const bool touches = step.obstacles.count > 0;
+  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size; i += team_threads)
+    m.gradient[i] = static_cast<float>(w.now.residuals[i]);
+  if (touches) copy_contacts(tables, step, w.now.contacts, w.linear);
+  __syncthreads();
+  w.refactor = false;
+  count_phase(m, ReplayPhase::rest);
+  for (int solved = 1;; ++solved) {
+    restrict_by(w, w.linear, coupled, step);
+    count_phase(m, ReplayPhase::contact);
+    const int solves = find_direction<Stored>(w, step, coupled);
+    stats.solves += solves;
+    w.refactor = w.refactor || solves > w.replay.stale_factor_solves;
+    // What holds in the last one has to be what its direction was found with.
+    if (!touches || solved == linear_problems) return;
+    const bool changed =
+        exchange_contacts(tables, step, w.now, m.direction, m.change, stuck, w.linear, m.gradient);
+    count_phase(m, ReplayPhase::contact);
+    if (!changed) return;
   }
+}
+
+/// The slope of the potential along the direction, at an iterate [J].
+__device__ inline double slope_at(const Work& w, const Iterate& at) {
+  double slope[1] = {};
+  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads)
+    slope[0] += dot(force_at(at.residuals, i), way_at(w.memory.direction, i));
   sum_over_team(slope, shared_memory<double>());
   __syncthreads();
   return slope[0];
 }
 
-/// Evaluates the point `length` directions from the iterate.
+/// Evaluates the feasible iterate nearest to the point `length` directions from the iterate.
 __device__ inline void move(const Work& w, const StepProblem& step, double length, Iterate& to) {
   for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
     const Point from = w.now.positions[i];
     const float* way = w.memory.direction + 3 * i;
     to.positions[i] = {from.x + length * way[0], from.y + length * way[1], from.z + length * way[2], 0};
   }
-  evaluate(w, step, to);
+  count_phase(w.memory, ReplayPhase::rest);
+  project_to_feasible(w.replay.sheet, step, &w.linear, to.positions);
+  count_phase(w.memory, ReplayPhase::contact);
+  evaluate(w, step, &w.now.contacts, to);
 }
+
+/// The potential with that of friction at the normal forces of the line's start.
+__device__ inline double potential_on_line(const Iterate& at) { return at.potential + at.line_friction; }
 
 __device__ inline void swap_iterates(Iterate& a, Iterate& b) {
   const Iterate c = a;
@@ -144,20 +187,21 @@ __device__ inline void swap_iterates(Iterate& a, Iterate& b) {
   b = c;
 }
 
-/// The potential guides the step. Near the solution it falls by less than its rounding: a smaller residual
-/// does as well.
-__device__ inline bool acceptable(const Work& w, double slope, double length) {
+/// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
+/// Near the solution it falls by less than its rounding. So a smaller residual does as well.
+__device__ inline bool acceptable(const Work& w, bool coupled, double slope, double length) {
   constexpr double armijo_share = 1e-4, residual_share = 0.1;
-  return w.trial.potential <= w.now.potential + armijo_share * length * slope ||
+  return (!coupled &&
+          potential_on_line(w.trial) <= w.now.potential + w.now.friction + armijo_share * length * slope) ||
          w.trial.residual <= (1 - residual_share * length) * w.now.residual;
 }
 
 /// Halves a whole step until it is acceptable or too short; returns its length.
-__device__ inline double line_search(Work& w, const StepProblem& step, double slope) {
+__device__ inline double line_search(Work& w, const StepProblem& step, bool coupled, double slope) {
   constexpr double least_length = 1e-3;
   double length = 1;
   move(w, step, length, w.trial);
-  while (!acceptable(w, slope, length) && length > least_length) {
+  while (!acceptable(w, coupled, slope, length) && length > least_length) {
     length *= 0.5;
     move(w, step, length, w.trial);
   }
@@ -170,14 +214,15 @@ __device__ inline void lengthen(Work& w, const StepProblem& step, double slope, 
   constexpr double greatest_length = 30, flat_slope = 0.2, least_growth = 1.5, greatest_growth = 3,
                    residual_growth = 10;
   while (length >= 1 && length < greatest_length) {
-    const double end_slope = slope_at(w, step, w.trial);
+    const double end_slope = slope_at(w, w.trial);
     if (end_slope > flat_slope * slope) return;
     const double secant = slope / (slope - end_slope);
     const double growth = secant < least_growth      ? least_growth
                           : secant > greatest_growth ? greatest_growth
                                                      : secant;
     move(w, step, length * growth, w.longer);
-    if (w.longer.potential >= w.trial.potential || !(w.longer.residual < residual_growth * w.now.residual))
+    if (potential_on_line(w.longer) >= potential_on_line(w.trial) ||
+        !(w.longer.residual < residual_growth * w.now.residual))
       return;
     length *= growth;
     swap_iterates(w.trial, w.longer);
@@ -186,8 +231,8 @@ __device__ inline void lengthen(Work& w, const StepProblem& step, double slope, 
 
 /// From w.now to balance or until it cannot go on. Counts its work in `stats`.
 template <typename Stored>
-__device__ void iterate_to_balance(Work& w, const StepProblem& step, ReplayStats& stats) {
-  constexpr int most_forced_moves = 6;
+__device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stats) {
+  constexpr int most_forced_moves = 6, coupled_after = 20;
   bool stuck = false;
   int forced_moves = 0;
   for (int iterations = 0; iterations < w.replay.max_iterations && !balanced(step, w.now, w.replay.tolerance);
@@ -198,22 +243,25 @@ __device__ void iterate_to_balance(Work& w, const StepProblem& step, ReplayStats
       ++stats.factorizations;
     }
     assemble_matrix(w, step, stuck);
-    const int solves = linear_step<Stored>(w, step);
-    stats.solves += solves;
-    w.refactor = solves > w.replay.stale_factor_solves;
+    // In the parts of a step that could not be solved as one, friction at the normal forces of the iterate
+    // goes round in circles at times. Then both are solved at once, guided by the residual.
+    const bool coupled =
+        !stuck && step.obstacles.count > 0 && step.h < w.replay.time_step && iterations + 1 > coupled_after;
+    linear_step<Stored>(w, step, stuck, coupled, stats);
 
-    const double slope = slope_at(w, step, w.now);
-    const double length = line_search(w, step, slope);
-    if (!acceptable(w, slope, length)) {
+    const double slope = slope_at(w, w.now);
+    const double length = line_search(w, step, coupled, slope);
+    if (!acceptable(w, coupled, slope, length)) {
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
         stuck = w.refactor = true;
         continue;
       }
+      // A small step all the same lets the contacts decide anew.
       if (++forced_moves > most_forced_moves || !isfinite(w.trial.potential)) return;
     }
     stuck = false;
-    lengthen(w, step, slope, length);
+    if (!coupled) lengthen(w, step, slope, length);
     swap_iterates(w.now, w.trial);
   }
 }

@@ -27,9 +27,16 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
   Point *positions = replay.positions + static_cast<long>(size) * e,
         *velocities = replay.velocities + static_cast<long>(size) * e;
   const ReplayMaterial& material = replay.materials[e];
-  const auto iterate = [&](int k) { return Iterate{memory.positions[k], memory.forces[k], {}, 0, 0, 0}; };
+  const auto iterate = [&](int k) {
+    Iterate at = {};
+    at.positions = memory.positions[k];
+    at.force = memory.forces[k];
+    at.residuals = memory.residuals[k];
+    at.contacts = memory.contacts[k];
+    return at;
+  };
   if (threadIdx.x == 0) memory.clocks[replay_phases] = clock64();
-  Work w = {replay, memory, true, iterate(0), iterate(1), iterate(2)};
+  Work w = {replay, memory, true, iterate(0), iterate(1), iterate(2), memory.contacts[3]};
   StepProblem step = {&material,
                       replay.time_step,
                       {},
@@ -37,21 +44,32 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
                       velocities,
                       replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
                       {memory.restrictions, 0, memory.restriction_of},
+                      memory.held_axes,
+                      0,
+                      {},
                       {},
                       {}};
   // The energy that it starts with.
   Iterate& now = w.now;
   for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads) now.positions[i] = positions[i];
   step.numbers = {material.law, material.lame, material.rigidity, 0};
-  evaluate(w, step, now);
+  evaluate(w, step, nullptr, now);
   step.at_start = now.elastic;
   for (int at = first; at < end; ++at) {
     if (at % replay.restart_interval == 0) w.refactor = true;
-    const int* starts = replay.hold_starts + static_cast<long>(material.motion) * replay.motion_steps +
-                        (at - replay.stats_begin);
-    const StepHolds holds = {replay.holds + starts[0], starts[1] - starts[0]};
-    step.restrictions.count = holds.count;
-    const ReplayStats stats = advance_step<Stored>(w, step, holds, positions, velocities);
+    const long row = static_cast<long>(material.motion) * replay.motion_steps + (at - replay.stats_begin);
+    const int* starts = replay.hold_starts + row;
+    const StepMotion motion = {
+        replay.holds + starts[0],
+        starts[1] - starts[0],
+        replay.hold_forces +
+            3L * replay.hold_count * (static_cast<long>(replay.stats_each) * e + at - replay.stats_begin),
+        replay.obstacles + static_cast<long>(replay.most_obstacles_each) * e,
+        material.obstacle_count,
+        material.several,
+        replay.poses + row * replay.frames};
+    step.restrictions.count = step.held_count = motion.held_count;
+    const ReplayStats stats = advance_step<Stored>(w, step, motion, positions, velocities);
     const long place = at - replay.stats_begin;
     if (threadIdx.x == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
     const int kept = replay.kept_index[place];

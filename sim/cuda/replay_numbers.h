@@ -3,6 +3,7 @@
 #include "sim/cuda/four.h"
 #include "sim/cuda/front_tables.h"
 #include "sim/cuda/sheet_tables.h"
+#include "sim/law/vertex_contact.h"
 
 namespace flash::sim::cuda {
 
@@ -17,6 +18,28 @@ struct ReplayMaterial {
   double weight_factor;  ///< |gravity|, 9.81 without [m/s^2]
   double force_scale;    ///< |M g| [N]
   int motion;            ///< of what holds it
+  int obstacle_count;
+  bool several;  ///< whether a box stands beside another obstacle
+};
+
+/// An obstacle as an environment has it.
+struct PlacedObstacle {
+  MovingObstacle<double> obstacle;  ///< where it stands in its frame is `start`
+  int frame;                        ///< that carries it, where it moves
+};
+
+/// A frame of a schedule at the end of a step.
+struct FramePose {
+  Frame<double> frame;
+  Vector3<double> turn;  ///< rotation vector from it to the next pose [rad]
+};
+
+/// What obstacles do to the vertices at an iterate, by place.
+struct ContactSet {
+  int* listed;              ///< whether `contacts` and `touches` say anything of a vertex
+  VertexContact* contacts;  ///< only of those
+  VertexTouch* touches;     ///< only of those: one an obstacle of the environment
+  double* clearance;        ///< distance to the nearest obstacle [m]
 };
 
 /// A vertex held in some axes at the end of a step.
@@ -24,23 +47,47 @@ struct HeldPlace {
   int place;
   int axes;  ///< bits 1, 2 and 4: x, y and z
   double target[3];
+  int holds[3];  ///< number of the hold that each axis obeys
 };
 
 /// How one step of one environment went.
 struct ReplayStats {
-  double residual;  ///< |r| / |M g|
+  double residual;     ///< |r| / |M g|
+  double penetration;  ///< deepest vertex below a surface [m]
   int iterations, solves, factorizations, substeps;
   int converged;
 };
 
 /// Where the time of a step goes.
-enum class ReplayPhase { evaluation, matrix, preconditioner, factorization, directions, rest };
-inline constexpr int replay_phases = 6;
+enum class ReplayPhase { evaluation, matrix, preconditioner, factorization, directions, contact, rest };
+inline constexpr int replay_phases = 7;
+
+/// Directions that the generalized minimal residual method keeps, all of them.
+inline constexpr int most_directions = 40;
+
+/// Memory of a team for that method.
+struct CoupledMemory {
+  float* left;        ///< a matrix for each restriction, nine numbers, column after column
+  float* basis;       ///< most_directions + 1 vectors, three numbers a vertex
+  float* directions;  ///< most_directions of them
+  double* small;      ///< small_numbers
+};
+
+/// Numbers of its small problem: the triangle, the rotations, the right-hand side and the weights.
+inline constexpr int small_columns = most_directions + 1;
+inline constexpr int small_numbers =
+    most_directions * small_columns + 2 * most_directions + 2 * small_columns;
 
 /// Memory of a team. Vectors have three numbers a vertex where nothing is said.
 struct TeamMemory {
-  Point* positions[3];  ///< of the iterates
-  double* forces[3];    ///< what each vertex needs from outside [N]
+  Point* positions[3];     ///< of the iterates
+  double* forces[3];       ///< what each vertex needs from outside [N]
+  double* residuals[3];    ///< what the constraints leave of it [N]
+  ContactSet contacts[4];  ///< of the iterates and of the linear problem; null without obstacles
+  MovingObstacle<double>* obstacles;
+  float* own_blocks;      ///< what contact adds to the diagonal of the matrix, nine numbers a vertex
+  int* held_axes;         ///< by place: bits 1, 2 and 4 for x, y and z
+  CoupledMemory coupled;  ///< null without obstacles
   float *gradient, *direction, *change;
   float *residual, *image, *forward, *passed;
   Four<float>* search;
@@ -62,8 +109,9 @@ struct WorkQueue {
   int* entries;  ///< -1 where nothing stands yet
   int* taken;
   int* added;
-  int* steps;  ///< where each environment stands
-  int size;    ///< entries in all
+  int* steps;       ///< where each environment stands
+  const int* stop;  ///< of the host: once set no team takes another environment
+  int size;         ///< entries in all
 };
 
 struct ReplayNumbers {
@@ -85,8 +133,15 @@ struct ReplayNumbers {
   const int* hold_starts;  ///< of each motion and step, in `holds`
   int motion_steps;        ///< steps of a motion, and one more, in `hold_starts`
   const HeldPlace* holds;
+  const PlacedObstacle* obstacles;  ///< `most_obstacles_each` an environment; null without
+  int most_obstacles_each;
+  const FramePose* poses;  ///< of each motion and step, `frames` each
+  int frames;
+  double exit_speed;              ///< [m/s]
   Point *positions, *velocities;  ///< state of each environment
   ReplayStats* stats;
+  double* hold_forces;  ///< environments x steps x holds x 3, from stats_begin on, zero at first [N]
+  int hold_count;
   const int* kept_index;  ///< of each step from stats_begin on, -1 where it is not kept
   int kept_count;
   const int* order;  ///< vertex at each place

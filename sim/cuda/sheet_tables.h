@@ -16,6 +16,8 @@ struct SheetTables {
   const double* group_values;
   const float *single_group_values, *stand_in;
   const double* vertex_area;
+  int edge_count;  ///< the first pairs
+  const double* edge_lengths;
   int hinge_count;
   const int* hinge_vertices;
   const double *hinge_weights, *hinge_rest_angles, *hinge_rest_areas;

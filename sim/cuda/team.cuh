@@ -85,4 +85,22 @@ __device__ Number sum_over_team(Number value, Number* partial) {
   return sum;
 }
 
+/// The larger of two numbers, of which what is not a number counts as the largest.
+__device__ inline double worse_of(double worst, double other) {
+  return other <= worst || worst != worst ? worst : other;
+}
+
+/// The largest of one value a thread, not negative, for all threads; what is not a number counts as the
+/// largest. `partial`: on-chip memory for a number a warp.
+__device__ inline double worst_over_team(double value, double* partial) {
+  for (int offset = 16; offset > 0; offset /= 2)
+    value = worse_of(value, __shfl_xor_sync(0xffffffffu, value, offset));
+  __syncthreads();
+  if (lane() == 0) partial[warp()] = value;
+  __syncthreads();
+  double worst = 0;
+  for (int w = 0; w < team_warps; ++w) worst = worse_of(worst, partial[w]);
+  return worst;
+}
+
 }  // namespace flash::sim::cuda

@@ -3,14 +3,19 @@
 
 namespace flash::sim::cuda {
 
-/// The next environment, -1 where there is none left, and the step where it stands; waits for one that
-/// another team still works on. By one thread. What the last team wrote for it is visible to this thread and,
-/// behind a barrier, to its team.
+/// The next environment, -1 where there is none left or the host wants to stop, and the step where it stands;
+/// waits for one that another team still works on. By one thread. What the last team wrote for it is visible
+/// to this thread and, behind a barrier, to its team.
 __device__ inline int take(const WorkQueue& queue, int* step) {
   const int place = atomicAdd(queue.taken, 1);
   if (place >= queue.size) return -1;
   const volatile int* entry = queue.entries + place;
-  while (*entry < 0) __nanosleep(200);
+  const volatile int* stop = queue.stop;
+  if (*stop != 0) return -1;
+  while (*entry < 0) {
+    if (*stop != 0) return -1;
+    __nanosleep(200);
+  }
   const int environment = *entry;
   __threadfence();
   *step = queue.steps[environment];

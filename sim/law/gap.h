@@ -15,6 +15,7 @@ struct MovingObstacle {
   Real radius{};                 ///< of a cylinder [m]
   Frame<Real> start{}, end{};    ///< at the start and at the end of the step
   bool moves = false;            ///< whether the two differ
+  Real friction{};               ///< Coulomb coefficient on the body at hand
 };
 
 /// How a point stands against an obstacle.

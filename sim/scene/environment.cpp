@@ -56,10 +56,14 @@ HeldVertices take(const Hold& hold, const State& state, const Isometry3d& frame,
 
 }  // namespace
 
-double friction_between(const Environment& environment, const Obstacle& obstacle, int body) {
+double friction_on(const Obstacle& obstacle, int body, double friction) {
   const auto index = static_cast<std::size_t>(body);
   const bool told = index < obstacle.friction.size() && obstacle.friction[index] >= 0;
-  return told ? obstacle.friction[index] : environment.materials[index].friction;
+  return told ? obstacle.friction[index] : friction;
+}
+
+double friction_between(const Environment& environment, const Obstacle& obstacle, int body) {
+  return friction_on(obstacle, body, environment.materials[static_cast<std::size_t>(body)].friction);
 }
 
 Isometry3d frame_pose(const Environment& environment, int frame, double time) {

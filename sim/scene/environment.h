@@ -65,6 +65,9 @@ struct Environment {
   State state;
 };
 
+/// Coulomb coefficient of an obstacle on a body whose material has that `friction`.
+double friction_on(const Obstacle& obstacle, int body, double friction);
+
 /// Coulomb coefficient between an obstacle and the vertices of a body.
 double friction_between(const Environment& environment, const Obstacle& obstacle, int body);
 

@@ -15,13 +15,10 @@ using Eigen::Vector3d;
 
 namespace {
 
-constexpr double smoothing =
-    1e-8;  ///< slip at which friction is 0.7 of its bound, for a smooth start of sliding [m]
-
 double friction_bound_of(const Touch& touch) { return touch.friction_coefficient * touch.normal_force; }
 
 /// Length of a slip as friction takes it, smooth where it starts [m].
-double smooth_length(double length) { return std::sqrt(length * length + smoothing * smoothing); }
+double smooth_length(double length) { return std::sqrt(length * length + slip_smoothing * slip_smoothing); }
 
 Vector3d way_of(const ContactStep& step, const Points& positions, int i) {
   return (positions.row(i) - step.environment.state.positions.row(i)).transpose();
@@ -97,12 +94,6 @@ VertexConstraint constraint_of(const ContactStep& step, const Points& positions,
                                     direction * direction.transpose());
   }
   return constraint;
-}
-
-bool is_box(const Obstacle& obstacle) { return std::holds_alternative<Box>(obstacle.shape); }
-
-bool stand_beside(const std::vector<Obstacle>& obstacles) {
-  return obstacles.size() > 1 && std::any_of(obstacles.begin(), obstacles.end(), is_box);
 }
 
 }  // namespace

@@ -11,9 +11,6 @@
 
 namespace flash::sim {
 
-/// Slip up to which a vertex has not moved: rounding of a position [m].
-inline constexpr double resting_slip = 1e-13;
-
 /// The step in which vertices meet obstacles: from environment.state to `time`, `time_step` later.
 struct ContactStep {
   /// Sheet and environment have to outlive the step.
@@ -37,14 +34,6 @@ struct ContactStep {
 
   /// Signed distance of vertex i to an obstacle at the start of the step [m].
   double distance_at_start(int obstacle, int i) const;
-};
-
-/// What a vertex may do at the current iterate of a step.
-enum class Freedom {
-  free,
-  held,   ///< some axes obey a hold
-  slip,   ///< on a surface, the friction force on the rim of its cone
-  stick,  ///< on a surface, at rest against it
 };
 
 /// What holds a vertex at the current iterate of a step.

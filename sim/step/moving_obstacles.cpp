@@ -1,6 +1,8 @@
 #include "sim/step/moving_obstacles.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <utility>
 
 namespace flash::sim {
 
@@ -35,12 +37,33 @@ Isometry3d describe(const Cylinder& cylinder, MovingObstacle<double>& moving) {
   return frame_along(cylinder.point, cylinder.axis);
 }
 
+/// The obstacle itself, and where it stands in the frame that carries it.
+std::pair<MovingObstacle<double>, Isometry3d> described(const Obstacle& obstacle, double friction) {
+  MovingObstacle<double> moving;
+  const Isometry3d place =
+      std::visit([&](const auto& shape) { return describe(shape, moving); }, obstacle.shape);
+  moving.moves = obstacle.frame != base_frame;
+  moving.friction = friction_on(obstacle, 0, friction);
+  return {moving, place};
+}
+
+}  // namespace
+
+bool stand_beside(const std::vector<Obstacle>& obstacles) {
+  const auto is_box = [](const Obstacle& obstacle) { return std::holds_alternative<Box>(obstacle.shape); };
+  return obstacles.size() > 1 && std::any_of(obstacles.begin(), obstacles.end(), is_box);
+}
+
 Frame<double> frame_of(const Isometry3d& pose) {
   return {vector3(pose.linear().col(0)), vector3(pose.linear().col(1)), vector3(pose.linear().col(2)),
           vector3(pose.translation())};
 }
 
-}  // namespace
+MovingObstacle<double> obstacle_in_frame(const Obstacle& obstacle, double friction) {
+  auto [moving, place] = described(obstacle, friction);
+  moving.start = moving.end = frame_of(place);
+  return moving;
+}
 
 Gap gap_of(const SurfaceGap<double>& gap) {
   return {gap.distance,
@@ -55,10 +78,7 @@ std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environm
                                                      double end) {
   std::vector<MovingObstacle<double>> all;
   for (const Obstacle& obstacle : environment.obstacles) {
-    MovingObstacle<double> moving;
-    const Isometry3d place =
-        std::visit([&](const auto& shape) { return describe(shape, moving); }, obstacle.shape);
-    moving.moves = obstacle.frame != base_frame;
+    auto [moving, place] = described(obstacle, environment.materials[0].friction);
     moving.start = frame_of(moving.moves ? frame_pose(environment, obstacle.frame, start) * place : place);
     moving.end = moving.moves ? frame_of(frame_pose(environment, obstacle.frame, end) * place) : moving.start;
     all.push_back(moving);

@@ -22,7 +22,16 @@ struct Gap {
 };
 Gap gap_of(const SurfaceGap<double>& gap);
 
-/// The obstacles of an environment between the times `start` and `end` [s].
+/// An obstacle as it stands in the frame that carries it, in both of its frames. `friction`: on the body at hand.
+MovingObstacle<double> obstacle_in_frame(const Obstacle& obstacle, double friction);
+
+/// Whether a box stands beside another obstacle, so that one may continue the other.
+bool stand_beside(const std::vector<Obstacle>& obstacles);
+
+Frame<double> frame_of(const Eigen::Isometry3d& pose);
+
+/// The obstacles of an environment between the times `start` and `end` [s], with the friction on its first
+/// body.
 std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environment, double start,
                                                      double end);
 

@@ -3,10 +3,9 @@
 #include <span>
 #include <vector>
 
-namespace flash::sim {
+#include "sim/law/freedom.h"
 
-/// Gap up to which a vertex is on a surface: rounding of a projected position [m].
-inline constexpr double touching_gap = 1e-10;
+namespace flash::sim {
 
 /// A vertex against an obstacle.
 struct Touch {

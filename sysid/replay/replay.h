@@ -29,6 +29,7 @@ struct ReplaySettings {
   int min_points = 20;  ///< keyframes of fewer points carry no weight
   int envs = 64;        ///< candidates simulated side by side, at most
   int threads = 1;
+  sim::Device device = sim::Device::cpu;  ///< where candidates are simulated
 };
 
 /// How the sheet lay and how it was grasped: what the recording leaves open and what changes the motion.

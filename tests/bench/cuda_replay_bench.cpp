@@ -1,5 +1,6 @@
-// Whole steps on the device: sheets carried by a corner, each of its own material, without a table. Usage:
-// flash_cuda_replay_bench [VERTICES[,...] [ENVIRONMENTS[,...] [STEPS [SOLVES_BY_AN_OLD_FACTOR]]]]
+// Whole steps on the device: sheets carried by a corner, each of its own material. Usage:
+// flash_cuda_replay_bench [VERTICES[,...] [ENVIRONMENTS[,...] [STEPS [SOLVES_BY_AN_OLD_FACTOR [table]]]]]
+// They hang free, or lie on a table with friction of 0.3.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -31,7 +32,7 @@ std::shared_ptr<const HoldMotion> lift(const data::Points& rest, int steps, doub
 }
 
 /// E t from 10 to 300 N/m and D from 1e-5 to 1e-4 N m, drawn evenly in their logarithms.
-std::vector<ReplayEnvironment> lifts(const Towel& towel, int count, int steps, double time_step) {
+std::vector<ReplayEnvironment> lifts(const Towel& towel, int count, int steps, double time_step, bool table) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0, 1);
   const data::Points& rest = towel.plan->sheet.rest.vertices;
@@ -42,6 +43,8 @@ std::vector<ReplayEnvironment> lifts(const Towel& towel, int count, int steps, d
     environment.material = towel.material;
     environment.material.membrane_stiffness = 10 * std::pow(30, share(random));
     environment.material.bending_rigidity = 1e-5 * std::pow(10, share(random));
+    environment.material.friction = 0.3;
+    if (table) environment.obstacles = {{Plane{}}};
     environment.holds = motion;
     environment.positions = rest;
     environment.velocities = data::Points::Zero(rest.rows(), 3);
@@ -80,12 +83,12 @@ Floor floor_of(const Towel& towel, double iterations, double factorizations, dou
   return floor;
 }
 
-void time_replay(const Towel& towel, int environments, int steps, int stale_factor_solves) {
+void time_replay(const Towel& towel, int environments, int steps, int stale_factor_solves, bool table) {
   ReplaySettings settings;
   settings.stale_factor_solves = stale_factor_solves;
   settings.steps = steps;
   settings.kept_steps = {steps};
-  BatchReplay replay(towel.plan, lifts(towel, environments, steps, settings.time_step), settings);
+  BatchReplay replay(towel.plan, lifts(towel, environments, steps, settings.time_step, table), settings);
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   replay.advance(steps);
@@ -108,7 +111,8 @@ void time_replay(const Towel& towel, int environments, int steps, int stale_fact
               iterations / count, factorizations / count, solves / count, substeps / count,
               100 * converged / count, 1e6 * each, 1e6 * floor.seconds, each / floor.seconds,
               floor.bytes / each / bandwidth, floor.flops / each / single_rate);
-  std::printf("         share of evaluation, matrix, preconditioner, factorization, directions, rest:");
+  std::printf(
+      "         share of evaluation, matrix, preconditioner, factorization, directions, contact, rest:");
   for (const double share : replay.phases()) std::printf(" %.3f", share);
   std::printf("\n");
   std::fflush(stdout);
@@ -127,11 +131,12 @@ int main(int count, char** arguments) {
                          environments = numbers_of(count > 2 ? arguments[2] : "1,64,256,1024");
   const int steps = count > 3 ? std::stoi(arguments[3]) : 100,
             stale = count > 4 ? std::stoi(arguments[4]) : 5;
+  const bool table = count > 5 && std::string(arguments[5]) == "table";
   std::printf("%8s %6s %6s %10s %8s %8s %8s %8s %9s %10s %10s %8s %7s %7s\n", "vertices", "envs", "teams",
               "ms a step", "iters", "factors", "solves", "substeps", "conv. %", "us an env.", "floor us",
               "ratio", "of B/s", "of F/s");
   for (const int size : vertices) {
     const flash::sim::Towel towel(size);
-    for (const int batch : environments) time_replay(towel, batch, steps, stale);
+    for (const int batch : environments) time_replay(towel, batch, steps, stale, table);
   }
 }

@@ -145,6 +145,10 @@ SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const
     layout.block_columns.push_back(fronts.position[column]);
   }
   add_triangles(plan, fronts.position, layout);
+  for (std::size_t k = 0; k < plan.edge_count; ++k) {
+    const auto [i, j] = plan.pattern.pairs[k];
+    layout.edge_lengths.push_back((plan.sheet.rest.vertices.row(i) - plan.sheet.rest.vertices.row(j)).norm());
+  }
   add_block_rows(plan, fronts.position, layout);
   add_scalar_rows(bending, fronts.position, layout);
   if (bending.model == data::BendingModel::hinge) add_hinges(plan, fronts.position, layout);

@@ -44,6 +44,7 @@ struct SheetLayout {
   std::vector<int> hinge_corner_starts, hinge_corners;   ///< of each vertex: 4 * hinge + corner
   std::vector<int> hinge_source_starts, hinge_sources;   ///< of each block: 16 * hinge + 4 * row + column
   std::vector<double> vertex_area;                       ///< by place [m^2]
+  std::vector<double> edge_lengths;                      ///< at rest; the first pairs are the edges [m]
 };
 
 SheetLayout lay_out(const SheetPlan& plan, const BendingOperator& bending, const FrontPlan& fronts);

@@ -158,8 +158,8 @@ Trajectory by_processor(const Scene& scene, double tolerance) {
         environment.holds.push_back(support(held.vertex, held.axes, held.target));
     const StepReport report = solver.step(environment);
     trajectory.positions.push_back(environment.state.positions);
-    trajectory.steps.push_back({report.residual, report.iterations, report.solves, report.factorizations,
-                                report.substeps, report.converged});
+    trajectory.steps.push_back({report.residual, report.penetration_max, report.iterations, report.solves,
+                                report.factorizations, report.substeps, report.converged});
   }
   return trajectory;
 }

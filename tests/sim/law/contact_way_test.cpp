@@ -18,11 +18,6 @@ Isometry3d random_pose() {
                     Eigen::AngleAxisd(3 * Vector3d::Random().x(), Vector3d::Random().normalized()));
 }
 
-Frame<double> frame_of(const Isometry3d& pose) {
-  return {vector3(pose.linear().col(0)), vector3(pose.linear().col(1)), vector3(pose.linear().col(2)),
-          vector3(pose.translation())};
-}
-
 /// The gap of a way without other obstacles, in a step of 10 ms from which things come out at 1 m/s.
 Gap gap_of_way(const MovingObstacle<double>& obstacle, const Vector3d& from, const Vector3d& to) {
   return gap_of(gap_after(obstacle, {}, vector3(from), vector3(to), vector3(to), 0.01, {.speed = 1}));

@@ -1,0 +1,190 @@
+#pragma once
+#include "sim/cuda/environment_numbers.h"
+#include "sim/cuda/incremental_potential.cuh"
+#include "sim/cuda/team.cuh"
+
+namespace flash::sim::cuda {
+
+// Contact of a sheet with obstacles: sim/newton/active_set.h and sim/step/contact_set.h for one environment.
+// A thread decides for the vertices i, i + team_threads, ...; none of them reads what another decides.
+
+/// The way of the linear problem's solution at a vertex.
+__device__ inline Triple way_at(const float* direction, int i) {
+  return {direction[3 * i], direction[3 * i + 1], direction[3 * i + 2]};
+}
+
+/// Moves a trial iterate out of the obstacles, held vertices onto their surface. `contacts`: of the linear
+/// problem, null where there is none yet.
+__device__ __noinline__ void project_to_feasible(const SheetTables& tables, const StepProblem& step,
+                                                 const ContactSet* contacts, Point* positions) {
+  if (step.obstacles.count == 0) return;
+  __syncthreads();
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    if (step.held_axes[i] != 0) continue;
+    const Triple start = triple(step.start[i]), point = triple(positions[i]);
+    Triple place = point;
+    if (contacts != nullptr && contacts->listed[i] != 0)
+      place =
+          feasible_place(step.obstacles, start, contacts->contacts[i], step.touches_of(*contacts, i), point);
+    else if (!(clearance_of(step.obstacles, start, point) >= 0))
+      place = projected_out(step.obstacles, start, nullptr, point);
+    positions[i] = {place.x, place.y, place.z, 0};
+  }
+}
+
+/// Copies what holds the vertices at an iterate.
+__device__ inline void copy_contacts(const SheetTables& tables, const StepProblem& step,
+                                     const ContactSet& from, const ContactSet& to) {
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    const int listed = from.listed[i];
+    to.listed[i] = listed;
+    if (listed == 0) continue;
+    to.contacts[i] = from.contacts[i];
+    for (int k = 0; k < step.obstacles.count; ++k) step.touches_of(to, i)[k] = step.touches_of(from, i)[k];
+  }
+}
+
+/// Fills in what may not move freely: held vertices, and those that `contacts` hold. Their order does not
+/// matter. `left`: null, or the matrices of sim/cuda/generalized_residuals.cuh. `count`: on chip.
+__device__ inline void gather_restrictions(const SheetTables& tables, StepProblem& step,
+                                           const ContactSet& contacts, VertexRestriction* list, int* of_place,
+                                           float* left, int* count) {
+  if (step.obstacles.count == 0) return;
+  __syncthreads();
+  if (threadIdx.x == 0) *count = step.held_count;
+  for (int k = static_cast<int>(threadIdx.x); k < step.held_count && left != nullptr; k += team_threads)
+    for (int e = 0; e < 9; ++e) left[9 * k + e] = list[k].free[e];
+  __syncthreads();
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    if (step.held_axes[i] != 0) continue;
+    const bool holds = contacts.listed[i] != 0 && contacts.contacts[i].freedom != Freedom::free;
+    if (!holds) {
+      of_place[i] = -1;
+      continue;
+    }
+    const VertexContact& contact = contacts.contacts[i];
+    VertexRestriction restriction = {i, {}, {}};
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) restriction.free[3 * c + r] = static_cast<float>(contact.free.at(r, c));
+      restriction.correction[c] = static_cast<float>(contact.correction[c]);
+    }
+    const int at = atomicAdd(count, 1);
+    list[at] = restriction;
+    of_place[i] = at;
+    if (left == nullptr) continue;
+    for (int c = 0; c < 3; ++c) {
+      const Triple coupling = friction_coupling(step.obstacles, contact, step.touches_of(contacts, i), c);
+      for (int r = 0; r < 3; ++r)
+        left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
+    }
+  }
+  __syncthreads();
+  step.restrictions.count = *count;
+  __syncthreads();
+}
+
+/// What contact adds to the diagonal blocks: the stiffness of friction, whose force turns with the slip; with
+/// `curved` that of round surfaces, on which the normal force turns.
+__device__ inline void write_own_blocks(const SheetTables& tables, const StepProblem& step,
+                                        const ContactSet& contacts, bool curved, float* blocks) {
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    Symmetric3 sum;
+    if (step.held_axes[i] == 0 && contacts.listed[i] != 0) {
+      const VertexContact& contact = contacts.contacts[i];
+      if (contact.freedom == Freedom::slip) sum = restricted(contact.slip_stiffness, contact.free);
+      for (int k = 0; k < step.obstacles.count && curved; ++k) {
+        const VertexTouch& touch = step.touches_of(contacts, i)[k];
+        if (touch.holds) sum = sum - touch.normal_force * square(touch.curvature_direction);
+      }
+    }
+    for (int e = 0; e < 9; ++e) blocks[9 * i + e] = static_cast<float>(sum.at(e % 3, e / 3));
+  }
+}
+
+/// One exchange of the active set of the linear problem, as exchange_contacts of the CPU; `stuck`: as
+/// hold_touching. `change`: what the direction adds to the forces. Returns whether any vertex changed, to
+/// all.
+__device__ __noinline__ bool exchange_contacts(const SheetTables& tables, const StepProblem& step,
+                                               const Iterate& now, const float* direction,
+                                               const float* change, bool stuck, const ContactSet& contacts,
+                                               float* gradient) {
+  const ObstacleStep<double>& obstacles = step.obstacles;
+  const double reach = stuck ? touching_gap : no_such_side;
+  bool any = false;
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    if (step.held_axes[i] != 0) continue;
+    const Triple way = way_at(direction, i);
+    VertexTouch* touches = step.touches_of(contacts, i);
+    if (contacts.listed[i] != 0) {
+      VertexContact contact = contacts.contacts[i];
+      const Triple force = force_at(now.force, i);
+      if (!stuck && contact.freedom != Freedom::free &&
+          release(obstacles, force + way_at(change, i), contact, touches)) {
+        const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
+        for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
+      } else if (contact.freedom == Freedom::stick || !hold(obstacles.count, way, reach, contact, touches)) {
+        continue;
+      }
+      contacts.contacts[i] = contact;
+      any = true;
+      continue;
+    }
+    const double clearance = now.contacts.clearance[i];
+    if (clearance > reach || clearance > norm(way)) continue;
+    find_touches(obstacles, triple(step.start[i]), triple(now.positions[i]), touches);
+    VertexContact contact;
+    if (!hold(obstacles.count, way, reach, contact, touches)) continue;
+    contacts.contacts[i] = contact;
+    contacts.listed[i] = 1;
+    any = true;
+  }
+  return __syncthreads_or(any) != 0;
+}
+
+/// What a step says of its contacts.
+struct ContactEnd {
+  double complementarity;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
+  double penetration;      ///< deepest vertex below a surface [m]
+  double start_depth;      ///< deepest that started inside an obstacle [m]
+  double work;             ///< of the obstacles on the sheet [J]
+};
+
+__device__ __noinline__ ContactEnd judge_contacts(const SheetTables& tables, const StepProblem& step,
+                                                  const Iterate& end, double* partial) {
+  const ObstacleStep<double>& obstacles = step.obstacles;
+  if (obstacles.count == 0) return {};
+  double complementarity = 0, penetration = 0, start_depth = 0, work[1] = {};
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    const Triple start = triple(step.start[i]), point = triple(end.positions[i]);
+    const int axes = step.held_axes[i];
+    for (int k = 0; k < obstacles.count; ++k) {
+      const SurfaceGap<double> gap = gap_in_step(obstacles, k, start, point);
+      if (axes == 7) {
+        penetration = worse_of(penetration, gap.sunk - gap.distance);
+        continue;
+      }
+      const double depth =
+          gap.starts_inside ? -gap_to(obstacles.obstacles[k], point).distance : -gap.distance;
+      penetration = worse_of(penetration, depth);
+      complementarity = worse_of(complementarity, -gap.distance);
+      if (axes == 0) start_depth = worse_of(start_depth, -distance_at_start(obstacles.obstacles[k], start));
+    }
+    if (axes != 0 || end.contacts.listed[i] == 0) continue;
+    for (int k = 0; k < obstacles.count; ++k) {
+      const VertexTouch& touch = step.touches_of(end.contacts, i)[k];
+      if (!touch.holds) continue;
+      complementarity = worse_of(complementarity, touch.gap);
+      const Triple force = touch.normal_force * touch.normal + touch.friction;
+      // The obstacle pushes out a vertex that starts inside, even where it stands still.
+      work[0] += touch.starts_inside ? fmax(0.0, dot(force, point - start)) : dot(force, touch.surface_moved);
+    }
+  }
+  sum_over_team(work, partial);
+  complementarity = worst_over_team(complementarity, partial);
+  penetration = worst_over_team(penetration, partial);
+  start_depth = worst_over_team(start_depth, partial);
+  __syncthreads();
+  return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, work[0]};
+}
+
+}  // namespace flash::sim::cuda

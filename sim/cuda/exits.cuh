@@ -1,0 +1,80 @@
+#pragma once
+#include "sim/cuda/contact.cuh"
+
+namespace flash::sim::cuda {
+
+// How a sheet that starts a step inside obstacles leaves them: sim/step/exits.h for one environment.
+
+/// Whether vertex i, which nothing holds, starts the step inside an obstacle.
+__device__ inline bool starts_inside(const StepProblem& step, int i, int obstacle) {
+  return step.held_axes[i] == 0 &&
+         distance_at_start(step.obstacles.obstacles[obstacle], triple(step.start[i])) < -inside_depth;
+}
+
+/// The k-th of the directions that lead out of a plane, out of the faces of a box, across the axis of a
+/// cylinder.
+__device__ inline int exit_directions(const MovingObstacle<double>& obstacle) {
+  return obstacle.shape == ObstacleShape::plane ? 1 : obstacle.shape == ObstacleShape::box ? 6 : 16;
+}
+__device__ inline Triple exit_direction(const MovingObstacle<double>& obstacle, int k) {
+  const Frame<double>& frame = obstacle.start;
+  if (obstacle.shape == ObstacleShape::plane) return frame.z;
+  if (obstacle.shape == ObstacleShape::box) return (k % 2 == 0 ? 1.0 : -1.0) * frame.axis(k / 2);
+  double sine, cosine;
+  sincospi(k / 8.0, &sine, &cosine);
+  return cosine * frame.x + sine * frame.y;
+}
+
+/// The unit direction in which the sheet leaves all obstacles that it starts in by the shortest way; zero
+/// where there is none.
+__device__ inline Triple shortest_way_out(const SheetTables& tables, const StepProblem& step,
+                                          double* partial) {
+  const ObstacleStep<double>& obstacles = step.obstacles;
+  Triple best = {};
+  double shortest = no_such_side;
+  for (int own = 0; own < obstacles.count; ++own) {
+    bool any = false;
+    for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads)
+      any = any || starts_inside(step, i, own);
+    if (__syncthreads_or(any) == 0) continue;
+    for (int k = 0; k < exit_directions(obstacles.obstacles[own]); ++k) {
+      const Triple direction = exit_direction(obstacles.obstacles[own], k);
+      double longest = 0;
+      for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads)
+        for (int other = 0; other < obstacles.count; ++other)
+          if (starts_inside(step, i, other))
+            longest =
+                worse_of(longest, depth_along(obstacles.obstacles[other], triple(step.start[i]), direction));
+      longest = worst_over_team(longest, partial);
+      if (longest < shortest) {
+        shortest = longest;
+        best = direction;
+      }
+    }
+  }
+  return best;
+}
+
+/// Whether leaving the obstacles at `speed` has not torn the sheet, which ends the step at `end`.
+__device__ inline bool exits_gently(const SheetTables& tables, const StepProblem& step, const Point* end,
+                                    double speed) {
+  const double limit = speed * sqrt(step.material->areal_density / step.material->membrane_stiffness);
+  const auto exits = [&](int i) {
+    for (int k = 0; k < step.obstacles.count; ++k)
+      if (starts_inside(step, i, k)) return true;
+    return false;
+  };
+  bool torn = false;
+  for (int k = static_cast<int>(threadIdx.x); k < tables.edge_count; k += team_threads) {
+    const int i = tables.block_rows[tables.size + k], j = tables.block_columns[tables.size + k];
+    if (!exits(i) && !exits(j)) continue;
+    const auto strain = [&](const Point* x) {
+      return fabs(norm(triple(x[i]) - triple(x[j])) / tables.edge_lengths[k] - 1);
+    };
+    const double at_end = strain(end);
+    torn = torn || !(at_end <= limit || at_end <= strain(step.start));
+  }
+  return __syncthreads_or(torn) == 0;
+}
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,87 @@
+#include "sim/cuda/hold_motion.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace flash::sim::cuda {
+
+using data::Points;
+
+namespace {
+
+/// The vertices held at the end of a step, as begin_step of sim/step/contact_set.h takes them.
+std::vector<HeldVertex> held_at(const Environment& environment, double time) {
+  std::vector<HeldVertex> all;
+  std::vector<int> place(static_cast<std::size_t>(environment.state.positions.rows()), -1);
+  for (std::size_t k = 0; k < environment.holds.size(); ++k) {
+    const Hold& hold = environment.holds[k];
+    const HeldVertices& held = environment.state.held[k];
+    if (held.vertices.empty()) continue;
+    const Eigen::Isometry3d frame = frame_pose(environment, hold.frame, time);
+    const Points places = held_places(hold, held, time);
+    for (std::size_t v = 0; v < held.vertices.size(); ++v) {
+      int& at = place[static_cast<std::size_t>(held.vertices[v])];
+      if (at < 0) {
+        at = static_cast<int>(all.size());
+        all.push_back({held.vertices[v], {false, false, false}, Eigen::Vector3d::Zero(), {-1, -1, -1}});
+      }
+      HeldVertex& own = all[static_cast<std::size_t>(at)];
+      const Eigen::Vector3d target = frame * places.row(static_cast<Eigen::Index>(v)).transpose();
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!hold.axes[static_cast<std::size_t>(axis)]) continue;
+        own.axes[static_cast<std::size_t>(axis)] = true;
+        own.holds[static_cast<std::size_t>(axis)] = static_cast<int>(k);
+        own.target[axis] = target[axis];
+      }
+    }
+  }
+  return all;
+}
+
+/// Whether the hold acts in the step from `start` to `end` [s].
+bool is_closed(const Hold& hold, double start, double end) {
+  const double middle = 0.5 * (start + end);
+  return hold.from <= middle && middle < hold.to;
+}
+
+}  // namespace
+
+int steps_before_a_hold_closes(const Environment& environment, double time_step, int most) {
+  double time = environment.state.time;
+  for (int k = 0; k < most; ++k, time += time_step)
+    for (const Hold& hold : environment.holds)
+      if (k > 0 && is_closed(hold, time, time + time_step) && !is_closed(hold, time - time_step, time))
+        return k;
+  return most;
+}
+
+HoldMotion motion_of_holds(Environment& environment, double time_step, int steps) {
+  HoldMotion motion;
+  const double start = environment.state.time;
+  for (int k = 0; k < steps; ++k) {
+    const double time = environment.state.time + time_step;
+    update_holds(environment, time);
+    motion.push_back(held_at(environment, time));
+    environment.state.time = time;
+  }
+  environment.state.time = start;
+  return motion;
+}
+
+ReplayEnvironment replay_environment(const Environment& environment,
+                                     std::shared_ptr<const HoldMotion> holds) {
+  ReplayEnvironment replay;
+  replay.material = environment.materials[0];
+  replay.gravity = environment.gravity;
+  replay.loads = environment.loads;
+  replay.holds = std::move(holds);
+  replay.hold_count = static_cast<int>(environment.holds.size());
+  replay.obstacles = environment.obstacles;
+  replay.schedule = environment.schedule;
+  replay.time = environment.state.time;
+  replay.positions = environment.state.positions;
+  replay.velocities = environment.state.velocities;
+  return replay;
+}
+
+}  // namespace flash::sim::cuda

@@ -1,0 +1,163 @@
+#include "sim/device_batch.h"
+
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "data/error.h"
+#include "data/parallel.h"
+#include "sim/law/vertex_contact.h"
+#ifdef FLASH_HAVE_CUDA
+#include "sim/cuda/hold_motion.h"
+#include "sim/cuda/out_of_memory.h"
+#endif
+
+namespace flash::sim {
+
+std::string why_not_on_device(const Environment& environment) {
+  if (environment.materials.size() > 1) return "several bodies in one environment";
+  if (environment.obstacles.size() > most_obstacles)
+    return "more than " + std::to_string(most_obstacles) + " obstacles: found " +
+           std::to_string(environment.obstacles.size());
+  return {};
+}
+
+#ifdef FLASH_HAVE_CUDA
+
+namespace {
+
+/// Environments that run together: over which steps, and which.
+struct Group {
+  int first, count;
+  std::vector<int> environments;
+};
+
+/// The groups of environments that stand at the step `at` of each, up to the step `end`.
+std::vector<Group> grouped(const SheetPlan& plan, const std::vector<Environment>& environments,
+                           const std::vector<int>& at, int end, double time_step) {
+  std::map<std::tuple<const BendingOperator*, int, int>, std::vector<int>> groups;
+  for (std::size_t e = 0; e < environments.size(); ++e) {
+    if (at[e] >= end) continue;
+    const data::SheetMaterial& material = environments[e].materials[0];
+    const BendingOperator& bending = bending_operator(plan, material.bending_model, material.poissons_ratio);
+    const int count = cuda::steps_before_a_hold_closes(environments[e], time_step, end - at[e]);
+    groups[{&bending, at[e], count}].push_back(static_cast<int>(e));
+  }
+  std::vector<Group> all;
+  for (auto& [key, members] : groups) all.push_back({std::get<1>(key), std::get<2>(key), std::move(members)});
+  // Results come in the order of the environments.
+  std::sort(all.begin(), all.end(),
+            [](const Group& a, const Group& b) { return a.environments[0] < b.environments[0]; });
+  return all;
+}
+
+cuda::ReplaySettings settings_of(const BatchSettings& settings, int first, int count) {
+  cuda::ReplaySettings own;
+  own.time_step = settings.solver.time_step;
+  own.max_iterations = settings.solver.max_iterations;
+  own.tolerance = settings.solver.tolerance;
+  own.stale_factor_solves = settings.solver.stale_factor_solves;
+  own.exit_speed = settings.solver.exit_speed;
+  own.halvings = settings.solver.halvings;
+  own.first_step = first;
+  own.steps = first + count;
+  for (const int step : settings.kept_steps)
+    if (step > first && step <= first + count) own.kept_steps.push_back(step);
+  return own;
+}
+
+/// Runs a group, whose environments advance.
+void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, const BatchSettings& settings,
+         std::vector<Environment>& environments, const DeviceResults& results) {
+  const double h = settings.solver.time_step;
+  const cuda::ReplaySettings own = settings_of(settings, group.first, group.count);
+  std::vector<std::vector<HeldVertices>> held;
+  std::vector<cuda::ReplayEnvironment> replays;
+  for (const int e : group.environments) {
+    Environment moved = environments[static_cast<std::size_t>(e)];
+    auto motion = std::make_shared<const cuda::HoldMotion>(cuda::motion_of_holds(moved, h, group.count));
+    // Most environments of a batch are held alike.
+    if (!replays.empty() && replays.back().holds != nullptr && *replays.back().holds == *motion)
+      motion = replays.back().holds;
+    replays.push_back(cuda::replay_environment(environments[static_cast<std::size_t>(e)], motion));
+    held.push_back(std::move(moved.state.held));
+  }
+  cuda::BatchReplay replay(plan, replays, own);
+  replays.clear();
+  replay.advance(group.count);
+  replay.synchronize(settings.solver.stop);
+  if (settings.solver.stop != nullptr && *settings.solver.stop) throw data::Stopped();
+
+  const auto kept_begin =
+      std::upper_bound(settings.kept_steps.begin(), settings.kept_steps.end(), group.first);
+  const int kept_first = static_cast<int>(kept_begin - settings.kept_steps.begin());
+  data::for_each_in_parallel(group.environments.size(), settings.threads, [&](std::size_t k) {
+    const int e = group.environments[k], in_replay = static_cast<int>(k);
+    State& state = environments[static_cast<std::size_t>(e)].state;
+    std::vector<StepStats> stats;
+    for (const cuda::ReplayStep& step : replay.stats(in_replay)) {
+      stats.push_back({step.residual, step.penetration_max, step.iterations, step.solves, step.factorizations,
+                       step.substeps, step.converged});
+      state.time += h;
+    }
+    results.stepped({e, group.first, group.count, stats, replay.hold_forces(in_replay)});
+    for (std::size_t index = 0; index < own.kept_steps.size(); ++index)
+      results.kept(e, kept_first + static_cast<int>(index),
+                   replay.kept_positions(in_replay, static_cast<int>(index)));
+    state.positions = replay.positions(in_replay);
+    state.velocities = replay.velocities(in_replay);
+    state.held = std::move(held[k]);
+  });
+}
+
+/// Runs a group in parts that fit into the device's memory.
+void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& group,
+                  const BatchSettings& settings, std::vector<Environment>& environments,
+                  const DeviceResults& results) {
+  std::size_t at_once = group.environments.size();
+  for (std::size_t begin = 0; begin < group.environments.size();) {
+    const std::size_t count = std::min(at_once, group.environments.size() - begin);
+    const auto from = group.environments.begin() + static_cast<std::ptrdiff_t>(begin);
+    try {
+      run(plan, {group.first, group.count, {from, from + static_cast<std::ptrdiff_t>(count)}}, settings,
+          environments, results);
+      begin += count;
+    } catch (const cuda::OutOfMemory&) {
+      if (count == 1)
+        throw data::InputError("--device cuda: one environment does not fit into the memory of the device");
+      at_once = (count + 1) / 2;
+    }
+  }
+}
+
+}  // namespace
+
+void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment>& environments,
+                       const BatchSettings& settings, int first, int steps, const DeviceResults& results) {
+  for (const Environment& environment : environments)
+    if (const std::string why = why_not_on_device(environment); !why.empty())
+      throw data::InputError("--device cuda: " + why);
+  std::vector<int> at(environments.size(), first);
+  const int end = first + steps;
+  for (auto groups = grouped(*plan, environments, at, end, settings.solver.time_step); !groups.empty();
+       groups = grouped(*plan, environments, at, end, settings.solver.time_step))
+    for (const Group& group : groups) {
+      run_in_waves(plan, group, settings, environments, results);
+      for (const int e : group.environments) at[static_cast<std::size_t>(e)] += group.count;
+      if (group.first + group.count < end) continue;
+      data::for_each_in_parallel(group.environments.size(), settings.threads,
+                                 [&](std::size_t k) { results.finished(group.environments[k]); });
+    }
+}
+
+#else
+
+void advance_on_device(const std::shared_ptr<const SheetPlan>&, std::vector<Environment>&,
+                       const BatchSettings&, int, int, const DeviceResults&) {
+  throw data::InputError("--device cuda: this program was built without CUDA");
+}
+
+#endif
+
+}  // namespace flash::sim

@@ -1,0 +1,38 @@
+#pragma once
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sim/batch.h"
+
+namespace flash::sim {
+
+/// What a device cannot do yet of an environment, in a line; empty where it can all of it.
+std::string why_not_on_device(const Environment& environment);
+
+/// Results of one environment over some steps of a batch.
+struct DeviceSteps {
+  int environment;
+  int first, count;                     ///< steps
+  std::span<const StepStats> stats;     ///< one a step
+  std::span<const double> hold_forces;  ///< steps x holds x 3 [N]
+};
+
+/// What takes the results; called on several threads, for different environments.
+struct DeviceResults {
+  std::function<void(const DeviceSteps&)> stepped;
+  std::function<void(int environment, int index, const data::Points& positions)> kept;
+  std::function<void(int environment)> finished;  ///< its state is that at the end
+};
+
+/// Takes environments from the step `first` on `steps` further on the CUDA device. Those with the same
+/// bending operator, whose holds close in the same steps, run together, as many as fit into the device's
+/// memory. What an environment gets does not depend on the others, bitwise. Throws data::InputError where
+/// the device cannot do what an environment asks for, data::Stopped once settings.solver.stop is set, and
+/// std::runtime_error with the device's message.
+void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment>& environments,
+                       const BatchSettings& settings, int first, int steps, const DeviceResults& results);
+
+}  // namespace flash::sim

@@ -1,0 +1,22 @@
+#pragma once
+
+namespace flash::sim {
+
+/// What a vertex may do at the current iterate of a step.
+enum class Freedom {
+  free,
+  held,   ///< some axes obey a hold
+  slip,   ///< on a surface, the friction force on the rim of its cone
+  stick,  ///< on a surface, at rest against it
+};
+
+/// Gap up to which a vertex is on a surface: rounding of a projected position [m].
+inline constexpr double touching_gap = 1e-10;
+
+/// Slip up to which a vertex has not moved: rounding of a position [m].
+inline constexpr double resting_slip = 1e-13;
+
+/// Slip at which friction is 0.7 of its bound, for a smooth start of sliding [m].
+inline constexpr double slip_smoothing = 1e-8;
+
+}  // namespace flash::sim
