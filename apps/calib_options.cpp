@@ -58,6 +58,16 @@ void add_target_size_options(CLI::App& verb, double& sd) {
       ->excludes(known);
 }
 
+void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens) {
+  CLI::Option* refine = verb.add_flag_callback(
+      "--refine-intrinsics", [&lens] { lens = calib::LensKnowledge::unknown; },
+      "Solve for the lens with nothing known of it beforehand");
+  verb.add_flag_callback(
+          "--stated-intrinsics", [&lens] { lens = calib::LensKnowledge::stated; },
+          "Keep the lens as it is stated, to the last digit")
+      ->excludes(refine);
+}
+
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {
   calib::DatasetOptions options;
   options.poses = choice.poses;
@@ -66,7 +76,10 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool 
   options.needs_camera = needs_camera;
   options.depth_scale = choice.depth_scale;
   options.depth = !choice.no_depth;
-  return calib::load_dataset(choice.path, options);
+  calib::Dataset dataset = calib::load_dataset(choice.path, options);
+  calib::take_picture_size(dataset);
+  for (const std::string& guess : dataset.guesses) warn_calib(guess);
+  return dataset;
 }
 
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset) {

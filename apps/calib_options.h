@@ -7,6 +7,7 @@
 #include "calib/dataset/detection.h"
 #include "calib/dataset/target.h"
 #include "calib/detect/detect.h"
+#include "calib/uncertainty/lens_estimate.h"
 #include "calib/uncertainty/target_size.h"
 
 namespace flash {
@@ -36,8 +37,11 @@ struct DatasetChoice {
 };
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
 
-/// --target-size automatic|stated|solved
+/// --target-size-sd, --target-size stated|solved
 void add_target_size_options(CLI::App& verb, double& sd);
+
+/// --stated-intrinsics, --refine-intrinsics
+void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens);
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
 

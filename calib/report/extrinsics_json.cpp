@@ -131,9 +131,12 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   if (extrinsics.pixels) {
     const data::CameraIntrinsics& lens = calibration.refined.bundle.intrinsics.front();
     json["lens"] = {{"solved", calibration.unknowns.intrinsics > 0},
+                    {"as_stated", calibration.lens.far_off.empty()},
+                    {"size_px", {lens.width, lens.height}},
                     {"focal_px", {lens.fx, lens.fy}},
                     {"centre_px", {lens.cx, lens.cy}},
-                    {"distortion", lens.distortion}};
+                    {"distortion", lens.distortion},
+                    {"sd", list(Eigen::VectorXd(calibration.lens.sd.head(kLensUnknowns)))}};
   }
   json["depth"] = inputs.depth ? depth_json(*inputs.depth) : Json(nullptr);
   json["time_offset"] = inputs.time_offset ? Json{{"estimate_s", inputs.time_offset->estimate},
@@ -150,6 +153,10 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"weakest_deg", kDegrees * calibration.weakest.rotation}};
   json["convention_findings"] = Json::array();
   json["scale"] = calibration.size ? to_json(*calibration.size) : Json(nullptr);
+  if (calibration.size) {
+    json["scale"]["warp_mm"] = list(Eigen::Vector2d(1e3 * calibration.warp.estimate));
+    json["scale"]["warp_sd_mm"] = list(Eigen::Vector2d(1e3 * calibration.warp.sd));
+  }
   json["splits"] = nullptr;
   if (!calibration.splits.empty()) {
     json["splits"] = {{"covariance_factor", calibration.covariance_factor}};
