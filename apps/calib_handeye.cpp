@@ -67,11 +67,17 @@ std::string fixed(double value, int digits) {
 
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   const Eigen::Vector3d t = extrinsics.transform.T.translation();
-  const calib::Vector6d sd = c.covariance.diagonal().cwiseSqrt();
   constexpr double kDegrees = 180 / M_PI;
-  std::printf("%s <- %s: (%.5f, %.5f, %.5f) m, +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n",
-              extrinsics.transform.parent.c_str(), extrinsics.transform.child.c_str(), t.x(), t.y(), t.z(),
-              1e3 * sd[0], 1e3 * sd[1], 1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
+  const char* const parent = extrinsics.transform.parent.c_str();
+  std::printf("%s <- %s: (%.5f, %.5f, %.5f) m; deviations along and about the axes of %s:\n", parent,
+              extrinsics.transform.child.c_str(), t.x(), t.y(), t.z(), parent);
+  const auto deviations = [&](const char* what, const calib::Matrix6d& covariance) {
+    const calib::Vector6d sd = calib::parent_deviations(c.poses.X, covariance);
+    std::printf("  %-28s +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n", what, 1e3 * sd[0], 1e3 * sd[1],
+                1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
+  };
+  deviations("in the true frames", c.covariance);
+  if (extrinsics.pixels) deviations("repeatable in such poses", c.refined.covariance.topLeftCorner<6, 6>());
   const std::string corners =
       extrinsics.pixels ? "corners " + fixed(extrinsics.corner_px, 3) + " px, robot" : "robot and camera";
   std::printf("%zu of %zu views; %s %.3f deg %.2f mm an axis\n", c.used.size(), c.views.size(),
@@ -137,10 +143,15 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
   } else {
     const calib::Target target = target_of(options.dataset, dataset);
     const std::vector<calib::Detection> detections =
-        detect_all(dataset, target, options.dataset, options.common);
+        detect_all(dataset, target, options.dataset, options.common, LeftOut::told_later);
     phases.end("corners");
-    solved = calib::calibrate_images(setup, dataset, target, detections,
-                                     calib::read_depth(dataset, detections), settings);
+    try {
+      solved = calib::calibrate_images(setup, dataset, target, detections,
+                                       calib::read_depth(dataset, detections), settings);
+    } catch (const data::InputError&) {
+      if (!options.common.quiet) warn_of_left_out(detections);
+      throw;
+    }
   }
   phases.end("solving");
   return solved;

@@ -31,6 +31,7 @@ struct DatasetChoice {
   std::string target;  ///< text or file; empty: as the dataset says
   std::string poses;
   std::string camera;
+  std::string angles;
   std::string cache;
   double depth_scale = 0.001;
   bool no_depth = false;
@@ -49,9 +50,13 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true
 /// names one.
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset);
 
-/// Detections of the whole set, with a line of progress and a warning for each view left out.
+/// Detections of the whole set, with a line of progress and, unless the caller does so later, a warning for
+/// each view left out.
+enum class LeftOut { told, told_later };
 std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const calib::Target& target,
-                                         const DatasetChoice& choice, const CalibCommonOptions& options);
+                                         const DatasetChoice& choice, const CalibCommonOptions& options,
+                                         LeftOut left_out = LeftOut::told);
+void warn_of_left_out(const std::vector<calib::Detection>& detections);
 
 /// What a verb says to people, on stderr, unless --quiet.
 void say(const CalibCommonOptions& options, const std::string& line);

@@ -236,6 +236,18 @@ void check_splits(Calibration& result, const BundleSettings& settings, const Cal
   result.warnings.emplace_back(text);
 }
 
+/// Where an answer is none although most views close: the reading that explains them, if there is one.
+std::optional<std::string> cause_of(const Calibration& result, const std::vector<Observation>& all,
+                                    const std::vector<Symmetry>& symmetries,
+                                    const CalibrateSettings& settings) {
+  ConventionSettings any = settings.convention;
+  any.suspicious = 0;
+  const std::optional<Finding> finding =
+      check_convention(result.setup, all, symmetries, result.selection.robust_seed, settings.angles, any);
+  if (!finding) return std::nullopt;
+  return finding->sentence;
+}
+
 /// Of the lens and the target, which are not what was stated.
 void warn_of_shapes(Calibration& result, bool disputed) {
   if (result.warp.far_off()) result.warnings.insert(result.warnings.begin(), warp_sentence(result.warp));
@@ -254,6 +266,17 @@ void warn(Calibration& result) {
     result.warnings.push_back(
         std::to_string(result.used.size()) +
         " views: noise levels and uncertainty are themselves uncertain; 15 or more are better");
+  constexpr double kWideTurn = 10;  // [deg]
+  const double second = result.diversity.spread.y() / kDegree;
+  if (second < kWideTurn) {
+    char text[240];
+    std::snprintf(
+        text, sizeof text,
+        "the gripper turned by no more than %.1f deg rms about its second axis: turns by 20 to 40 deg about "
+        "two axes are what tells the camera's place",
+        second);
+    result.warnings.emplace_back(text);
+  }
   if (missing > 0)
     result.warnings.push_back(std::to_string(missing) + " of " + std::to_string(result.views.size()) +
                               " views were not used");
@@ -285,7 +308,7 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
   return observations;
 }
 
-void finish(Calibration& result, const std::vector<Observation>& used) {
+bool finish(Calibration& result, const std::vector<Observation>& used) {
   report_views(result);
   std::vector<Eigen::Isometry3d> robot;
   std::vector<double> distances;
@@ -297,14 +320,18 @@ void finish(Calibration& result, const std::vector<Observation>& used) {
   result.weakest = weakest_direction(result.covariance, median(distances), "camera");
   warn(result);
   const std::string implausible = implausibility(result, used);
-  if (implausible.empty()) return;
+  if (implausible.empty()) return true;
   result.warnings.insert(result.warnings.begin(), implausible);
   result.usable = false;
+  return false;
 }
 
-Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
-                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
-                      const CalibrateSettings& settings) {
+namespace {
+
+/// With whatever moved taken to have stood still.
+Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                  const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                  const CalibrateSettings& settings) {
   Calibration result;
   result.setup = setup;
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
@@ -315,6 +342,8 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   result.unknowns = refine_settings.bundle.unknowns;
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
+  const std::string noisy = implausible_noise(result.refined.noise, observations);
+  if (!noisy.empty()) throw data::InputError(cause_of(result, all, symmetries, settings).value_or(noisy));
   SizedRefinement sized = refine_sizes(std::move(result.refined), refine_settings);
   result.refined = std::move(sized.refined);
   result.size = sized.sizes.front();
@@ -337,9 +366,72 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
-  finish(result, observations);
+  const bool plausible = finish(result, observations);
   warn_of_shapes(result, sized.disputed);
+  if (!plausible)
+    if (const auto cause = cause_of(result, all, symmetries, settings))
+      result.warnings.insert(result.warnings.begin(), *cause);
   return result;
+}
+
+/// The views of one side of a knock; the others are left without a pose of the target.
+std::vector<Observation> side_of(std::vector<Observation> views, std::size_t first, bool before) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if ((i < first) != before) views[i].T_camera_target.clear();
+  return views;
+}
+
+std::string knock_sentence(const KnockedPart& other, std::size_t used) {
+  const Knock& knock = other.knock;
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "the %s moved by %.1f mm and %.2f deg before %s: the answer is of the %zu views %s; the %d views %s "
+      "were %s",
+      knock.camera ? "camera" : "target", 1e3 * knock.motion.head<3>().norm(),
+      knock.motion.tail<3>().norm() / kDegree, other.view.c_str(), used,
+      other.before ? "since" : "until then", other.views, other.before ? "until then" : "since",
+      other.poses ? "solved by themselves" : "too few for a solution");
+  return text;
+}
+
+}  // namespace
+
+Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                      const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
+                      const CalibrateSettings& settings) {
+  Calibration whole = solve(setup, camera, points, symmetries, all, settings);
+  if (!whole.pose_errors) return whole;
+  const std::optional<Knock> knock =
+      find_knock(whole.refined, {.unknowns = whole.unknowns}, whole.pose_errors->gain);
+  if (!knock) return whole;
+  const auto first = static_cast<std::size_t>(whole.used[knock->pose]);
+  const std::size_t after = whole.used.size() - knock->pose;
+  // What holds now counts, unless it is hardly known.
+  KnockedPart other{
+      .knock = *knock, .view = all[first].image, .before = after >= 10 || 2 * after >= whole.used.size()};
+  const auto part = [&](bool before) {
+    return solve(setup, camera, points, symmetries, side_of(all, first, before), settings);
+  };
+  Calibration answer;
+  try {
+    answer = part(!other.before);
+  } catch (const data::InputError&) {
+    return whole;  // a part alone may turn about one axis only
+  }
+  other.views = static_cast<int>(other.before ? knock->pose : after);
+  try {
+    other.poses = part(other.before).poses;
+  } catch (const data::InputError&) {
+    // said in the sentence
+  }
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if ((i < first) == other.before && !all[i].T_camera_target.empty())
+      answer.views[i].reason = answer.selection.views[i].reason =
+          std::string(other.before ? "before" : "after") + " the knock at " + other.view;
+  answer.warnings.insert(answer.warnings.begin(), knock_sentence(other, answer.used.size()));
+  answer.other_part = std::move(other);
+  return answer;
 }
 
 }  // namespace flash::calib

@@ -9,6 +9,7 @@
 #include "calib/solve/errors_in_variables.h"
 #include "calib/solve/view_selection.h"
 #include "calib/uncertainty/correlated_pose_errors.h"
+#include "calib/uncertainty/knock.h"
 #include "calib/uncertainty/lens_estimate.h"
 #include "calib/uncertainty/observability.h"
 #include "calib/uncertainty/split_check.h"
@@ -41,6 +42,15 @@ struct ViewResult {
   Vector6d correction = Vector6d::Zero();  ///< of the robot's pose, of a used view
 };
 
+/// What a knock during the recording parts from the answer.
+struct KnockedPart {
+  Knock knock = {};
+  std::string view = {};  ///< the first after it
+  bool before = true;     ///< the part is that before the knock; else that after it
+  int views = 0;
+  std::optional<HandEyePoses> poses = {};  ///< where it has enough views for a solution of its own
+};
+
 struct Calibration {
   Setup setup = Setup::eye_in_hand;
   ViewSelection selection;
@@ -64,7 +74,8 @@ struct Calibration {
   std::vector<SplitCheck> splits;  ///< of X, interleaved first; none where there are too few views
   double covariance_factor = 1;    ///< by which the splits have widened the covariance
   std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found
-  std::vector<std::string> warnings;                ///< worst first
+  std::optional<KnockedPart> other_part;
+  std::vector<std::string> warnings;  ///< worst first
   bool usable = true;
 };
 
@@ -77,8 +88,9 @@ bool has_pixels(const Calibration& calibration);
 std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& observations,
                                  const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings);
 
-/// What all end with: views, observability, warnings.
-void finish(Calibration& result, const std::vector<Observation>& used);
+/// What all end with: views, observability, warnings. False where the answer is implausible, the first of
+/// them.
+bool finish(Calibration& result, const std::vector<Observation>& used);
 
 /// From observations to the answer: views selected, seed, bundle, errors in variables, a second look for
 /// views that do not belong, held-out residuals, comparison; lens, size and warp of the target among the

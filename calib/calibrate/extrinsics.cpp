@@ -30,6 +30,12 @@ std::string resolved(const std::string& path, const std::string& calibration) {
                               ", expected where it was when the file was written");
 }
 
+Vector6d parent_deviations(const Eigen::Isometry3d& T, const Matrix6d& covariance) {
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = T.linear();
+  return (turn * covariance * turn.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+}
+
 namespace {
 
 std::vector<double> numbers(const data::JsonObject& object, const char* field) {

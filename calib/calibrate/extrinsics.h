@@ -27,6 +27,10 @@ ExtrinsicsInputs relative_to(ExtrinsicsInputs inputs, const std::string& out);
 /// data::InputError where it is at neither.
 std::string resolved(const std::string& path, const std::string& calibration);
 
+/// Standard deviations of a transform along and about the axes of its parent, in which its translation is
+/// written. covariance: of the right perturbation (dt, dtheta), along those of the child.
+Vector6d parent_deviations(const Eigen::Isometry3d& T, const Matrix6d& covariance);
+
 /// "flash-extrinsics/1", as far as other programs need it.
 struct Extrinsics {
   Setup setup = Setup::eye_in_hand;

@@ -217,6 +217,19 @@ class PosePairing {
   bool in_order_ = false, named_ = false, by_time_ = false;
 };
 
+/// The rotations anew, as `order` reads the angles of the poses.
+void read_angles(const std::string& order, Dataset& dataset) {
+  const std::vector<std::string>& orders = angle_orders();
+  if (std::find(orders.begin(), orders.end(), order) == orders.end())
+    throw InputError("angles: found \"" + order +
+                     "\", expected an order as xyz (fixed axes), XYZ (turning axes) or rotvec");
+  for (Frame& frame : dataset.frames) {
+    if (!frame.angles)
+      throw InputError(dataset.poses_path + ": found no angles, expected three a pose to read as " + order);
+    frame.T_base_gripper.linear() = rotation_from_angles(*frame.angles, order);
+  }
+}
+
 void read_target(const fs::path& folder, Dataset& dataset) {
   const fs::path file = folder / "target.json";
   if (!fs::exists(file)) return;
@@ -347,6 +360,7 @@ Dataset load_dataset(const std::string& path, const DatasetOptions& options) {
     return dataset;
   }
   read_pictures(folder, options, dataset);
+  if (!options.angles.empty()) read_angles(options.angles, dataset);
   return dataset;
 }
 

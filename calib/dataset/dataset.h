@@ -40,6 +40,7 @@ struct Dataset {
 struct DatasetOptions {
   std::string poses = {};    ///< file or folder; empty: found by name in the dataset
   std::string camera = {};   ///< intrinsics file; empty: found by name in the dataset
+  std::string angles = {};   ///< what three angles of a pose mean, see rotation_from_angles; empty: "xyz"
   bool needs_poses = true;   ///< without: pictures alone, as for intrinsics
   bool needs_camera = true;  ///< of sets with pictures
   double depth_scale = 0.001;

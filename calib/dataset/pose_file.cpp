@@ -10,6 +10,7 @@
 #include "calib/dataset/pose_json.h"
 #include "calib/dataset/pose_numbers.h"
 #include "calib/dataset/yaml_file.h"
+#include "calib/geometry/pose.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/text.h"
@@ -225,11 +226,32 @@ std::vector<PosePair> load_samples(const std::string& path) {
 }  // namespace
 
 Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& angles, const std::string& order) {
+  if (order == kRotationVector) return rotation_exp(angles);
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  for (int k = 0; k < 3; ++k)
-    rotation = Eigen::AngleAxisd(angles[k], Eigen::Vector3d::Unit(order[static_cast<std::size_t>(k)] - 'x')) *
-               rotation;
+  for (int k = 0; k < 3; ++k) {
+    const char axis = order[static_cast<std::size_t>(k)];
+    const bool turning = axis < 'a';
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(angles[k], Eigen::Vector3d::Unit(axis - (turning ? 'X' : 'x'))).toRotationMatrix();
+    rotation = turning ? Eigen::Matrix3d(rotation * turn) : Eigen::Matrix3d(turn * rotation);
+  }
   return rotation;
+}
+
+const std::vector<std::string>& angle_orders() {
+  static const std::vector<std::string> orders = [] {
+    std::vector<std::string> list;
+    for (const char* order :
+         {"xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz"}) {
+      list.emplace_back(order);
+      std::string turning = order;
+      for (char& axis : turning) axis = static_cast<char>(axis - 'x' + 'X');
+      list.push_back(turning);
+    }
+    list.emplace_back(kRotationVector);
+    return list;
+  }();
+  return orders;
 }
 
 std::optional<long> number_in_name(const std::string& path) {

@@ -44,9 +44,13 @@ RecordedPose load_pose_yaml(const std::string& path);
 /// object in the sensor) and others (load_json_pairs). Throws InputError.
 std::vector<PosePair> load_pose_pairs(const std::string& path);
 
-/// R = R_c(angles[2]) R_b(angles[1]) R_a(angles[0]) for an order "abc" about fixed axes, as "xyz" (roll,
-/// pitch, yaw).
+/// How three numbers are a rotation. About fixed axes, "xyz" (roll, pitch, yaw; Fanuc's W P R) and the other
+/// eleven orders: R = R_c(angles[2]) R_b(angles[1]) R_a(angles[0]) for "abc". About axes that turn along, in
+/// capitals: R = R_a(angles[0]) R_b(angles[1]) R_c(angles[2]) for "ABC", as "ZYX" (KUKA's A B C), "XYZ"
+/// (Staubli) and "ZYZ" (Kawasaki's O A T). And "rotvec": axis times angle (Universal Robots).
+constexpr const char* kRotationVector = "rotvec";
 Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& angles, const std::string& order = "xyz");
+const std::vector<std::string>& angle_orders();
 
 /// The last whole number in a file name without its folder and ending: "frame_000012.png" is 12.
 std::optional<long> number_in_name(const std::string& path);

@@ -115,6 +115,15 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                {"covariance", rows(calibration.covariance)}};
   json["predicted_sd"] = {{"translation_mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
                           {"rotation_deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
+  const Vector6d in_parent = parent_deviations(calibration.poses.X, calibration.covariance);
+  json["predicted_sd"]["translation_parent_mm"] = list(Eigen::Vector3d(1e3 * in_parent.head<3>()));
+  json["predicted_sd"]["rotation_parent_deg"] = list(Eigen::Vector3d(kDegrees * in_parent.tail<3>()));
+  if (extrinsics.pixels) {
+    const Vector6d here =
+        parent_deviations(calibration.poses.X, calibration.refined.covariance.topLeftCorner<6, 6>());
+    json["predicted_sd"]["repeatable_parent_mm"] = list(Eigen::Vector3d(1e3 * here.head<3>()));
+    json["predicted_sd"]["repeatable_parent_deg"] = list(Eigen::Vector3d(kDegrees * here.tail<3>()));
+  }
   const auto px = [&](double value) { return extrinsics.pixels ? Json(value) : Json(nullptr); };
   json["sigmas"] = {
       {"corner_px", px(extrinsics.corner_px)},
@@ -164,6 +173,17 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       json["splits"][to_string(check.split)] = {{"apart_mm", 1e3 * check.apart.head<3>().norm()},
                                                 {"apart_deg", kDegrees * check.apart.tail<3>().norm()},
                                                 {"chi_square", check.chi_square}};
+  }
+  if (calibration.other_part) {
+    const KnockedPart& other = *calibration.other_part;
+    const Vector6d& motion = other.knock.motion;
+    json["splits"]["knock"] = {{"view", other.view},
+                               {"what", other.knock.camera ? "camera" : "target"},
+                               {"moved_mm", list(Eigen::Vector3d(1e3 * motion.head<3>()))},
+                               {"moved_deg", list(Eigen::Vector3d(kDegrees * motion.tail<3>()))},
+                               {"other_part", other.before ? "before" : "after"},
+                               {"other_views", other.views}};
+    if (other.poses) json["splits"]["knock"]["other_transform"] = list(data::to_vector(other.poses->X));
   }
   json["smooth_errors"] = nullptr;
   if (calibration.pose_errors) {
