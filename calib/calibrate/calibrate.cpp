@@ -388,8 +388,10 @@ std::string knock_sentence(const KnockedPart& other, std::size_t used) {
       text, sizeof text,
       "the %s moved by %.1f mm and %.2f deg before %s: the answer is of the %zu views %s; the %d views %s "
       "were %s",
-      knock.camera ? "camera" : "target", 1e3 * knock.motion.head<3>().norm(),
-      knock.motion.tail<3>().norm() / kDegree, other.view.c_str(), used,
+      !knock.told    ? "camera or the target"
+      : knock.camera ? "camera"
+                     : "target",
+      1e3 * knock.motion.head<3>().norm(), knock.motion.tail<3>().norm() / kDegree, other.view.c_str(), used,
       other.before ? "since" : "until then", other.views, other.before ? "until then" : "since",
       other.poses ? "solved by themselves" : "too few for a solution");
   return text;

@@ -179,6 +179,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
     const Vector6d& motion = other.knock.motion;
     json["splits"]["knock"] = {{"view", other.view},
                                {"what", other.knock.camera ? "camera" : "target"},
+                               {"told", other.knock.told},
                                {"moved_mm", list(Eigen::Vector3d(1e3 * motion.head<3>()))},
                                {"moved_deg", list(Eigen::Vector3d(kDegrees * motion.tail<3>()))},
                                {"other_part", other.before ? "before" : "after"},

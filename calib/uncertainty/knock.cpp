@@ -8,8 +8,19 @@
 namespace flash::calib {
 namespace {
 
-constexpr std::size_t kLeastViews = 5;  // on either side
-constexpr double kOdds = 20;            // against a knock, before any view is seen
+constexpr std::size_t kLeastViews = 5;            // on either side
+constexpr double kOdds = 20;                      // against a knock, before any view is seen
+constexpr double kUsualError = 0.1 * M_PI / 180;  // of arms in use, shared by neighbouring views
+constexpr double kOnceInHundred = 16.812;         // chi-square, 6 degrees of freedom
+
+/// More than what the errors of an arm that two halves of a recording do not share put between them.
+bool beyond_usual(const Bundle& bundle, const Vector6d& step) {
+  double distance = 0;
+  for (const BundleView& view : bundle.views)
+    distance += predicted_pose(bundle, view).translation().norm() / static_cast<double>(bundle.views.size());
+  const double turn = step.tail<3>().norm(), shift = step.head<3>().norm() / distance;
+  return turn * turn + shift * shift > kOnceInHundred * 2 * kUsualError * kUsualError;
+}
 
 /// Of each pose, [d_shared residual]^T [d_shared residual] with its own correction eliminated.
 std::vector<Eigen::MatrixXd> reduced_grams(const LinearModel& model, const std::vector<double>& sigmas) {
@@ -53,8 +64,9 @@ std::optional<Knock> find_knock(const Refinement& refined, const BundleSettings&
   const auto numbers = 6 * static_cast<double>(count);
   const double places = 2 * static_cast<double>(count - 2 * kLeastViews + 1);
   const double earn = 6 * std::log(numbers) + 2 * std::log(places * kOdds) + std::max(0.0, rival);
-  std::optional<Knock> best;
+  std::optional<Knock> best, other;  // of the kinds
   for (const bool camera : {true, false}) {
+    std::optional<Knock> of_kind;
     const int column = camera ? columns.cameras.front() : columns.targets.front();
     Eigen::MatrixXd after = Eigen::MatrixXd::Zero(s + 1, 6);
     for (std::size_t k = count - 1; k >= kLeastViews; --k) {
@@ -68,9 +80,13 @@ std::optional<Knock> find_knock(const Refinement& refined, const BundleSettings&
       const Vector6d step = -information.ldlt().solve(pull);
       const double left = std::max(1 + step.dot(pull) / squares, 1e-3);
       const double gain = -numbers * std::log(left) - earn;
-      if (gain > (best ? best->gain : 0)) best = Knock{k, camera, step, gain};
+      if (gain > (of_kind ? of_kind->gain : 0) && beyond_usual(bundle, step))
+        of_kind = Knock{k, camera, step, true, gain};
     }
+    if (of_kind && (!best || of_kind->gain > best->gain)) std::swap(best, of_kind);
+    if (of_kind) other = of_kind;
   }
+  if (best && other) best->told = best->gain - other->gain > 2 * std::log(kOdds);
   return best;
 }
 

@@ -60,6 +60,7 @@ TEST_P(Knocks, EightMillimetresHalfWayAreFoundByTheirTimeAndBothPartsSolved) {
   const KnockedPart& other = *result.other_part;
   EXPECT_EQ(other.view, "10");
   EXPECT_EQ(other.knock.camera, camera);
+  EXPECT_TRUE(other.knock.told);  // views turn by 45 deg: only one of them explains both parts
   // A robot of 0.5 mm and 0.05 deg at 0.4 m, ten views: 0.2 mm an axis, known to four of them.
   EXPECT_LT((other.knock.motion.head<3>() - motion.head<3>()).norm(), 2e-3);
   EXPECT_TRUE(other.before);
