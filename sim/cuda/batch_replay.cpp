@@ -254,7 +254,7 @@ struct BatchReplay::Memory {
     numbers.teams = team_memory.data();
     check(cudaMallocHost(&stop, sizeof(int)));
     *stop = 0;
-    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), stop, 0};
+    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), stop};
     place_on_chip(settings.precision, numbers);
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
@@ -396,7 +396,6 @@ struct BatchReplay::Memory {
     counters.write(0, counts, 2);
     const std::vector<int> stand(static_cast<std::size_t>(count), step);
     steps.write(0, stand.data(), stand.size());
-    numbers.queue.size = static_cast<int>(queue.size());
     numbers.end_step = end;
     run_replay(settings.precision, numbers, teams, stream);
     step = end;

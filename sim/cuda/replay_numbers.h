@@ -111,7 +111,6 @@ struct WorkQueue {
   int* added;
   int* steps;       ///< where each environment stands
   const int* stop;  ///< of the host: once set no team takes another environment
-  int size;         ///< entries in all
 };
 
 struct ReplayNumbers {
