@@ -1,9 +1,9 @@
 # Sets FLASH_HAVE_CUDA: whether the CUDA language is enabled. The CPU backend never depends on it.
 set(FLASH_HAVE_CUDA OFF)
 if(FLASH_CUDA)
-  # CMake's own default is compute capability 75 alone. Real code for each current architecture, PTX for later ones.
+  # CMake's own default is compute capability 75 alone. Code of 80 runs on 86 and 89 as well, PTX on later ones.
   if(NOT CMAKE_CUDA_ARCHITECTURES)
-    set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 86-real 89-real 90-real 100-real 120)
+    set(CMAKE_CUDA_ARCHITECTURES 75-real 80-real 90-real 100-real 120)
   endif()
   # CMake 3.25 does not know nvcc's switch for C++20.
   set(CMAKE_CUDA20_STANDARD_COMPILE_OPTION -std=c++20)

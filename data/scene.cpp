@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <set>
+#include <utility>
 
 #include "data/asset.h"
 #include "data/atomic_file.h"
@@ -276,15 +278,40 @@ void read_end_effectors(const JsonObject& file, Scene& scene) {
   }
 }
 
+/// Bodies are known by their names: in pairs of friction, in messages and in tables of forces.
+void check_names(const JsonObject& file, const Scene& scene) {
+  std::set<std::string> names;
+  const auto add = [&](const char* list, const std::string& name) {
+    if (!names.insert(name).second)
+      throw input_error(file.source(), std::string(list) + "." + name,
+                        "found a name that another body has, expected names that differ");
+  };
+  for (const SceneObject& object : scene.objects) add("objects", object.name);
+  for (const SceneObstacle& obstacle : scene.obstacles) add("obstacles", obstacle.name);
+  for (const SceneEndEffector& effector : scene.end_effectors) add("end_effectors", effector.name);
+}
+
 void read_pair_friction(const JsonObject& file, Scene& scene) {
-  std::vector<std::string> names;
-  for (const SceneObject& object : scene.objects) names.push_back(object.name);
-  for (const SceneObstacle& obstacle : scene.obstacles) names.push_back(obstacle.name);
-  for (const SceneEndEffector& effector : scene.end_effectors) names.push_back(effector.name);
-  for (const JsonObject& object : file.objects("friction")) {
-    object.expect_fields({"a", "b", "friction"});
-    for (const char* key : {"a", "b"}) read_choice(object, key, "", names);
-    scene.pair_friction.push_back({object.string("a"), object.string("b"), object.not_negative("friction")});
+  std::vector<std::string> objects, others, names;
+  for (const SceneObject& object : scene.objects) objects.push_back(object.name);
+  for (const SceneObstacle& obstacle : scene.obstacles) others.push_back(obstacle.name);
+  for (const SceneEndEffector& effector : scene.end_effectors)
+    if (effector.collides) others.push_back(effector.name);
+  names = objects;
+  names.insert(names.end(), others.begin(), others.end());
+  std::set<std::pair<std::string, std::string>> known;
+  for (const JsonObject& entry : file.objects("friction")) {
+    entry.expect_fields({"a", "b", "friction"});
+    for (const char* key : {"a", "b"}) read_choice(entry, key, "", names);
+    ScenePairFriction pair{entry.string("a"), entry.string("b"), entry.not_negative("friction")};
+    const auto among = [](const std::vector<std::string>& list, const std::string& name) {
+      return std::find(list.begin(), list.end(), name) != list.end();
+    };
+    if (!among(objects, pair.object)) std::swap(pair.object, pair.other);
+    if (!among(objects, pair.object) || !among(others, pair.other))
+      throw entry.error("b", "one object, and one obstacle or end effector that collides");
+    if (!known.emplace(pair.object, pair.other).second) throw entry.error("b", "each pair once");
+    scene.pair_friction.push_back(pair);
   }
 }
 
@@ -342,6 +369,7 @@ Scene load_scene(const std::string& path) {
   read_obstacles(file, scene);
   read_objects(file, scene);
   read_end_effectors(file, scene);
+  check_names(file, scene);
   read_pair_friction(file, scene);
   if (file.has("quasistatic")) {
     const JsonObject object = file.object("quasistatic");
@@ -364,7 +392,7 @@ bool asks_for_cuda(const SceneSolver& solver) {
 std::optional<double> friction_between(const Scene& scene, const std::string& object,
                                        const std::string& other) {
   for (const ScenePairFriction& pair : scene.pair_friction)
-    if ((pair.a == object && pair.b == other) || (pair.a == other && pair.b == object)) return pair.friction;
+    if (pair.object == object && pair.other == other) return pair.friction;
   for (const SceneObstacle& obstacle : scene.obstacles)
     if (obstacle.name == other) return obstacle.friction;
   for (const SceneEndEffector& effector : scene.end_effectors)

@@ -113,9 +113,9 @@ struct SceneEndEffector {
   std::vector<SceneGrasp> grasps;
 };
 
-/// Coulomb coefficient between two named bodies (objects, obstacles, end effectors).
+/// Coulomb coefficient of an object on an obstacle, or on an end effector that collides.
 struct ScenePairFriction {
-  std::string a, b;
+  std::string object, other;
   double friction = 0.0;
 };
 

@@ -7,7 +7,7 @@
 
 #include "data/error.h"
 #include "data/parallel.h"
-#include "sim/law/vertex_contact.h"
+#include "sim/cuda/most_obstacles.h"
 #ifdef FLASH_HAVE_CUDA
 #include "sim/cuda/hold_motion.h"
 #include "sim/cuda/out_of_memory.h"

@@ -2,6 +2,8 @@
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/incremental_potential.cuh"
 #include "sim/cuda/team.cuh"
+#include "sim/law/contact_exchange.h"
+#include "sim/law/feasible_place.h"
 
 namespace flash::sim::cuda {
 
@@ -18,16 +20,17 @@ __device__ inline Triple way_at(const float* direction, int i) {
 __device__ __noinline__ void project_to_feasible(const SheetTables& tables, const StepProblem& step,
                                                  const ContactSet* contacts, Point* positions) {
   if (step.obstacles.count == 0) return;
+  SurfaceRoom<most_obstacles> room;
   __syncthreads();
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     if (step.held_axes[i] != 0) continue;
     const Triple start = triple(step.start[i]), point = triple(positions[i]);
     Triple place = point;
     if (contacts != nullptr && contacts->listed[i] != 0)
-      place =
-          feasible_place(step.obstacles, start, contacts->contacts[i], step.touches_of(*contacts, i), point);
+      place = feasible_place(step.obstacles, start, contacts->contacts[i], step.touches_of(*contacts, i),
+                             point, room);
     else if (!(clearance_of(step.obstacles, start, point) >= 0))
-      place = projected_out(step.obstacles, start, nullptr, point);
+      place = projected_out(step.obstacles, start, nullptr, point, room);
     positions[i] = {place.x, place.y, place.z, 0};
   }
 }
@@ -110,6 +113,7 @@ __device__ __noinline__ bool exchange_contacts(const SheetTables& tables, const 
                                                float* gradient) {
   const ObstacleStep<double>& obstacles = step.obstacles;
   const double reach = stuck ? touching_gap : no_such_side;
+  SurfaceRoom<most_obstacles> room;
   bool any = false;
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     if (step.held_axes[i] != 0) continue;
@@ -119,10 +123,10 @@ __device__ __noinline__ bool exchange_contacts(const SheetTables& tables, const 
       VertexContact contact = contacts.contacts[i];
       const Triple force = force_at(now.force, i);
       if (!stuck && contact.freedom != Freedom::free &&
-          release(obstacles, force + way_at(change, i), contact, touches)) {
+          release(obstacles, force + way_at(change, i), contact, touches, room)) {
         const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
         for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
-      } else if (contact.freedom == Freedom::stick || !hold(obstacles.count, way, reach, contact, touches)) {
+      } else if (contact.freedom == Freedom::stick || !hold(obstacles, way, reach, contact, touches)) {
         continue;
       }
       contacts.contacts[i] = contact;
@@ -133,7 +137,7 @@ __device__ __noinline__ bool exchange_contacts(const SheetTables& tables, const 
     if (clearance > reach || clearance > norm(way)) continue;
     find_touches(obstacles, triple(step.start[i]), triple(now.positions[i]), touches);
     VertexContact contact;
-    if (!hold(obstacles.count, way, reach, contact, touches)) continue;
+    if (!hold(obstacles, way, reach, contact, touches)) continue;
     contacts.contacts[i] = contact;
     contacts.listed[i] = 1;
     any = true;

@@ -149,7 +149,8 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   if (clearance > touching_gap) return response;
   VertexTouch* touches = step.touches_of(contacts, i);
   find_touches(step.obstacles, start, point, touches);
-  const VertexContact contact = decide_contact(step.obstacles, start, point, force, touches);
+  SurfaceRoom<most_obstacles> room;
+  const VertexContact contact = decide_contact(step.obstacles, start, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
   contacts.contacts[i] = contact;
   contacts.listed[i] = 1;

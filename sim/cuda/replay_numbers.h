@@ -2,6 +2,7 @@
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/four.h"
 #include "sim/cuda/front_tables.h"
+#include "sim/cuda/most_obstacles.h"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/law/vertex_contact.h"
 

@@ -67,9 +67,10 @@ void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWor
   w.refactor = false;
   for (int solved = 0; solved < linear_problems; ++solved) {
     w.force = w.now.force;
-    const int solves = coupled ? w.matrix.solve_coupled(w.linear, friction_couplings(w.linear), w.gradient,
-                                                        enough, w.direction, w.force)
-                               : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
+    const int solves = coupled
+                           ? w.matrix.solve_coupled(w.linear, friction_couplings(problem.contacts, w.linear),
+                                                    w.gradient, enough, w.direction, w.force)
+                           : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
     report.solves += solves;
     w.refactor = w.refactor || solves > w.settings.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.

@@ -25,7 +25,7 @@ std::vector<VertexMatrix<Scalar>> vertex_matrices(const ContactSet& contacts,
     const VertexConstraint& constraint = contacts.constraints[k];
     if (constraint.freedom == Freedom::free) continue;
     const Eigen::Matrix3d coupling = k < couplings.size() ? couplings[k] : Eigen::Matrix3d::Zero();
-    matrices.emplace_back(position[constraint.vertex], constraint.free + coupling);
+    matrices.emplace_back(position[constraint.vertex], matrix3d(constraint.free) + coupling);
   }
   return matrices;
 }
@@ -72,7 +72,7 @@ RestrictedProblem<Scalar> NewtonMatrix::restricted(SheetProduct<Scalar>& product
   for (const VertexConstraint& constraint : contacts.constraints)
     if (constraint.freedom != Freedom::free)
       problem.start.template segment<3>(4L * position[constraint.vertex]) =
-          constraint.correction.cast<Scalar>();
+          vector3d(constraint.correction).cast<Scalar>();
   return problem;
 }
 

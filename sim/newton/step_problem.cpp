@@ -30,7 +30,7 @@ void StepProblem::evaluate(Iterate& iterate) const {
   update_contacts(contacts, iterate.positions, iterate.force, iterate.contacts);
   iterate.residual = iterate.force;
   for (const VertexConstraint& constraint : iterate.contacts.constraints)
-    iterate.residual.row(constraint.vertex) -= constraint.reaction.transpose();
+    iterate.residual.row(constraint.vertex) -= vector3d(constraint.reaction).transpose();
 }
 
 bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
@@ -42,7 +42,7 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
       const VertexConstraint* c = iterate.contacts.find(i);
       const double rounding = c == nullptr ? 0
                                            : std::numeric_limits<double>::epsilon() *
-                                                 iterate.positions.row(i).norm() * c->slip_stiffness.norm();
+                                                 iterate.positions.row(i).norm() * norm(c->slip_stiffness);
       if (!(iterate.residual.row(i).norm() <=
             vertex_tolerance * tolerance * potential.mass()[i] * gravity + rounding))
         return false;

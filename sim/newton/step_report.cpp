@@ -25,16 +25,18 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
   for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
     const VertexConstraint& c = end.contacts.constraints[k];
     add_hold_forces(c, c.reaction, report.hold_forces);
-    for (const Touch& touch : end.contacts.touches_of(k)) {
+    const std::span<const VertexTouch> touches = end.contacts.touches_of(k);
+    for (size_t obstacle = 0; obstacle < touches.size(); ++obstacle) {
+      const VertexTouch& touch = touches[obstacle];
       if (!touch.holds) continue;
       report.complementarity = worst(report.complementarity, touch.gap);
-      report.obstacle_forces[touch.obstacle] += touch.normal_force * touch.normal + touch.friction;
+      report.obstacle_forces[obstacle] += vector3d(touch.normal_force * touch.normal + touch.friction);
     }
   }
   for (int i = 0; i < end.positions.rows(); ++i) {
     const VertexConstraint* c = end.contacts.find(i);
     // One that is held in some axes meets no obstacle in the others: such a step is not solved.
-    if (c != nullptr && c->freedom == Freedom::held && c->free.isZero(0)) continue;
+    if (c != nullptr && c->freedom == Freedom::held && is_zero(c->free)) continue;
     for (size_t k = 0; k < environment.obstacles.size(); ++k) {
       const SurfaceGap<double> gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
       const double depth = gap.starts_inside
@@ -74,16 +76,16 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
   }
   for (size_t k = 0; k < end.contacts.constraints.size(); ++k) {
     const VertexConstraint& c = end.contacts.constraints[k];
-    const Vector3d way = moved.row(c.vertex);
+    const Vector3<double> way = vector3(moved, c.vertex);
     if (c.freedom == Freedom::held) {
-      report.work += c.reaction.dot(way);
-      start_is_feasible = start_is_feasible && ((Eigen::Matrix3d::Identity() - c.free) * way).isZero(0);
+      report.work += dot(c.reaction, way);
+      start_is_feasible = start_is_feasible && is_zero(way - c.free * way);
     }
-    for (const Touch& touch : end.contacts.touches_of(k)) {
+    for (const VertexTouch& touch : end.contacts.touches_of(k)) {
       if (!touch.holds) continue;
-      const Vector3d force = touch.normal_force * touch.normal + touch.friction;
+      const Vector3<double> force = touch.normal_force * touch.normal + touch.friction;
       // The obstacle pushes out a vertex that starts inside, even where it stands still.
-      report.work += touch.starts_inside ? std::max(0.0, force.dot(way)) : force.dot(touch.surface_moved);
+      report.work += touch.starts_inside ? std::max(0.0, dot(force, way)) : dot(force, touch.surface_moved);
     }
   }
   for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));

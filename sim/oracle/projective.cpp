@@ -42,7 +42,7 @@ namespace {
 
 /// The law of the contacts at an iterate, gaps linear in the multipliers: with dx = -h^2 A^-1 (force - H^T
 /// lambda) from the multipliers at hand, and W for a change of them.
-ContactProblem contact_problem(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system,
+ContactProblem contact_problem(const std::vector<ProjectiveContact>& contacts, const ProjectiveSystem& system,
                                const ProjectiveSettings& settings, ContactMetric metric, const Points& force,
                                const VectorXd& multiplier) {
   const double h = settings.time_step;
@@ -83,8 +83,8 @@ ContactProblem contact_problem(const std::vector<VertexContact>& contacts, const
 }
 
 /// Whether each contact moves its own vertex alone, so that the inertia metric is close to the full one.
-bool carries_itself(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system) {
-  return std::all_of(contacts.begin(), contacts.end(), [&](const VertexContact& contact) {
+bool carries_itself(const std::vector<ProjectiveContact>& contacts, const ProjectiveSystem& system) {
+  return std::all_of(contacts.begin(), contacts.end(), [&](const ProjectiveContact& contact) {
     return system.mass()[contact.vertex] * system.inverse(contact.vertex, contact.vertex).maxCoeff() >= 0.5;
   });
 }
@@ -104,15 +104,15 @@ std::string inertia_warning(double carried, double gravity, const ProjectiveSett
 
 /// Forces of holds and obstacles, and how well the contacts are met. `needed`: from the holds [N].
 void report_forces(const Environment& environment, const ProjectiveSettings& settings,
-                   const ContactSet& holds, const std::vector<VertexContact>& contacts,
+                   const ContactSet& holds, const std::vector<ProjectiveContact>& contacts,
                    const VectorXd& multiplier, const Points& needed, ProjectiveReport& report) {
   report.hold_forces.assign(environment.holds.size(), Vector3d::Zero());
   report.obstacle_forces.assign(environment.obstacles.size(), Vector3d::Zero());
   for (const VertexConstraint& held : holds.constraints)
-    add_hold_forces(held, needed.row(held.vertex), report.hold_forces);
+    add_hold_forces(held, vector3(needed, held.vertex), report.hold_forces);
   std::size_t loaded = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {
-    const VertexContact& contact = contacts[k];
+    const ProjectiveContact& contact = contacts[k];
     const Vector3d l = multiplier.segment<3>(3 * k);
     report.obstacle_forces[contact.obstacle] += contact.directions.transpose() * l;
     report.penetration_max = std::max(report.penetration_max, -contact.gap[0]);
@@ -156,9 +156,9 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   std::vector<Vector3d> free_axes(n, Vector3d::Ones());
   std::array<std::vector<int>, 3> held;
   for (const VertexConstraint& hold : holds.constraints) {
-    free_axes[hold.vertex] = hold.free.diagonal();
+    free_axes[hold.vertex] = {hold.free.xx, hold.free.yy, hold.free.zz};
     for (int axis = 0; axis < 3; ++axis)
-      if (hold.free(axis, axis) == 0) held[axis].push_back(hold.vertex);
+      if (hold.free.at(axis, axis) == 0) held[axis].push_back(hold.vertex);
   }
   system.hold(held);
   const double gravity = environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81;
@@ -168,7 +168,7 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   report.metric = ContactMetric::inertia;
   Anderson anderson(settings.acceleration);
   std::map<std::pair<int, int>, Vector3d> known;  // multipliers of the last iteration, to start the next from
-  std::vector<VertexContact> contacts;
+  std::vector<ProjectiveContact> contacts;
   VectorXd multiplier;
   Points force, residual, plain;
   Points reaction = Points::Zero(n, 3);

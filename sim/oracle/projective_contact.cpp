@@ -25,18 +25,18 @@ Vector3d moved_against(const Environment& environment, const Gap& gap, const dat
 
 }  // namespace
 
-std::vector<VertexContact> find_contacts(const Sheet& sheet, const Environment& environment, double time,
-                                         double time_step, const data::Points& positions,
-                                         const Eigen::VectorXd& reach, const std::vector<Vector3d>& free_axes,
-                                         double tangent_angle) {
+std::vector<ProjectiveContact> find_contacts(const Sheet& sheet, const Environment& environment, double time,
+                                             double time_step, const data::Points& positions,
+                                             const Eigen::VectorXd& reach,
+                                             const std::vector<Vector3d>& free_axes, double tangent_angle) {
   const std::vector<MovingObstacle<double>> obstacles = moving_obstacles(environment, time - time_step, time);
-  std::vector<VertexContact> contacts;
+  std::vector<ProjectiveContact> contacts;
   for (Index i = 0; i < positions.rows(); ++i) {
     if (free_axes[i].isZero()) continue;
     for (std::size_t k = 0; k < obstacles.size(); ++k) {
       const Gap gap = gap_of(gap_to(obstacles[k], vector3(positions, i)));
       if (!(gap.distance < reach[i]) || gap.normal.cwiseProduct(free_axes[i]).norm() < 1e-6) continue;
-      VertexContact contact{static_cast<int>(i), static_cast<int>(k), {}, {}, 0};
+      ProjectiveContact contact{static_cast<int>(i), static_cast<int>(k), {}, {}, 0};
       const Vector3d first = gap.normal.unitOrthogonal(), second = gap.normal.cross(first);
       contact.directions.row(0) = gap.normal;
       contact.directions.row(1) = std::cos(tangent_angle) * first + std::sin(tangent_angle) * second;
@@ -51,7 +51,7 @@ std::vector<VertexContact> find_contacts(const Sheet& sheet, const Environment& 
   return contacts;
 }
 
-data::Points contact_forces(const std::vector<VertexContact>& contacts, const Eigen::VectorXd& multiplier,
+data::Points contact_forces(const std::vector<ProjectiveContact>& contacts, const Eigen::VectorXd& multiplier,
                             Index vertices) {
   data::Points force = data::Points::Zero(vertices, 3);
   for (std::size_t k = 0; k < contacts.size(); ++k)
@@ -59,7 +59,7 @@ data::Points contact_forces(const std::vector<VertexContact>& contacts, const Ei
   return force;
 }
 
-Eigen::VectorXd along_contacts(const std::vector<VertexContact>& contacts, const data::Points& u) {
+Eigen::VectorXd along_contacts(const std::vector<ProjectiveContact>& contacts, const data::Points& u) {
   Eigen::VectorXd along(3 * contacts.size());
   for (std::size_t k = 0; k < contacts.size(); ++k)
     along.segment<3>(3 * k) = contacts[k].directions * u.row(contacts[k].vertex).transpose();
@@ -67,14 +67,14 @@ Eigen::VectorXd along_contacts(const std::vector<VertexContact>& contacts, const
 }
 
 double contact_potential(const Environment& environment, double time, double time_step,
-                         const std::vector<VertexContact>& contacts, const Eigen::VectorXd& multiplier,
+                         const std::vector<ProjectiveContact>& contacts, const Eigen::VectorXd& multiplier,
                          const data::Points& positions) {
   const std::vector<MovingObstacle<double>> obstacles = moving_obstacles(environment, time - time_step, time);
   double potential = 0;
   for (std::size_t k = 0; k < contacts.size(); ++k) {
     const double normal = multiplier[3 * k];
     if (normal == 0) continue;
-    const VertexContact& contact = contacts[k];
+    const ProjectiveContact& contact = contacts[k];
     const Gap gap = gap_of(gap_to(obstacles[contact.obstacle], vector3(positions, contact.vertex)));
     const Vector3d moved = moved_against(environment, gap, positions, contact.vertex);
     const double slip = (moved - gap.normal * gap.normal.dot(moved)).norm();
@@ -83,7 +83,7 @@ double contact_potential(const Environment& environment, double time, double tim
   return potential;
 }
 
-Eigen::MatrixXd full_metric(const std::vector<VertexContact>& contacts, const ProjectiveSystem& system) {
+Eigen::MatrixXd full_metric(const std::vector<ProjectiveContact>& contacts, const ProjectiveSystem& system) {
   const Index n = static_cast<Index>(contacts.size());
   Eigen::MatrixXd W(3 * n, 3 * n);
   for (Index j = 0; j < n; ++j)
@@ -98,7 +98,7 @@ Eigen::MatrixXd full_metric(const std::vector<VertexContact>& contacts, const Pr
   return W;
 }
 
-Eigen::VectorXd full_metric_diagonal(const std::vector<VertexContact>& contacts,
+Eigen::VectorXd full_metric_diagonal(const std::vector<ProjectiveContact>& contacts,
                                      const ProjectiveSystem& system) {
   Eigen::VectorXd diagonal(3 * contacts.size());
   for (std::size_t k = 0; k < contacts.size(); ++k) {

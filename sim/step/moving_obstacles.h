@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sim/law/obstacle_step.h"
+#include "sim/law/symmetric3.h"
 #include "sim/scene/environment.h"
 
 namespace flash::sim {
@@ -12,6 +13,9 @@ inline Vector3<double> vector3(const data::Points& rows, Eigen::Index i) {
   return {rows(i, 0), rows(i, 1), rows(i, 2)};
 }
 inline Eigen::Vector3d vector3d(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+inline Eigen::Matrix3d matrix3d(const Symmetric3& a) {
+  return (Eigen::Matrix3d() << a.xx, a.xy, a.xz, a.xy, a.yy, a.yz, a.xz, a.yz, a.zz).finished();
+}
 
 /// How a point stands against an obstacle, as SurfaceGap says.
 struct Gap {

@@ -160,6 +160,17 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
             "end_effectors.left.grasps[0].object: found \"rag\", expected a name of objects");
   EXPECT_EQ(changed(kFlash, "/friction/0/b", "floor"),
             "friction[0].b: found \"floor\", expected one of cloth, flag, table, rail, tray, wall, left");
+  EXPECT_EQ(
+      changed(kFlash, "/friction/0/a", "cloth"),
+      "friction[0].b: found \"flag\", expected one object, and one obstacle or end effector that collides");
+  EXPECT_EQ(
+      changed(kFlash, "/friction/0/b", "rail"),
+      "friction[0].b: found \"rail\", expected one object, and one obstacle or end effector that collides");
+  EXPECT_EQ(changed(kFlash, "/friction/1", {{"a", "flag"}, {"b", "table"}, {"friction", 1}}),
+            "friction[1].b: found \"table\", expected each pair once");
+  EXPECT_EQ(
+      changed(kFlash, "/obstacles/left", {{"shape", "plane"}, {"point", {0, 0, 0}}, {"normal", {0, 0, 1}}}),
+      "end_effectors.left: found a name that another body has, expected names that differ");
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include "sim/cuda/batch_replay.h"
 #include "sim/cuda/batch_system.h"
 #include "sim/cuda/hold_motion.h"
-#include "sim/law/vertex_contact.h"
+#include "sim/cuda/most_obstacles.h"
 #include "sim/newton/solver.h"
 #include "tests/sim/sheet_scene.h"
 

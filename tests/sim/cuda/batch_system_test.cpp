@@ -301,23 +301,23 @@ TEST(BatchSystem, HeldVerticesMoveAsTheyAreTold) {
   // As a whole team, whose barriers compute-sanitizer's racecheck knows.
   Bench bench(plan, 3, FactorPrecision::single, 0, 1);
   const Eigen::Vector3d normal = Eigen::Vector3d(1, 2, 3).normalized(), correction(1e-3, -2e-3, 5e-4);
-  const Eigen::Matrix3d along = Eigen::Matrix3d::Identity() - normal * normal.transpose();
+  const Symmetric3 along = identity3() - square(vector3(normal));
   ContactSet contacts;
   std::vector<VertexRestriction> restrictions;
-  const auto restrict = [&](int vertex, Freedom freedom, const Eigen::Matrix3d& free,
+  const auto restrict = [&](int vertex, Freedom freedom, const Symmetric3& free,
                             const Eigen::Vector3d& move) {
     VertexConstraint constraint;
     constraint.vertex = vertex;
     constraint.freedom = freedom;
     constraint.free = free;
-    constraint.correction = move;
+    constraint.correction = vector3(move);
     contacts.constraints.push_back(constraint);
     VertexRestriction restriction{bench.batch.fronts().position[vertex], {}, {}};
-    for (int k = 0; k < 9; ++k) restriction.free[k] = static_cast<float>(free(k % 3, k / 3));
+    for (int k = 0; k < 9; ++k) restriction.free[k] = static_cast<float>(free.at(k % 3, k / 3));
     for (int c = 0; c < 3; ++c) restriction.correction[c] = static_cast<float>(move[c]);
     restrictions.push_back(restriction);
   };
-  restrict(3, Freedom::held, Eigen::Matrix3d::Zero(), correction);
+  restrict(3, Freedom::held, {}, correction);
   restrict(40, Freedom::slip, along, 1e-3 * normal);
   restrict(77, Freedom::slip, along, Eigen::Vector3d::Zero());
   bench.batch.set_restrictions(1, restrictions);

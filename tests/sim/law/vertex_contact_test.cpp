@@ -1,181 +1,207 @@
-// The formulas of one vertex beside those of contact sets.
 #include "sim/law/vertex_contact.h"
 
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <random>
-
-#include "sim/newton/active_set.h"
 #include "sim/step/feasible_positions.h"
+#include "tests/sim/law/contact_world.h"
 
 namespace flash::sim {
 namespace {
 
-using data::Points;
-using Eigen::Isometry3d;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double time_step = 0.01;
-constexpr int vertices = 400;
+/// A vertex of a world on its surfaces, with what decides of it.
+struct Decided {
+  ObstacleStep<double> view;
+  Vector3<double> start, point, needed;
+  std::vector<VertexTouch> touches;
+  VertexContact contact;
 
-/// Vertices above, on and in one to three obstacles, some of which move.
-struct World {
-  Environment environment;
-  Points positions, force, direction;
-
-  explicit World(unsigned seed) {
-    std::mt19937 engine(seed);
-    std::uniform_real_distribution<double> number(-1, 1);
-    const auto vector = [&] { return Vector3d(number(engine), number(engine), number(engine)); };
-    const auto pose = [&](double size) {
-      return Isometry3d(Eigen::Translation3d(size * vector()) *
-                        Eigen::AngleAxisd(size * number(engine), vector().normalized()));
-    };
-    const Isometry3d from = pose(0.02), to = pose(0.02);
-    environment.schedule = std::make_shared<const Schedule>(Schedule{0, time_step, {{from, to}}});
-    const int count = 1 + static_cast<int>(seed % 3);
-    for (int k = 0; k < count; ++k) {
-      Obstacle obstacle{Plane{0.01 * vector(), (vector() + 3 * Vector3d::UnitZ()).normalized()}};
-      if ((seed / 3 + static_cast<unsigned>(k)) % 3 == 1)
-        obstacle.shape = Box{0.02 * Vector3d::Ones() + 0.05 * vector().cwiseAbs(), pose(0.05)};
-      if ((seed / 3 + static_cast<unsigned>(k)) % 3 == 2)
-        obstacle.shape = Cylinder{0.02 * vector(), vector().normalized(), 0.03};
-      obstacle.friction = {k == 1 ? 0 : 0.5};
-      obstacle.frame = seed % 2 == 0 && k == 0 ? 0 : base_frame;
-      environment.obstacles.push_back(obstacle);
-    }
-    const auto points = [&](double size) {
-      Points p(vertices, 3);
-      for (int i = 0; i < vertices; ++i) p.row(i) = size * vector();
-      return p;
-    };
-    environment.state.positions = points(0.08);
-    positions = environment.state.positions + points(0.01);
-    // Some rest where their surface takes them.
-    for (int i = 0; i < vertices; i += 3) positions.row(i) = environment.state.positions.row(i);
-    force = points(1);
-    direction = points(0.02);
+  Decided(const ContactStep& step, const data::Points& positions, const data::Points& force, int i)
+      : view(step.view()), start(step.start(i)), point(vector3(positions, i)), needed(vector3(force, i)) {
+    decide();
+  }
+  void decide() {
+    touches.assign(static_cast<std::size_t>(view.count), {});
+    find_touches(view, start, point, touches.data());
+    ContactRoom room(touches.size());
+    contact = decide_contact(view, start, point, needed, touches.data(), room);
+  }
+  /// Longest slip against a surface that is touched.
+  double slipped() const {
+    double longest = 0;
+    for (const VertexTouch& touch : touches)
+      if (touch.touches())
+        longest = std::max(longest, norm(along_plane(touch.normal, point - start - touch.surface_moved)));
+    return longest;
+  }
+  Vector3d friction() const {
+    Vector3d sum = Vector3d::Zero();
+    for (const VertexTouch& touch : touches) sum += vector3d(touch.friction);
+    return sum;
   }
 };
 
-Matrix3d matrix(const Symmetric3& a) {
-  Matrix3d m;
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) m(r, c) = a.at(r, c);
-  return m;
-}
-
-/// Both do the same arithmetic but for the order of sums.
-constexpr double rounding = 1e-9;
-
-void expect_near(const Vector3<double>& own, const Vector3d& expected) {
-  EXPECT_LE((vector3d(own) - expected).norm(), rounding * (1 + expected.norm()));
-}
-
-void expect_equal(const VertexContact& own, const VertexConstraint& expected) {
-  EXPECT_EQ(own.freedom, expected.freedom);
-  expect_near(own.correction, expected.correction);
-  EXPECT_LE((matrix(own.free) - expected.free).norm(), rounding);
-}
-
-TEST(VertexContact, IsDecidedAsInAContactSet) {
-  int seen[4] = {}, on_several = 0, exchanged = 0, moved = 0;
-  Sheet sheet;
-  sheet.bodies = {{.vertex_count = vertices}};
+/// Calls `check` with each vertex of many worlds that something holds, moved out of the obstacles.
+template <typename Check>
+void for_each_held(const Check& check) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
-    World world(seed);
-    const ContactStep step(sheet, world.environment, time_step, {.speed = 1});
-    const ObstacleStep<double> view = step.view();
-    const Points& start = world.environment.state.positions;
-    ContactSet none = begin_step(step, world.positions);
-    Points feasible = world.positions;
-    project_to_feasible(step, none, feasible);
-    ContactSet set = none;
-    update_contacts(step, feasible, world.force, set);
-    ContactSet linear = set;
-    Points residual = world.force, gradient;
-    for (const VertexConstraint& c : set.constraints) residual.row(c.vertex) -= c.reaction.transpose();
-    gradient = residual;
-    const Points force_at_end = 0.5 * world.force.colwise().reverse();
-    exchange_contacts({step, feasible, world.force, residual}, world.direction, force_at_end, gradient,
-                      linear);
-    Points trial = feasible + world.direction;
-    const Points straight = trial;
-    project_to_feasible(step, linear, trial);
-    const double potential = friction_potential(step, set, trial);
-    double own_potential = 0;
-    const std::vector<Matrix3d> couplings = friction_couplings(set);
-
-    for (int i = 0; i < vertices; ++i) {
-      const Vector3<double> from = vector3(start, i);
-      // Between faces that press against each other there is no such place, and rounding decides.
-      const auto is_outside = [&](const Vector3<double>& at) {
-        return clearance_of(view, from, at) >= -rounding;
-      };
-      const Vector3<double> point = vector3(feasible, i);
-      if (is_outside(point))
-        expect_near(projected_out(view, from, nullptr, vector3(world.positions, i)), feasible.row(i));
-      EXPECT_LE(std::abs(clearance_of(view, from, point) - set.clearance[i]), rounding);
-      VertexTouch touches[most_obstacles];
-      find_touches(view, from, point, touches);
-      VertexContact contact = decide_contact(view, from, point, vector3(world.force, i), touches);
-      const VertexConstraint* expected = set.find(i);
-      ASSERT_EQ(contact.freedom != Freedom::free && set.clearance[i] <= touching_gap, expected != nullptr);
-      if (expected != nullptr) {
-        expect_equal(contact, *expected);
-        expect_near(contact.reaction, expected->reaction);
-        expect_near(contact.slip_direction, expected->slip_direction);
-        EXPECT_LE((matrix(contact.slip_stiffness) - expected->slip_stiffness).norm(),
-                  rounding * (1 + expected->slip_stiffness.norm()));
-        ++seen[static_cast<int>(contact.freedom)];
-        on_several +=
-            contact.free.xx + contact.free.yy + contact.free.zz < 1.5 && contact.freedom == Freedom::slip;
-        for (int axis = 0; axis < 3; ++axis)
-          expect_near(friction_coupling(view, contact, touches, axis),
-                      couplings[static_cast<std::size_t>(set.place[i])].col(axis));
-        own_potential += friction_potential_of(view, from, vector3(trial, i), contact, touches);
-      }
-      // The linear problem.
-      const Vector3<double> way = vector3(world.direction, i);
-      constexpr double any_reach = std::numeric_limits<double>::infinity();
-      if (expected == nullptr) {
-        find_touches(view, from, point, touches);
-        contact = {};
-        if (set.clearance[i] <= norm(way)) exchanged += hold(view.count, way, any_reach, contact, touches);
-      } else if (release(view, vector3(force_at_end, i), contact, touches)) {
-        ++exchanged;
-      } else if (contact.freedom != Freedom::stick) {
-        exchanged += hold(view.count, way, any_reach, contact, touches);
-      }
-      const VertexConstraint* exchanged_to = linear.find(i);
-      if (exchanged_to == nullptr)
-        EXPECT_EQ(contact.freedom, Freedom::free);
-      else
-        expect_equal(contact, *exchanged_to);
-      const bool listed = exchanged_to != nullptr;
-      const Vector3<double> place =
-          feasible_place(view, from, contact, listed ? touches : nullptr, vector3(straight, i));
-      // An edge across the slip at the iterate leaves its sign to rounding.
-      const auto turns = [&] {
-        const Vector3<double> there = projected_out(view, from, touches, vector3(straight, i));
-        return dot(slip_against(view, from, there, touches), contact.slip_direction);
-      };
-      const bool clear =
-          contact.freedom != Freedom::slip || is_zero(contact.slip_direction) || std::abs(turns()) > 1e-15;
-      if (is_outside(vector3(trial, i)) && clear) expect_near(place, trial.row(i));
-      moved += (vector3d(place) - straight.row(i).transpose()).norm() > rounding;
+    ContactWorld world = mixed_world(seed);
+    const ContactStep step = world.step();
+    ContactSet set = begin_step(step, world.positions);
+    project_to_feasible(step, set, world.positions);
+    for (int i = 0; i < ContactWorld::vertices; ++i) {
+      const Decided decided(step, world.positions, world.force, i);
+      if (decided.contact.freedom != Freedom::free) check(decided);
     }
-    EXPECT_NEAR(own_potential, potential, rounding * (1 + potential));
   }
-  // The worlds have all of it.
-  EXPECT_GT(seen[static_cast<int>(Freedom::slip)], 1000);
-  EXPECT_GT(seen[static_cast<int>(Freedom::stick)], 30);
+}
+
+/// Forces are of one newton. Faces that are not parallel span a volume of a thousandth at least.
+constexpr double rounding = 1e-11;
+
+TEST(VertexTouch, SurfacesShareAForceByNonNegativeLeastSquares) {
+  std::mt19937 engine(1);
+  std::normal_distribution<double> number;
+  const auto random = [&] { return Vector3d(number(engine), number(engine), number(engine)); };
+  for (int sample = 0; sample < 2000; ++sample) {
+    std::vector<VertexTouch> touches(static_cast<std::size_t>(1 + sample % 6));
+    std::vector<MovingObstacle<double>> obstacles(touches.size());
+    for (VertexTouch& touch : touches) touch.normal = vector3(random().normalized());
+    const Vector3d needed = random();
+    ContactRoom room(touches.size());
+    share_force(
+        ObstacleStep<double>{obstacles.data(), static_cast<int>(touches.size())}, vector3(needed), false,
+        [](const VertexTouch&) { return true; }, touches.data(), room);
+    // The conditions of the minimum of |needed - sum forces * normals|^2 over forces not below zero.
+    Vector3d rest = needed;
+    for (const VertexTouch& touch : touches) rest -= touch.normal_force * vector3d(touch.normal);
+    for (const VertexTouch& touch : touches) {
+      EXPECT_GE(touch.normal_force, 0);
+      EXPECT_EQ(touch.holds, touch.normal_force > 0);
+      // Three faces that span a volume of less than a thousandth count as two of them.
+      EXPECT_LE(vector3d(touch.normal).dot(rest), 1e-3 * needed.norm());
+      // Rounding, by three normals that span a volume of 1e-3 at least.
+      EXPECT_NEAR(touch.normal_force * vector3d(touch.normal).dot(rest), 0, 1e-7);
+    }
+  }
+}
+
+TEST(VertexContact, ObeysTheLawsOfSignoriniAndCoulomb) {
+  int sticking = 0, slipping = 0, on_several = 0;
+  for_each_held([&](const Decided& d) {
+    if (has_no_unique_force(d.touches)) return;
+    const Vector3d rest = vector3d(d.needed - d.contact.reaction);
+    Vector3d sum = Vector3d::Zero();
+    double bound = 0;
+    int held = 0;
+    for (int k = 0; k < d.view.count; ++k) {
+      const VertexTouch& touch = d.touches[static_cast<std::size_t>(k)];
+      const double own_bound = d.view.obstacles[k].friction * touch.normal_force;
+      EXPECT_GE(touch.normal_force, 0);
+      if (!touch.touches()) {
+        EXPECT_EQ(touch.normal_force, 0);
+        continue;
+      }
+      bound += own_bound;
+      held += touch.holds;
+      sum += vector3d(touch.normal_force * touch.normal + touch.friction);
+      EXPECT_LE(norm(touch.friction), own_bound + rounding);
+      if (!touch.holds) continue;
+      EXPECT_NEAR(norm(d.contact.free * touch.normal), 0, rounding);
+      const Vector3<double> slip = along_plane(touch.normal, d.point - d.start - touch.surface_moved);
+      if (d.contact.freedom == Freedom::slip && norm(slip) > 1e-6) {
+        // Against the slip, of its whole size but for the smooth start of sliding.
+        EXPECT_NEAR(dot(touch.friction, slip), -own_bound * norm(slip), 1e-4 * own_bound * norm(slip));
+      }
+    }
+    EXPECT_NEAR(d.contact.friction_bound, bound, rounding);
+    if (d.contact.freedom == Freedom::stick) {
+      ++sticking;
+      EXPECT_LE(d.slipped(), resting_slip);
+      EXPECT_NEAR(rest.norm(), 0, rounding);
+      EXPECT_EQ(norm(d.contact.free), 0);
+    } else {
+      ++slipping;
+      on_several += held > 1;
+      EXPECT_NEAR((vector3d(d.contact.reaction) - sum).norm(), 0, rounding);
+      if (d.slipped() > resting_slip) {
+        // No surface has to push more, and those that push, push what is needed.
+        for (const VertexTouch& touch : d.touches) {
+          const double left = vector3d(touch.normal).dot(rest);
+          EXPECT_LE(touch.touches() ? left : 0, rounding);
+          EXPECT_NEAR(touch.holds ? left : 0, 0, rounding);
+        }
+      }
+    }
+  });
+  EXPECT_GT(sticking, 30);
+  EXPECT_GT(slipping, 1000);
   EXPECT_GT(on_several, 20);
-  EXPECT_GT(exchanged, 1000);
-  EXPECT_GT(moved, 1000);
+}
+
+TEST(VertexContact, FrictionFollowsTheForceAsItsCouplingSays) {
+  constexpr double step = 1e-6;  // [N]; the law is linear in the force while the same surfaces hold
+  int checked = 0;
+  for_each_held([&](const Decided& d) {
+    if (d.contact.freedom != Freedom::slip || d.slipped() <= resting_slip || has_no_unique_force(d.touches))
+      return;
+    for (int axis = 0; axis < 3; ++axis) {
+      Vector3d ends[2];
+      bool same = true;
+      for (const int side : {0, 1}) {
+        Decided moved = d;
+        moved.needed[axis] += side == 0 ? -step : step;
+        moved.decide();
+        ends[side] = moved.friction();
+        for (std::size_t k = 0; k < d.touches.size(); ++k)
+          same = same && moved.touches[k].holds == d.touches[k].holds;
+      }
+      if (!same) continue;
+      const Vector3d coupling = vector3d(friction_coupling(d.view, d.contact, d.touches.data(), axis));
+      EXPECT_LE((-(ends[1] - ends[0]) / (2 * step) - coupling).norm(), 1e-7 * (1 + coupling.norm()));
+      ++checked;
+    }
+  });
+  EXPECT_GT(checked, 3000);
+}
+
+TEST(VertexContact, FrictionOnAPlaneIsTheGradientOfItsPotential) {
+  constexpr double step = 1e-7;  // [m]
+  int checked = 0;
+  for_each_held([&](const Decided& d) {
+    if (d.view.count != 1 || d.view.obstacles[0].shape != ObstacleShape::plane || d.view.obstacles[0].moves ||
+        d.contact.freedom != Freedom::slip || d.slipped() < 1e-4)
+      return;
+    const auto potential = [&](const Vector3<double>& at) {
+      return friction_potential_of(d.view, d.start, at, d.contact, d.touches.data());
+    };
+    const auto gradient = [&](const Vector3<double>& at) {
+      Vector3d g;
+      for (int axis = 0; axis < 3; ++axis) {
+        Vector3<double> more = at, less = at;
+        more[axis] += step;
+        less[axis] -= step;
+        g[axis] = (potential(more) - potential(less)) / (2 * step);
+      }
+      return g;
+    };
+    EXPECT_LE((gradient(d.point) + d.friction()).norm(), 1e-6 * d.contact.friction_bound + 1e-9);
+    const Matrix3d stiffness = matrix3d(d.contact.slip_stiffness);
+    Matrix3d differences;
+    for (int axis = 0; axis < 3; ++axis) {
+      Vector3<double> more = d.point, less = d.point;
+      more[axis] += 1e-5;
+      less[axis] -= 1e-5;
+      differences.col(axis) = (gradient(more) - gradient(less)) / 2e-5;
+    }
+    // The third derivative is of the size bound / slip^3; rounding of the potential is divided by both steps.
+    const double slip = d.slipped();
+    EXPECT_LE((differences - stiffness).norm(),
+              d.contact.friction_bound * 1e-10 / std::pow(slip, 3) + 1e-3 * stiffness.norm() + 1e-3);
+    ++checked;
+  });
+  EXPECT_GT(checked, 100);
 }
 
 }  // namespace

@@ -1,0 +1,83 @@
+#pragma once
+#include "sim/law/vertex_contact.h"
+
+namespace flash::sim {
+inline namespace FLASH_LEVEL {
+
+/// Whether the vertex is to land on the surface that held it at the iterate. The step has to be long enough
+/// to bring it down, and must not have taken it beyond the end of that surface.
+FLASH_HOST_DEVICE inline bool lands(const VertexTouch& touch, const SurfaceGap<double>& gap) {
+  constexpr double closed_share = 0.01;  // of the gap at the iterate that counts as closed
+  constexpr double same_surface = 0.5;   // cosine between the normals of a surface, before its end
+  return touch.holds && gap.distance > 0 && (touch.touches() || gap.distance <= closed_share * touch.gap) &&
+         dot(gap.normal, touch.normal) > same_surface;
+}
+
+/// Whether a vertex may stay at `point`. `touches`: at the iterate, null where nothing holds it.
+FLASH_HOST_DEVICE inline bool stays(const ObstacleStep<double>& step, const Vector3<double>& start,
+                                    const Vector3<double>& point, const VertexTouch* touches) {
+  for (int k = 0; k < step.count; ++k) {
+    const bool held = touches != nullptr && touches[k].holds;
+    if (!held && step.several && far_gap(step.obstacles[k], start, point) > 0) continue;
+    const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
+    if (!(gap.distance >= 0) || (held && lands(touches[k], gap))) return false;
+  }
+  return true;
+}
+
+/// The nearest place out of all obstacles, and on those where the vertex is to land. Exact for planes at
+/// once; round surfaces and faces that change take a few rounds.
+template <typename Room>
+FLASH_HOST_DEVICE inline Vector3<double> projected_out(const ObstacleStep<double>& step,
+                                                       const Vector3<double>& start,
+                                                       const VertexTouch* touches, Vector3<double> point,
+                                                       Room& room) {
+  constexpr int rounds = 40;
+  if (stays(step, start, point, touches)) return point;
+  for (int round = 0; round < rounds; ++round) {
+    double moved = 0;
+    bool outside = true;
+    for (int k = 0; k < step.count; ++k) {
+      const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
+      room.normals[k] = gap.normal;
+      room.right[k] = -gap.distance;
+      if (touches != nullptr && lands(touches[k], gap)) {
+        point = point - gap.distance * gap.normal;
+        moved = larger_of(moved, gap.distance);
+        room.right[k] = 0;
+      }
+      outside = outside && room.right[k] <= 0;
+    }
+    if (moved == 0 && outside) break;
+    solve_lcp(step.count, &room.normals[0], &room.normals[0], &room.right[0], &room.solution[0]);
+    Vector3<double> way{};
+    for (int k = 0; k < step.count; ++k) way = way + room.solution[k] * room.normals[k];
+    point = point + way;
+    if (larger_of(moved, norm(way)) <= resting_slip) break;
+  }
+  return point;
+}
+
+/// The feasible place nearest to a trial `point` of a vertex, by its contact in the linear problem. A slip
+/// that turned against its direction is stopped at no slip, where it has to decide again.
+template <typename Room>
+FLASH_HOST_DEVICE inline Vector3<double> feasible_place(const ObstacleStep<double>& step,
+                                                        const Vector3<double>& start,
+                                                        const VertexContact& contact,
+                                                        const VertexTouch* touches,
+                                                        const Vector3<double>& point, Room& room) {
+  constexpr int rounds = 10;
+  Vector3<double> place = projected_out(step, start, touches, point, room);
+  if (contact.freedom != Freedom::slip) return place;
+  Vector3<double> slip = slip_against(step, start, place, touches);
+  if (dot(slip, contact.slip_direction) >= 0) return place;
+  // The way back leaves a round surface: the vertex is projected on it, and the slip taken back again.
+  for (int round = 0; round < rounds && norm(slip) > resting_slip; ++round) {
+    place = projected_out(step, start, touches, place - slip, room);
+    slip = slip_against(step, start, place, touches);
+  }
+  return place;
+}
+
+}  // namespace FLASH_LEVEL
+}  // namespace flash::sim
