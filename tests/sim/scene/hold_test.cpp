@@ -238,7 +238,11 @@ TYPED_TEST(Grasping, AHeldCornerOverATableSharesTheWeightWithIt) {
     const Vector3d expected =
         (momentum(sheet, environment) - before) / h - mass.sum() * environment.gravity - drag;
     const Vector3d found = report.hold_forces[0] + report.obstacle_forces[0];
-    EXPECT_LE((found - expected).norm(), 1e-4 * expected.norm()) << n;
+    // The halves of a step have each their own drag: their mean is within that of the change of momentum.
+    const double halved = report.substeps > 1 ? environment.materials[0].air_drag *
+                                                    (momentum(sheet, environment) - before).norm()
+                                              : 0;
+    EXPECT_LE((found - expected).norm(), 1e-4 * expected.norm() + halved) << n;
     EXPECT_GE(report.obstacle_forces[0].z(), 0);
   }
 }
