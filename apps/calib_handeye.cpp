@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -29,6 +30,7 @@ struct HandEyeOptions {
   CalibCommonOptions common;
   DatasetChoice dataset;
   std::string setup;
+  calib::Use use = calib::Use::workspace;
   bool time_offset = false;
   calib::LensKnowledge lens = calib::LensKnowledge::near;
   double target_size_sd = calib::kPrintSd;
@@ -77,7 +79,9 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
                 1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
   };
   deviations("in the true frames", c.covariance);
-  if (extrinsics.pixels) deviations("repeatable in such poses", c.refined.covariance.topLeftCorner<6, 6>());
+  if (extrinsics.pixels) deviations("repeatable in such poses", c.repeatable);
+  if (c.use.value)
+    std::printf("for %s: %s %.3g %s\n", calib::to_string(c.use.use), c.use.measure, *c.use.value, c.use.unit);
   const std::string corners =
       extrinsics.pixels ? "corners " + fixed(extrinsics.corner_px, 3) + " px, robot" : "robot and camera";
   std::printf("%zu of %zu views; %s %.3f deg %.2f mm an axis\n", c.used.size(), c.views.size(),
@@ -167,6 +171,7 @@ int run_handeye(const HandEyeOptions& options) {
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
+  settings.use = options.use;
   settings.lens = options.lens;
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.closed_forms = calib::opencv_closed_forms();
@@ -222,6 +227,15 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   verb->add_option("--setup", options->setup,
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+  verb->add_option("--for", options->use,
+                   "What the answer is for. workspace: places seen by the camera, in the robot's frame; "
+                   "image: pictures predicted through this robot; two-arms: arms that one camera relates, "
+                   "with lens and target as stated for all alike")
+      ->transform(
+          CLI::CheckedTransformer(std::map<std::string, calib::Use>{{"workspace", calib::Use::workspace},
+                                                                    {"image", calib::Use::image},
+                                                                    {"two-arms", calib::Use::two_arms}}))
+      ->default_str("workspace");
   add_lens_options(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd);
   verb->add_flag(
