@@ -18,6 +18,7 @@
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/extrinsics_json.h"
 #include "calib/report/report.h"
+#include "calib/uncertainty/joint_zeros.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -95,6 +96,12 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
         "target: %.4f +- %.4f times as large as stated, its middle %.2f +- %.2f and %.2f +- %.2f mm behind "
         "its ends along x and y\n",
         c.size->estimate, c.size->sd, warp.x(), warp_sd.x(), warp.y(), warp_sd.y());
+  }
+  if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
+    std::printf("joints are farther than they say by");
+    for (Eigen::Index i = 0; i < zeros->estimate.size(); ++i)
+      std::printf(" %.3f +- %.3f", kDegrees * zeros->estimate[i], kDegrees * zeros->sd[i]);
+    std::printf(" deg\n");
   }
   const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
   if (depth && depth->used)

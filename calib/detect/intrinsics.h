@@ -5,8 +5,8 @@
 
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target.h"
+#include "calib/dataset/target_shape.h"
 #include "calib/geometry/projection.h"
-#include "calib/uncertainty/lens_estimate.h"
 #include "data/camera.h"
 
 namespace flash::calib {

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/uncertainty/joint_zeros.h"
 #include "data/trajectory.h"
 
 namespace flash::calib {
@@ -208,6 +209,11 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                                {"other_views", other.views}};
     if (other.poses) json["splits"]["knock"]["other_transform"] = list(data::to_vector(other.poses->X));
   }
+  json["joint_zeros"] = nullptr;
+  if (const auto zeros =
+          joint_zeros(calibration.refined.bundle, calibration.unknowns, calibration.shared_covariance))
+    json["joint_zeros"] = {{"estimate_deg", list(Eigen::VectorXd(kDegrees * zeros->estimate))},
+                           {"sd_deg", list(Eigen::VectorXd(kDegrees * zeros->sd))}};
   json["smooth_errors"] = nullptr;
   if (calibration.pose_errors) {
     const CorrelatedPoseErrors& errors = *calibration.pose_errors;

@@ -33,7 +33,7 @@ void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, 
   }
   if (method == Method::errors_in_variables) return;
   if (method == Method::bundle || method == Method::pixels) {
-    for (RobotPose& pose : bundle.poses) pose.correction.setIdentity();
+    for (RobotPose& pose : bundle.poses) pose.correction = usual_correction(bundle, pose);
     solve_bundle(bundle, settings.noise, {.unknowns = {.corrections = false}, .huber = 0});
     return;
   }
