@@ -13,7 +13,8 @@ int main(int argc, char** argv) {
     const calib::Calibration result =
         calib::calibrate_pairs(calib::Setup::eye_to_hand, calib::pair_observations(dataset));
     std::cout << "base <- camera:\n" << result.poses.X.matrix() << '\n';
-    std::cout << "one standard deviation [m, rad]: " << result.covariance.diagonal().cwiseSqrt().transpose() << '\n';
+    std::cout << "one standard deviation [m, rad]: " << result.covariance.diagonal().cwiseSqrt().transpose()
+              << '\n';
     for (const std::string& warning : result.warnings) std::cerr << warning << '\n';
     return result.usable ? 0 : 3;
   } catch (const data::InputError& error) {
