@@ -3,7 +3,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -234,14 +233,16 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   verb->add_option("--setup", options->setup,
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
-  verb->add_option("--for", options->use,
-                   "What the answer is for. workspace: places seen by the camera, in the robot's frame; "
-                   "image: pictures predicted through this robot; two-arms: arms that one camera relates, "
-                   "with lens and target as stated for all alike")
-      ->transform(
-          CLI::CheckedTransformer(std::map<std::string, calib::Use>{{"workspace", calib::Use::workspace},
-                                                                    {"image", calib::Use::image},
-                                                                    {"two-arms", calib::Use::two_arms}}))
+  verb->add_option_function<std::string>(
+          "--for",
+          [options](const std::string& name) {
+            for (const calib::Use use : {calib::Use::workspace, calib::Use::image, calib::Use::two_arms})
+              if (name == calib::to_string(use)) options->use = use;
+          },
+          "What the answer is for. workspace: places seen by the camera, in the robot's frame; "
+          "image: pictures predicted through this robot; two-arms: arms that one camera relates, "
+          "with lens and target as stated for all alike")
+      ->check(CLI::IsMember({"workspace", "image", "two-arms"}))
       ->default_str("workspace");
   add_lens_options(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd);
