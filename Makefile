@@ -16,7 +16,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate size-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
+.PHONY: help demo configure build test validate size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -59,6 +59,10 @@ validate: reference configure-test  ## Calibrate and fit what is in $(DATA), ren
 size-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly, over 200 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target size_study
 	$(BUILD)/tests/size_study
+
+use-study: configure-test  ## Say what each use of a hand-eye calibration (--for) gains, over 100 fresh scenes of each kind
+	cmake --build $(BUILD) -j $(JOBS) --target use_study
+	$(BUILD)/tests/use_study
 
 random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study

@@ -30,9 +30,13 @@ nlohmann::ordered_json reading_json(const calib::CornerReading& reading) {
           {"pixels", std::move(pixels)}};
 }
 
-nlohmann::ordered_json result_json(const std::vector<calib::Detection>& detections) {
+nlohmann::ordered_json result_json(const std::vector<calib::Detection>& detections,
+                                   const Eigen::Matrix3Xd& target_points) {
   nlohmann::ordered_json json;
   json["schema"] = "flash-detections/1";
+  json["target_points"] = nlohmann::json::array();
+  for (const auto& point : target_points.colwise())
+    json["target_points"].push_back({point.x(), point.y(), point.z()});
   json["refiners"] = nlohmann::json::array();
   for (const calib::RefinerScore& score : calib::rank_refiners(detections))
     json["refiners"].push_back(
@@ -77,7 +81,7 @@ int run_detect(const DetectOptions& options) {
   without_warnings.quiet = true;
   const std::vector<calib::Detection> detections =
       detect_all(dataset, target, options.dataset, without_warnings);
-  const std::string text = data::format_json(result_json(detections)) + '\n';
+  const std::string text = data::format_json(result_json(detections, calib::target_points(target))) + '\n';
   if (!options.out.empty()) data::write_atomically(options.out, text);
   if (options.common.json)
     std::cout << text;

@@ -17,6 +17,7 @@
 #include "calib/report/extrinsics_export.h"
 #include "calib/report/extrinsics_json.h"
 #include "calib/report/report.h"
+#include "calib/uncertainty/joint_zeros.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -29,6 +30,7 @@ struct HandEyeOptions {
   CalibCommonOptions common;
   DatasetChoice dataset;
   std::string setup;
+  calib::Use use = calib::Use::workspace;
   bool time_offset = false;
   calib::LensKnowledge lens = calib::LensKnowledge::near;
   double target_size_sd = calib::kPrintSd;
@@ -77,7 +79,9 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
                 1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
   };
   deviations("in the true frames", c.covariance);
-  if (extrinsics.pixels) deviations("repeatable in such poses", c.refined.covariance.topLeftCorner<6, 6>());
+  if (extrinsics.pixels) deviations("repeatable in such poses", c.repeatable);
+  if (c.use.value)
+    std::printf("for %s: %s %.3g %s\n", calib::to_string(c.use.use), c.use.measure, *c.use.value, c.use.unit);
   const std::string corners =
       extrinsics.pixels ? "corners " + fixed(extrinsics.corner_px, 3) + " px, robot" : "robot and camera";
   std::printf("%zu of %zu views; %s %.3f deg %.2f mm an axis\n", c.used.size(), c.views.size(),
@@ -91,6 +95,12 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
         "target: %.4f +- %.4f times as large as stated, its middle %.2f +- %.2f and %.2f +- %.2f mm behind "
         "its ends along x and y\n",
         c.size->estimate, c.size->sd, warp.x(), warp_sd.x(), warp.y(), warp_sd.y());
+  }
+  if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
+    std::printf("joints are farther than they say by");
+    for (Eigen::Index i = 0; i < zeros->estimate.size(); ++i)
+      std::printf(" %.3f +- %.3f", kDegrees * zeros->estimate[i], kDegrees * zeros->sd[i]);
+    std::printf(" deg\n");
   }
   const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
   if (depth && depth->used)
@@ -167,6 +177,7 @@ int run_handeye(const HandEyeOptions& options) {
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
+  settings.use = options.use;
   settings.lens = options.lens;
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.closed_forms = calib::opencv_closed_forms();
@@ -222,6 +233,17 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   verb->add_option("--setup", options->setup,
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+  verb->add_option_function<std::string>(
+          "--for",
+          [options](const std::string& name) {
+            for (const calib::Use use : {calib::Use::workspace, calib::Use::image, calib::Use::two_arms})
+              if (name == calib::to_string(use)) options->use = use;
+          },
+          "What the answer is for. workspace: places seen by the camera, in the robot's frame; "
+          "image: pictures predicted through this robot; two-arms: arms that one camera relates, "
+          "with lens and target as stated for all alike")
+      ->check(CLI::IsMember({"workspace", "image", "two-arms"}))
+      ->default_str("workspace");
   add_lens_options(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd);
   verb->add_flag(

@@ -38,6 +38,12 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
       "--angles", choice.angles,
       "What three angles of a pose are: xyz and the like about fixed axes, XYZ about turning ones "
       "(KUKA: ZYX, Staubli: XYZ, Kawasaki: ZYZ), rotvec");
+  CLI::Option* robot =
+      group.add_option("--robot", choice.robot,
+                       "URDF of the arm: the poses are then its joints, a CSV with a column of "
+                       "each by its name or q1 q2 ... [rad], and their zeros are solved for");
+  group.add_option("--base-link", choice.base_link, "Link of the URDF that stands still")->needs(robot);
+  group.add_option("--tip-link", choice.tip_link, "Link of the URDF that is the gripper")->needs(robot);
   group.add_option("--camera", choice.camera,
                    "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain, JSON, npz");
   group.add_option("--depth-scale", choice.depth_scale, "Metres a count of the depth pictures")
@@ -77,6 +83,9 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool 
   options.poses = choice.poses;
   options.camera = choice.camera;
   options.angles = choice.angles;
+  options.robot = choice.robot;
+  options.base_link = choice.base_link;
+  options.tip_link = choice.tip_link;
   options.needs_poses = needs_poses;
   options.needs_camera = needs_camera;
   options.depth_scale = choice.depth_scale;

@@ -32,6 +32,7 @@ struct DatasetChoice {
   std::string poses;
   std::string camera;
   std::string angles;
+  std::string robot, base_link, tip_link;
   std::string cache;
   double depth_scale = 0.001;
   bool no_depth = false;

@@ -35,8 +35,8 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
                       "target_pose", "covariance", "predicted_sd",  "sigmas",
                       "residuals",   "depth",      "lens",          "time_offset",
                       "comparison",  "views",      "observability", "convention_findings",
-                      "scale",       "splits",     "smooth_errors", "warnings",
-                      "exit_code",   "provenance"});
+                      "scale",       "splits",     "smooth_errors", "joint_zeros",
+                      "use",         "warnings",   "exit_code",     "provenance"});
   if (file.string("schema", "") != "flash-extrinsics/1") throw file.error("schema", "\"flash-extrinsics/1\"");
   CameraPose pose;
   pose.transform = read_transform(file.object("transform"));

@@ -9,6 +9,7 @@
 #include "calib/calibrate/plausibility.h"
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
+#include "calib/uncertainty/pixel_fit.h"
 #include "data/error.h"
 
 namespace flash::calib {
@@ -93,18 +94,27 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
   return true;
 }
 
+/// The solution's bundle with the poses of the answer.
+Bundle answer_of(const Calibration& result) {
+  Bundle bundle = result.refined.bundle;
+  if (bundle.cameras.empty()) return bundle;
+  bundle.cameras.front() = result.poses.X;
+  bundle.targets.front() = result.poses.Z;
+  return bundle;
+}
+
 void report_views(Calibration& result) {
   result.views.resize(result.selection.views.size());
   for (std::size_t i = 0; i < result.views.size(); ++i) {
     result.views[i].used = result.selection.views[i].used;
     result.views[i].reason = result.selection.views[i].reason;
   }
-  const Bundle& bundle = result.refined.bundle;
+  const Bundle &bundle = result.refined.bundle, answer = answer_of(result);
   for (const BundleView& view : bundle.views) {
     ViewResult& entry =
         result.views[static_cast<std::size_t>(result.used[static_cast<std::size_t>(view.pose)])];
     const auto rms = [&](bool corrected) {
-      return std::sqrt(residuals(bundle, view, corrected).squaredNorm() /
+      return std::sqrt(residuals(corrected ? bundle : answer, view, corrected).squaredNorm() /
                        static_cast<double>(view.points.cols()));
     };
     entry.px = rms(true);
@@ -139,35 +149,70 @@ void flag_wild_pixels(std::vector<ComparedMethod>& closed_forms) {
     method.wild = method.wild || !(method.px <= kWild * least + 1e-3);
 }
 
+/// Middle of where the target was seen, in the parent of X.
+Eigen::Vector3d workspace_middle(const Bundle& bundle) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const BundleView& view : bundle.views)
+    middle += bundle.cameras.front() * (predicted_pose(bundle, view) * view.points.rowwise().mean());
+  return middle / static_cast<double>(bundle.views.size());
+}
+
+/// Every method with its held-out residuals, the answer last.
 void compare_methods(Calibration& result, const std::vector<Observation>& observations, const Bundle& plain,
-                     RefineSettings settings, const CalibrateSettings& calibrate) {
+                     const std::optional<PixelFit>& pixels, RefineSettings settings,
+                     const CalibrateSettings& calibrate) {
   const std::vector<PoseLoop> loops = pose_loops(result.setup, observations);
   const std::vector<Eigen::Isometry3d> poses = target_poses(observations);
+  const Bundle& refined = result.refined.bundle;
+  const Eigen::Vector3d middle = workspace_middle(refined);
   Bundle bundle = plain;
   settings.noise = result.refined.noise;
-  const auto hold = [&](Method method) {
-    return hold_out(method == Method::errors_in_variables ? result.refined.bundle : plain, poses, method,
-                    settings, calibrate.folds, calibrate.threads);
+  const auto hold = [&](Method method, ComparedMethod& entry) {
+    const bool corrected = method == Method::errors_in_variables || method == Method::pixels;
+    const Bundle& start = corrected ? refined : plain;
+    entry.held_out = hold_out(start, poses, method, settings, calibrate.folds, calibrate.threads);
+    if (calibrate.use == Use::two_arms && loops.size() >= 4 * static_cast<std::size_t>(calibrate.least_views))
+      entry.halves = halves_apart(start, poses, method, settings, middle, calibrate.folds, calibrate.threads);
   };
   result.comparison = compare_closed_forms(loops, calibrate.closed_forms);
   for (ComparedMethod& method : result.comparison) {
     bundle.cameras.front() = method.poses.X;
     bundle.targets.front() = method.poses.Z;
     method.px = reprojection_rms(bundle, false);
-    if (method.name == "park") method.held_out = hold(Method::park);
-    if (method.name == "shah") method.held_out = hold(Method::shah);
+    if (method.name == "park") hold(Method::park, method);
+    if (method.name == "shah") hold(Method::shah, method);
   }
   flag_wild_pixels(result.comparison);
-  for (const Method kind : {Method::bundle, Method::errors_in_variables}) {
-    const Bundle& solved = kind == Method::bundle ? plain : result.refined.bundle;
+  const auto add = [&](Method kind, Bundle solved) {
     ComparedMethod& method = result.comparison.emplace_back();
     method.name = to_string(kind);
+    if (kind == Method::pixels) {
+      solved.cameras.front() = pixels->poses.X;
+      solved.targets.front() = pixels->poses.Z;
+    }
     method.poses = {solved.cameras.front(), solved.targets.front()};
     method.relative = relative_rms(loops, method.poses.X);
     method.px = reprojection_rms(solved, false);
-    method.held_out = hold(kind);
+    hold(kind, method);
+  };
+  add(Method::bundle, plain);
+  if (pixels) add(Method::pixels, refined);
+  add(Method::errors_in_variables, refined);
+  ComparedMethod* const last = &result.comparison.back();
+  if (pixels && last[-1].held_out->px < last->held_out->px) {
+    std::swap(last[-1], *last);
+    result.method = Method::pixels;
   }
-  result.held_out = *result.comparison.back().held_out;
+  result.held_out = *last->held_out;
+  result.use = use_error(calibrate.use, result.held_out, last->halves);
+}
+
+/// What is known of lens and print is taken as stated where it is alike for all that the answer relates.
+CalibrateSettings for_use(CalibrateSettings settings) {
+  if (settings.use != Use::two_arms) return settings;
+  if (settings.lens == LensKnowledge::near) settings.lens = LensKnowledge::stated;
+  if (std::isfinite(settings.target_size_sd)) settings.target_size_sd = 0;
+  return settings;
 }
 
 Priors priors_of(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
@@ -200,6 +245,7 @@ double add_systematic(Calibration& result, const SystematicUncertainty& systemat
   const Matrix6d noise = result.refined.covariance.topLeftCorner<6, 6>();
   result.shared_covariance = systematic.covariance;
   result.covariance = systematic.covariance.topLeftCorner<6, 6>();
+  result.repeatable = noise;
   const double grown = std::max(1.0, noise.ldlt().solve(result.covariance).trace() / 6);
   if (!errors.found) return grown;
   char text[320];
@@ -331,15 +377,17 @@ namespace {
 /// With whatever moved taken to have stood still.
 Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                   const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
-                  const CalibrateSettings& settings) {
+                  const CalibrateSettings& given) {
+  const CalibrateSettings settings = for_use(given);
   Calibration result;
   result.setup = setup;
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
 
   RefineSettings refine_settings = settings.refine;
   refine_settings.bundle.unknowns.scales = settings.target_size_sd > 0;
-  refine_settings.bundle.unknowns.warps = true;
+  refine_settings.bundle.unknowns.warps = settings.use != Use::two_arms;
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
+  refine_settings.bundle.unknowns.joint_zeros = observations.front().joint_motions.cols() > 0;
   result.unknowns = refine_settings.bundle.unknowns;
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
   const std::string noisy = implausible_noise(result.refined.noise, observations);
@@ -357,12 +405,20 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   solve_bundle(plain, result.refined.noise, exact_robot);
 
   const Bundle& bundle = result.refined.bundle;
-  result.poses = {bundle.cameras.front(), bundle.targets.front()};
+  std::optional<PixelFit> pixels;
+  if (settings.use == Use::image && !result.unknowns.joint_zeros)
+    pixels = fit_pixels(result.refined, refine_settings.bundle,
+                        fit_pose_errors(result.refined, refine_settings.bundle));
+  compare_methods(result, observations, plain, pixels, refine_settings, settings);
+  result.poses = result.comparison.back().poses;
   result.corner_rms = reprojection_rms(bundle, true);
-  result.chain_rms = reprojection_rms(bundle, false);
-  result.centre_rms = centre_rms(bundle, target_poses(observations));
-  compare_methods(result, observations, plain, refine_settings, settings);
+  result.chain_rms = result.comparison.back().px;
+  result.centre_rms = centre_rms(answer_of(result), target_poses(observations));
   const double grown = add_systematic(result, sized.systematic);
+  if (result.method == Method::pixels) {
+    result.covariance = pixels->covariance;
+    result.repeatable = pixels->repeatable;
+  }
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);

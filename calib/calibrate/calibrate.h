@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "calib/calibrate/method_comparison.h"
+#include "calib/calibrate/use.h"
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/convention_check.h"
 #include "calib/solve/errors_in_variables.h"
@@ -18,6 +19,7 @@
 namespace flash::calib {
 
 struct CalibrateSettings {
+  Use use = Use::workspace;
   ViewSelectionSettings selection;
   ConventionSettings convention;
   std::vector<Eigen::Vector3d> angles;  ///< of each view, where the robot's file gave angles [rad]
@@ -57,7 +59,9 @@ struct Calibration {
   std::vector<int> used;  ///< views in the solution, by their place in the set
   Refinement refined;
   HandEyePoses poses;
-  Matrix6d covariance = Matrix6d::Zero();  ///< of X, right perturbation (dt, dtheta)
+  Matrix6d covariance = Matrix6d::Zero();       ///< of X, right perturbation (dt, dtheta)
+  Matrix6d repeatable = covariance;             ///< of independent errors alone
+  Method method = Method::errors_in_variables;  ///< that the poses are of: that, or pixels
   LensEstimate lens;
   WarpEstimate warp;
   Unknowns unknowns;                  ///< of the solution
@@ -66,7 +70,8 @@ struct Calibration {
   double chain_rms = 0;               ///< without [px]
   double centre_rms = 0;  ///< of the target's projected middle against the view's own pose, without [px]
   HeldOut held_out;
-  std::vector<ComparedMethod> comparison;
+  UseError use;
+  std::vector<ComparedMethod> comparison;  ///< the answer last
   std::vector<ViewResult> views;
   RotationDiversity diversity;
   WeakestDirection weakest;

@@ -36,7 +36,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   const std::vector<PoseLoop> loops = pose_loops(setup, observations);
   const PoseSpaceFit fit = fit_pose_space(loops, shah(loops));
   result.poses = fit.poses;
-  result.covariance = fit.covariance.topLeftCorner<6, 6>();
+  result.covariance = result.repeatable = fit.covariance.topLeftCorner<6, 6>();
   result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation}, {0.0}};
   result.refined.converged = fit.converged;
   result.comparison = compare_closed_forms(loops, settings.closed_forms);
@@ -47,8 +47,11 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   result.held_out = hold_out_pairs(loops, settings.folds, [](const std::vector<PoseLoop>& train) {
     return fit_pose_space(train, shah(train)).poses;
   });
-  result.comparison.push_back(
-      {"pose_space", fit.poses, relative_rms(loops, fit.poses.X), 0, result.held_out, false});
+  result.use = use_error(Use::workspace, result.held_out, std::nullopt);
+  result.comparison.push_back({.name = "pose_space",
+                               .poses = fit.poses,
+                               .relative = relative_rms(loops, fit.poses.X),
+                               .held_out = result.held_out});
   finish(result, observations);
   return result;
 }

@@ -75,7 +75,7 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
   Extrinsics extrinsics;
   extrinsics.setup = calibration.setup;
   extrinsics.pixels = has_pixels(calibration);
-  extrinsics.method = extrinsics.pixels ? to_string(Method::errors_in_variables) : "pose_space";
+  extrinsics.method = extrinsics.pixels ? to_string(calibration.method) : "pose_space";
   extrinsics.transform = {in_hand ? "gripper" : "base", "camera", calibration.poses.X};
   extrinsics.target_pose = {in_hand ? "base" : "gripper", "target", calibration.poses.Z};
   extrinsics.covariance = calibration.covariance;

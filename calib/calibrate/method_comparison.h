@@ -25,7 +25,8 @@ struct ComparedMethod {
   ClosingError relative;  ///< rms of A X = X B over all pairs of views
   double px = 0;          ///< reprojection through the chain, robot poses as reported, 2-D rms per corner
   std::optional<HeldOut> held_out;
-  bool wild = false;  ///< not finite, or far worse than the best of the table
+  std::optional<Halves> halves = {};  ///< where the answer is for two arms
+  bool wild = false;                  ///< not finite, or far worse than the best of the table
 };
 
 /// Poses of each closed form and how they close; wild is what closes three times worse than the best.

@@ -7,6 +7,7 @@
 
 #include "calib/dataset/bare_poses.h"
 #include "calib/dataset/intrinsics_file.h"
+#include "calib/dataset/urdf_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
@@ -147,7 +148,8 @@ class PosePairing {
   bool by_time() const { return by_time_; }
 
   /// place: of the picture among all, in order. Throws InputError where it has no pose.
-  void pair(Frame& frame, const fs::path& image, std::size_t place) const {
+  /// robot: whose joints the poses came as, or null.
+  void pair(Frame& frame, const fs::path& image, std::size_t place, const SerialChain* robot) const {
     const RecordedPose* found = nullptr;
     if (in_order_) {
       found = &poses_.at(place);
@@ -174,6 +176,7 @@ class PosePairing {
     }
     frame.T_base_gripper = found->pose;
     frame.angles = found->angles;
+    if (robot && found->joints.size() > 0) frame.joint_motions = joint_motions(*robot, found->joints);
   }
 
   data::Trajectory stream() const {
@@ -302,9 +305,11 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
         "such pictures");
   dataset.poses_path = choose_poses(folder, options);
   std::optional<PosePairing> pairing;
+  std::optional<SerialChain> robot;
   std::size_t poses = 0;
   if (!dataset.poses_path.empty()) {
-    PoseList list = load_poses(dataset.poses_path);
+    if (!options.robot.empty()) robot = load_urdf(options.robot, options.base_link, options.tip_link);
+    PoseList list = robot ? load_joint_list(dataset.poses_path, *robot) : load_poses(dataset.poses_path);
     poses = list.poses.size();
     if (list.in_order && poses != images.size())
       throw InputError(dataset.poses_path + ": found " + std::to_string(poses) +
@@ -325,7 +330,7 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
     const fs::path depth = folder / "depth" / (image.stem().string() + ".png");
     if (options.depth && fs::exists(depth)) frame.depth = depth.string();
     try {
-      if (pairing) pairing->pair(frame, image, place);
+      if (pairing) pairing->pair(frame, image, place, robot ? &*robot : nullptr);
       dataset.frames.push_back(std::move(frame));
     } catch (const InputError& error) {
       unpaired.emplace_back(error.what());
@@ -335,6 +340,9 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
   for (const std::string& reason : unpaired) dataset.guesses.push_back(reason + "; it is left out");
   std::stable_sort(dataset.frames.begin(), dataset.frames.end(),
                    [](const Frame& a, const Frame& b) { return a.stamp < b.stamp; });
+  if (robot && pairing->by_time())
+    throw InputError(dataset.poses_path +
+                     ": found joints over time, expected one line a picture, by its number or name");
   if (pairing && pairing->by_time()) dataset.stream = pairing->stream();
   if (pairing && !pairing->by_time() && poses > dataset.frames.size())
     dataset.notices.push_back(std::to_string(poses - dataset.frames.size()) + " of " + std::to_string(poses) +

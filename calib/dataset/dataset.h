@@ -19,7 +19,8 @@ struct Frame {
   double stamp = 0;   ///< number of the picture, or its time [s]
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
   std::optional<Eigen::Vector3d> angles;  ///< the rotation as written, where it came as angles [rad]
-  std::optional<Eigen::Isometry3d> T_camera_target;  ///< in a set of pairs
+  std::optional<Eigen::Isometry3d> T_camera_target;             ///< in a set of pairs
+  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< of the gripper, where joints are known
 };
 
 struct Dataset {
@@ -38,8 +39,10 @@ struct Dataset {
 };
 
 struct DatasetOptions {
-  std::string poses = {};    ///< file or folder; empty: found by name in the dataset
-  std::string camera = {};   ///< intrinsics file; empty: found by name in the dataset
+  std::string poses = {};   ///< file or folder; empty: found by name in the dataset
+  std::string camera = {};  ///< intrinsics file; empty: found by name in the dataset
+  std::string robot = {};   ///< URDF: the poses are joints of this robot; empty: they are poses
+  std::string base_link = {}, tip_link = {};  ///< of the robot, as load_urdf
   std::string angles = {};   ///< what three angles of a pose mean, see rotation_from_angles; empty: "xyz"
   bool needs_poses = true;   ///< without: pictures alone, as for intrinsics
   bool needs_camera = true;  ///< of sets with pictures

@@ -19,6 +19,8 @@ struct Observation {
   Eigen::Matrix3Xd depth_points = {};  ///< on the target's plane by depth, camera frame [m]; or none
   Eigen::Matrix<double, 6, 1> velocity =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; of a stream
+  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions =
+      {};  ///< as joint_motions(), where joints are known
 };
 
 /// The closed chain through each view, with the first pose of its target.

@@ -87,6 +87,15 @@ struct CsvLine {
   }
 };
 
+/// To which picture the line belongs.
+void read_picture(const CsvLine& line, RecordedPose& pose) {
+  if (line.has("image"))
+    pose.image = line.text("image");
+  else
+    pose.stamp = line.value(line.has("index") ? "index" : "t");
+  if (std::abs(pose.stamp) > 1e14) pose.stamp *= 1e-9;  // EuRoC counts nanoseconds
+}
+
 RecordedPose pose_of_line(const CsvLine& line) {
   RecordedPose pose;
   const std::string where = "line " + std::to_string(line.number);
@@ -113,11 +122,7 @@ RecordedPose pose_of_line(const CsvLine& line) {
     pose.pose.linear() = rotation;
     pose.pose.translation() = translation;
   }
-  if (line.has("image"))
-    pose.image = line.text("image");
-  else
-    pose.stamp = line.value(line.has("index") ? "index" : "t");
-  if (std::abs(pose.stamp) > 1e14) pose.stamp *= 1e-9;  // EuRoC counts nanoseconds
+  read_picture(line, pose);
   return pose;
 }
 
@@ -134,7 +139,9 @@ void expect_columns(const Columns& columns, const std::string& path) {
                       "found no rotation, expected qx,qy,qz,qw or rx,ry,rz or rotvec_x,rotvec_y,rotvec_z");
 }
 
-std::vector<RecordedPose> load_csv(const std::string& path) {
+/// Reads the lines below a header; `check` looks at its columns, `read` makes a pose of each line.
+template <class Check, class Read>
+std::vector<RecordedPose> read_csv(const std::string& path, const Check& check, const Read& read) {
   const std::string text = data::read_file(path);
   std::vector<RecordedPose> poses;
   Columns columns;
@@ -147,17 +154,37 @@ std::vector<RecordedPose> load_csv(const std::string& path) {
     for (const std::string_view cell : data::split(line, separator)) cells.push_back(trimmed(cell));
     if (columns.empty()) {
       for (std::size_t c = 0; c < cells.size(); ++c) columns[column_name(cells[c])] = c;
-      expect_columns(columns, path);
+      check(columns);
       continue;
     }
     if (cells.size() < columns.size())
       throw input_error(
           path, "line " + std::to_string(lines.number()),
           "found " + std::to_string(cells.size()) + " columns, expected " + std::to_string(columns.size()));
-    poses.push_back(pose_of_line(CsvLine{path, columns, std::move(cells), lines.number()}));
+    poses.push_back(read(CsvLine{path, columns, std::move(cells), lines.number()}));
   }
   if (poses.empty()) throw InputError(path + ": found no poses below its header");
   return poses;
+}
+
+std::vector<RecordedPose> load_csv(const std::string& path) {
+  return read_csv(
+      path, [&](const Columns& columns) { expect_columns(columns, path); }, pose_of_line);
+}
+
+/// Columns of the joints that move: by their names, else q1 q2 ...; in degrees where they end so.
+std::vector<std::string> joint_columns(const Columns& columns, const SerialChain& robot,
+                                       const std::string& path) {
+  std::vector<std::string> names = moving_joints(robot), found;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    for (const std::string& name : {column_name(names[k]), "q" + std::to_string(k + 1)})
+      for (const std::string& column : {name, name + "_deg"})
+        if (found.size() == k && columns.count(column) > 0) found.push_back(column);
+  if (found.size() == names.size()) return found;
+  throw input_error(path, "header",
+                    "found no column of joint " + names[found.size()] + ", expected " + names[found.size()] +
+                        " or q" + std::to_string(found.size() + 1) +
+                        " [rad], or the same with the ending _deg");
 }
 
 /// The words of the first line that holds any but comments.
@@ -269,7 +296,7 @@ PoseList load_pose_list(const std::string& path) {
   PoseList list;
   if (extension == ".samples") {
     for (const PosePair& pair : load_samples(path))
-      list.poses.push_back({"", static_cast<double>(list.poses.size()), pair.T_base_gripper, std::nullopt});
+      list.poses.push_back({"", static_cast<double>(list.poses.size()), pair.T_base_gripper});
     list.in_order = true;
     list.guess = path + ": its samples are taken to be in the order of the pictures";
   } else if (extension != ".tum" && !is_tum(path)) {
@@ -278,9 +305,38 @@ PoseList load_pose_list(const std::string& path) {
   } else {
     const data::Trajectory trajectory = data::load_tum(path);
     for (std::size_t i = 0; i < trajectory.times.size(); ++i)
-      list.poses.push_back({"", trajectory.times[i], trajectory.poses[i], std::nullopt});
+      list.poses.push_back({"", trajectory.times[i], trajectory.poses[i]});
   }
   expect_plausible(list.poses, path);
+  return list;
+}
+
+PoseList load_joint_list(const std::string& path, const SerialChain& robot) {
+  constexpr double kTurns = 4 * M_PI;  // beyond which no joint turns
+  std::vector<std::string> names;
+  const auto check = [&](const Columns& columns) {
+    if (columns.count("image") + columns.count("index") + columns.count("t") == 0)
+      throw input_error(path, "header", "found none of the columns image, index, t");
+    names = joint_columns(columns, robot, path);
+  };
+  const auto read = [&](const CsvLine& line) {
+    RecordedPose pose;
+    read_picture(line, pose);
+    pose.joints.resize(static_cast<Eigen::Index>(names.size()));
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      const bool degrees = names[k].ends_with("_deg");
+      const double value = line.value(names[k]) * (degrees ? M_PI / 180 : 1);
+      if (std::abs(value) > kTurns)
+        throw input_error(path, "line " + std::to_string(line.number) + ", " + names[k],
+                          "found " + data::format_short(value) +
+                              " rad, more than two turns (degrees? end the name in _deg)");
+      pose.joints[static_cast<Eigen::Index>(k)] = value;
+    }
+    pose.pose = gripper_pose(robot, pose.joints);
+    return pose;
+  };
+  PoseList list;
+  list.poses = read_csv(path, check, read);
   return list;
 }
 

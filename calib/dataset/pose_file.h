@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "calib/geometry/serial_chain.h"
+
 namespace flash::calib {
 
 /// A pose of the robot as a file gives it.
@@ -12,7 +14,8 @@ struct RecordedPose {
   std::string image;  ///< file name of the picture it belongs to, where the file says so
   double stamp = 0;   ///< number of the picture, or its time [s]
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  std::optional<Eigen::Vector3d> angles;  ///< as written, where the rotation came as three angles [rad]
+  std::optional<Eigen::Vector3d> angles = {};  ///< as written, where the rotation came as three angles [rad]
+  Eigen::VectorXd joints = {};                 ///< where the pose came as joints of a robot [rad, m]
 };
 
 struct PoseList {
@@ -34,6 +37,11 @@ struct PosePair {
 /// turn (degrees), translations of many metres (millimetres). Other numbers are bare (load_bare_poses). JSON
 /// as load_json_poses reads it; the robot's poses of `.samples`.
 PoseList load_pose_list(const std::string& path);
+
+/// A CSV of joints whose header names the columns: image, index or t as above, and each joint that moves by
+/// its name in the robot, or q1 q2 ... in their order [rad, m]; with the ending _deg in degrees. The pose is
+/// that of the robot's last link. Throws InputError naming file and line.
+PoseList load_joint_list(const std::string& path, const SerialChain& robot);
 
 /// One pose in YAML: x y z qx qy qz qw; position and orientation, or translation and rotation, of named
 /// parts; a 4 x 4 matrix as {rows, cols, data} or a list of lists; ViSP's vector of translation and axis

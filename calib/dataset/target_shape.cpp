@@ -1,5 +1,7 @@
 #include "calib/dataset/target_shape.h"
 
+#include <cstdio>
+
 namespace flash::calib {
 
 Eigen::Matrix2Xd target_bows(const Eigen::Matrix3Xd& target_points) {
@@ -17,6 +19,22 @@ double usual_warp_sd(const Eigen::Matrix3Xd& target_points) {
 Eigen::Matrix3Xd shaped(Eigen::Matrix3Xd points, const Eigen::Matrix2Xd& bows, const TargetShape& shape) {
   points.row(2) += shape.warp.transpose() * bows;
   return shape.scale * points;
+}
+
+bool WarpEstimate::far_off() const {
+  constexpr double kFar = 3;  // standard deviations
+  return prior_sd > 0 &&
+         (estimate.array().abs() > kFar * (sd.array().square() + prior_sd * prior_sd).sqrt()).any();
+}
+
+std::string warp_sentence(const WarpEstimate& warp) {
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "the target is not flat: its middle stands %.1f +- %.1f mm (2 sd) behind its ends along x, %.1f +- "
+      "%.1f mm along y; the answer takes it into account, a flat target needs no such guess",
+      1e3 * warp.estimate.x(), 2e3 * warp.sd.x(), 1e3 * warp.estimate.y(), 2e3 * warp.sd.y());
+  return text;
 }
 
 }  // namespace flash::calib

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <string>
 
 namespace flash::calib {
 
@@ -18,5 +19,15 @@ double usual_warp_sd(const Eigen::Matrix3Xd& target_points);
 
 /// Where points with these bows are, in the target frame.
 Eigen::Matrix3Xd shaped(Eigen::Matrix3Xd points, const Eigen::Matrix2Xd& bows, const TargetShape& shape);
+
+/// By how much the middle of a target stands behind its ends, along x and y (target_bows).
+struct WarpEstimate {
+  Eigen::Vector2d estimate = Eigen::Vector2d::Zero(), sd = estimate;  ///< [m]
+  double prior_sd = 0;                                                ///< an axis [m]
+
+  /// More than prints usually bend, by three deviations of both together.
+  bool far_off() const;
+};
+std::string warp_sentence(const WarpEstimate& warp);
 
 }  // namespace flash::calib

@@ -22,6 +22,7 @@ Observation observe(const Frame& frame, const Sighting& sighting) {
   Observation observation;
   observation.image = frame.name;
   observation.T_base_gripper = frame.T_base_gripper;
+  observation.joint_motions = frame.joint_motions;
   observation.points = sighting.points;
   observation.pixels.resize(2, static_cast<Eigen::Index>(sighting.pixels.size()));
   for (std::size_t i = 0; i < sighting.pixels.size(); ++i)

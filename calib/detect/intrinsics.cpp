@@ -6,6 +6,8 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "calib/dataset/target_shape.h"
+#include "calib/detect/lens_fit.h"
 #include "calib/geometry/pose.h"
 #include "data/error.h"
 #include "data/text.h"
@@ -81,38 +83,11 @@ Solution solve(const Eigen::Matrix3Xd& points, const std::vector<const Observati
   return solution;
 }
 
-/// Covariance of the unknowns [in use only], the poses eliminated, noise from the residuals.
-Eigen::MatrixXd covariance(const Solution& solution, const Eigen::Matrix3Xd& points,
-                           const std::vector<const Observation*>& views) {
-  const std::vector<int> used = unknowns(solution.camera.model);
-  const Eigen::Index count = static_cast<Eigen::Index>(used.size());
-  const IntrinsicsVector intrinsics = to_vector(solution.camera);
-  Eigen::MatrixXd reduced = Eigen::MatrixXd::Zero(count, count);
-  double squares = 0, equations = -static_cast<double>(count);
-  for (std::size_t v = 0; v < views.size(); ++v) {
-    const Eigen::Isometry3d& pose = solution.poses[v];
-    Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(count, 6);
-    Matrix6d of_pose = Matrix6d::Zero();
-    for (std::size_t i = 0; i < views[v]->points.size(); ++i) {
-      const Eigen::Vector3d p = points.col(views[v]->points[i]);
-      Eigen::Matrix<double, 2, 3> by_point;
-      Eigen::Matrix<double, 2, kIntrinsics> by_all;
-      const Eigen::Vector2d pixel = project(intrinsics, pose * p, &by_point, &by_all);
-      const Eigen::MatrixXd by_used = by_all(Eigen::all, used);
-      Eigen::Matrix<double, 3, 6> motion;
-      motion << pose.linear(), -pose.linear() * skew(p);
-      const Eigen::Matrix<double, 2, 6> by_pose = by_point * motion;
-      reduced += by_used.transpose() * by_used;
-      cross += by_used.transpose() * by_pose;
-      of_pose += by_pose.transpose() * by_pose;
-      squares += (pixel - views[v]->pixels.col(static_cast<Eigen::Index>(i))).squaredNorm();
-      equations += 2;
-    }
-    reduced -= cross * of_pose.ldlt().solve(cross.transpose());
-    equations -= 6;
-  }
-  const double variance = squares / std::max(1.0, equations);
-  return variance * reduced.ldlt().solve(Eigen::MatrixXd::Identity(count, count));
+/// The same with a target that need not be flat.
+LensFit refined(const Solution& solution, const Eigen::Matrix3Xd& points,
+                const std::vector<const Observation*>& views) {
+  return fit_lens({.lens = to_vector(solution.camera), .poses = solution.poses, .covariance = {}},
+                  unknowns(solution.camera.model), points, views);
 }
 
 /// Of the projection of the rays that now meet the corners of the picture; the worst, kFarOff at most [px].
@@ -159,6 +134,7 @@ std::vector<std::string> warnings_of(const IntrinsicsEstimate& estimate, std::si
   if (estimate.coverage < 0.5)
     warnings.push_back("corners cover " + percent(estimate.coverage) +
                        " of the picture: distortion beyond is a guess");
+  if (estimate.warp.far_off()) warnings.push_back(warp_sentence(estimate.warp));
   if (views < 8) warnings.push_back("only " + std::to_string(views) + " views; 15 or more are usual");
   return warnings;
 }
@@ -216,22 +192,27 @@ IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<
     solution = solve(points, views, width, height, settings.model);
   }
 
-  estimate.camera = solution.camera;
+  const LensFit fit = refined(solution, points, views);
+  estimate.camera = with_vector(solution.camera, fit.lens);
   double squares = 0, corners = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    estimate.views[place[v]].rms = solution.rms[v];
     const double count = static_cast<double>(views[v]->points.size());
-    squares += count * solution.rms[v] * solution.rms[v];
+    const double own = residuals(fit, v, points, *views[v]).squaredNorm();
+    estimate.views[place[v]].rms = std::sqrt(own / count);
+    squares += own;
     corners += count;
     for (std::size_t w = 0; w < v; ++w)
-      estimate.tilt =
-          std::max(estimate.tilt,
-                   std::acos(std::clamp(
-                       solution.poses[v].linear().col(2).dot(solution.poses[w].linear().col(2)), -1.0, 1.0)));
+      estimate.tilt = std::max(
+          estimate.tilt,
+          std::acos(std::clamp(fit.poses[v].linear().col(2).dot(fit.poses[w].linear().col(2)), -1.0, 1.0)));
   }
   estimate.rms = std::sqrt(squares / corners);
-  const Eigen::MatrixXd variances = covariance(solution, points, views);
   const std::vector<int> used = unknowns(settings.model);
+  const auto count = static_cast<Eigen::Index>(used.size());
+  const Eigen::MatrixXd variances = fit.covariance.topLeftCorner(count, count);
+  estimate.warp = {.estimate = fit.warp,
+                   .sd = fit.covariance.diagonal().tail<2>().cwiseSqrt(),
+                   .prior_sd = usual_warp_sd(points)};
   estimate.covariance(used, used) = variances;
   for (std::size_t i = 0; i < used.size(); ++i)
     estimate.sd[used[i]] =

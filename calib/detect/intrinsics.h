@@ -5,6 +5,7 @@
 
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target.h"
+#include "calib/dataset/target_shape.h"
 #include "calib/geometry/projection.h"
 #include "data/camera.h"
 
@@ -26,6 +27,7 @@ struct IntrinsicsEstimate {
   IntrinsicsVector sd =
       IntrinsicsVector::Zero();  ///< standard deviations, from the residuals; poses marginalised
   LensCovariance covariance = LensCovariance::Zero();  ///< of which those are the diagonal
+  WarpEstimate warp;                                   ///< of the target, solved for beside the lens
   double rms = 0;                                      ///< reprojection, 2-D rms per corner [px]
   double corner_sd =
       0;  ///< of where the worst corner of the picture is projected, for a fixed ray; 100 at most [px]
@@ -35,8 +37,9 @@ struct IntrinsicsEstimate {
   std::vector<std::string> warnings;  ///< what these pictures do not determine
 };
 
-/// Camera from views of a flat target (Zhang 2000, by OpenCV), views that do not fit left out. Points and
-/// pixels of the observations alone are used. Throws data::InputError below three usable views.
+/// Camera from views of a flat target (Zhang 2000, by OpenCV), views that do not fit left out; then of one
+/// that is not quite flat (fit_lens). Points and pixels of the observations alone are used. Throws
+/// data::InputError below three usable views.
 IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<Observation>& observations,
                                         int width, int height, const IntrinsicsSettings& settings = {});
 

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "calib/uncertainty/joint_zeros.h"
 #include "data/trajectory.h"
 
 namespace flash::calib {
@@ -47,14 +48,31 @@ Json comparison_json(const Calibration& calibration) {
       entry["heldout_px"] = pixels ? Json(method.held_out->px) : Json(nullptr);
       entry["heldout_mm"] = method.held_out->mm;
       entry["heldout_deg"] = method.held_out->deg;
+      // Mean squares of px, mm and deg over the views of each fold.
+      if (pixels)
+        entry["heldout_folds"] = {means_of_folds(*method.held_out, 0), means_of_folds(*method.held_out, 1),
+                                  means_of_folds(*method.held_out, 2)};
       if (pixels) entry["behind"] = behind_json(calibration.held_out, *method.held_out);
     }
+    if (method.halves) entry["halves_apart_mm"] = method.halves->apart;
     entry["wild"] = method.wild;
     entry["translation"] = list(method.poses.X.translation());
     entry["rotation_xyzw"] = list(data::to_vector(method.poses.X).tail<4>());
     methods[method.name] = std::move(entry);
   }
   return methods;
+}
+
+/// What the answer is for, its error in that, and of halves which views made the first.
+Json use_json(const Calibration& calibration) {
+  const UseError& use = calibration.use;
+  Json json = {{"for", to_string(use.use)}, {"measure", use.measure}, {"unit", use.unit}};
+  json["error"] = use.value ? Json(*use.value) : Json(nullptr);
+  const std::optional<Halves>* halves = nullptr;
+  for (const ComparedMethod& method : calibration.comparison)
+    if (method.halves) halves = &method.halves;
+  if (halves) json["first_halves"] = (*halves)->first;
+  return json;
 }
 
 Json views_json(const Calibration& calibration) {
@@ -69,6 +87,11 @@ Json views_json(const Calibration& calibration) {
       entry["chain_px"] = view.chain_px;
       entry["correction_mm"] = 1e3 * view.correction.head<3>().norm();
       entry["correction_deg"] = view.correction.tail<3>().norm() * kDegrees;
+    }
+    if (view.used) {
+      const Observation& observation = calibration.selection.observations[i];
+      entry["base_gripper"] = list(data::to_vector(observation.T_base_gripper));
+      entry["camera_target"] = list(data::to_vector(observation.T_camera_target.front()));
     }
     if (view.used) entry["renumbered"] = calibration.selection.views[i].symmetry != 0;
     views.push_back(std::move(entry));
@@ -119,8 +142,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   json["predicted_sd"]["translation_parent_mm"] = list(Eigen::Vector3d(1e3 * in_parent.head<3>()));
   json["predicted_sd"]["rotation_parent_deg"] = list(Eigen::Vector3d(kDegrees * in_parent.tail<3>()));
   if (extrinsics.pixels) {
-    const Vector6d here =
-        parent_deviations(calibration.poses.X, calibration.refined.covariance.topLeftCorner<6, 6>());
+    const Vector6d here = parent_deviations(calibration.poses.X, calibration.repeatable);
     json["predicted_sd"]["repeatable_parent_mm"] = list(Eigen::Vector3d(1e3 * here.head<3>()));
     json["predicted_sd"]["repeatable_parent_deg"] = list(Eigen::Vector3d(kDegrees * here.tail<3>()));
   }
@@ -130,6 +152,7 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"robot_rotation_rad", extrinsics.robot_rotation_rad},
       {"robot_translation_m", extrinsics.robot_translation_m},
       {"depth_m", inputs.depth && inputs.depth->used ? Json(inputs.depth->sigma) : Json(nullptr)}};
+  json["use"] = use_json(calibration);
   json["residuals"] = {{"reprojection_rms_px", px(calibration.chain_rms)},
                        {"corner_rms_px", px(calibration.corner_rms)},
                        {"centre_rms_px", px(calibration.centre_rms)},
@@ -186,6 +209,11 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                                {"other_views", other.views}};
     if (other.poses) json["splits"]["knock"]["other_transform"] = list(data::to_vector(other.poses->X));
   }
+  json["joint_zeros"] = nullptr;
+  if (const auto zeros =
+          joint_zeros(calibration.refined.bundle, calibration.unknowns, calibration.shared_covariance))
+    json["joint_zeros"] = {{"estimate_deg", list(Eigen::VectorXd(kDegrees * zeros->estimate))},
+                           {"sd_deg", list(Eigen::VectorXd(kDegrees * zeros->sd))}};
   json["smooth_errors"] = nullptr;
   if (calibration.pose_errors) {
     const CorrelatedPoseErrors& errors = *calibration.pose_errors;

@@ -31,11 +31,14 @@ Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eige
                 .pivots = {Eigen::Vector3d::Zero()},
                 .poses = {},
                 .views = {}};
+  if (!observations.empty() && observations.front().joint_motions.cols() > 0)
+    bundle.joint_zeros = {Eigen::VectorXd::Zero(observations.front().joint_motions.cols())};
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const Observation& observation = observations[i];
     RobotPose pose;
     pose.T_base_gripper = observation.T_base_gripper;
     pose.velocity = observation.velocity;
+    pose.joint_motions = observation.joint_motions;
     bundle.poses.push_back(pose);
     BundleView view = make_view(target_points, observation);
     view.pose = static_cast<int>(i);
@@ -56,6 +59,12 @@ Eigen::Isometry3d predicted_pose(const Bundle& bundle, const BundleView& view, b
   return chain_of(bundle, view, corrected).target_in_camera();
 }
 
+Eigen::Isometry3d usual_correction(const Bundle& bundle, const RobotPose& pose) {
+  if (bundle.joint_zeros.empty() || pose.joint_motions.cols() == 0) return Eigen::Isometry3d::Identity();
+  return moved(Eigen::Isometry3d::Identity(),
+               pose.joint_motions * bundle.joint_zeros[static_cast<std::size_t>(pose.arm)]);
+}
+
 Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected) {
   const RobotPose& pose = bundle.poses[static_cast<std::size_t>(view.pose)];
   const auto arm = static_cast<std::size_t>(pose.arm);
@@ -63,7 +72,7 @@ Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected) {
           bundle.cameras[static_cast<std::size_t>(view.camera)],
           bundle.bases[arm],
           pose.T_base_gripper,
-          corrected ? pose.correction : Eigen::Isometry3d::Identity(),
+          corrected ? pose.correction : usual_correction(bundle, pose),
           bundle.targets[static_cast<std::size_t>(view.target)],
           bundle.time_offsets[arm],
           pose.velocity};

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -19,6 +20,7 @@ struct RobotPose {
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d correction = Eigen::Isometry3d::Identity();  ///< true pose = T_base_gripper * correction
   Vector6d velocity = Vector6d::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; for the time offset
+  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< where joints are known (serial_chain.h)
 };
 
 /// One target in one image.
@@ -31,14 +33,18 @@ struct BundleView {
                                   ///< none
 };
 
+/// Of the zeros of joints of arms in use [rad].
+constexpr double kUsualJointZero = 0.1 * M_PI / 180;
+
 /// What is known before a picture is taken: normal distributions about what is stated.
 struct Priors {
   double scale_sd = std::numeric_limits<double>::infinity();  ///< of each target's scale; infinity: nothing
   /// Of each target: full standard deviation of the scale that the pictures tell, over that of noise alone.
   /// The prior weighs as much more against residuals that are taken for noise. Empty: 1.
   std::vector<double> caution = {};
-  std::vector<LensPrior> lenses = {};  ///< of each camera; empty: nothing
-  std::vector<double> warp_sd = {};    ///< of each target's warp, an axis [m]; empty: flat
+  std::vector<LensPrior> lenses = {};      ///< of each camera; empty: nothing
+  std::vector<double> warp_sd = {};        ///< of each target's warp, an axis [m]; empty: flat
+  double joint_zero_sd = kUsualJointZero;  ///< of each joint's zero [rad]
 };
 
 /// The standard deviation that the prior of a target's scale has among residuals of noise.
@@ -57,9 +63,11 @@ struct Bundle {
   std::vector<double> scales;               ///< of each target: true size over stated size
   std::vector<Eigen::Vector2d> warps = {};  ///< of each target, see target_bows(); empty: flat
   std::vector<double> time_offsets;         ///< tau of each arm [s]
-  std::vector<double> depth_scales = {};    ///< of each camera: depth over distance; empty: 1
-  std::vector<Eigen::Vector3d> pivots;      ///< of each arm, in its gripper: where errors of rotation and of
-                                            ///< translation are independent [m]
+  std::vector<Eigen::VectorXd> joint_zeros =
+      {};                                 ///< of each arm: joints are that much farther [rad]; empty: 0
+  std::vector<double> depth_scales = {};  ///< of each camera: depth over distance; empty: 1
+  std::vector<Eigen::Vector3d> pivots;    ///< of each arm, in its gripper: where errors of rotation and of
+                                          ///< translation are independent [m]
   std::vector<RobotPose> poses;
   std::vector<BundleView> views;
   Priors priors = {};
@@ -88,6 +96,10 @@ Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bo
 inline double depth_scale(const Bundle& bundle, std::size_t camera) {
   return bundle.depth_scales.empty() ? 1 : bundle.depth_scales[camera];
 }
+
+/// What a pose needs for the zeros of its arm's joints, to first order: the mean that its correction scatters
+/// about.
+Eigen::Isometry3d usual_correction(const Bundle& bundle, const RobotPose& pose);
 
 /// The closed chain through one view, with the correction of the robot's pose or without.
 Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected = true);

@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "calib/geometry/projection.h"
+#include "calib/solve/correction_error.h"
 
 namespace flash::calib {
 namespace {
@@ -168,27 +169,62 @@ class DepthCost final : public ceres::SizedCostFunction<1, 7, 7, 7, 7, 1, 1> {
   double weight_;
 };
 
-class CorrectionPrior final : public ceres::SizedCostFunction<6, 7> {
+/// Blocks: correction, zeros of the joints where there are any.
+class CorrectionPrior final : public ceres::CostFunction {
  public:
-  CorrectionPrior(double translation, double rotation, Eigen::Vector3d pivot)
-      : translation_(1 / translation), rotation_(1 / rotation), pivot_(std::move(pivot)) {}
+  CorrectionPrior(double translation, double rotation, Eigen::Vector3d pivot, const RobotPose& pose,
+                  bool zeros)
+      : translation_(1 / translation), rotation_(1 / rotation), pivot_(std::move(pivot)), pose_(pose) {
+    set_num_residuals(6);
+    mutable_parameter_block_sizes()->push_back(7);
+    if (zeros) mutable_parameter_block_sizes()->push_back(static_cast<int>(pose.joint_motions.cols()));
+  }
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    const Eigen::Isometry3d D = pose_of(x[0]);
-    const Eigen::Vector3d angle = rotation_log(D.linear());
-    Eigen::Map<Vector6d>(residual, 6) << translation_ * (D * pivot_ - pivot_), rotation_ * angle;
+    const bool zeros = parameter_block_sizes().size() > 1;
+    Eigen::Isometry3d usual = Eigen::Isometry3d::Identity();
+    if (zeros)
+      usual = moved(
+          usual, pose_.joint_motions * Eigen::Map<const Eigen::VectorXd>(x[1], pose_.joint_motions.cols()));
+    const CorrectionError error = correction_error(pose_of(x[0]), usual, pivot_, pose_.joint_motions);
+    const auto weighted = [&](auto rows) {
+      rows.template topRows<3>() *= translation_;
+      rows.template bottomRows<3>() *= rotation_;
+      return rows;
+    };
+    Eigen::Map<Vector6d>(residual, 6) = weighted(error.value);
     if (!jacobians) return true;
-    Matrix6d d = Matrix6d::Zero();
-    d.topLeftCorner<3, 3>() = translation_ * D.linear();
-    d.topRightCorner<3, 3>() = -translation_ * D.linear() * skew(pivot_);
-    d.bottomRightCorner<3, 3>() = rotation_ * right_jacobian_inverse(angle);
-    set_pose_jacobian(jacobians[0], d);
+    set_pose_jacobian(jacobians[0], weighted(error.by_correction));
+    if (zeros && jacobians[1])
+      Eigen::Map<Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>>(
+          jacobians[1], 6, pose_.joint_motions.cols()) = weighted(error.by_zeros);
     return true;
   }
 
  private:
   double translation_, rotation_;
   Eigen::Vector3d pivot_;
+  const RobotPose& pose_;
+};
+
+/// What is known of the zeros of joints beforehand.
+class JointZeroPrior final : public ceres::CostFunction {
+ public:
+  JointZeroPrior(int joints, double sd) : weight_(1 / sd) {
+    set_num_residuals(joints);
+    mutable_parameter_block_sizes()->push_back(joints);
+  }
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    const int joints = num_residuals();
+    Eigen::Map<Eigen::VectorXd>(residual, joints) = weight_ * Eigen::Map<const Eigen::VectorXd>(x[0], joints);
+    if (jacobians && jacobians[0])
+      Eigen::Map<Eigen::MatrixXd>(jacobians[0], joints, joints) =
+          weight_ * Eigen::MatrixXd::Identity(joints, joints);
+    return true;
+  }
+
+ private:
+  double weight_;
 };
 
 /// What is known of a target's size beforehand.
@@ -246,10 +282,12 @@ struct Blocks {
   std::vector<PoseBlock> cameras, bases, targets, corrections;
   std::vector<IntrinsicsVector> intrinsics;
   std::vector<Eigen::Vector2d> warps;
+  std::vector<Eigen::VectorXd> joint_zeros;
   std::vector<double> scales, time_offsets, depth_scales;
 
   explicit Blocks(const Bundle& bundle)
       : warps(bundle.warps),
+        joint_zeros(bundle.joint_zeros),
         scales(bundle.scales),
         time_offsets(bundle.time_offsets),
         depth_scales(bundle.depth_scales) {
@@ -272,6 +310,7 @@ struct Blocks {
       bundle.intrinsics[i] = with_vector(bundle.intrinsics[i], intrinsics[i]);
     bundle.scales = scales;
     bundle.warps = warps;
+    bundle.joint_zeros = joint_zeros;
     bundle.time_offsets = time_offsets;
     bundle.depth_scales = depth_scales;
   }
@@ -320,9 +359,14 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     if (!problem.HasParameterBlock(correction)) continue;
     if (unknowns.corrections) {
       const auto arm = static_cast<std::size_t>(bundle.poses[i].arm);
-      problem.AddResidualBlock(
-          new CorrectionPrior(noise.translation[arm], noise.rotation[arm], bundle.pivots[arm]), nullptr,
-          correction);
+      const bool zeros =
+          unknowns.joint_zeros && !blocks.joint_zeros.empty() && blocks.joint_zeros[arm].size() > 0;
+      auto* const prior = new CorrectionPrior(noise.translation[arm], noise.rotation[arm], bundle.pivots[arm],
+                                              bundle.poses[i], zeros);
+      if (zeros)
+        problem.AddResidualBlock(prior, nullptr, correction, blocks.joint_zeros[arm].data());
+      else
+        problem.AddResidualBlock(prior, nullptr, correction);
       order.AddElementToGroup(correction, 0);
     } else {
       hold(problem, correction);
@@ -358,6 +402,11 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
     else if (problem.HasParameterBlock(warp))
       problem.AddResidualBlock(new WarpPrior(bundle.priors.warp_sd[target]), nullptr, warp);
   }
+  for (Eigen::VectorXd& zeros : blocks.joint_zeros)
+    if (problem.HasParameterBlock(zeros.data()))
+      problem.AddResidualBlock(
+          new JointZeroPrior(static_cast<int>(zeros.size()), bundle.priors.joint_zero_sd), nullptr,
+          zeros.data());
   for (double& tau : blocks.time_offsets)
     if (!unknowns.time_offsets) hold(problem, &tau);
   for (double& scale : blocks.depth_scales)

@@ -19,6 +19,8 @@ struct Unknowns {
   int intrinsics = 0;       ///< how many of fx fy cx cy k1 k2 p1 p2 k3 ..., held by Priors::lenses
   bool scales = false;      ///< of targets, held by Priors::scale_sd
   bool warps = false;       ///< of targets, held by Priors::warp_sd
+  bool joint_zeros =
+      false;  ///< of arms whose joints are known, held by Priors::joint_zero_sd; with corrections
   bool time_offsets = false;
   bool depth_scales = true;  ///< of cameras with depth: it tells shape and tilt, not how long a metre is
 };
@@ -37,8 +39,9 @@ struct BundleSummary {
 };
 
 /// Minimises the sum over all corners of rho(|pixel - project(q)|^2 / corner^2) and, with corrections D, the
-/// prior |dt|^2 / translation^2 + |dtheta|^2 / rotation^2 of each, dt being the motion of the arm's pivot.
-/// Levenberg-Marquardt on the manifold; the corrections are eliminated first.
+/// prior |dt|^2 / translation^2 + |dtheta|^2 / rotation^2 of each, dt being the motion of the arm's pivot,
+/// from what the zeros of its joints make of it. Levenberg-Marquardt on the manifold; the corrections are
+/// eliminated first.
 BundleSummary solve_bundle(Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings = {});
 
 }  // namespace flash::calib

@@ -1,7 +1,10 @@
 #include "calib/solve/held_out.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
+#include <random>
 
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose_from_pixels.h"
@@ -23,14 +26,14 @@ std::vector<PoseLoop> loops_of(const Bundle& bundle, const std::vector<BundleVie
 
 void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
          const RefineSettings& settings) {
-  if (method == Method::errors_in_variables) {
+  if (method == Method::errors_in_variables || method == Method::pixels) {
     RefineSettings anew = settings;
     anew.estimate_pivots = false;
     bundle = refine(std::move(bundle), anew).bundle;
-    return;
   }
-  if (method == Method::bundle) {
-    for (RobotPose& pose : bundle.poses) pose.correction.setIdentity();
+  if (method == Method::errors_in_variables) return;
+  if (method == Method::bundle || method == Method::pixels) {
+    for (RobotPose& pose : bundle.poses) pose.correction = usual_correction(bundle, pose);
     solve_bundle(bundle, settings.noise, {.unknowns = {.corrections = false}, .huber = 0});
     return;
   }
@@ -50,6 +53,8 @@ const char* to_string(Method method) {
       return "shah";
     case Method::bundle:
       return "bundle";
+    case Method::pixels:
+      return "pixels";
     case Method::errors_in_variables:
       break;
   }
@@ -121,6 +126,42 @@ HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_c
   result.mm = std::sqrt(all.mm / all.views);
   result.deg = std::sqrt(all.deg / all.views);
   return result;
+}
+
+double Halves::rms() const {
+  double sum = 0;
+  for (const double distance : apart) sum += distance * distance;
+  return std::sqrt(sum / static_cast<double>(apart.size()));
+}
+
+Halves halves_apart(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target,
+                    Method method, const RefineSettings& settings, const Eigen::Vector3d& middle, int splits,
+                    int threads) {
+  const std::size_t count = bundle.poses.size();
+  Halves halves;
+  std::mt19937 random(1);
+  std::vector<std::vector<int>> half_of;
+  for (int split = 0; split < splits; ++split) {
+    std::vector<int> order(count);
+    std::iota(order.begin(), order.end(), 0);
+    for (std::size_t i = count - 1; i > 0; --i) std::swap(order[i], order[random() % (i + 1)]);
+    order.resize(count / 2);
+    std::sort(order.begin(), order.end());
+    half_of.emplace_back(count, 1);
+    for (const int pose : order) half_of.back()[static_cast<std::size_t>(pose)] = 0;
+    halves.first.push_back(std::move(order));
+  }
+  halves.apart.resize(half_of.size());
+  data::for_each_in_parallel(half_of.size(), threads, [&](std::size_t split) {
+    std::array<Eigen::Isometry3d, 2> X;
+    for (std::size_t half = 0; half < 2; ++half) {
+      Bundle own = views_of(bundle, half_of[split], static_cast<int>(half), true);
+      fit(own, T_camera_target, method, settings);
+      X[half] = own.cameras.front();
+    }
+    halves.apart[split] = 1e3 * (X[0] * (X[1].inverse() * middle) - middle).norm();
+  });
+  return halves;
 }
 
 std::vector<double> means_of_folds(const HeldOut& held, int measure) {

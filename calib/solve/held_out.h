@@ -25,7 +25,13 @@ struct MeanDifference {
 };
 MeanDifference mean_difference(const std::vector<double>& a, const std::vector<double>& b);
 
-enum class Method { park, shah, bundle, errors_in_variables };
+enum class Method {
+  park,
+  shah,
+  bundle,  ///< the fewest pixels at the lens that the bundle holds, robot exact
+  pixels,  ///< the same at the lens, size and warp that errors in variables finds
+  errors_in_variables
+};
 const char* to_string(Method method);
 
 /// Every view left out once, in `folds` interleaved parts (a pose each when there are no more than that).
@@ -34,5 +40,17 @@ const char* to_string(Method method);
 /// same digits.
 HeldOut hold_out(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, Method method,
                  const RefineSettings& settings, int folds = 10, int threads = 1);
+
+/// Two halves of the views taken for two arms on one camera, again and again.
+struct Halves {
+  std::vector<std::vector<int>> first;  ///< poses of one half of each split
+  std::vector<double> apart;            ///< how far they put the middle of the workspace from each other [mm]
+  double rms() const;
+};
+
+/// `splits` drawn at random, the same for every method. middle: of the workspace, in the parent of X.
+Halves halves_apart(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target,
+                    Method method, const RefineSettings& settings, const Eigen::Vector3d& middle,
+                    int splits = 10, int threads = 1);
 
 }  // namespace flash::calib

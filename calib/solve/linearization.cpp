@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "calib/geometry/projection.h"
+#include "calib/solve/correction_error.h"
 
 namespace flash::calib {
 namespace {
@@ -73,17 +75,19 @@ Eigen::MatrixXd depth_gram(const Bundle& bundle, const BundleView& view, const U
   return gram;
 }
 
-/// The prior of a correction, linearised: its rotation and its translation.
-std::pair<Eigen::MatrixXd, Eigen::MatrixXd> prior_grams(const Eigen::Isometry3d& D,
-                                                        const Eigen::Vector3d& pivot, Eigen::Index width) {
-  const Eigen::Vector3d angle = rotation_log(D.linear());
-  Eigen::Matrix<double, 3, Eigen::Dynamic> rotation = Eigen::MatrixXd::Zero(3, width),
-                                           translation = Eigen::MatrixXd::Zero(3, width);
-  rotation.middleCols<3>(3) = right_jacobian_inverse(angle);
-  rotation.col(width - 1) = angle;
-  translation.leftCols<3>() = D.linear();
-  translation.middleCols<3>(3) = -D.linear() * skew(pivot);
-  translation.col(width - 1) = D * pivot - pivot;
+/// The prior of a correction, linearised: its rotation and its translation. zeros: column of the first zero
+/// of its joints among all, or none.
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> prior_grams(const Bundle& bundle, const RobotPose& pose,
+                                                        Eigen::Index width,
+                                                        std::optional<Eigen::Index> zeros) {
+  const Eigen::Vector3d& pivot = bundle.pivots[static_cast<std::size_t>(pose.arm)];
+  const CorrectionError error =
+      correction_error(pose.correction, usual_correction(bundle, pose), pivot, pose.joint_motions);
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(6, width);
+  rows.leftCols<6>() = error.by_correction;
+  if (zeros) rows.middleCols(*zeros, error.by_zeros.cols()) = error.by_zeros;
+  rows.col(width - 1) = error.value;
+  const Eigen::MatrixXd translation = rows.topRows<3>(), rotation = rows.bottomRows<3>();
   return {rotation.transpose() * rotation, translation.transpose() * translation};
 }
 
@@ -109,6 +113,16 @@ Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns)
       gram(columns.count, column) += weight * warp;
       gram(columns.count, columns.count) += weight * warp * warp;
     }
+  }
+  for (std::size_t arm = 0; arm < columns.joint_zeros.size(); ++arm) {
+    if (columns.joint_zeros[arm] < 0) continue;
+    const double weight = std::pow(bundle.priors.joint_zero_sd, -2);
+    const Eigen::VectorXd& zeros = bundle.joint_zeros[arm];
+    const Eigen::Index first = columns.joint_zeros[arm], count = zeros.size();
+    gram.diagonal().segment(first, count).array() += weight;
+    gram.col(columns.count).segment(first, count) += weight * zeros;
+    gram.row(columns.count).segment(first, count) += weight * zeros.transpose();
+    gram(columns.count, columns.count) += weight * zeros.squaredNorm();
   }
   for (std::size_t camera = 0; camera < bundle.priors.lenses.size(); ++camera) {
     const int first = columns.intrinsics[camera], count = columns.intrinsics_count;
@@ -140,6 +154,12 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
   columns.intrinsics_count = unknowns.intrinsics;
   take(columns.scales, bundle.targets.size(), unknowns.scales ? 1 : 0);
   take(columns.warps, bundle.targets.size(), unknowns.warps ? 2 : 0);
+  columns.joint_zeros.assign(bundle.joint_zeros.size(), -1);
+  for (std::size_t arm = 0; unknowns.joint_zeros && arm < bundle.joint_zeros.size(); ++arm) {
+    if (bundle.joint_zeros[arm].size() == 0) continue;
+    columns.joint_zeros[arm] = columns.count;
+    columns.count += static_cast<int>(bundle.joint_zeros[arm].size());
+  }
   take(columns.time_offsets, bundle.bases.size(), unknowns.time_offsets ? 1 : 0);
   columns.depth_scales.assign(bundle.cameras.size(), -1);
   for (const BundleView& view : bundle.views) {
@@ -165,6 +185,9 @@ void move_shared(Bundle& bundle, const SharedColumns& columns, const Eigen::Vect
   bundle.warps.resize(bundle.targets.size(), Eigen::Vector2d::Zero());
   for (std::size_t i = 0; i < bundle.warps.size(); ++i)
     if (columns.warps[i] >= 0) bundle.warps[i] += step.segment<2>(columns.warps[i]);
+  for (std::size_t arm = 0; arm < bundle.joint_zeros.size(); ++arm)
+    if (columns.joint_zeros[arm] >= 0)
+      bundle.joint_zeros[arm] += step.segment(columns.joint_zeros[arm], bundle.joint_zeros[arm].size());
   move_numbers(bundle.time_offsets, columns.time_offsets);
   bundle.depth_scales.resize(bundle.cameras.size(), 1);
   move_numbers(bundle.depth_scales, columns.depth_scales);
@@ -249,8 +272,10 @@ LinearModel linearize(const Bundle& bundle, const NoiseLevels& noise, const Bund
   for (int i = 0; i < model.groups; ++i) {
     // A pose that nothing saw still needs its prior to be determined; it then tells nothing of the noise.
     const RobotPose& pose = bundle.poses[static_cast<std::size_t>(i)];
-    auto [rotation, translation] = prior_grams(
-        pose.correction, bundle.pivots[static_cast<std::size_t>(pose.arm)], model.own + model.shared + 1);
+    std::optional<Eigen::Index> zeros;
+    if (!columns.joint_zeros.empty() && columns.joint_zeros[static_cast<std::size_t>(pose.arm)] >= 0)
+      zeros = model.own + columns.joint_zeros[static_cast<std::size_t>(pose.arm)];
+    auto [rotation, translation] = prior_grams(bundle, pose, model.own + model.shared + 1, zeros);
     const double count = 3;
     model.blocks.push_back({i, 2 * cameras + pose.arm, count, std::move(rotation)});
     model.blocks.push_back({i, 2 * cameras + arms + pose.arm, count, std::move(translation)});

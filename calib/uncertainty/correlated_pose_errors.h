@@ -31,6 +31,7 @@ struct PoseErrorModel {
 /// gripper: it is turned at the wrist, turned about the base, shifted in either's axes, and the arm is
 /// stretched. Each size and reach has the weight of its restricted likelihood times that of the size among
 /// arms in use, log-normal about 0.1 deg.
+/// Where the zeros of joints are unknowns, they stand for all that.
 PoseErrorModel fit_pose_errors(const Refinement& refined, const BundleSettings& settings);
 
 }  // namespace flash::calib

@@ -59,11 +59,6 @@ std::string lens_sentence(const LensEstimate& lens) {
          "intrinsics)";
 }
 
-bool WarpEstimate::far_off() const {
-  return prior_sd > 0 &&
-         (estimate.array().abs() > kFar * (sd.array().square() + prior_sd * prior_sd).sqrt()).any();
-}
-
 WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
                            std::size_t target) {
   WarpEstimate warp;
@@ -73,16 +68,6 @@ WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const
   warp.sd = covariance.diagonal().segment<2>(first).cwiseSqrt();
   warp.prior_sd = bundle.priors.warp_sd[target];
   return warp;
-}
-
-std::string warp_sentence(const WarpEstimate& warp) {
-  char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "the target is not flat: its middle stands %.1f +- %.1f mm (2 sd) behind its ends along x, %.1f +- "
-      "%.1f mm along y; the answer takes it into account, a flat target needs no such guess",
-      1e3 * warp.estimate.x(), 2e3 * warp.sd.x(), 1e3 * warp.estimate.y(), 2e3 * warp.sd.y());
-  return text;
 }
 
 }  // namespace flash::calib

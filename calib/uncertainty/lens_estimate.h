@@ -1,6 +1,7 @@
 #pragma once
 #include <string>
 
+#include "calib/dataset/target_shape.h"
 #include "calib/solve/bundle_adjustment.h"
 #include "calib/solve/lens_prior.h"
 
@@ -26,16 +27,7 @@ LensEstimate lens_estimate(const Bundle& bundle, const Unknowns& unknowns, const
 /// "the lens is not as stated: fx 582.1 +- 1.2 (2 sd) px, stated 611.0 ...", of a lens that is far off.
 std::string lens_sentence(const LensEstimate& lens);
 
-/// By how much the middle of a target stands behind its ends, along x and y (target_bows).
-struct WarpEstimate {
-  Eigen::Vector2d estimate = Eigen::Vector2d::Zero(), sd = estimate;  ///< [m]
-  double prior_sd = 0;                                                ///< an axis [m]
-
-  /// More than prints usually bend, by three deviations of both together.
-  bool far_off() const;
-};
 WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
                            std::size_t target = 0);
-std::string warp_sentence(const WarpEstimate& warp);
 
 }  // namespace flash::calib

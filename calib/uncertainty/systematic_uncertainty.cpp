@@ -12,6 +12,8 @@ namespace flash::calib {
 SystematicUncertainty systematic_uncertainty(const Refinement& refined, const BundleSettings& settings,
                                              const PoseErrorModel& model) {
   SystematicUncertainty result{refined.covariance, model.arms, {}};
+  result.caution.assign(refined.bundle.targets.size(), 1);
+  if (settings.unknowns.joint_zeros) return result;  // which the covariance holds
   const std::vector<PoseInformation> all = pose_informations(refined, settings);
   const Bundle& bundle = refined.bundle;
   const SharedColumns columns = shared_columns(bundle, settings.unknowns);
@@ -41,7 +43,6 @@ SystematicUncertainty systematic_uncertainty(const Refinement& refined, const Bu
   }
   const Eigen::LDLT<Eigen::MatrixXd> shared(information);
   result.covariance += shared.solve(shared.solve(more).transpose());
-  result.caution.assign(bundle.targets.size(), 1);
   for (std::size_t target = 0; target < bundle.targets.size(); ++target) {
     const int column = columns.scales[target];
     if (column < 0) continue;

@@ -105,6 +105,7 @@ inline HandEyeScene make_arm_scene(const SceneSettings& settings, const ArmError
     observation.T_camera_target = {fitted_pose(scene.camera, points, observation.pixels, T_camera_target)};
     scene.observations.push_back(std::move(observation));
     scene.true_poses.push_back(pose);
+    scene.joints.emplace_back(q);
   }
   return scene;
 }

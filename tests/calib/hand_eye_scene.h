@@ -39,7 +39,8 @@ struct HandEyeScene {
   Eigen::Matrix3Xd points;
   HandEyePoses truth;
   std::vector<Observation> observations;
-  std::vector<Eigen::Isometry3d> true_poses;  ///< T_base_gripper
+  std::vector<Eigen::Isometry3d> true_poses;             ///< T_base_gripper
+  std::vector<Eigen::Matrix<double, 6, 1>> joints = {};  ///< of arms [rad]
 };
 
 inline Eigen::Isometry3d make_pose(const Eigen::Vector3d& translation, const Eigen::Vector3d& rotation) {

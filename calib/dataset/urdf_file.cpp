@@ -1,0 +1,124 @@
+#include "calib/dataset/urdf_file.h"
+
+#include <tinyxml2.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/text.h"
+
+namespace flash::calib {
+namespace {
+
+using data::input_error;
+using data::InputError;
+
+struct Link {
+  Joint joint;         ///< that carries it
+  std::string parent;  ///< link before it
+};
+
+std::string attribute(const tinyxml2::XMLElement* element, const char* name) {
+  const char* const text = element ? element->Attribute(name) : nullptr;
+  return text ? text : "";
+}
+
+Eigen::Vector3d three_numbers(const std::string& text, const Eigen::Vector3d& otherwise,
+                              const std::string& path, const std::string& field) {
+  if (text.empty()) return otherwise;
+  std::vector<double> values;
+  for (const std::string_view word : data::split(text, " \t\r\n"))
+    if (!word.empty()) {
+      const std::optional<double> value = data::parse_number(std::string(word));
+      if (!value || !std::isfinite(*value))
+        throw input_error(path, field, "found \"" + text + "\", expected numbers");
+      values.push_back(*value);
+    }
+  if (values.size() != 3) throw input_error(path, field, "found \"" + text + "\", expected three numbers");
+  return Eigen::Vector3d(values[0], values[1], values[2]);
+}
+
+Joint joint_of(const tinyxml2::XMLElement& element, const std::string& path) {
+  Joint joint{.name = attribute(&element, "name")};
+  const std::string field = "joint " + joint.name, kind = attribute(&element, "type");
+  if (kind == "revolute" || kind == "continuous")
+    joint.kind = Joint::Kind::revolute;
+  else if (kind == "prismatic")
+    joint.kind = Joint::Kind::prismatic;
+  else if (kind != "fixed")
+    throw input_error(path, field,
+                      "found type \"" + kind + "\", expected revolute, continuous, prismatic or fixed");
+  const tinyxml2::XMLElement* const origin = element.FirstChildElement("origin");
+  const Eigen::Vector3d rpy =
+      three_numbers(attribute(origin, "rpy"), Eigen::Vector3d::Zero(), path, field + ", rpy");
+  joint.origin.translation() =
+      three_numbers(attribute(origin, "xyz"), Eigen::Vector3d::Zero(), path, field + ", xyz");
+  joint.origin.linear() = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+                           Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+                           Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+                              .toRotationMatrix();
+  joint.axis = three_numbers(attribute(element.FirstChildElement("axis"), "xyz"), Eigen::Vector3d::UnitX(),
+                             path, field + ", axis");
+  if (joint.kind == Joint::Kind::fixed) return joint;
+  if (!(joint.axis.norm() > 1e-6)) throw input_error(path, field, "found an axis of no length");
+  joint.axis.normalize();
+  if (element.FirstChildElement("mimic"))
+    throw input_error(path, field, "follows another joint (mimic), expected one that moves by itself");
+  return joint;
+}
+
+/// The only one of the links that qualifies.
+std::string only(const std::set<std::string>& links, const std::string& path, const char* what) {
+  if (links.size() == 1) return *links.begin();
+  std::string list;
+  for (const std::string& link : links) list += (list.empty() ? "" : ", ") + link;
+  throw InputError(path + ": found " + std::to_string(links.size()) + " links that can be " + what +
+                   (list.empty() ? "" : " (" + list + ")") + ", expected one (name it)");
+}
+
+}  // namespace
+
+SerialChain load_urdf(const std::string& path, const std::string& base, const std::string& tip) {
+  const std::string text = data::read_file(path);
+  tinyxml2::XMLDocument document;
+  if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
+    throw InputError(path + ": line " + std::to_string(document.ErrorLineNum()) + ": expected XML");
+  const tinyxml2::XMLElement* const robot = document.FirstChildElement("robot");
+  if (!robot) throw InputError(path + ": found no element robot, expected a URDF (expand xacro first)");
+  std::map<std::string, Link> carried;
+  std::set<std::string> parents, roots, leaves;
+  for (const auto* element = robot->FirstChildElement("joint"); element;
+       element = element->NextSiblingElement("joint")) {
+    const std::string parent = attribute(element->FirstChildElement("parent"), "link"),
+                      child = attribute(element->FirstChildElement("child"), "link");
+    if (parent.empty() || child.empty())
+      throw input_error(path, "joint " + attribute(element, "name"), "expected a parent and a child link");
+    if (!carried.emplace(child, Link{joint_of(*element, path), parent}).second)
+      throw input_error(path, "link " + child, "hangs on two joints");
+    parents.insert(parent);
+  }
+  for (const std::string& parent : parents)
+    if (carried.count(parent) == 0) roots.insert(parent);
+  for (const auto& [child, link] : carried)
+    if (parents.count(child) == 0) leaves.insert(child);
+  const std::string first = base.empty() ? only(roots, path, "the base (--base-link)") : base;
+  const std::string last = tip.empty() ? only(leaves, path, "the gripper (--tip-link)") : tip;
+  SerialChain chain;
+  for (std::string link = last; link != first;) {
+    const auto found = carried.find(link);
+    if (found == carried.end() || chain.joints.size() > carried.size())
+      throw InputError(path + ": found no chain of joints from link " + first + " to link " + last);
+    chain.joints.push_back(found->second.joint);
+    link = found->second.parent;
+  }
+  std::reverse(chain.joints.begin(), chain.joints.end());
+  if (moving_joints(chain).empty())
+    throw InputError(path + ": no joint moves from link " + first + " to link " + last);
+  return chain;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,14 @@
+#pragma once
+#include <string>
+
+#include "calib/geometry/serial_chain.h"
+
+namespace flash::calib {
+
+/// The joints of a URDF from the link `base` to the link `tip`. Empty: the link without a parent, and the
+/// only one without children. Continuous joints are revolute; limits, masses and shapes are not read. Throws
+/// data::InputError where the file is no such XML, links are missing or `tip` hangs on no chain from `base`,
+/// and where a joint is of another kind or follows another.
+SerialChain load_urdf(const std::string& path, const std::string& base = "", const std::string& tip = "");
+
+}  // namespace flash::calib

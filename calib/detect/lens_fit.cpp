@@ -1,0 +1,121 @@
+#include "calib/detect/lens_fit.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "calib/dataset/target_shape.h"
+#include "calib/geometry/pose.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr Eigen::Index kWarp = 2;
+
+/// Of one view: information of the shared unknowns, of its pose and of both, and their gradients.
+struct ViewTerms {
+  Eigen::MatrixXd shared, cross;  // s x s, s x 6
+  Matrix6d pose = Matrix6d::Zero();
+  Eigen::VectorXd g_shared;
+  Vector6d g_pose = Vector6d::Zero();
+};
+
+ViewTerms terms_of(const LensFit& fit, std::size_t view, const std::vector<int>& unknowns,
+                   const Eigen::Matrix3Xd& points, const Eigen::Matrix2Xd& bows, const Observation& seen) {
+  const Eigen::Index count = static_cast<Eigen::Index>(unknowns.size()), s = count + kWarp;
+  ViewTerms terms{.shared = Eigen::MatrixXd::Zero(s, s),
+                  .cross = Eigen::MatrixXd::Zero(s, 6),
+                  .g_shared = Eigen::VectorXd::Zero(s)};
+  const Eigen::Isometry3d& pose = fit.poses[view];
+  for (std::size_t i = 0; i < seen.points.size(); ++i) {
+    const Eigen::Vector2d bow = bows.col(seen.points[i]);
+    const Eigen::Vector3d p = points.col(seen.points[i]) + fit.warp.dot(bow) * Eigen::Vector3d::UnitZ();
+    Eigen::Matrix<double, 2, 3> by_point;
+    Eigen::Matrix<double, 2, kIntrinsics> by_all;
+    const Eigen::Vector2d residual =
+        project(fit.lens, pose * p, &by_point, &by_all) - seen.pixels.col(static_cast<Eigen::Index>(i));
+    Eigen::MatrixXd by_shared(2, s);
+    by_shared << by_all(Eigen::all, unknowns), by_point * pose.linear().col(2) * bow.transpose();
+    Eigen::Matrix<double, 3, 6> motion;
+    motion << pose.linear(), -pose.linear() * skew(p);
+    const Eigen::Matrix<double, 2, 6> by_pose = by_point * motion;
+    terms.shared += by_shared.transpose() * by_shared;
+    terms.cross += by_shared.transpose() * by_pose;
+    terms.pose += by_pose.transpose() * by_pose;
+    terms.g_shared += by_shared.transpose() * residual;
+    terms.g_pose += by_pose.transpose() * residual;
+  }
+  return terms;
+}
+
+double squares(const LensFit& fit, const Eigen::Matrix3Xd& points,
+               const std::vector<const Observation*>& views) {
+  double sum = 0;
+  for (std::size_t v = 0; v < views.size(); ++v) sum += residuals(fit, v, points, *views[v]).squaredNorm();
+  return sum;
+}
+
+}  // namespace
+
+Eigen::Matrix2Xd residuals(const LensFit& fit, std::size_t view, const Eigen::Matrix3Xd& points,
+                           const Observation& seen) {
+  const Eigen::Matrix3Xd bent = shaped(points, target_bows(points), {.warp = fit.warp});
+  Eigen::Matrix2Xd result(2, seen.pixels.cols());
+  for (Eigen::Index i = 0; i < result.cols(); ++i)
+    result.col(i) = seen.pixels.col(i) -
+                    project(fit.lens, fit.poses[view] * bent.col(seen.points[static_cast<std::size_t>(i)]));
+  return result;
+}
+
+LensFit fit_lens(LensFit fit, const std::vector<int>& unknowns, const Eigen::Matrix3Xd& points,
+                 const std::vector<const Observation*>& views) {
+  constexpr int kSteps = 30;
+  constexpr double kStill = 1e-6;  // of a step, in standard deviations
+  const Eigen::Matrix2Xd bows = target_bows(points);
+  const Eigen::Index count = static_cast<Eigen::Index>(unknowns.size()), s = count + kWarp;
+  double freedom = -static_cast<double>(s);
+  for (const Observation* view : views) freedom += 2 * static_cast<double>(view->points.size()) - 6;
+  freedom = std::max(1.0, freedom);
+  double damping = 0;
+  for (int step = 0; step < kSteps; ++step) {
+    // Exact corners would leave the prior of the warp without a weight.
+    const double before = squares(fit, points, views);
+    fit.variance = std::max(1e-12, before / freedom);
+    const double prior = fit.variance / std::pow(usual_warp_sd(points), 2);
+    Eigen::MatrixXd reduced = Eigen::MatrixXd::Zero(s, s);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(s);
+    reduced.bottomRightCorner<kWarp, kWarp>().diagonal().setConstant(prior);
+    gradient.tail<kWarp>() = prior * fit.warp;
+    std::vector<ViewTerms> terms;
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      const ViewTerms& own = terms.emplace_back(terms_of(fit, v, unknowns, points, bows, *views[v]));
+      reduced += own.shared - own.cross * own.pose.ldlt().solve(own.cross.transpose());
+      gradient += own.g_shared - own.cross * own.pose.ldlt().solve(own.g_pose);
+    }
+    fit.covariance = fit.variance * reduced.ldlt().solve(Eigen::MatrixXd::Identity(s, s));
+    Eigen::MatrixXd damped = reduced;
+    damped.diagonal() *= 1 + damping;
+    const Eigen::VectorXd move = -damped.ldlt().solve(gradient);
+    LensFit next = fit;
+    next.lens(unknowns) += move.head(count);
+    next.warp += move.tail<kWarp>();
+    for (std::size_t v = 0; v < views.size(); ++v)
+      next.poses[v] = moved(fit.poses[v],
+                            -terms[v].pose.ldlt().solve(terms[v].g_pose + terms[v].cross.transpose() * move));
+    const double worth = before + prior * fit.warp.squaredNorm(),
+                 cost = squares(next, points, views) + prior * next.warp.squaredNorm();
+    if (!(cost <= worth * (1 + 1e-12))) {
+      damping = std::max(1e-3, 10 * damping);
+      continue;
+    }
+    const bool still = move.dot(reduced * move) < kStill * kStill * fit.variance;
+    fit.lens = next.lens;
+    fit.warp = next.warp;
+    fit.poses = std::move(next.poses);
+    if (still) break;
+    damping = damping > 1e-3 ? 0.1 * damping : 0;
+  }
+  return fit;
+}
+
+}  // namespace flash::calib

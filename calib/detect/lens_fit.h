@@ -1,0 +1,29 @@
+#pragma once
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "calib/dataset/observation.h"
+#include "calib/geometry/projection.h"
+
+namespace flash::calib {
+
+/// A lens, the warp of the target it was seen through (target_bows) and where the target stood in each view.
+struct LensFit {
+  IntrinsicsVector lens = IntrinsicsVector::Zero();
+  Eigen::Vector2d warp = Eigen::Vector2d::Zero();  ///< [m]
+  std::vector<Eigen::Isometry3d> poses;
+  double variance = 0;         ///< of a corner's coordinate, from the residuals [px^2]
+  Eigen::MatrixXd covariance;  ///< of the unknowns in use, then of the warp; poses marginalised
+};
+
+/// Least squares of the reprojection from a start that is near, by Gauss and Newton with the poses
+/// eliminated. unknowns: places in `lens` that may change. The warp is held by what prints usually are
+/// (usual_warp_sd).
+LensFit fit_lens(LensFit start, const std::vector<int>& unknowns, const Eigen::Matrix3Xd& points,
+                 const std::vector<const Observation*>& views);
+
+/// Seen minus projected of one view [px], 2 x N.
+Eigen::Matrix2Xd residuals(const LensFit& fit, std::size_t view, const Eigen::Matrix3Xd& points,
+                           const Observation& seen);
+
+}  // namespace flash::calib

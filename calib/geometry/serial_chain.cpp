@@ -1,0 +1,51 @@
+#include "calib/geometry/serial_chain.h"
+
+#include "calib/geometry/pose.h"
+
+namespace flash::calib {
+namespace {
+
+/// (dt, dtheta) of the joint's own frame per unit of the joint.
+Vector6d motion_of(const Joint& joint) {
+  Vector6d xi = Vector6d::Zero();
+  if (joint.kind == Joint::Kind::revolute) xi.tail<3>() = joint.axis;
+  if (joint.kind == Joint::Kind::prismatic) xi.head<3>() = joint.axis;
+  return xi;
+}
+
+/// The gripper in the frame of each joint, moved by it; the last entry is of the gripper itself.
+std::vector<Eigen::Isometry3d> after_each(const SerialChain& chain, const Eigen::VectorXd& q) {
+  std::vector<Eigen::Isometry3d> poses(chain.joints.size() + 1, Eigen::Isometry3d::Identity());
+  Eigen::Index moving = q.size();
+  for (std::size_t k = chain.joints.size(); k-- > 0;) {
+    const Joint& joint = chain.joints[k];
+    const double value = joint.kind == Joint::Kind::fixed ? 0 : q[--moving];
+    poses[k] = joint.origin * moved(Eigen::Isometry3d::Identity(), value * motion_of(joint)) * poses[k + 1];
+  }
+  return poses;
+}
+
+}  // namespace
+
+std::vector<std::string> moving_joints(const SerialChain& chain) {
+  std::vector<std::string> names;
+  for (const Joint& joint : chain.joints)
+    if (joint.kind != Joint::Kind::fixed) names.push_back(joint.name);
+  return names;
+}
+
+Eigen::Isometry3d gripper_pose(const SerialChain& chain, const Eigen::VectorXd& q) {
+  return after_each(chain, q).front();
+}
+
+Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions(const SerialChain& chain, const Eigen::VectorXd& q) {
+  const std::vector<Eigen::Isometry3d> poses = after_each(chain, q);
+  Eigen::Matrix<double, 6, Eigen::Dynamic> J(6, q.size());
+  Eigen::Index column = 0;
+  for (std::size_t k = 0; k < chain.joints.size(); ++k)
+    if (chain.joints[k].kind != Joint::Kind::fixed)
+      J.col(column++) = adjoint(poses[k + 1].inverse()) * motion_of(chain.joints[k]);
+  return J;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,71 @@
+#include "calib/calibrate/use.h"
+
+#include <gtest/gtest.h>
+
+#include "calib/calibrate/calibrate.h"
+#include "tests/calib/arm_scene.h"
+
+namespace flash::calib {
+namespace {
+
+Calibration solved(const HandEyeScene& scene, Use use) {
+  CalibrateSettings settings;
+  settings.use = use;
+  return calibrate(scene.settings.setup, scene.camera, scene.points, grid_symmetries(scene.points),
+                   scene.observations, settings);
+}
+
+HandEyeScene arm_scene(unsigned seed) {
+  SceneSettings settings = protocol_settings(Setup::eye_in_hand);
+  settings.views = 20;
+  settings.robot_deg = 0.005;
+  settings.robot_mm = 0.03;
+  return make_arm_scene(settings, {.zero_deg = 0.1, .length_mm = 0.5}, 0.4, board_points(), seed);
+}
+
+TEST(Use, ImageTakesWhatPredictsPicturesBest) {
+  int fewest = 0;
+  for (const unsigned seed : {41U, 42U}) {
+    const HandEyeScene scene = arm_scene(seed);
+    const Calibration image = solved(scene, Use::image), workspace = solved(scene, Use::workspace);
+    EXPECT_LE(image.held_out.px, workspace.held_out.px);
+    EXPECT_EQ(image.use.value, image.held_out.px);
+    EXPECT_EQ(workspace.use.value, workspace.held_out.mm);
+    EXPECT_EQ(image.comparison.back().name, to_string(image.method));
+    EXPECT_TRUE(image.poses.X.isApprox(image.comparison.back().poses.X, 0));
+    fewest += image.method == Method::pixels;
+  }
+  EXPECT_GT(fewest, 0);
+}
+
+TEST(Use, TwoArmsTakeLensAndPrintAsStated) {
+  const HandEyeScene scene = arm_scene(45);
+  const Calibration result = solved(scene, Use::two_arms);
+  const Bundle& bundle = result.refined.bundle;
+  EXPECT_EQ(to_vector(bundle.intrinsics.front()), to_vector(scene.camera));
+  EXPECT_EQ(bundle.scales.front(), 1);
+  EXPECT_EQ(result.unknowns.warps, false);
+  ASSERT_TRUE(result.use.value);
+  EXPECT_GT(*result.use.value, 0);
+  for (const ComparedMethod& method : result.comparison)
+    EXPECT_EQ(method.halves.has_value(), method.held_out.has_value());
+}
+
+TEST(Use, HalvesAgreeWhereRobotAndCornersAreExact) {
+  SceneSettings settings = protocol_settings(Setup::eye_to_hand);
+  settings.corner_px = 0;
+  const HandEyeScene scene = make_scene(settings, board_points(), 46);
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Observation& o : scene.observations) poses.push_back(o.T_camera_target.front());
+  const Bundle bundle = seeded_bundle(scene);
+  RefineSettings refine_settings;
+  refine_settings.noise = uniform_noise(bundle, 1, 1, 1, 1);
+  const Halves halves =
+      halves_apart(bundle, poses, Method::bundle, refine_settings, Eigen::Vector3d(0.6, 0.1, 0.3), 4);
+  ASSERT_EQ(halves.apart.size(), 4U);
+  EXPECT_LT(halves.rms(), 1e-4);  // Ceres stops where the cost no longer changes by 1e-10
+  for (const std::vector<int>& first : halves.first) EXPECT_EQ(first.size(), scene.observations.size() / 2);
+}
+
+}  // namespace
+}  // namespace flash::calib

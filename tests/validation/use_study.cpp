@@ -1,0 +1,111 @@
+// What --for serves, over seeded scenes: robots whose poses are noisy, and arms whose kinematic model is
+// wrong. image: held-out pixels and stated uncertainty; two-arms: two arms on one camera whose lens is not
+// quite as stated, against the truth. SCENES FIRST_SEED
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <random>
+#include <string>
+
+#include "calib/calibrate/calibrate.h"
+#include "tests/calib/arm_scene.h"
+
+namespace flash::calib {
+namespace {
+
+HandEyeScene scene_of(Setup setup, const Eigen::Matrix3Xd& points, bool wrong_kinematics, unsigned seed) {
+  SceneSettings settings = protocol_settings(setup);
+  settings.views = 20;
+  settings.robot_deg = wrong_kinematics ? 0.005 : 0.05;  // how well an arm repeats; a noisy one
+  settings.robot_mm = wrong_kinematics ? 0.03 : 0.5;
+  if (!wrong_kinematics) return make_scene(settings, points, seed);
+  const double reach = setup == Setup::eye_in_hand ? 0.4 : 0.6;
+  return make_arm_scene(settings, {.zero_deg = 0.1, .length_mm = 0.5}, reach, points, seed);
+}
+
+Calibration solved(const HandEyeScene& scene, const data::CameraIntrinsics& camera, Use use, int folds) {
+  CalibrateSettings settings;
+  settings.use = use;
+  settings.folds = folds;
+  return calibrate(scene.settings.setup, camera, scene.points, grid_symmetries(scene.points),
+                   scene.observations, settings);
+}
+
+const char* name_of(bool wrong_kinematics) { return wrong_kinematics ? "wrong kinematics" : "white noise"; }
+
+void study_image(Setup setup, bool wrong_kinematics, int scenes, unsigned first_seed) {
+  constexpr double kChiSquare95 = 12.592;
+  int fewest = 0, inside = 0;
+  std::map<std::string, double> px;
+  for (int i = 0; i < scenes; ++i) {
+    const HandEyeScene scene =
+        scene_of(setup, protocol_points(setup), wrong_kinematics, first_seed + static_cast<unsigned>(i));
+    const Calibration result = solved(scene, scene.camera, Use::image, 5);
+    for (const ComparedMethod& method : result.comparison)
+      if (method.held_out) px[method.name] += std::pow(method.held_out->px, 2) / scenes;
+    px["answer"] += std::pow(result.held_out.px, 2) / scenes;
+    fewest += result.method == Method::pixels;
+    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+    inside += error.dot(result.covariance.ldlt().solve(error)) < kChiSquare95;
+  }
+  std::printf("image, %s, %s: held out px", to_string(setup), name_of(wrong_kinematics));
+  for (const auto& [name, square] : px) std::printf(" %s %.3f", name.c_str(), std::sqrt(square));
+  std::printf(" | fewest pixels in %d, truth inside 95 %% in %d of %d\n", fewest, inside, scenes);
+}
+
+void study_arms(bool wrong_kinematics, double lens_sd, int scenes, unsigned first_seed) {
+  const Eigen::Matrix3Xd points = board_points(7, 5, 0.03);
+  std::map<std::string, double> squares;
+  for (int i = 0; i < scenes; ++i) {
+    std::mt19937 random(first_seed + static_cast<unsigned>(i));
+    const double off = 1 + lens_sd * std::normal_distribution<double>()(random);
+    std::map<std::string, std::vector<Eigen::Isometry3d>> X;
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();  // of what the second arm holds, in its base
+    for (unsigned arm = 0; arm < 2; ++arm) {
+      HandEyeScene scene = scene_of(Setup::eye_to_hand, points, wrong_kinematics,
+                                    first_seed + 2 * static_cast<unsigned>(i) + arm);
+      data::CameraIntrinsics camera = scene.camera;
+      camera.fx *= off;
+      camera.fy *= off;
+      middle.setZero();
+      for (Observation& o : scene.observations) {
+        middle +=
+            scene.truth.X * (o.T_camera_target.front() * points.rowwise().mean()) / scene.settings.views;
+        o.T_camera_target = {fitted_pose(camera, points, o.pixels, o.T_camera_target.front())};
+      }
+      X["truth"].push_back(scene.truth.X);
+      X["workspace"].push_back(solved(scene, camera, Use::workspace, 2).poses.X);
+      const Calibration result = solved(scene, camera, Use::two_arms, 2);
+      X["two-arms"].push_back(result.poses.X);
+      for (const ComparedMethod& method : result.comparison)
+        if (method.held_out) X[method.name].push_back(method.poses.X);
+    }
+    X.erase("errors_in_variables");
+    const auto at = [&](const std::vector<Eigen::Isometry3d>& arms) -> Eigen::Vector3d {
+      return arms[0] * (arms[1].inverse() * middle);
+    };
+    for (const auto& [name, arms] : X) squares[name] += (at(arms) - at(X["truth"])).squaredNorm() / scenes;
+  }
+  std::printf("two arms, %s, lens stated to %.1f %%: mm", name_of(wrong_kinematics), 100 * lens_sd);
+  for (const auto& [name, square] : squares)
+    if (name != "truth") std::printf(" %s %.2f", name.c_str(), 1e3 * std::sqrt(square));
+  std::printf(" of %d\n", scenes);
+}
+
+}  // namespace
+}  // namespace flash::calib
+
+int main(int argc, char** argv) {
+  const int scenes = argc > 1 ? std::atoi(argv[1]) : 100;
+  // Settings were chosen on seeds below 500,100.
+  const unsigned first_seed = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 600001;
+  using flash::calib::Setup;
+  for (const bool wrong_kinematics : {false, true}) {
+    for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand})
+      flash::calib::study_image(setup, wrong_kinematics, scenes, first_seed);
+    for (const double lens_sd : {0.0, 0.002, 0.005})
+      flash::calib::study_arms(wrong_kinematics, lens_sd, scenes, first_seed);
+  }
+}
