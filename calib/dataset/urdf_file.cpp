@@ -18,8 +18,8 @@ using data::input_error;
 using data::InputError;
 
 struct Link {
-  Joint joint;         ///< that carries it
-  std::string parent;  ///< link before it
+  const tinyxml2::XMLElement* joint;  ///< that carries it
+  std::string parent;                 ///< link before it
 };
 
 std::string attribute(const tinyxml2::XMLElement* element, const char* name) {
@@ -97,7 +97,7 @@ SerialChain load_urdf(const std::string& path, const std::string& base, const st
                       child = attribute(element->FirstChildElement("child"), "link");
     if (parent.empty() || child.empty())
       throw input_error(path, "joint " + attribute(element, "name"), "expected a parent and a child link");
-    if (!carried.emplace(child, Link{joint_of(*element, path), parent}).second)
+    if (!carried.emplace(child, Link{element, parent}).second)
       throw input_error(path, "link " + child, "hangs on two joints");
     parents.insert(parent);
   }
@@ -112,7 +112,8 @@ SerialChain load_urdf(const std::string& path, const std::string& base, const st
     const auto found = carried.find(link);
     if (found == carried.end() || chain.joints.size() > carried.size())
       throw InputError(path + ": found no chain of joints from link " + first + " to link " + last);
-    chain.joints.push_back(found->second.joint);
+    // Other joints, such as those of fingers, may be of any kind.
+    chain.joints.push_back(joint_of(*found->second.joint, path));
     link = found->second.parent;
   }
   std::reverse(chain.joints.begin(), chain.joints.end());

@@ -77,6 +77,19 @@ TEST_F(Urdf, WhatIsNoChainIsNamed) {
             std::string::npos);
 }
 
+TEST_F(Urdf, JointsBesideTheChainMayBeOfAnyKind) {
+  std::string arm = kArm;
+  arm.insert(arm.find("</robot>"),
+             "<joint name=\"finger\" type=\"prismatic\"><parent link=\"tool\"/><child link=\"left\"/>"
+             "<mimic joint=\"other\"/></joint>"
+             "<joint name=\"cable\" type=\"floating\"><parent link=\"tool\"/><child link=\"plug\"/></joint>");
+  const std::string path = write("fingers.urdf", arm);
+  EXPECT_EQ(moving_joints(load_urdf(path, "base", "tool")).size(), 3U);
+  EXPECT_NE(data::input_error_of([&] { load_urdf(path, "base", "left"); }).find("mimic"), std::string::npos);
+  EXPECT_NE(data::input_error_of([&] { load_urdf(path, "base", "plug"); }).find("floating"),
+            std::string::npos);
+}
+
 TEST_F(Urdf, JointsAreReadByNameOrNumber) {
   const SerialChain chain = load_urdf(write("arm.urdf", kArm), "base", "tool");
   const PoseList named = load_joint_list(
