@@ -18,7 +18,6 @@
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
 #include "sysid/infer/answer.h"
-#include "sysid/infer/refine.h"
 #include "sysid/report/overlay.h"
 #include "sysid/report/parameter_label.h"
 #include "sysid/report/recording_names.h"
@@ -59,7 +58,8 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   settings.score = score_settings(options.replay);
   settings.envs = options.envs;
   settings.threads = threads;
-  settings.rollouts = options.rollouts;
+  settings.rollouts =
+      options.rollouts.empty() ? (fs::path(options.out) / "motions").string() : options.rollouts;
   for (const auto& [name, text] : options.axes) settings.axes.push_back(sysid::parse_axis(name, text));
   if (settings.axes.empty())
     throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
@@ -154,20 +154,16 @@ void tell_what_was_shared(const std::vector<sysid::Replay>& replays, const Commo
                      " of " + std::to_string(replay.steps + 1) + " steps a candidate");
 }
 
-// The best candidate over the observations, recording by recording; kept with the run.
-std::vector<sysid::Overlay> keep_best(const sysid::GridResults& results, const sysid::Summary& summary,
-                                      const std::vector<sysid::Replay>& replays,
-                                      const sysid::GridSettings& settings, const std::string& out) {
+// The estimate over the observations, recording by recording; kept with the run.
+std::vector<sysid::Overlay> keep_estimate(const std::vector<std::string>& recordings,
+                                          const sysid::Answer& answer,
+                                          const std::vector<sysid::Replay>& replays, const std::string& out) {
   std::vector<sysid::Overlay> overlays;
-  if (summary.best.empty()) return overlays;
-  const auto better = [](const auto& a, const auto& b) { return a.score < b.score; };
-  const sysid::CandidateResult& best =
-      *std::min_element(results.candidates.begin(), results.candidates.end(), better);
-  const std::vector<std::string> folders = sysid::file_names(results.recordings);
+  if (answer.best < 0) return overlays;
+  const std::vector<std::string> folders = sysid::file_names(recordings);
   for (std::size_t r = 0; r < replays.size(); ++r) {
-    const sysid::ReplayResult motion =
-        std::move(sysid::run(replays[r], {sysid::candidate_at(best.values, settings)}).front());
-    overlays.push_back(sysid::make_overlay(replays[r], motion.motion, best.recordings[r]));
+    overlays.push_back(
+        sysid::make_overlay(replays[r], answer.motions[r].motion, answer.estimate.recordings[r]));
     sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / folders[r]).string());
   }
   return overlays;
@@ -221,7 +217,7 @@ int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
   summary.asset = fs::absolute(asset.source).lexically_normal().string();
   summary.device = device;
   summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  write_results(summary, results, keep_best(results, summary, replays, settings, options.out), options);
+  write_results(summary, results, keep_estimate(results.recordings, answer, replays, options.out), options);
 
   for (const std::string& warning : summary.warnings) warn(warning);
   if (options.common.json) {
@@ -271,7 +267,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
           data::format_count(static_cast<std::size_t>(replays.front().sheet().rest.vertices.rows())) +
           " vertices, " + std::to_string(threads) + " threads, about " +
           data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) + " MB of memory");
-  if (!settings.rollouts.empty()) {
+  {
     const sysid::AnswerWork most = sysid::most_work(settings, replays.size(), !options.no_solver_check);
     say(options.common, "then the answer: at most " +
                             data::format_count(static_cast<std::size_t>(most.motions)) +
@@ -321,7 +317,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
                  "Do not solve the best candidate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_option("--rollouts", options->rollouts,
-                   "Folder that keeps the motions, to score them again without simulating");
+                   "Folder that keeps the motions, for several searches; without it, motions/ of the run");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);

@@ -31,16 +31,13 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
   const double candidates = count_candidates(settings.axes);
   const double at_once = std::min<double>(settings.envs, candidates);
   const double threads = std::min<double>(settings.threads, at_once);
-  const bool keeps = !settings.rollouts.empty();
-  const double finer_at_once = keeps ? at_once : 1, finer_threads = keeps ? threads : 1;
   estimate.steps = at_once * motion;
   estimate.simulation = threads * solver + estimate.steps;
   if (solver_check) {
-    estimate.steps = std::max(estimate.steps, kFiner * finer_at_once * motion);
+    estimate.steps = std::max(estimate.steps, kFiner * at_once * motion);
     estimate.simulation =
-        std::max(estimate.simulation, kFiner * (finer_threads * solver + finer_at_once * motion));
+        std::max(estimate.simulation, kFiner * (threads * solver + at_once * motion));
   }
-  if (!keeps) return estimate;
   const double finer = solver_check ? count_candidates(thinned(settings.axes)) : 0;
   // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer
   // one.

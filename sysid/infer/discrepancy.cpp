@@ -47,8 +47,9 @@ double diagonal_deviance(double squares, const Eigen::VectorXd& gains, const Eig
 
 }  // namespace
 
-DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals, double explained)
-    : rows_(std::move(rows)), keyframes_(static_cast<int>(rows_.times.size())), explained_(explained) {
+DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals,
+                                   std::optional<double> repeatability)
+    : rows_(std::move(rows)), keyframes_(static_cast<int>(rows_.times.size())) {
   if (rows_.known.rows() == 0) rows_.known.resize(residuals.size(), 0);
   channels_ = 1 + *std::max_element(rows_.channel.begin(), rows_.channel.end());
   duration_ = std::max(rows_.times.back() - rows_.times.front(), 1e-9);
@@ -87,6 +88,8 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
   }
   modes_known_ = sums(rows_.known).modes;
   estimate_noise(residuals);
+  if (repeatability)
+    explained_ = std::sqrt(std::max(0.0, M_PI / 4 * *repeatability * *repeatability - 0.5 * noise_ * noise_));
   for (const Shape& shape : shapes()) fields_.push_back(field(shape));
   // Half-Cauchy in what is beyond the explained; d tau = tau d log tau.
   double sum = 0;

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 namespace flash::sysid {
@@ -40,11 +41,14 @@ struct Misfit {
 /// recording and a quarter to the whole of the sheet, alike. The likelihood is the mean over them.
 class DiscrepancyModel {
  public:
-  /// Sigma is estimated from `residuals`, with the most flexible discrepancy taken out. `explained`: the
-  /// least tau [m].
-  DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals, double explained = 0);
+  /// Sigma is estimated from `residuals`, with the most flexible discrepancy taken out. `repeatability`: mean
+  /// distance d between two trials [m]. Each trial differs from what both have in common by `explained`,
+  /// pi / 2 d^2 = sigma^2 + 2 explained^2, and tau is no less.
+  DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals,
+                   std::optional<double> repeatability = {});
 
   double noise() const { return noise_; }
+  Eigen::Index rows() const { return rows_.weights.size(); }
 
   /// -2 log likelihood of each column of residuals [m], up to a constant common to all.
   Eigen::VectorXd deviance(const Eigen::MatrixXd& residuals) const;
