@@ -122,22 +122,32 @@ struct Estimate {
   std::vector<std::string> names;  ///< of the errors of the solution, as of a SolverCheck; they come first
 };
 
-/// By what is held and not measured, about an estimate. What diverges is left out.
-std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values) {
+bool all_finite(const std::vector<ReplayResult>& results) {
+  return std::all_of(results.begin(), results.end(),
+                     [](const ReplayResult& result) { return result.finite; });
+}
+
+/// By what is held and not measured, about an estimate: how the motion changes with it, and how that bends.
+/// What diverges is left out.
+std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
+                                       const std::vector<ReplayResult>& here) {
   std::vector<KnownError> errors;
   for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
-    KnownError error{task.replays, task.replays, {}, {}, 0.5, held.shared};
-    for (const Replay& replay : task.replays) {
-      error.motions.push_back(
-          task.store.run(replay, candidate_with(values, task.grid, held.name, held.values[0])));
-      error.finer_motions.push_back(
-          task.store.run(replay, candidate_with(values, task.grid, held.name, held.values[1])));
-      for (int side = 0; side < 2; ++side) task.tell_motion();
-    }
-    const auto finite = [](const ReplayResult& result) { return result.finite; };
-    if (std::all_of(error.motions.begin(), error.motions.end(), finite) &&
-        std::all_of(error.finer_motions.begin(), error.finer_motions.end(), finite))
-      errors.push_back(std::move(error));
+    std::array<std::vector<ReplayResult>, 2> ends;
+    for (const std::size_t side : {0, 1})
+      for (const Replay& replay : task.replays) {
+        ends[side].push_back(
+            task.store.run(replay, candidate_with(values, task.grid, held.name, held.values[side])));
+        task.tell_motion();
+      }
+    if (!all_finite(ends[0]) || !all_finite(ends[1])) continue;
+    const auto sum = [&](double low, double middle, double high) {
+      KnownError error{{{low, task.replays, ends[0]}, {high, task.replays, ends[1]}}, held.shared};
+      if (middle != 0) error.terms.push_back({middle, task.replays, here});
+      return error;
+    };
+    errors.push_back(sum(-0.5, 0, 0.5));
+    errors.push_back(sum(0.5, -1, 0.5));
   }
   return errors;
 }
@@ -159,18 +169,20 @@ std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
     add(simulated[r].motion, -1, own_model[r].motion);
     estimate.motions.push_back(std::move(own));
   }
-  estimate.errors.push_back({on_model, on_model, model, simulated, 1, true, true});
-  estimate.names.emplace_back("estimate_itself");
+  const auto add_error = [&](std::string name, MotionTerm from, MotionTerm to, bool corrects) {
+    from.factor = -1;
+    estimate.errors.push_back({{std::move(from), std::move(to)}, true, corrects});
+    estimate.names.push_back(std::move(name));
+  };
+  add_error("estimate_itself", {1, on_model, model}, {1, on_model, simulated}, true);
   if (!task.settings.solver_check) return estimate;
-  if (emulator.share != kOwn) {
-    estimate.errors.push_back({on_model, on_model, motions_at(emulator, values, kFiner), model});
-    estimate.names.emplace_back("double_mesh");
-  }
+  if (emulator.share != kOwn)
+    add_error("double_mesh", {1, on_model, motions_at(emulator, values, kFiner)}, {1, on_model, model},
+              false);
   for (FinerSolution& finer : finer_solutions(task.replays, candidate, task.store)) {
     for (std::size_t r = 0; r < task.replays.size(); ++r) task.tell_motion();
-    estimate.errors.push_back(
-        {task.replays, std::move(finer.replays), estimate.motions, std::move(finer.motions), 1, true, true});
-    estimate.names.push_back(finer.what);
+    add_error(finer.what, {1, task.replays, estimate.motions},
+              {1, std::move(finer.replays), std::move(finer.motions)}, true);
   }
   return estimate;
 }
@@ -194,7 +206,7 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   const Look first = look(extent, at);
   std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values());
   if (!estimate) return std::nullopt;
-  if (held.empty()) held = errors_of_held(task, first.posterior.values());
+  if (held.empty()) held = errors_of_held(task, first.posterior.values(), estimate->motions);
   errors = estimate->errors;
   errors.insert(errors.end(), held.begin(), held.end());
   Look second = look(extent_of(first.posterior.axes), first.posterior.values());
@@ -274,9 +286,9 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
                           motions_of(found.emulator.models, found.emulator.share));
   std::vector<SolverCheck> checks;
   for (std::size_t e = 0; e < found.estimate.names.size(); ++e) {
-    const KnownError& error = found.estimate.errors[e];
-    checks.push_back(compare_solutions(found.estimate.names[e], sensitivity, error.replays, error.motions,
-                                       error.finer, error.finer_motions, task.grid));
+    const std::vector<MotionTerm>& terms = found.estimate.errors[e].terms;
+    checks.push_back(compare_solutions(found.estimate.names[e], sensitivity, terms[0].replays,
+                                       terms[0].motions, terms[1].replays, terms[1].motions, task.grid));
   }
   return checks;
 }

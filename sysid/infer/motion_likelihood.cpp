@@ -120,11 +120,12 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
     Eigen::VectorXd correction = Eigen::VectorXd::Zero(count);
     for (std::size_t e = 0; e < errors.size(); ++e) {
       const KnownError& error = errors[e];
-      const Eigen::VectorXd moved =
-          of_rows.cwiseProduct(places.displacements(error.finer[r], error.finer_motions[r].motion) -
-                               places.displacements(error.replays[r], error.motions[r].motion));
+      Eigen::VectorXd moved = Eigen::VectorXd::Zero(count);
+      for (const MotionTerm& term : error.terms)
+        moved +=
+            term.factor * of_rows.cwiseProduct(places.displacements(term.replays[r], term.motions[r].motion));
       // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
-      const double size = error.size * (error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1);
+      const double size = error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1;
       rows.known.col(static_cast<Eigen::Index>(5 + e)) = size * moved;
       if (error.corrects) correction += moved;
     }

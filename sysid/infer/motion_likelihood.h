@@ -8,14 +8,18 @@
 
 namespace flash::sysid {
 
-/// An error of known shape: what lies between two motions of each recording.
+/// Motions of each recording, and how often they count.
+struct MotionTerm {
+  double factor = 1;
+  std::vector<Replay> replays;  ///< of the motions; other meshes and steps than those observed, or the same
+  std::vector<ReplayResult> motions;
+};
+
+/// An error of known shape, one standard deviation of it: a sum of motions whose factors add up to zero.
 struct KnownError {
-  std::vector<Replay> replays, finer;
-  std::vector<ReplayResult> motions, finer_motions;
-  double size = 1;     ///< one standard deviation over what lies between
-  bool shared = true;  ///< all recordings have the same error, not each its own
-  bool corrects =
-      false;  ///< the likelihood is that of motions moved by it; either way its size stays uncertain
+  std::vector<MotionTerm> terms;
+  bool shared = true;     ///< all recordings have the same error, not each its own
+  bool corrects = false;  ///< the likelihood is that of motions moved by it; its size stays uncertain
 };
 
 /// How likely motions of several recordings are. Observed points keep their places and the registration is
