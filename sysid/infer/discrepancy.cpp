@@ -13,8 +13,8 @@ namespace {
 constexpr double kTimes[] = {0.125, 0.25, 0.5, 1};    // reaches over the duration
 constexpr double kSheets[] = {0.25, 0.5, 1};          // over the longest side of the sheet
 constexpr Eigen::Index kModes = 12;                   // along the sheet, at most
-constexpr Eigen::Index kCoordinates = 150;            // of a field, at most
-constexpr double kLeast = 1e-6;                       // variance of a coordinate over the largest
+constexpr Eigen::Index kCoordinates = 120;            // of a field, at most
+constexpr double kLeast = 1e-5;                       // variance of a coordinate over the largest
 constexpr int kSizes = 20;                            // values of tau,
 constexpr double kFirstSize = 0.03, kSizeStep = 1.7;  // the first over sigma, and their ratio
 // Chi-square with 3 degrees of freedom: a size and two reaches.
@@ -233,7 +233,7 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
         rows - (variance * gains / (1 + variance * gains)).sum() - static_cast<double>(count);
     const double before = noise_;
     noise_ = std::max(noise_ * std::sqrt(std::max(left, 0.0) / std::max(freedom, 0.1 * rows)), 1e-9);
-    if (std::abs(noise_ - before) < 1e-4 * before) break;
+    if (std::abs(noise_ - before) < 1e-3 * before) break;
   }
   fields_.clear();
 }

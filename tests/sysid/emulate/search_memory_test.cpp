@@ -21,8 +21,6 @@ TEST(SearchMemory, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_lift(folder)};
   GridSettings grid = grid_over("1e-4:4e-4:3:log");
-  EXPECT_EQ(estimate_memory(replays, grid, true).kept, 0);
-  grid.rollouts = folder / "rollouts";
 
   const Replay& replay = replays.front();
   std::set<long> steps = {0, replay.steps};
@@ -53,9 +51,9 @@ TEST(SearchMemory, GrowsWithWhatIsInWorkAtOnce) {
   EXPECT_DOUBLE_EQ(simulation(9, 1) - simulation(4, 1), 5 * 2 * motion_bytes(replays.front()));
   EXPECT_DOUBLE_EQ(simulation(64, 1), simulation(9, 1));  // there are no more candidates
   EXPECT_DOUBLE_EQ(simulation(5, 6), simulation(5, 5));   // nor threads than environments
-  // The check on half the cell takes one candidate of four times as many vertices.
-  const double one = simulation(1, 1);
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * one);
+  // Half the cell: four times as many vertices, as many at once.
+  const double several = simulation(5, 2);
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * several);
 }
 
 }  // namespace
