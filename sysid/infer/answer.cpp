@@ -132,6 +132,7 @@ bool all_finite(const std::vector<ReplayResult>& results) {
 std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
                                        const std::vector<ReplayResult>& here) {
   std::vector<KnownError> errors;
+  const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
   for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
     std::array<std::vector<ReplayResult>, 2> ends;
     for (const std::size_t side : {0, 1})
@@ -141,13 +142,10 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
         task.tell_motion();
       }
     if (!all_finite(ends[0]) || !all_finite(ends[1])) continue;
-    const auto sum = [&](double low, double middle, double high) {
-      KnownError error{{{low, task.replays, ends[0]}, {high, task.replays, ends[1]}}, held.shared};
-      if (middle != 0) error.terms.push_back({middle, task.replays, here});
-      return error;
-    };
-    errors.push_back(sum(-0.5, 0, 0.5));
-    errors.push_back(sum(0.5, -1, 0.5));
+    const auto low = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[0])}),
+               high = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[1])});
+    errors.push_back({{{-0.5, low}, {0.5, high}}, held.shared});
+    errors.push_back({{{0.5, low}, {-1, middle}, {0.5, high}}, held.shared});
   }
   return errors;
 }
@@ -169,20 +167,19 @@ std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
     add(simulated[r].motion, -1, own_model[r].motion);
     estimate.motions.push_back(std::move(own));
   }
-  const auto add_error = [&](std::string name, MotionTerm from, MotionTerm to, bool corrects) {
-    from.factor = -1;
-    estimate.errors.push_back({{std::move(from), std::move(to)}, true, corrects});
-    estimate.names.push_back(std::move(name));
+  const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects) {
+    const auto shared = [](Motions& motions) { return std::make_shared<const Motions>(std::move(motions)); };
+    estimate.errors.push_back({{{-1, shared(from)}, {1, shared(to)}}, true, corrects});
+    estimate.names.push_back(name);
   };
-  add_error("estimate_itself", {1, on_model, model}, {1, on_model, simulated}, true);
+  add_error("estimate_itself", {on_model, model}, {on_model, simulated}, true);
   if (!task.settings.solver_check) return estimate;
   if (emulator.share != kOwn)
-    add_error("double_mesh", {1, on_model, motions_at(emulator, values, kFiner)}, {1, on_model, model},
-              false);
+    add_error("double_mesh", {on_model, motions_at(emulator, values, kFiner)}, {on_model, model}, false);
   for (FinerSolution& finer : finer_solutions(task.replays, candidate, task.store)) {
     for (std::size_t r = 0; r < task.replays.size(); ++r) task.tell_motion();
-    add_error(finer.what, {1, task.replays, estimate.motions},
-              {1, std::move(finer.replays), std::move(finer.motions)}, true);
+    add_error(finer.what, {task.replays, estimate.motions},
+              {std::move(finer.replays), std::move(finer.motions)}, true);
   }
   return estimate;
 }
@@ -229,22 +226,30 @@ std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes) 
   return {std::min(own, kFew), std::min(finer, kFew)};
 }
 
+/// One lattice over an extent, and what its motions say; empty where too many would be needed, or one
+/// diverged.
+std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
+                                bool finer, const std::vector<KnownError>& errors,
+                                std::vector<KnownError>& held) {
+  const std::vector<Axis>& searched = task.grid.axes;
+  const std::vector<Axis> axes = lattice(extent, searched, 3);
+  if (cartesian_product(axes).size() > kFew) return std::nullopt;
+  std::optional<Emulator> emulator =
+      emulator_over(task, axes, finer ? thinned(lattice(extent, searched, 2)) : std::vector<Axis>{}, true);
+  if (!emulator) return std::nullopt;
+  return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
+}
+
 /// Motions simulated anew about the answer where few simulations do, and again where it leaves them.
 Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held) {
   const bool finer = found.emulator.share != kOwn;
-  const std::vector<Axis>& searched = task.grid.axes;
   Extent extent = extent_of(found.look.posterior.axes);
   for (int round = 0; round < kRounds; ++round) {
-    const std::vector<Axis> axes = lattice(extent, searched, 3);
-    if (cartesian_product(axes).size() > kFew) break;
-    std::optional<Emulator> emulator =
-        emulator_over(task, axes, finer ? thinned(lattice(extent, searched, 2)) : std::vector<Axis>{}, true);
-    if (!emulator) break;
-    std::optional<Found> there = look_with(task, std::move(*emulator), axes, extent,
-                                           found.look.posterior.values(), found.errors, held);
+    std::optional<Found> there =
+        look_about(task, extent, found.look.posterior.values(), finer, found.errors, held);
     if (!there) break;
     found = std::move(*there);
-    const Extent next = next_lattice(extent, found.look.posterior, searched);
+    const Extent next = next_lattice(extent, found.look.posterior, task.grid.axes);
     if (next == extent) break;
     extent = next;
   }
@@ -287,13 +292,34 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   std::vector<SolverCheck> checks;
   for (std::size_t e = 0; e < found.estimate.names.size(); ++e) {
     const std::vector<MotionTerm>& terms = found.estimate.errors[e].terms;
-    checks.push_back(compare_solutions(found.estimate.names[e], sensitivity, terms[0].replays,
-                                       terms[0].motions, terms[1].replays, terms[1].motions, task.grid));
+    const Motions &from = *terms[0].motions, &to = *terms[1].motions;
+    checks.push_back(compare_solutions(found.estimate.names[e], sensitivity, from.replays, from.results,
+                                       to.replays, to.results, task.grid));
   }
   return checks;
 }
 
 }  // namespace
+
+std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
+                               const std::vector<double>& start, const Extent& around,
+                               const AnswerSettings& settings, const TellWork& told) {
+  constexpr int kWalk = 8;  // lattices, each of which may go twice as far as the one before
+  const MotionStore store(grid.rollouts);
+  const Task task{replays, grid, settings, store, told};
+  Extent extent = around;
+  std::vector<double> at = start;
+  std::vector<KnownError> held;
+  for (int round = 0; round < kWalk; ++round) {
+    const std::optional<Found> found = look_about(task, extent, at, false, {}, held);
+    if (!found) break;
+    at = found->look.posterior.values();
+    const Extent next = next_lattice(extent, found->look.posterior, grid.axes);
+    if (next == extent) break;
+    extent = next;
+  }
+  return lattice(extent, grid.axes, 3);
+}
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);

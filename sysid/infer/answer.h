@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/answer_work.h"
 #include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
@@ -46,6 +47,14 @@ struct Answer {
 /// without a measurement (held_parameters). `told`: of the work that most_work counts.
 Answer find_answer(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
                    const AnswerSettings& settings, const TellWork& told = {});
+
+/// Where a search goes on from a `start` inside the range of `grid.axes`, one value an axis: three values of
+/// each parameter, as far about what its motions make likely as the posterior needs. `around`: the first
+/// three. Where a parameter is not told to a cell of `grid.axes`, or more than thirty simulations would be
+/// needed, the values of `grid.axes` themselves.
+std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
+                               const std::vector<double>& start, const Extent& around,
+                               const AnswerSettings& settings, const TellWork& told = {});
 
 /// The most work that find_answer takes. The motions of the grid itself are kept already and do not count.
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check);

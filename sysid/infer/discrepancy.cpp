@@ -191,9 +191,8 @@ DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
   const Eigen::MatrixXd information =
       precision * (weighed * design.transpose() - to_known * inverse_known_ * to_known.transpose());
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-  Field field{shape, {}, {}, {}, eigen.eigenvalues().cwiseMax(0.0)};
+  Field field{shape, {}, {}, eigen.eigenvalues().cwiseMax(0.0)};
   field.modes = eigen.eigenvectors().transpose() * design;
-  field.map = precision * field.modes;
   field.known = -precision * (eigen.eigenvectors().transpose() * to_known * inverse_known_);
   return field;
 }
@@ -206,7 +205,7 @@ DiscrepancyModel::Reduced DiscrepancyModel::reduce(const Eigen::MatrixXd& residu
        sums.known.cwiseProduct(inverse_known_ * sums.known).colwise().sum().transpose().eval()) /
       (noise_ * noise_);
   for (const Field& field : fields_)
-    reduced.coordinates.emplace_back(field.map * sums.modes + field.known * sums.known);
+    reduced.coordinates.emplace_back(field.modes * sums.modes / (noise_ * noise_) + field.known * sums.known);
   return reduced;
 }
 

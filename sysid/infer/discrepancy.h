@@ -78,7 +78,6 @@ class DiscrepancyModel {
   struct Field {
     Shape shape;
     Eigen::MatrixXd modes;  ///< rows: coordinates; columns: (keyframe, channel, mode)
-    Eigen::MatrixXd map;    ///< from Sums::modes, errors of known shape eliminated
     Eigen::MatrixXd known;  ///< from Sums::known
     Eigen::VectorXd gains;  ///< information of each coordinate over its prior at tau = 1 m
   };

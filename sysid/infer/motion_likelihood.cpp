@@ -122,8 +122,8 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
       const KnownError& error = errors[e];
       Eigen::VectorXd moved = Eigen::VectorXd::Zero(count);
       for (const MotionTerm& term : error.terms)
-        moved +=
-            term.factor * of_rows.cwiseProduct(places.displacements(term.replays[r], term.motions[r].motion));
+        moved += term.factor * of_rows.cwiseProduct(places.displacements(term.motions->replays[r],
+                                                                         term.motions->results[r].motion));
       // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
       const double size = error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1;
       rows.known.col(static_cast<Eigen::Index>(5 + e)) = size * moved;

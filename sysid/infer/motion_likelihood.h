@@ -1,4 +1,5 @@
 #pragma once
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -8,11 +9,15 @@
 
 namespace flash::sysid {
 
-/// Motions of each recording, and how often they count.
+/// A motion of each recording, kept once however many errors it is part of.
+struct Motions {
+  std::vector<Replay> replays;  ///< of the motions; other meshes and steps than those observed, or the same
+  std::vector<ReplayResult> results;
+};
+
 struct MotionTerm {
   double factor = 1;
-  std::vector<Replay> replays;  ///< of the motions; other meshes and steps than those observed, or the same
-  std::vector<ReplayResult> motions;
+  std::shared_ptr<const Motions> motions;
 };
 
 /// An error of known shape, one standard deviation of it: a sum of motions whose factors add up to zero.
