@@ -156,17 +156,34 @@ int most_scores(const std::vector<Axis>& axes) {
   return kRounds * static_cast<int>(cartesian_product(axes_over(extent_of(axes), axes)).size());
 }
 
-std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count) {
+std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,
+                          std::size_t at_most) {
+  constexpr int kMost = 9;  // of a wide axis
   std::vector<Axis> axes = searched;
+  std::size_t narrow = 1, wide = 0;
+  const auto is_wide = [&](std::size_t k) {
+    return distance(searched[k], extent[k][0], extent[k][1]) > cell_of(searched[k]);
+  };
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    if (axes[k].values.size() < 2) continue;
+    if (is_wide(k))
+      ++wide;
+    else
+      narrow *= static_cast<std::size_t>(count);
+  }
+  int more = count;  // values of a wide axis: as many as there may be
+  while (more < kMost &&
+         static_cast<double>(narrow) * std::pow(more + 1, wide) <= static_cast<double>(at_most))
+    ++more;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     Axis& axis = axes[k];
     if (axis.values.size() < 2) continue;
     const double first = axis.values.front(), last = axis.values.back();
+    const int points = is_wide(k) ? more : count;
     const auto [low, high] = extent[k];
-    if (distance(axis, low, high) > cell_of(axis)) continue;
     axis.values.clear();
-    for (int i = 0; i < count; ++i) {
-      const double share = static_cast<double>(i) / (count - 1);
+    for (int i = 0; i < points; ++i) {
+      const double share = static_cast<double>(i) / (points - 1);
       const double value = axis.logarithmic ? low * std::pow(high / low, share) : low + share * (high - low);
       axis.values.push_back(std::clamp(value, first, last));
     }

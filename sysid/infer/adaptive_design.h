@@ -49,9 +49,10 @@ Look narrow(const Emulator& emulator, const Extent& start, const std::vector<dou
 /// The most points that narrow looks at over such axes.
 int most_scores(const std::vector<Axis>& axes);
 
-/// Values at which motions are simulated anew about an answer: `count` over the extent of an axis, evenly,
-/// where that is no wider than a cell of the search; else the values of the search.
-std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count);
+/// Values at which motions are simulated anew about an answer, evenly over the extent of each axis: `count`
+/// where that is no wider than a cell of the search, else as many, to nine, as `at_most` points allow.
+std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,
+                          std::size_t at_most);
 
 /// Where to simulate next: `extent` itself where nothing likely is beyond it within the searched range, and
 /// the posterior takes half of it or more. Else an extent about the estimate, twice as far on a side that

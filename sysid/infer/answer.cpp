@@ -12,9 +12,11 @@
 namespace flash::sysid {
 namespace {
 
-constexpr int kRounds = 3;                                // of motions about the answer
-constexpr std::size_t kFew = 30;                          // of them in a round
-constexpr int kAtEstimate = 3;                            // motions at an estimate: itself, two finer
+constexpr int kRounds = 3;               // of motions about the answer
+constexpr int kWalk = 8;                 // of them on the way from a start
+constexpr std::size_t kFew = 30;         // of them in a round
+constexpr int kDraws = 4;                // at which an emulator is tried
+constexpr int kAtEstimate = 3 + kDraws;  // motions at an estimate: itself, two finer, and those
 constexpr double kOwn = 0, kFiner = 1, kLimit = 4.0 / 3;  // shares of a TwoMeshMotions
 
 /// What all steps of an answer need.
@@ -150,6 +152,32 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
   return errors;
 }
 
+/// What the emulator misses at some draws of a posterior: errors of which any mixture is as likely.
+std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,
+                                           const Posterior& posterior) {
+  std::vector<KnownError> errors;
+  const Eigen::MatrixXd samples = samples_of(posterior);
+  const std::vector<Replay> on_model = replays_of(emulator);
+  const double share = 1 / std::sqrt(static_cast<double>(kDraws));
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd row = samples.row((2 * draw + 1) * samples.rows() / (2 * kDraws)).transpose();
+    const std::vector<double> values(row.begin(), row.end());
+    const ReplayCandidate candidate = candidate_at(values, task.grid);
+    Motions simulated{on_model, {}};
+    for (std::size_t r = 0; r < task.replays.size(); ++r) {
+      ReplayResult own = task.store.run(task.replays[r], candidate);
+      task.tell_motion();
+      simulated.results.push_back(own);
+      simulated.results.back().motion = emulator.models[r].model.on_its_mesh(own.motion);
+    }
+    if (!all_finite(simulated.results)) continue;
+    errors.push_back(
+        {{{-share, std::make_shared<const Motions>(Motions{on_model, motions_at(emulator, values, kOwn)})},
+          {share, std::make_shared<const Motions>(std::move(simulated))}}});
+  }
+  return errors;
+}
+
 /// Empty where a motion diverged.
 std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
                                  const std::vector<double>& values) {
@@ -206,6 +234,8 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   if (held.empty()) held = errors_of_held(task, first.posterior.values(), estimate->motions);
   errors = estimate->errors;
   errors.insert(errors.end(), held.begin(), held.end());
+  for (KnownError& error : errors_of_emulator(task, emulator, first.posterior))
+    errors.push_back(std::move(error));
   Look second = look(extent_of(first.posterior.axes), first.posterior.values());
   return Found{std::move(emulator), std::move(second), std::move(*estimate), std::move(errors)};
 }
@@ -232,10 +262,10 @@ std::optional<Found> look_about(const Task& task, const Extent& extent, const st
                                 bool finer, const std::vector<KnownError>& errors,
                                 std::vector<KnownError>& held) {
   const std::vector<Axis>& searched = task.grid.axes;
-  const std::vector<Axis> axes = lattice(extent, searched, 3);
+  const std::vector<Axis> axes = lattice(extent, searched, 3, kFew);
   if (cartesian_product(axes).size() > kFew) return std::nullopt;
-  std::optional<Emulator> emulator =
-      emulator_over(task, axes, finer ? thinned(lattice(extent, searched, 2)) : std::vector<Axis>{}, true);
+  std::optional<Emulator> emulator = emulator_over(
+      task, axes, finer ? thinned(lattice(extent, searched, 2, kFew / 3)) : std::vector<Axis>{}, true);
   if (!emulator) return std::nullopt;
   return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
 }
@@ -301,10 +331,15 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
 
 }  // namespace
 
+AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
+  constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
+  const std::size_t motions = kWalk * (kFew + kAtEstimate) + kHeld;
+  return {static_cast<int>(recordings * motions), 2 * kWalk * most_scores(grid.axes)};
+}
+
 std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
                                const std::vector<double>& start, const Extent& around,
                                const AnswerSettings& settings, const TellWork& told) {
-  constexpr int kWalk = 8;  // lattices, each of which may go twice as far as the one before
   const MotionStore store(grid.rollouts);
   const Task task{replays, grid, settings, store, told};
   Extent extent = around;
@@ -318,12 +353,12 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
     if (next == extent) break;
     extent = next;
   }
-  return lattice(extent, grid.axes, 3);
+  return lattice(extent, grid.axes, 3, kFew);
 }
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
-  constexpr std::size_t kHeld = 12;  // of six parameters, to both sides
+  constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
   std::size_t motions = kAtEstimate + 1 + kHeld + kRounds * (own + kAtEstimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(grid.axes)).size();
   const int looks = 2 * (own > 0 ? 1 + kRounds : 1);

@@ -42,19 +42,22 @@ struct Answer {
 /// what was observed say under noise and a discrepancy of the model (MotionLikelihood). Where few simulations
 /// do, a small lattice about what is found is simulated on both meshes, and the answer comes from its
 /// motions. Errors of the solution are known shapes in the likelihood: what the interpolation misses at the
-/// estimate, the last third to the mesh of no cells, and what half the step and four times the iterations
-/// change. The motions are corrected by all but the second. So are the errors of what the search holds
-/// without a measurement (held_parameters). `told`: of the work that most_work counts.
+/// estimate, at some draws of the posterior, the last third to the mesh of no cells, and what half the step
+/// and four times the iterations change. The motions are corrected by all but the second. So are the errors
+/// of what the search holds without a measurement (held_parameters). `told`: of the work that most_work
+/// counts.
 Answer find_answer(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
                    const AnswerSettings& settings, const TellWork& told = {});
 
 /// Where a search goes on from a `start` inside the range of `grid.axes`, one value an axis: three values of
 /// each parameter, as far about what its motions make likely as the posterior needs. `around`: the first
-/// three. Where a parameter is not told to a cell of `grid.axes`, or more than thirty simulations would be
-/// needed, the values of `grid.axes` themselves.
+/// three. A parameter that is not told to a cell of `grid.axes` has more, thirty simulations in all.
 std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
                                const std::vector<double>& start, const Extent& around,
                                const AnswerSettings& settings, const TellWork& told = {});
+
+/// The most work that design_about takes.
+AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings);
 
 /// The most work that find_answer takes. The motions of the grid itself are kept already and do not count.
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check);

@@ -23,15 +23,8 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
   const auto add = [&](const char* name, double low, double high) {
     if (!is_known(name, grid)) held.push_back({name, {low, high}});
   };
-  const double young = material.membrane_stiffness / grid.base.thickness.value_or(1.0);
-  add("young", young / 2, 2 * young);
-  if (!grid.base.bending_from_thickness)
-    add("bending", material.bending_rigidity / 3, 3 * material.bending_rigidity);
   if (std::any_of(replays.begin(), replays.end(), [](const Replay& r) { return r.recording.has_table; }))
     add("friction", material.friction / 2, 2 * material.friction);
-  if (material.constitutive != data::Constitutive::tri_arap)
-    add("poisson", std::max(0.0, material.poissons_ratio - 0.1),
-        std::min(0.49, material.poissons_ratio + 0.1));
   double yaw = 0, height = 0;
   for (const Replay& replay : replays) {
     yaw = std::max(yaw, replay.recording.nuisance.start_yaw);

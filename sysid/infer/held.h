@@ -14,9 +14,9 @@ struct HeldParameter {
   bool shared = true;            ///< one value for all recordings
 };
 
-/// Of the material: young and friction within a factor of 2, bending 3, poisson by 0.1, about the
-/// values that the search holds them at. Of each recording: its bounds on start yaw and table height, over
-/// sqrt(3), where it has any. Weight, grasp and what was fixed count as measured.
+/// Friction within a factor of 2 of the value that the search holds it at: it competes with bending where a
+/// sheet is lifted off a table. The bounds of a recording on start yaw and table height, over sqrt(3), where
+/// it has any. The other properties of the asset, the grasp and what was fixed count as known.
 std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays);
 
 /// The candidate at `values`, with one parameter at another value than the search holds it at.

@@ -65,13 +65,14 @@ TEST(NextExtent, ReachesAMinimumFarOutside) {
   EXPECT_LT(std::log(extent[0][1] / extent[0][0]), 0.13);
 }
 
-TEST(Lattice, HasValuesOfItsOwnWhereTheExtentIsNarrowerThanACellOfTheSearch) {
-  const std::vector<Axis> axes = lattice({{4, 6.25}, {0.15, 0.35}, {0.3, 0.3}}, kSearched, 3);
+TEST(Lattice, HasMoreValuesWhereTheExtentIsWiderThanACellOfTheSearch) {
+  const std::vector<Axis> axes = lattice({{4, 6.25}, {0.15, 0.35}, {0.3, 0.3}}, kSearched, 3, 16);
   ASSERT_EQ(axes[0].values.size(), 3u);
   EXPECT_DOUBLE_EQ(axes[0].values[0], 4);
   EXPECT_DOUBLE_EQ(axes[0].values[1], 5);  // even in the logarithm
   EXPECT_DOUBLE_EQ(axes[0].values[2], 6.25);
-  EXPECT_EQ(axes[1].values, kSearched[1].values);  // wider
+  ASSERT_EQ(axes[1].values.size(), 5u);  // wider: five times three are no more than 16
+  EXPECT_DOUBLE_EQ(axes[1].values[1], 0.2);
   EXPECT_EQ(axes[2].values, kSearched[2].values);
 }
 
@@ -115,7 +116,7 @@ TEST(Lattice, MotionsBetweenItsPointsAreThoseSimulated) {
   grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log"), parse_axis("friction", "0.15:0.6:3:log")};
   const MotionStore store(folder / "rollouts");
   GridSettings local = grid;
-  local.axes = lattice({{1.7e-4, 2.5e-4}, {0.25, 0.36}}, grid.axes, 3);
+  local.axes = lattice({{1.7e-4, 2.5e-4}, {0.25, 0.36}}, grid.axes, 3, 30);
   const MotionInterpolant whole = *motion_interpolant(replay, grid, store),
                           near = *motion_interpolant(replay, local, store);
   double whole_off = 0, near_off = 0, count = 0;  // sums of squares [m^2]
