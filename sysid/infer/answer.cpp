@@ -333,7 +333,7 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
 
 AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
   constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
-  const std::size_t motions = kWalk * (kFew + kAtEstimate) + kHeld;
+  const std::size_t motions = kWalk * (2 * kFew + kAtEstimate) + kHeld;
   return {static_cast<int>(recordings * motions), 2 * kWalk * most_scores(grid.axes)};
 }
 
@@ -346,7 +346,9 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
   std::vector<double> at = start;
   std::vector<KnownError> held;
   for (int round = 0; round < kWalk; ++round) {
-    const std::optional<Found> found = look_about(task, extent, at, false, {}, held);
+    std::optional<Found> found;
+    if (settings.solver_check) found = look_about(task, extent, at, true, {}, held);
+    if (!found) found = look_about(task, extent, at, false, {}, held);
     if (!found) break;
     at = found->look.posterior.values();
     const Extent next = next_lattice(extent, found->look.posterior, grid.axes);
