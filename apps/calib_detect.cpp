@@ -49,25 +49,29 @@ nlohmann::ordered_json result_json(const std::vector<calib::Detection>& detectio
   return json;
 }
 
-void print_table(const std::vector<calib::Detection>& detections) {
+/// posed: there are intrinsics, and with them poses that corners can be held against.
+void print_table(const std::vector<calib::Detection>& detections, bool posed) {
   std::size_t found = 0;
   for (const calib::Detection& detection : detections) {
     found += detection.readings.empty() ? 0 : 1;
     std::printf("%-24s", detection.image.c_str());
     if (detection.readings.empty()) std::printf("  %s", detection.reason.c_str());
-    for (const calib::CornerReading& reading : detection.readings)
-      std::printf("  %s %.3f px (%zu)", reading.refiner.c_str(), reading.observation.pose_rms,
-                  reading.observation.points.size());
+    for (const calib::CornerReading& reading : detection.readings) {
+      std::printf("  %s", reading.refiner.c_str());
+      if (posed) std::printf(" %.3f px", reading.observation.pose_rms);
+      std::printf(" (%zu)", reading.observation.points.size());
+    }
     std::printf("\n");
   }
   std::printf("%zu of %zu pictures show the target\n", found, detections.size());
+  if (!posed) return;
   for (const calib::RefinerScore& score : calib::rank_refiners(detections))
     std::printf("%-16s %.3f px rms a corner, %d views\n", score.refiner.c_str(), score.rms, score.views);
 }
 
 int run_detect(const DetectOptions& options) {
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
-  const calib::Dataset dataset = load_dataset(options.dataset, false);
+  const calib::Dataset dataset = load_dataset(options.dataset, false, false);
   const calib::Target target = target_of(options.dataset, dataset);
   CalibCommonOptions without_warnings = options.common;  // the table says the same
   without_warnings.quiet = true;
@@ -78,7 +82,7 @@ int run_detect(const DetectOptions& options) {
   if (options.common.json)
     std::cout << text;
   else
-    print_table(detections);
+    print_table(detections, dataset.camera.has_value());
   return exit_done;
 }
 

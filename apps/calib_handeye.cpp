@@ -29,10 +29,11 @@ struct HandEyeOptions {
   CalibCommonOptions common;
   DatasetChoice dataset;
   std::string setup;
-  bool refine_intrinsics = false, stated_lens = false, time_offset = false;
+  bool time_offset = false;
+  calib::LensKnowledge lens = calib::LensKnowledge::near;
   double target_size_sd = calib::kPrintSd;
   std::string parent, child = "camera";
-  std::string ros, urdf, easy_handeye2;
+  std::string ros, urdf, easy_handeye2, camera_info;
   std::string out, report;
 };
 
@@ -66,16 +67,31 @@ std::string fixed(double value, int digits) {
 
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
   const Eigen::Vector3d t = extrinsics.transform.T.translation();
-  const calib::Vector6d sd = c.covariance.diagonal().cwiseSqrt();
   constexpr double kDegrees = 180 / M_PI;
-  std::printf("%s <- %s: (%.5f, %.5f, %.5f) m, +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n",
-              extrinsics.transform.parent.c_str(), extrinsics.transform.child.c_str(), t.x(), t.y(), t.z(),
-              1e3 * sd[0], 1e3 * sd[1], 1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
+  const char* const parent = extrinsics.transform.parent.c_str();
+  std::printf("%s <- %s: (%.5f, %.5f, %.5f) m; deviations along and about the axes of %s:\n", parent,
+              extrinsics.transform.child.c_str(), t.x(), t.y(), t.z(), parent);
+  const auto deviations = [&](const char* what, const calib::Matrix6d& covariance) {
+    const calib::Vector6d sd = calib::parent_deviations(c.poses.X, covariance);
+    std::printf("  %-28s +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n", what, 1e3 * sd[0], 1e3 * sd[1],
+                1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
+  };
+  deviations("in the true frames", c.covariance);
+  if (extrinsics.pixels) deviations("repeatable in such poses", c.refined.covariance.topLeftCorner<6, 6>());
   const std::string corners =
       extrinsics.pixels ? "corners " + fixed(extrinsics.corner_px, 3) + " px, robot" : "robot and camera";
   std::printf("%zu of %zu views; %s %.3f deg %.2f mm an axis\n", c.used.size(), c.views.size(),
               corners.c_str(), kDegrees * extrinsics.robot_rotation_rad,
               1e3 * extrinsics.robot_translation_m);
+  if (extrinsics.pixels) {
+    std::printf("lens: focal lengths %.1f +- %.1f, %.1f +- %.1f px (stated %.1f, %.1f)\n", c.lens.estimate[0],
+                c.lens.sd[0], c.lens.estimate[1], c.lens.sd[1], c.lens.stated[0], c.lens.stated[1]);
+    const Eigen::Vector2d warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
+    std::printf(
+        "target: %.4f +- %.4f times as large as stated, its middle %.2f +- %.2f and %.2f +- %.2f mm behind "
+        "its ends along x and y\n",
+        c.size->estimate, c.size->sd, warp.x(), warp_sd.x(), warp.y(), warp_sd.y());
+  }
   const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
   if (depth && depth->used)
     std::printf("depth of %d views: plane of the target known to %.2f mm, a pixel to %.2f mm\n", depth->views,
@@ -127,10 +143,15 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
   } else {
     const calib::Target target = target_of(options.dataset, dataset);
     const std::vector<calib::Detection> detections =
-        detect_all(dataset, target, options.dataset, options.common);
+        detect_all(dataset, target, options.dataset, options.common, LeftOut::told_later);
     phases.end("corners");
-    solved = calib::calibrate_images(setup, dataset, target, detections,
-                                     calib::read_depth(dataset, detections), settings);
+    try {
+      solved = calib::calibrate_images(setup, dataset, target, detections,
+                                       calib::read_depth(dataset, detections), settings);
+    } catch (const data::InputError&) {
+      if (!options.common.quiet) warn_of_left_out(detections);
+      throw;
+    }
   }
   phases.end("solving");
   return solved;
@@ -138,15 +159,16 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
 
 int run_handeye(const HandEyeOptions& options) {
   const std::string report = report_path(options);
-  for (const std::string& path : {options.out, report, options.ros, options.urdf, options.easy_handeye2})
+  for (const std::string& path :
+       {options.out, report, options.ros, options.urdf, options.easy_handeye2, options.camera_info})
     if (!path.empty()) data::check_file_free(path, options.common.force);
   Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
-  if (options.refine_intrinsics) settings.refine.bundle.unknowns.intrinsics = calib::kLensUnknowns;
-  settings.check_lens = !options.stated_lens;
+  settings.lens = options.lens;
+  if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.closed_forms = calib::opencv_closed_forms();
   settings.target_size_sd = options.target_size_sd;
   settings.threads = options.common.threads;
@@ -171,6 +193,8 @@ int run_handeye(const HandEyeOptions& options) {
   if (!options.urdf.empty()) data::write_atomically(options.urdf, calib::urdf_joint(extrinsics.transform));
   if (!options.easy_handeye2.empty())
     data::write_atomically(options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup));
+  if (!options.camera_info.empty() && extrinsics.pixels)
+    data::save_camera_info(solved.calibration.refined.bundle.intrinsics.front(), options.camera_info);
 
   if (!options.common.quiet)
     for (const calib::ViewResult& view : solved.calibration.views)
@@ -198,11 +222,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   verb->add_option("--setup", options->setup,
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
-  CLI::Option* refine =
-      verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
-  verb->add_flag("--stated-intrinsics", options->stated_lens,
-                 "Keep the lens as it is stated, whatever views left out say")
-      ->excludes(refine);
+  add_lens_options(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd);
   verb->add_flag(
       "--time-offset", options->time_offset,
@@ -214,6 +234,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
   verb->add_option("--ros", options->ros, "File for a static_transform_publisher line");
   verb->add_option("--urdf", options->urdf, "File for a fixed joint");
   verb->add_option("--easy-handeye2", options->easy_handeye2, "File for easy_handeye2's .calib");
+  verb->add_option("--camera-info", options->camera_info, "File for the lens that the answer is for");
   verb->add_option("-o,--out", options->out, "File for the extrinsics, JSON");
   verb->add_option("--report", options->report, "File for the report, HTML (default: OUT with .html)");
   add_calib_common_options(*verb, options->common);

@@ -6,6 +6,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "calib/dataset/lens_file.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/grey_image.h"
 #include "calib/detect/intrinsics.h"
@@ -81,7 +82,7 @@ int run_intrinsics(const IntrinsicsOptions& options) {
   for (const calib::IntrinsicsView& view : estimate.views)
     if (!view.reason.empty()) warn_calib(view.image + ": left out: " + view.reason);
   for (const std::string& warning : estimate.warnings) warn_calib(warning);
-  if (!options.out.empty()) data::save_camera_info(estimate.camera, options.out);
+  if (!options.out.empty()) calib::save_lens(estimate.camera, estimate.covariance, options.out);
   if (options.common.json)
     std::cout << data::format_json(result_json(estimate)) << '\n';
   else

@@ -34,8 +34,12 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
                    "aruco:DICT_4X4_50:0:0.09, aruco_grid:5x7:0.04:0.01:DICT_4X4_50, apriltag:36h11:0:0.048, "
                    "aprilgrid:6x6:0.088:0.3, circles:10x10:0.0254:origin-dot, or a file; lengths in metres");
   group.add_option("--poses", choice.poses, "File or folder of T_base_gripper in place of the dataset's");
+  group.add_option(
+      "--angles", choice.angles,
+      "What three angles of a pose are: xyz and the like about fixed axes, XYZ about turning ones "
+      "(KUKA: ZYX, Staubli: XYZ, Kawasaki: ZYZ), rotvec");
   group.add_option("--camera", choice.camera,
-                   "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain");
+                   "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain, JSON, npz");
   group.add_option("--depth-scale", choice.depth_scale, "Metres a count of the depth pictures")
       ->check(positive_number())
       ->capture_default_str();
@@ -58,15 +62,29 @@ void add_target_size_options(CLI::App& verb, double& sd) {
       ->excludes(known);
 }
 
+void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens) {
+  CLI::Option* refine = verb.add_flag_callback(
+      "--refine-intrinsics", [&lens] { lens = calib::LensKnowledge::unknown; },
+      "Solve for the lens with nothing known of it beforehand");
+  verb.add_flag_callback(
+          "--stated-intrinsics", [&lens] { lens = calib::LensKnowledge::stated; },
+          "Keep the lens as it is stated, to the last digit")
+      ->excludes(refine);
+}
+
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool needs_camera) {
   calib::DatasetOptions options;
   options.poses = choice.poses;
   options.camera = choice.camera;
+  options.angles = choice.angles;
   options.needs_poses = needs_poses;
   options.needs_camera = needs_camera;
   options.depth_scale = choice.depth_scale;
   options.depth = !choice.no_depth;
-  return calib::load_dataset(choice.path, options);
+  calib::Dataset dataset = calib::load_dataset(choice.path, options);
+  calib::take_picture_size(dataset);
+  for (const std::string& guess : dataset.guesses) warn_calib(guess);
+  return dataset;
 }
 
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset) {
@@ -79,7 +97,8 @@ calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& datas
 }
 
 std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const calib::Target& target,
-                                         const DatasetChoice& choice, const CalibCommonOptions& options) {
+                                         const DatasetChoice& choice, const CalibCommonOptions& options,
+                                         LeftOut left_out) {
   calib::DetectSettings settings;
   settings.threads = options.threads;
   settings.cache = choice.cache;
@@ -89,10 +108,13 @@ std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const ca
         if (visible) std::cerr << "\r" << done << " of " << total << " pictures\033[K" << std::flush;
       });
   if (visible) std::cerr << "\r\033[K";
-  for (const calib::Detection& detection : detections)
-    if (!detection.reason.empty() && !options.quiet)
-      warn_calib(detection.image + ": left out: " + detection.reason);
+  if (left_out == LeftOut::told && !options.quiet) warn_of_left_out(detections);
   return detections;
+}
+
+void warn_of_left_out(const std::vector<calib::Detection>& detections) {
+  for (const calib::Detection& detection : detections)
+    if (!detection.reason.empty()) warn_calib(detection.image + ": left out: " + detection.reason);
 }
 
 void say(const CalibCommonOptions& options, const std::string& line) {

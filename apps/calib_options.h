@@ -7,6 +7,7 @@
 #include "calib/dataset/detection.h"
 #include "calib/dataset/target.h"
 #include "calib/detect/detect.h"
+#include "calib/uncertainty/lens_estimate.h"
 #include "calib/uncertainty/target_size.h"
 
 namespace flash {
@@ -30,14 +31,18 @@ struct DatasetChoice {
   std::string target;  ///< text or file; empty: as the dataset says
   std::string poses;
   std::string camera;
+  std::string angles;
   std::string cache;
   double depth_scale = 0.001;
   bool no_depth = false;
 };
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
 
-/// --target-size automatic|stated|solved
+/// --target-size-sd, --target-size stated|solved
 void add_target_size_options(CLI::App& verb, double& sd);
+
+/// --stated-intrinsics, --refine-intrinsics
+void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens);
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
 
@@ -45,9 +50,13 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true
 /// names one.
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset);
 
-/// Detections of the whole set, with a line of progress and a warning for each view left out.
+/// Detections of the whole set, with a line of progress and, unless the caller does so later, a warning for
+/// each view left out.
+enum class LeftOut { told, told_later };
 std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const calib::Target& target,
-                                         const DatasetChoice& choice, const CalibCommonOptions& options);
+                                         const DatasetChoice& choice, const CalibCommonOptions& options,
+                                         LeftOut left_out = LeftOut::told);
+void warn_of_left_out(const std::vector<calib::Detection>& detections);
 
 /// What a verb says to people, on stderr, unless --quiet.
 void say(const CalibCommonOptions& options, const std::string& line);

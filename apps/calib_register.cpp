@@ -31,12 +31,10 @@ struct RegisterOptions {
   std::vector<double> workspace;
   double depth_scale = 0.001;
   bool without_images = false, no_depth = false;
-  bool refine_intrinsics = false;
+  calib::LensKnowledge lens = calib::LensKnowledge::near;
   double target_size_sd = calib::kPrintSd;
   std::string out;
 };
-
-constexpr int kRefinedIntrinsics = 9;  // fx fy cx cy k1 k2 p1 p2 k3
 
 /// What the provenance says of the target: words, or a file.
 std::string target_text(const std::string& target, const std::string& calibration) {
@@ -69,6 +67,8 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
   calib::CalibrateSettings settings;
   settings.target_size_sd = options.target_size_sd;
+  settings.lens = options.lens;
+  if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = time_offset;
   const calib::ImageCalibration solved = calib::calibrate_images(
@@ -89,9 +89,8 @@ std::string name_of(const std::string& path) {
 }
 
 calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
-  calib::RefineSettings settings;
-  if (options.refine_intrinsics) settings.bundle.unknowns.intrinsics = kRefinedIntrinsics;
-  return calib::solve_cell(members, settings, options.target_size_sd);
+  return calib::solve_cell(members,
+                           {.refine = {}, .target_size_sd = options.target_size_sd, .lens = options.lens});
 }
 
 calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
@@ -222,7 +221,7 @@ void add_register_verb(CLI::App& app, Action& action) {
       ->expected(3)
       ->check(any_number());
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
-  verb->add_flag("--refine-intrinsics", options->refine_intrinsics, "Solve for the lens as well");
+  add_lens_options(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd);
   verb->add_option("--depth-scale", options->depth_scale, "Metres a count of the depth pictures of --cameras")
       ->check(positive_number())

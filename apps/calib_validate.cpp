@@ -147,12 +147,17 @@ int run_validate(const ValidateOptions& options) {
 
   std::vector<calib::Observation> observations;
   for (const ValidatedView& view : views) observations.push_back(view.observation);
-  observations = calib::for_target_size(std::move(observations), extrinsics.target_scale);
+  const bool same_size = extrinsics.lens && dataset.camera &&
+                         extrinsics.lens->width == dataset.camera->width &&
+                         extrinsics.lens->height == dataset.camera->height;
+  // The calibration knows its lens better than the file that it started from.
+  const data::CameraIntrinsics lens =
+      same_size ? *extrinsics.lens : dataset.camera.value_or(data::CameraIntrinsics{});
+  if (!pairs) observations = calib::with_poses_for(lens, target, extrinsics.target, std::move(observations));
   calib::HandEyePoses poses{extrinsics.transform.T, extrinsics.target_pose.T};
   const auto check_with = [&](const Eigen::Isometry3d& Z) {
-    return calib::check_projection(extrinsics.setup, {poses.X, Z},
-                                   dataset.camera.value_or(data::CameraIntrinsics{}), target, observations,
-                                   extrinsics.target_scale);
+    return calib::check_projection(extrinsics.setup, {poses.X, Z}, lens, target, observations,
+                                   extrinsics.target);
   };
   const Eigen::Isometry3d refitted = calib::target_pose_from(extrinsics.setup, poses.X, observations);
   if (options.refit_target) poses.Z = refitted;

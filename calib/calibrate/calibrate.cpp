@@ -120,8 +120,8 @@ double centre_rms(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_
   for (const BundleView& view : bundle.views) {
     const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics.front());
     const Eigen::Vector3d centre = view.points.rowwise().mean();
-    const double scale = bundle.scales[static_cast<std::size_t>(view.target)];
-    sum += (project(intrinsics, predicted_pose(bundle, view, false) * (scale * centre)) -
+    const Eigen::Vector3d true_centre = true_points(bundle, view).rowwise().mean();
+    sum += (project(intrinsics, predicted_pose(bundle, view, false) * true_centre) -
             project(intrinsics, T_camera_target[static_cast<std::size_t>(view.pose)] * centre))
                .squaredNorm();
   }
@@ -146,7 +146,8 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
   Bundle bundle = plain;
   settings.noise = result.refined.noise;
   const auto hold = [&](Method method) {
-    return hold_out(result.refined.bundle, poses, method, settings, calibrate.folds, calibrate.threads);
+    return hold_out(method == Method::errors_in_variables ? result.refined.bundle : plain, poses, method,
+                    settings, calibrate.folds, calibrate.threads);
   };
   result.comparison = compare_closed_forms(loops, calibrate.closed_forms);
   for (ComparedMethod& method : result.comparison) {
@@ -169,6 +170,14 @@ void compare_methods(Calibration& result, const std::vector<Observation>& observ
   result.held_out = *result.comparison.back().held_out;
 }
 
+Priors priors_of(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
+                 const CalibrateSettings& settings) {
+  Priors priors{.warp_sd = {usual_warp_sd(points)}};
+  if (settings.target_size_sd > 0) priors.scale_sd = settings.target_size_sd;
+  if (settings.lens == LensKnowledge::near) priors.lenses = {lens_prior(camera, settings.lens_covariance)};
+  return priors;
+}
+
 /// Errors in variables again and again, without the view that no longer looks like the rest, until all do.
 /// Returns the bundle at its seed.
 Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observations,
@@ -177,7 +186,7 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
   for (;;) {
     const HandEyePoses seed = shah(pose_loops(result.setup, observations));
     Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
-    if (settings.target_size_sd > 0) plain.priors.scale_sd = settings.target_size_sd;
+    plain.priors = priors_of(camera, points, settings);
     result.refined = refine(plain, refine_settings);
     const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
     if (few || !drop_worst(result, observations, settings.surprise)) return plain;
@@ -227,7 +236,23 @@ void check_splits(Calibration& result, const BundleSettings& settings, const Cal
   result.warnings.emplace_back(text);
 }
 
-void warn_of_size(Calibration& result, bool disputed) {
+/// Where an answer is none although most views close: the reading that explains them, if there is one.
+std::optional<std::string> cause_of(const Calibration& result, const std::vector<Observation>& all,
+                                    const std::vector<Symmetry>& symmetries,
+                                    const CalibrateSettings& settings) {
+  ConventionSettings any = settings.convention;
+  any.suspicious = 0;
+  const std::optional<Finding> finding =
+      check_convention(result.setup, all, symmetries, result.selection.robust_seed, settings.angles, any);
+  if (!finding) return std::nullopt;
+  return finding->sentence;
+}
+
+/// Of the lens and the target, which are not what was stated.
+void warn_of_shapes(Calibration& result, bool disputed) {
+  if (result.warp.far_off()) result.warnings.insert(result.warnings.begin(), warp_sentence(result.warp));
+  if (!result.lens.far_off.empty())
+    result.warnings.insert(result.warnings.begin(), lens_sentence(result.lens));
   if (!result.size || !result.size->far_off()) return;
   result.warnings.insert(result.warnings.begin(), size_sentence(*result.size));
   // Who states a size that is to be kept is told, and served.
@@ -241,6 +266,17 @@ void warn(Calibration& result) {
     result.warnings.push_back(
         std::to_string(result.used.size()) +
         " views: noise levels and uncertainty are themselves uncertain; 15 or more are better");
+  constexpr double kWideTurn = 10;  // [deg]
+  const double second = result.diversity.spread.y() / kDegree;
+  if (second < kWideTurn) {
+    char text[240];
+    std::snprintf(
+        text, sizeof text,
+        "the gripper turned by no more than %.1f deg rms about its second axis: turns by 20 to 40 deg about "
+        "two axes are what tells the camera's place",
+        second);
+    result.warnings.emplace_back(text);
+  }
   if (missing > 0)
     result.warnings.push_back(std::to_string(missing) + " of " + std::to_string(result.views.size()) +
                               " views were not used");
@@ -272,7 +308,7 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
   return observations;
 }
 
-void finish(Calibration& result, const std::vector<Observation>& used) {
+bool finish(Calibration& result, const std::vector<Observation>& used) {
   report_views(result);
   std::vector<Eigen::Isometry3d> robot;
   std::vector<double> distances;
@@ -284,14 +320,15 @@ void finish(Calibration& result, const std::vector<Observation>& used) {
   result.weakest = weakest_direction(result.covariance, median(distances), "camera");
   warn(result);
   const std::string implausible = implausibility(result, used);
-  if (implausible.empty()) return;
+  if (implausible.empty()) return true;
   result.warnings.insert(result.warnings.begin(), implausible);
   result.usable = false;
+  return false;
 }
 
 namespace {
 
-/// With the unknowns that the settings state.
+/// With whatever moved taken to have stood still.
 Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                   const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
                   const CalibrateSettings& settings) {
@@ -301,8 +338,12 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
 
   RefineSettings refine_settings = settings.refine;
   refine_settings.bundle.unknowns.scales = settings.target_size_sd > 0;
+  refine_settings.bundle.unknowns.warps = true;
+  refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   result.unknowns = refine_settings.bundle.unknowns;
   Bundle plain = refine_and_drop(result, observations, camera, points, refine_settings, settings);
+  const std::string noisy = implausible_noise(result.refined.noise, observations);
+  if (!noisy.empty()) throw data::InputError(cause_of(result, all, symmetries, settings).value_or(noisy));
   SizedRefinement sized = refine_sizes(std::move(result.refined), refine_settings);
   result.refined = std::move(sized.refined);
   result.size = sized.sizes.front();
@@ -311,7 +352,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
         "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
         "out, or add views farther apart");
   BundleSettings exact_robot = settings.refine.bundle;
-  exact_robot.unknowns.corrections = exact_robot.unknowns.scales = false;
+  exact_robot.unknowns.corrections = false;
   exact_robot.huber = 0;
   solve_bundle(plain, result.refined.noise, exact_robot);
 
@@ -322,23 +363,38 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.centre_rms = centre_rms(bundle, target_poses(observations));
   compare_methods(result, observations, plain, refine_settings, settings);
   const double grown = add_systematic(result, sized.systematic);
+  result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
+  result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
-  finish(result, observations);
-  warn_of_size(result, sized.disputed);
+  const bool plausible = finish(result, observations);
+  warn_of_shapes(result, sized.disputed);
+  if (!plausible)
+    if (const auto cause = cause_of(result, all, symmetries, settings))
+      result.warnings.insert(result.warnings.begin(), *cause);
   return result;
 }
 
-/// By how much the squared residuals of views left out fall from one solution to the other [px^2], over the
-/// views that both use.
-MeanDifference fall_of_held_out(const Calibration& from, const Calibration& to) {
-  std::vector<double> before, after;
-  for (std::size_t i = 0; i < from.used.size(); ++i) {
-    const auto other = std::find(to.used.begin(), to.used.end(), from.used[i]);
-    if (other == to.used.end()) continue;
-    before.push_back(from.held_out.squares[i][0]);
-    after.push_back(to.held_out.squares[static_cast<std::size_t>(other - to.used.begin())][0]);
-  }
-  return mean_difference(before, after);
+/// The views of one side of a knock; the others are left without a pose of the target.
+std::vector<Observation> side_of(std::vector<Observation> views, std::size_t first, bool before) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    if ((i < first) != before) views[i].T_camera_target.clear();
+  return views;
+}
+
+std::string knock_sentence(const KnockedPart& other, std::size_t used) {
+  const Knock& knock = other.knock;
+  char text[400];
+  std::snprintf(
+      text, sizeof text,
+      "the %s moved by %.1f mm and %.2f deg before %s: the answer is of the %zu views %s; the %d views %s "
+      "were %s",
+      !knock.told    ? "camera or the target"
+      : knock.camera ? "camera"
+                     : "target",
+      1e3 * knock.motion.head<3>().norm(), knock.motion.tail<3>().norm() / kDegree, other.view.c_str(), used,
+      other.before ? "since" : "until then", other.views, other.before ? "until then" : "since",
+      other.poses ? "solved by themselves" : "too few for a solution");
+  return text;
 }
 
 }  // namespace
@@ -346,31 +402,38 @@ MeanDifference fall_of_held_out(const Calibration& from, const Calibration& to) 
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
                       const CalibrateSettings& settings) {
-  Calibration stated = solve(setup, camera, points, symmetries, all, settings);
-  // A size that nobody knows and a focal length that nobody knows look alike.
-  constexpr std::size_t kEnough = 8;
-  const bool asked = settings.refine.bundle.unknowns.intrinsics > 0;
-  if (asked || !settings.check_lens || std::isinf(settings.target_size_sd) || stated.used.size() < kEnough)
-    return stated;
-  CalibrateSettings with_lens = settings;
-  with_lens.refine.bundle.unknowns.intrinsics = kLensUnknowns;
-  Calibration solved = solve(setup, camera, points, symmetries, all, with_lens);
-  if (!solved.refined.converged || solved.used.size() < stated.used.size()) return stated;
-  const MeanDifference gain = fall_of_held_out(stated, solved);
-  constexpr double kClearly = 2, kMuch = 0.2;  // standard errors; of the squares that are left
-  if (!(gain.mean > kClearly * gain.sd && gain.mean > kMuch * stated.held_out.px * stated.held_out.px))
-    return stated;
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "the lens is not as stated: views left out are predicted to %.2f px with it solved for, to %.2f px "
-      "without (focal lengths %.1f %.1f px, stated %.1f %.1f); the answer is for the lens solved for: "
-      "calibrate it (flash-calib intrinsics)",
-      solved.held_out.px, stated.held_out.px, solved.refined.bundle.intrinsics.front().fx,
-      solved.refined.bundle.intrinsics.front().fy, camera.fx, camera.fy);
-  solved.lens_found = true;
-  solved.warnings.insert(solved.warnings.begin(), text);
-  return solved;
+  Calibration whole = solve(setup, camera, points, symmetries, all, settings);
+  if (!whole.pose_errors) return whole;
+  const std::optional<Knock> knock =
+      find_knock(whole.refined, {.unknowns = whole.unknowns}, whole.pose_errors->gain);
+  if (!knock) return whole;
+  const auto first = static_cast<std::size_t>(whole.used[knock->pose]);
+  const std::size_t after = whole.used.size() - knock->pose;
+  // What holds now counts, unless it is hardly known.
+  KnockedPart other{
+      .knock = *knock, .view = all[first].image, .before = after >= 10 || 2 * after >= whole.used.size()};
+  const auto part = [&](bool before) {
+    return solve(setup, camera, points, symmetries, side_of(all, first, before), settings);
+  };
+  Calibration answer;
+  try {
+    answer = part(!other.before);
+  } catch (const data::InputError&) {
+    return whole;  // a part alone may turn about one axis only
+  }
+  other.views = static_cast<int>(other.before ? knock->pose : after);
+  try {
+    other.poses = part(other.before).poses;
+  } catch (const data::InputError&) {
+    // said in the sentence
+  }
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if ((i < first) == other.before && !all[i].T_camera_target.empty())
+      answer.views[i].reason = answer.selection.views[i].reason =
+          std::string(other.before ? "before" : "after") + " the knock at " + other.view;
+  answer.warnings.insert(answer.warnings.begin(), knock_sentence(other, answer.used.size()));
+  answer.other_part = std::move(other);
+  return answer;
 }
 
 }  // namespace flash::calib

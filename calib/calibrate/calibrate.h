@@ -9,14 +9,13 @@
 #include "calib/solve/errors_in_variables.h"
 #include "calib/solve/view_selection.h"
 #include "calib/uncertainty/correlated_pose_errors.h"
+#include "calib/uncertainty/knock.h"
+#include "calib/uncertainty/lens_estimate.h"
 #include "calib/uncertainty/observability.h"
 #include "calib/uncertainty/split_check.h"
 #include "calib/uncertainty/target_size.h"
 
 namespace flash::calib {
-
-/// The lens as unknowns: fx fy cx cy k1 k2 p1 p2 k3.
-constexpr int kLensUnknowns = 9;
 
 struct CalibrateSettings {
   ViewSelectionSettings selection;
@@ -30,8 +29,9 @@ struct CalibrateSettings {
   std::vector<ClosedForm> closed_forms = calib::closed_forms();  ///< of the comparison table
   /// Of the target's size over the stated one, before a picture is taken; 0: as stated; infinity: not known.
   double target_size_sd = kPrintSd;
-  bool check_lens = true;  ///< solve for the lens as well, and keep it where views left out tell it clearly
-  int threads = 1;         ///< of held-out residuals and splits; 0: one a processor
+  LensKnowledge lens = LensKnowledge::near;
+  LensCovariance lens_covariance = LensCovariance::Zero();  ///< as it was stated; zero: nothing was
+  int threads = 1;  ///< of held-out residuals and splits; 0: one a processor
 };
 
 struct ViewResult {
@@ -42,6 +42,15 @@ struct ViewResult {
   Vector6d correction = Vector6d::Zero();  ///< of the robot's pose, of a used view
 };
 
+/// What a knock during the recording parts from the answer.
+struct KnockedPart {
+  Knock knock = {};
+  std::string view = {};  ///< the first after it
+  bool before = true;     ///< the part is that before the knock; else that after it
+  int views = 0;
+  std::optional<HandEyePoses> poses = {};  ///< where it has enough views for a solution of its own
+};
+
 struct Calibration {
   Setup setup = Setup::eye_in_hand;
   ViewSelection selection;
@@ -49,8 +58,9 @@ struct Calibration {
   Refinement refined;
   HandEyePoses poses;
   Matrix6d covariance = Matrix6d::Zero();  ///< of X, right perturbation (dt, dtheta)
-  bool lens_found = false;  ///< the lens was solved for because views left out tell that it is not as stated
-  Unknowns unknowns;        ///< of the solution
+  LensEstimate lens;
+  WarpEstimate warp;
+  Unknowns unknowns;                  ///< of the solution
   Eigen::MatrixXd shared_covariance;  ///< of all shared unknowns (SharedColumns), before splits widen it
   double corner_rms = 0;              ///< with corrections, 2-D rms per corner [px]
   double chain_rms = 0;               ///< without [px]
@@ -64,7 +74,8 @@ struct Calibration {
   std::vector<SplitCheck> splits;  ///< of X, interleaved first; none where there are too few views
   double covariance_factor = 1;    ///< by which the splits have widened the covariance
   std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found
-  std::vector<std::string> warnings;                ///< worst first
+  std::optional<KnockedPart> other_part;
+  std::vector<std::string> warnings;  ///< worst first
   bool usable = true;
 };
 
@@ -77,13 +88,14 @@ bool has_pixels(const Calibration& calibration);
 std::vector<Observation> prepare(Calibration& result, const std::vector<Observation>& observations,
                                  const std::vector<Symmetry>& symmetries, const CalibrateSettings& settings);
 
-/// What all end with: views, observability, warnings.
-void finish(Calibration& result, const std::vector<Observation>& used);
+/// What all end with: views, observability, warnings. False where the answer is implausible, the first of
+/// them.
+bool finish(Calibration& result, const std::vector<Observation>& used);
 
 /// From observations to the answer: views selected, seed, bundle, errors in variables, a second look for
-/// views that do not belong, held-out residuals, comparison; the lens as stated, or solved for where that
-/// predicts the views left out better by two standard errors. Throws data::InputError where too few views are
-/// left or nothing can be determined, with the one sentence that names the cause.
+/// views that do not belong, held-out residuals, comparison; lens, size and warp of the target among the
+/// unknowns, with what is known of them. Throws data::InputError where too few views are left or nothing can
+/// be determined, with the one sentence that names the cause.
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& observations,
                       const CalibrateSettings& settings = {});

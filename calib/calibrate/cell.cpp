@@ -78,7 +78,11 @@ void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout
 CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
                        const Target& target, const Calibration& calibration) {
   CellMember member{.arm = arm, .camera = camera, .setup = calibration.setup, .intrinsics = *dataset.camera};
-  if (has_pixels(calibration)) member.intrinsics = calibration.refined.bundle.intrinsics.front();
+  if (has_pixels(calibration)) {
+    member.intrinsics = calibration.refined.bundle.intrinsics.front();
+    if (!calibration.refined.bundle.priors.lenses.empty())
+      member.lens = calibration.refined.bundle.priors.lenses.front();
+  }
   member.points = target_points(target);
   member.symmetries = confusable_symmetries(target);
   member.poses = calibration.poses;
@@ -104,6 +108,8 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   Bundle bundle;
   bundle.setup = members.front().setup;
   bundle.intrinsics.resize(cameras.size());
+  bundle.priors.lenses.resize(cameras.size());
+  bundle.priors.warp_sd.resize(layout.targets.size());
   std::map<std::pair<std::size_t, double>, int> pose_of;
   for (const CellMember& given : members) {
     if (given.setup != bundle.setup)
@@ -121,6 +127,9 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
       throw data::InputError(given.arm + " and " + given.camera +
                              " have nothing in common with the arms and cameras before them");
     bundle.intrinsics[camera] = member.intrinsics;
+    bundle.priors.lenses[camera] =
+        member.lens.parts.empty() ? usual_lens_prior(member.intrinsics) : member.lens;
+    bundle.priors.warp_sd[target] = usual_warp_sd(member.points);
     for (std::size_t i = 0; i < member.observations.size(); ++i) {
       const Observation& observation = member.observations[i];
       const auto [entry, fresh] =
@@ -131,13 +140,10 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
         pose.T_base_gripper = observation.T_base_gripper;
         bundle.poses.push_back(pose);
       }
-      BundleView view;
+      BundleView view = make_view(member.points, observation);
       view.pose = entry->second;
       view.camera = static_cast<int>(camera);
       view.target = static_cast<int>(target);
-      view.points = member.points(Eigen::all, observation.points);
-      view.pixels = observation.pixels;
-      view.depth_points = observation.depth_points;
       bundle.views.push_back(std::move(view));
     }
   }
@@ -150,11 +156,15 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   return bundle;
 }
 
-Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& given, double target_size_sd) {
+Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& given) {
   Cell cell{.joint = true};
-  RefineSettings settings = given;
+  const double target_size_sd = given.target_size_sd;
+  RefineSettings settings = given.refine;
   settings.bundle.unknowns.scales = target_size_sd > 0;
+  settings.bundle.unknowns.warps = true;
+  settings.bundle.unknowns.intrinsics = given.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   Bundle start = cell_bundle(members, &cell.notices);
+  if (given.lens == LensKnowledge::unknown) start.priors.lenses.clear();
   if (target_size_sd > 0) start.priors.scale_sd = target_size_sd;
   const SizedRefinement sized = refine_sizes(refine(std::move(start), settings), settings);
   const Refinement& refined = sized.refined;
@@ -171,6 +181,10 @@ Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& gi
   for (const TargetSize& size : cell.sizes)
     if (size.far_off()) cell.notices.push_back(size_sentence(size));
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
+  for (std::size_t c = 0; c < refined.bundle.cameras.size(); ++c) {
+    cell.lenses.push_back(lens_estimate(refined.bundle, settings.bundle.unknowns, systematic.covariance, c));
+    if (!cell.lenses.back().far_off.empty()) cell.notices.push_back(lens_sentence(cell.lenses.back()));
+  }
   const std::vector<std::string> arms = names_of(members, &CellMember::arm);
   const std::vector<std::string> cameras = names_of(members, &CellMember::camera);
   const auto block = [&](int column) -> Matrix6d {

@@ -16,8 +16,9 @@ namespace flash::calib {
 struct CellMember {
   std::string arm, camera;  ///< names; members that share one share its unknowns
   Setup setup = Setup::eye_to_hand;
-  data::CameraIntrinsics intrinsics;
-  Eigen::Matrix3Xd points = {};  ///< of the target
+  data::CameraIntrinsics intrinsics;  ///< as the member's own solution has them
+  LensPrior lens = {};                ///< what was known of them; empty: as usual
+  Eigen::Matrix3Xd points = {};       ///< of the target
   std::vector<Symmetry> symmetries = {};
   std::vector<Observation> observations = {};  ///< in use, T_camera_target the chosen pose alone
   std::vector<double> stamps = {};             ///< equal stamps of one arm are one pose of it
@@ -39,9 +40,10 @@ struct Cell {
   bool joint = false;  ///< one solution from all images; otherwise composed of single calibrations
   std::vector<CellFrame> bases = {}, cameras = {};
   NoiseLevels noise = {};
-  std::vector<TargetSize> sizes = {};    ///< of the targets; none where composed
-  bool usable = true;                    ///< false: a size is far off, and the answer depends on it
-  double corner_rms = 0, chain_rms = 0;  ///< with and without corrections, 2-D rms per corner [px]
+  std::vector<TargetSize> sizes = {};     ///< of the targets; none where composed
+  std::vector<LensEstimate> lenses = {};  ///< of the cameras; none where composed
+  bool usable = true;                     ///< false: a size is far off, and the answer depends on it
+  double corner_rms = 0, chain_rms = 0;   ///< with and without corrections, 2-D rms per corner [px]
   std::vector<std::string> notices = {};
 };
 
@@ -54,10 +56,14 @@ Cell compose_cell(const std::vector<std::string>& arms, const std::vector<Extrin
 /// data::InputError where a member has neither its arm nor its camera in common with those before it.
 Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::string>* notices = nullptr);
 
-/// Solved by errors in variables. Intrinsics: how many of fx fy cx cy ... of each camera are solved for.
-/// target_size_sd: as in CalibrateSettings.
-Cell solve_cell(const std::vector<CellMember>& members, const RefineSettings& settings = {},
-                double target_size_sd = kPrintSd);
+struct CellSettings {
+  RefineSettings refine;
+  double target_size_sd = kPrintSd;  ///< as in CalibrateSettings
+  LensKnowledge lens = LensKnowledge::near;
+};
+
+/// Solved by errors in variables, with lenses, sizes and warps of targets among the unknowns.
+Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& settings = {});
 
 /// Covariance of where a point lies, p in the frame's child, seen from its parent [m^2].
 Eigen::Matrix3d point_covariance(const CellFrame& frame, const Eigen::Vector3d& p);

@@ -1,5 +1,6 @@
 #include "calib/calibrate/extrinsics.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -29,6 +30,46 @@ std::string resolved(const std::string& path, const std::string& calibration) {
                               ", expected where it was when the file was written");
 }
 
+Vector6d parent_deviations(const Eigen::Isometry3d& T, const Matrix6d& covariance) {
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = T.linear();
+  return (turn * covariance * turn.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+}
+
+namespace {
+
+std::vector<double> numbers(const data::JsonObject& object, const char* field) {
+  const nlohmann::json& list = object.raw(field);
+  std::vector<double> values;
+  for (const nlohmann::json& value : list) {
+    if (!value.is_number()) throw object.error(field, "a list of numbers");
+    values.push_back(value.get<double>());
+  }
+  return values;
+}
+
+Eigen::Vector2d two_numbers(const data::JsonObject& object, const char* field) {
+  const std::vector<double> values = numbers(object, field);
+  if (values.size() != 2) throw object.error(field, "two numbers");
+  return {values[0], values[1]};
+}
+
+data::CameraIntrinsics read_lens(const data::JsonObject& lens) {
+  data::CameraIntrinsics camera;
+  const Eigen::Vector2i size = two_numbers(lens, "size_px").cast<int>();
+  camera.width = size.x();
+  camera.height = size.y();
+  IntrinsicsVector values = IntrinsicsVector::Zero();
+  values.head<2>() = two_numbers(lens, "focal_px");
+  values.segment<2>(2) = two_numbers(lens, "centre_px");
+  const std::vector<double> distortion = numbers(lens, "distortion");
+  for (std::size_t i = 0; i < std::min<std::size_t>(8, distortion.size()); ++i)
+    values[4 + static_cast<Eigen::Index>(i)] = distortion[i];
+  return with_vector(camera, values);
+}
+
+}  // namespace
+
 Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs& inputs) {
   const bool in_hand = calibration.setup == Setup::eye_in_hand;
   Extrinsics extrinsics;
@@ -41,6 +82,10 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
   extrinsics.corner_px = calibration.refined.noise.corner.front();
   extrinsics.robot_rotation_rad = calibration.refined.noise.rotation.front();
   extrinsics.robot_translation_m = calibration.refined.noise.translation.front();
+  if (extrinsics.pixels) {
+    extrinsics.target = shape_of(calibration.refined.bundle, 0);
+    extrinsics.lens = calibration.refined.bundle.intrinsics.front();
+  }
   extrinsics.inputs = inputs;
   return extrinsics;
 }
@@ -79,7 +124,12 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   }
   if (object.has("scale")) {
     const data::JsonObject scale = object.object("scale");
-    if (scale.boolean("solved", false)) extrinsics.target_scale = scale.positive("estimate");
+    if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");
+    if (scale.has("warp_mm")) extrinsics.target.warp = 1e-3 * two_numbers(scale, "warp_mm");
+  }
+  if (object.has("lens")) {
+    const data::JsonObject lens = object.object("lens");
+    if (lens.has("size_px")) extrinsics.lens = read_lens(lens);
   }
   if (object.has("provenance")) {
     const data::JsonObject from = object.object("provenance");

@@ -27,15 +27,19 @@ ExtrinsicsInputs relative_to(ExtrinsicsInputs inputs, const std::string& out);
 /// data::InputError where it is at neither.
 std::string resolved(const std::string& path, const std::string& calibration);
 
+/// Standard deviations of a transform along and about the axes of its parent, in which its translation is
+/// written. covariance: of the right perturbation (dt, dtheta), along those of the child.
+Vector6d parent_deviations(const Eigen::Isometry3d& T, const Matrix6d& covariance);
+
 /// "flash-extrinsics/1", as far as other programs need it.
 struct Extrinsics {
   Setup setup = Setup::eye_in_hand;
   std::string method;
-  NamedTransform transform;                ///< gripper <- camera (eye-in-hand) or base <- camera
-  NamedTransform target_pose;              ///< base <- target (eye-in-hand) or gripper <- target
-  Matrix6d covariance = Matrix6d::Zero();  ///< of the transform, right perturbation (dt, dtheta) [m, rad]
-  double target_scale =
-      1;  ///< size of the target that transform and target_pose are for, over the stated one
+  NamedTransform transform;                    ///< gripper <- camera (eye-in-hand) or base <- camera
+  NamedTransform target_pose;                  ///< base <- target (eye-in-hand) or gripper <- target
+  Matrix6d covariance = Matrix6d::Zero();      ///< of the transform, right perturbation (dt, dtheta) [m, rad]
+  TargetShape target;                          ///< that transform and target_pose are for
+  std::optional<data::CameraIntrinsics> lens;  ///< likewise; none of pose pairs
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
   bool pixels = true;                 ///< false: of pose pairs, which have no corners
   std::vector<std::string> warnings;  ///< of the calibration, worst first

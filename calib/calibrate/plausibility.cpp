@@ -7,6 +7,8 @@ namespace flash::calib {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
+constexpr const char* kAdvice =
+    "check that each picture stands beside its pose, and what the columns of the poses mean";
 
 /// Rms distance of places and rms angle between the poses and their mean.
 struct Motion {
@@ -34,14 +36,30 @@ std::string formatted(const char* format, const Values&... values) {
 
 }  // namespace
 
-std::string implausibility(const Calibration& calibration, const std::vector<Observation>& used,
-                           const PlausibilitySettings& settings) {
-  constexpr const char* kAdvice =
-      "check that each picture stands beside its pose, and what the columns of the poses mean";
-  std::vector<Eigen::Isometry3d> robot, target;
+std::string implausible_noise(const NoiseLevels& levels, const std::vector<Observation>& used,
+                              const PlausibilitySettings& settings) {
+  std::vector<Eigen::Isometry3d> robot;
   double distance = 0;
   for (const Observation& view : used) {
     robot.push_back(view.T_base_gripper);
+    distance += view.T_camera_target.front().translation().norm() / static_cast<double>(used.size());
+  }
+  const Motion moved = motion_of(robot);
+  const Motion noise{std::sqrt(3) * levels.translation.front(), std::sqrt(3) * levels.rotation.front()};
+  if (noise.over(distance) < settings.noise * moved.over(distance)) return {};
+  return formatted(
+      "robot and camera do not tell of the same motion: the robot's poses would have to be wrong by %.1f mm "
+      "and "
+      "%.2f deg, of %.1f mm and %.2f deg that it moved; %s",
+      1e3 * noise.translation, noise.rotation / kDegree, 1e3 * moved.translation, moved.rotation / kDegree,
+      kAdvice);
+}
+
+std::string implausibility(const Calibration& calibration, const std::vector<Observation>& used,
+                           const PlausibilitySettings& settings) {
+  std::vector<Eigen::Isometry3d> target;
+  double distance = 0;
+  for (const Observation& view : used) {
     target.push_back(view.T_camera_target.front());
     distance += view.T_camera_target.front().translation().norm() / static_cast<double>(used.size());
   }
@@ -56,15 +74,8 @@ std::string implausibility(const Calibration& calibration, const std::vector<Obs
         "%s",
         1e3 * left.translation, left.rotation / kDegree, 1e3 * still.translation, still.rotation / kDegree,
         kAdvice);
-  const Motion moved = motion_of(robot);
-  const NoiseLevels& levels = calibration.refined.noise;
-  const Motion noise{std::sqrt(3) * levels.translation.front(), std::sqrt(3) * levels.rotation.front()};
-  if (!(noise.over(distance) < settings.noise * moved.over(distance)))
-    return formatted(
-        "robot and camera do not tell of the same motion: the robot's poses would have to be wrong by %.1f "
-        "mm and %.2f deg, of %.1f mm and %.2f deg that it moved; %s",
-        1e3 * noise.translation, noise.rotation / kDegree, 1e3 * moved.translation, moved.rotation / kDegree,
-        kAdvice);
+  if (std::string noisy = implausible_noise(calibration.refined.noise, used, settings); !noisy.empty())
+    return noisy;
   if (!(place < settings.deviation * distance && turn < settings.deviation))
     return formatted(
         "the camera's place is known to no better than %.0f mm and %.1f deg, at %.0f mm from the target: "

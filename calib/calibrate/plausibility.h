@@ -19,4 +19,9 @@ struct PlausibilitySettings {
 std::string implausibility(const Calibration& calibration, const std::vector<Observation>& used,
                            const PlausibilitySettings& settings = {});
 
+/// The part that is known before views are left out: whether the robot would have to be wrong by about as
+/// much as it moved.
+std::string implausible_noise(const NoiseLevels& noise, const std::vector<Observation>& used,
+                              const PlausibilitySettings& settings = {});
+
 }  // namespace flash::calib

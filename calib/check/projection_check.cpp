@@ -4,6 +4,7 @@
 
 #include "calib/geometry/chain.h"
 #include "calib/geometry/pose.h"
+#include "calib/geometry/pose_from_pixels.h"
 
 namespace flash::calib {
 namespace {
@@ -67,11 +68,12 @@ ViewProjection project_view(const Eigen::Isometry3d& T_camera_target, const data
 
 ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const data::CameraIntrinsics& camera,
                                  const Target& target, const std::vector<Observation>& observations,
-                                 double target_scale) {
-  const Eigen::Matrix3Xd points = target_scale * target_points(target);
+                                 const TargetShape& shape) {
+  const Eigen::Matrix3Xd flat = target_points(target), points = shaped(flat, target_bows(flat), shape);
   const std::vector<std::vector<int>> symmetries = target_symmetries(target);
   std::vector<Numbering> numberings;
-  for (const std::vector<int>& symmetry : symmetries) numberings.push_back(numbering(points, symmetry));
+  for (const std::vector<int>& symmetry : symmetries)
+    numberings.push_back(numbering(shape.scale * flat, symmetry));
   ProjectionCheck check;
   double corners = 0, squares = 0, centres = 0, mm = 0, deg = 0;
   for (const Observation& view : observations) {
@@ -101,9 +103,15 @@ ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const d
   return check;
 }
 
-std::vector<Observation> for_target_size(std::vector<Observation> observations, double scale) {
+std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, const Target& target,
+                                        const TargetShape& shape, std::vector<Observation> observations) {
+  const Eigen::Matrix3Xd flat = target_points(target), points = shaped(flat, target_bows(flat), shape);
   for (Observation& observation : observations)
-    for (Eigen::Isometry3d& T : observation.T_camera_target) T.translation() *= scale;
+    for (Eigen::Isometry3d& T : observation.T_camera_target) {
+      T.translation() *= shape.scale;
+      if (observation.pixels.cols() > 0)
+        T = fitted_pose(camera, points(Eigen::all, observation.points), observation.pixels, T);
+    }
   return observations;
 }
 

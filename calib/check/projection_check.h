@@ -5,6 +5,7 @@
 
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target.h"
+#include "calib/dataset/target_shape.h"
 #include "calib/geometry/closed_form.h"
 #include "data/camera.h"
 
@@ -28,13 +29,14 @@ struct ProjectionCheck {
 
 /// Projects corners and middle of the target through the chain. Nothing is fitted; where a target can be
 /// numbered in several ways, the numbering that fits a view best counts. Views without pixels (pose pairs)
-/// have px 0. target_scale: size of the target over `target`; the views' own poses are for that size.
+/// have px 0. shape: of the target; the views' own poses are for it, and for this camera.
 ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const data::CameraIntrinsics& camera,
                                  const Target& target, const std::vector<Observation>& observations,
-                                 double target_scale = 1);
+                                 const TargetShape& shape = {});
 
-/// The views as they are if the target is `scale` times as large: their own poses lie that much farther away.
-std::vector<Observation> for_target_size(std::vector<Observation> observations, double scale);
+/// The views with their own poses fitted anew, of a target of that shape through that lens.
+std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, const Target& target,
+                                        const TargetShape& shape, std::vector<Observation> observations);
 
 /// T_base_target (eye-in-hand) or T_gripper_target as the mean over the views, for a target that was moved
 /// since.

@@ -5,7 +5,8 @@
 #include <filesystem>
 #include <map>
 
-#include "calib/dataset/kalibr.h"
+#include "calib/dataset/bare_poses.h"
+#include "calib/dataset/intrinsics_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
@@ -33,12 +34,28 @@ std::vector<fs::path> files_in(const fs::path& folder, const std::vector<std::st
   return files;
 }
 
-std::vector<fs::path> find_images(const fs::path& folder) {
-  for (const char* name : {"images", "rgb", "color", "image", "."}) {
-    std::vector<fs::path> images = files_in(folder / name, {".png", ".jpg", ".jpeg"});
-    if (!images.empty()) return images;
+/// The folders of that name, whatever its capitals.
+std::vector<fs::path> folders_named(const fs::path& folder, const std::string& name) {
+  std::vector<fs::path> found;
+  if (!fs::is_directory(folder)) return found;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    std::string lower = entry.path().filename().string();
+    std::transform(lower.begin(), lower.end(), lower.begin(),
+                   [](unsigned char c) { return std::tolower(c); });
+    if (entry.is_directory() && lower == name) found.push_back(entry.path());
   }
-  return {};
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<fs::path> find_images(const fs::path& folder) {
+  const std::vector<std::string> endings = {".png", ".jpg", ".jpeg", ".bmp"};
+  for (const char* name : {"images", "rgb", "color", "image", "img", "imgs", "pictures"})
+    for (const fs::path& place : folders_named(folder, name)) {
+      std::vector<fs::path> images = files_in(place, endings);
+      if (!images.empty()) return images;
+    }
+  return files_in(folder, endings);
 }
 
 std::vector<fs::path> pair_files(const fs::path& folder) {
@@ -47,37 +64,53 @@ std::vector<fs::path> pair_files(const fs::path& folder) {
   return files;
 }
 
+/// Files of one pose each: the last number in their names is that of the picture.
+std::vector<fs::path> pose_files(const fs::path& folder, const std::string& beginning = "") {
+  for (const std::vector<std::string>& endings :
+       {std::vector<std::string>{".yaml", ".yml"}, std::vector<std::string>{".txt"}}) {
+    std::vector<fs::path> files = files_in(folder, endings, beginning);
+    std::erase_if(files, [](const fs::path& file) { return !number_in_name(file.string()); });
+    if (!files.empty()) return files;
+  }
+  return {};
+}
+
 /// Lists of poses beside the pictures, and folders of one pose a file.
 std::vector<fs::path> pose_sources(const fs::path& folder) {
   std::vector<fs::path> sources;
-  for (const char* name : {"poses.tum", "poses.csv", "poses.txt", "gripper.tum"})
-    if (fs::exists(folder / name)) sources.push_back(folder / name);
-  if (!files_in(folder / "poses", {".yaml", ".yml"}).empty()) sources.push_back(folder / "poses");
-  if (!files_in(folder, {".yaml", ".yml"}, "pose").empty()) sources.push_back(folder);
+  for (const char* name : {"poses", "pose", "robot_poses", "gripper"})
+    for (const char* ending : {".tum", ".csv", ".txt", ".json"})
+      if (fs::exists(folder / (std::string(name) + ending)))
+        sources.push_back(folder / (std::string(name) + ending));
+  for (const fs::path& place : folders_named(folder, "poses"))
+    if (!pose_files(place).empty()) sources.push_back(place);
+  if (!pose_files(folder, "pose").empty()) sources.push_back(folder);
   return sources;
 }
 
-std::vector<RecordedPose> load_poses(const fs::path& source) {
+PoseList load_poses(const fs::path& source) {
   if (!fs::is_directory(source)) return load_pose_list(source.string());
-  std::vector<fs::path> files = files_in(source, {".yaml", ".yml"}, "pose");
-  if (files.empty()) files = files_in(source, {".yaml", ".yml"});
-  if (files.empty()) throw InputError(source.string() + ": found no poses, expected a YAML file for each");
-  std::vector<RecordedPose> poses;
-  for (const fs::path& file : files) poses.push_back(load_pose_yaml(file.string()));
-  return poses;
-}
-
-data::CameraIntrinsics load_camera(const std::string& path) {
-  return fs::path(path).filename().string().find("camchain") != std::string::npos
-             ? load_camchain(path)
-             : data::load_camera_intrinsics(path);
+  std::vector<fs::path> files = pose_files(source, "pose");
+  if (files.empty()) files = pose_files(source);
+  if (files.empty())
+    throw InputError(source.string() + ": found no poses, expected a YAML or text file for each");
+  if (data::lower_extension(files.front().string()) == ".txt") {
+    std::vector<std::string> names;
+    for (const fs::path& file : files) names.push_back(file.string());
+    return load_bare_pose_files(names, source.string());
+  }
+  PoseList list;
+  for (const fs::path& file : files) list.poses.push_back(load_pose_yaml(file.string()));
+  return list;
 }
 
 std::string find_camera(const fs::path& folder) {
   for (const fs::path& place : {folder, folder.parent_path()}) {
-    for (const char* name : {"camera_info.yaml", "camera_info.yml", "camera.yaml", "camera.yml",
-                             "intrinsics.yaml", "intrinsics.yml", "calibration.yml", "calibration.yaml"})
-      if (fs::exists(place / name)) return (place / name).string();
+    for (const char* name :
+         {"camera_info", "camera", "intrinsics", "calibration", "camera_matrix", "camera_params"})
+      for (const char* ending : {".yaml", ".yml", ".json", ".npz"})
+        if (fs::exists(place / (std::string(name) + ending)))
+          return (place / (std::string(name) + ending)).string();
     for (const fs::path& file : files_in(place, {".yaml", ".yml"}))
       if (file.filename().string().find("camchain") != std::string::npos) return file.string();
   }
@@ -94,8 +127,8 @@ std::optional<double> time_in_name(const fs::path& path) {
 /// Pairs pictures with poses, by the poses' own word.
 class PosePairing {
  public:
-  PosePairing(std::vector<RecordedPose> poses, std::string source)
-      : poses_(std::move(poses)), source_(std::move(source)) {
+  PosePairing(PoseList list, std::string source)
+      : poses_(std::move(list.poses)), source_(std::move(source)), in_order_(list.in_order) {
     bool whole = true;
     for (std::size_t i = 0; i < poses_.size(); ++i) {
       const RecordedPose& pose = poses_[i];
@@ -108,14 +141,17 @@ class PosePairing {
         throw InputError(source_ + ": two poses for " +
                          (pose.image.empty() ? "stamp " + data::format_number(pose.stamp) : pose.image));
     }
-    by_time_ = !named_ && !whole;
+    by_time_ = !named_ && !whole && !in_order_;
   }
 
   bool by_time() const { return by_time_; }
 
-  void pair(Frame& frame, const fs::path& image) const {
+  /// place: of the picture among all, in order. Throws InputError where it has no pose.
+  void pair(Frame& frame, const fs::path& image, std::size_t place) const {
     const RecordedPose* found = nullptr;
-    if (named_) {
+    if (in_order_) {
+      found = &poses_.at(place);
+    } else if (named_) {
       const auto entry = by_name_.find(image.filename().string());
       if (entry == by_name_.end())
         throw InputError(image.string() + ": no pose names this picture in " + source_);
@@ -178,8 +214,21 @@ class PosePairing {
   std::string source_;
   std::map<double, std::size_t> by_stamp_;
   std::map<std::string, std::size_t> by_name_;
-  bool named_ = false, by_time_ = false;
+  bool in_order_ = false, named_ = false, by_time_ = false;
 };
+
+/// The rotations anew, as `order` reads the angles of the poses.
+void read_angles(const std::string& order, Dataset& dataset) {
+  const std::vector<std::string>& orders = angle_orders();
+  if (std::find(orders.begin(), orders.end(), order) == orders.end())
+    throw InputError("angles: found \"" + order +
+                     "\", expected an order as xyz (fixed axes), XYZ (turning axes) or rotvec");
+  for (Frame& frame : dataset.frames) {
+    if (!frame.angles)
+      throw InputError(dataset.poses_path + ": found no angles, expected three a pose to read as " + order);
+    frame.T_base_gripper.linear() = rotation_from_angles(*frame.angles, order);
+  }
+}
 
 void read_target(const fs::path& folder, Dataset& dataset) {
   const fs::path file = folder / "target.json";
@@ -213,34 +262,61 @@ void read_pairs(const fs::path& file, Dataset& dataset) {
 std::string choose_poses(const fs::path& folder, const DatasetOptions& options) {
   if (!options.poses.empty() || !options.needs_poses) return options.poses;
   const std::vector<fs::path> sources = pose_sources(folder);
+  const std::vector<fs::path> pairs = pair_files(folder);
+  if (sources.empty() && pairs.size() == 1) return pairs.front().string();
   if (sources.empty())
-    throw InputError(folder.string() +
-                     ": found no poses, expected poses.tum, poses.csv or poses/*.yaml (or name them)");
+    throw InputError(
+        folder.string() +
+        ": found no poses, expected poses.tum, .csv, .txt or .json, or poses/*.yaml or *.txt (or name "
+        "them)");
   if (sources.size() > 1)
     throw InputError(folder.string() + ": found poses in " + sources[0].filename().string() + " and in " +
                      sources[1].filename().string() + ", expected one (name it)");
   return sources.front().string();
 }
 
+/// By the last number in their names where all have one of their own, else as they are.
+void order_by_number(std::vector<fs::path>& images) {
+  std::map<long, fs::path> numbered;
+  for (const fs::path& image : images)
+    if (const std::optional<long> number = number_in_name(image.string())) numbered.emplace(*number, image);
+  if (numbered.size() != images.size()) return;
+  std::transform(numbered.begin(), numbered.end(), images.begin(),
+                 [](const auto& entry) { return entry.second; });
+}
+
 void read_pictures(const fs::path& folder, const DatasetOptions& options, Dataset& dataset) {
-  const std::vector<fs::path> images = find_images(folder);
+  std::vector<fs::path> images = find_images(folder);
   if (images.empty())
     throw InputError(folder.string() + ": found no pictures, expected images/*.png or *.jpg");
   dataset.camera_path = options.camera.empty() ? find_camera(folder) : options.camera;
-  if (!dataset.camera_path.empty()) dataset.camera = load_camera(dataset.camera_path);
+  if (!dataset.camera_path.empty()) {
+    dataset.camera = load_intrinsics(dataset.camera_path);
+    dataset.lens_covariance = load_lens_covariance(dataset.camera_path);
+  }
   if (!dataset.camera && options.needs_camera)
-    throw InputError(folder.string() +
-                     ": found no intrinsics, expected camera_info.yaml (ROS), calibration.yml (OpenCV) or "
-                     "camchain.yaml (Kalibr)");
+    throw InputError(
+        folder.string() +
+        ": found no intrinsics, expected camera_info.yaml (ROS), calibration.yml (OpenCV), "
+        "camchain.yaml (Kalibr), intrinsics.json or .npz; flash-calib intrinsics estimates them from "
+        "such pictures");
   dataset.poses_path = choose_poses(folder, options);
   std::optional<PosePairing> pairing;
   std::size_t poses = 0;
   if (!dataset.poses_path.empty()) {
-    std::vector<RecordedPose> list = load_poses(dataset.poses_path);
-    poses = list.size();
+    PoseList list = load_poses(dataset.poses_path);
+    poses = list.poses.size();
+    if (list.in_order && poses != images.size())
+      throw InputError(dataset.poses_path + ": found " + std::to_string(poses) +
+                       " poses without names or numbers for " + std::to_string(images.size()) +
+                       " pictures, expected one for each");
+    if (list.in_order) order_by_number(images);
+    if (!list.guess.empty()) dataset.guesses.push_back(list.guess);
     pairing.emplace(std::move(list), dataset.poses_path);
   }
-  for (const fs::path& image : images) {
+  std::vector<std::string> unpaired;
+  for (std::size_t place = 0; place < images.size(); ++place) {
+    const fs::path& image = images[place];
     Frame frame;
     frame.name = image.filename().string();
     frame.image = image.string();
@@ -248,14 +324,20 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
         static_cast<double>(number_in_name(frame.image).value_or(static_cast<long>(dataset.frames.size())));
     const fs::path depth = folder / "depth" / (image.stem().string() + ".png");
     if (options.depth && fs::exists(depth)) frame.depth = depth.string();
-    if (pairing) pairing->pair(frame, image);
-    dataset.frames.push_back(std::move(frame));
+    try {
+      if (pairing) pairing->pair(frame, image, place);
+      dataset.frames.push_back(std::move(frame));
+    } catch (const InputError& error) {
+      unpaired.emplace_back(error.what());
+    }
   }
+  if (dataset.frames.empty()) throw InputError(unpaired.front());
+  for (const std::string& reason : unpaired) dataset.guesses.push_back(reason + "; it is left out");
   std::stable_sort(dataset.frames.begin(), dataset.frames.end(),
                    [](const Frame& a, const Frame& b) { return a.stamp < b.stamp; });
   if (pairing && pairing->by_time()) dataset.stream = pairing->stream();
-  if (pairing && !pairing->by_time() && poses > images.size())
-    dataset.notices.push_back(std::to_string(poses - images.size()) + " of " + std::to_string(poses) +
+  if (pairing && !pairing->by_time() && poses > dataset.frames.size())
+    dataset.notices.push_back(std::to_string(poses - dataset.frames.size()) + " of " + std::to_string(poses) +
                               " poses in " + dataset.poses_path + " have no picture");
 }
 
@@ -278,6 +360,7 @@ Dataset load_dataset(const std::string& path, const DatasetOptions& options) {
     return dataset;
   }
   read_pictures(folder, options, dataset);
+  if (!options.angles.empty()) read_angles(options.angles, dataset);
   return dataset;
 }
 

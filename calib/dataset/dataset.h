@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "calib/dataset/lens_file.h"
 #include "calib/dataset/observation.h"
 #include "calib/dataset/pose_file.h"
 #include "data/camera.h"
@@ -22,33 +23,37 @@ struct Frame {
 };
 
 struct Dataset {
-  std::string source;                            ///< the folder or file
-  std::string poses_path;                        ///< where the poses come from; empty without poses
-  std::string camera_path;                       ///< where the intrinsics come from; empty without
-  std::optional<data::CameraIntrinsics> camera;  ///< as the file says it
-  std::vector<Frame> frames;                     ///< in order of stamp
-  std::optional<data::Trajectory> stream;        ///< poses over time, where pictures fall between them
-  double depth_scale = 0.001;                    ///< [m] a count of the depth pictures
-  std::optional<Setup> setup;                    ///< as target.json says it
-  std::string target;                            ///< as target.json says it, for parse_target; or empty
-  std::vector<std::string> notices;              ///< what a reader should know
+  std::string source;                             ///< the folder or file
+  std::string poses_path;                         ///< where the poses come from; empty without poses
+  std::string camera_path;                        ///< where the intrinsics come from; empty without
+  std::optional<data::CameraIntrinsics> camera;   ///< as the file says it
+  std::optional<LensCovariance> lens_covariance;  ///< where the file states one
+  std::vector<Frame> frames;                      ///< in order of stamp
+  std::optional<data::Trajectory> stream;         ///< poses over time, where pictures fall between them
+  double depth_scale = 0.001;                     ///< [m] a count of the depth pictures
+  std::optional<Setup> setup;                     ///< as target.json says it
+  std::string target;                             ///< as target.json says it, for parse_target; or empty
+  std::vector<std::string> guesses;  ///< how what has no name was read, and what was left out: a warning each
+  std::vector<std::string> notices;  ///< what a reader may want to know
 };
 
 struct DatasetOptions {
   std::string poses = {};    ///< file or folder; empty: found by name in the dataset
   std::string camera = {};   ///< intrinsics file; empty: found by name in the dataset
+  std::string angles = {};   ///< what three angles of a pose mean, see rotation_from_angles; empty: "xyz"
   bool needs_poses = true;   ///< without: pictures alone, as for intrinsics
   bool needs_camera = true;  ///< of sets with pictures
   double depth_scale = 0.001;
   bool depth = true;  ///< look for depth pictures
 };
 
-/// A folder with images/ (or rgb/, color/, or the pictures themselves; jpg or png, sorted), poses.tum |
-/// poses.csv | poses.txt | poses/*.yaml | pose*.yaml, camera_info.yaml (ROS), *.yml (OpenCV) or
-/// camchain*.yaml (Kalibr), target.json, and depth/ with 16-bit png of the same names. Or a set of pairs: a
-/// .samples or pose_samples.json file, or a folder with one. Pictures pair with poses by file name, by the
-/// last number in it, or by time: where stamps are times, the pose is interpolated within `stream`. Throws
-/// InputError: nothing found, two sources of poses, a picture without a pose.
+/// A folder with images/ (or rgb/, color/, img/, or the pictures themselves; jpg, png or bmp, sorted), poses
+/// as a list (poses.tum, .csv, .txt, .json) or one a file (poses/*.yaml or *.txt, pose*.yaml or *.txt),
+/// intrinsics (load_intrinsics), target.json, and depth/ with 16-bit png of the same names. Or a set of
+/// pairs: a .samples or pose_samples.json file, or a folder with one; beside pictures its robot poses count.
+/// Pictures pair with poses by file name, by the last number in it, by their order where poses have neither,
+/// or by time: where stamps are times, the pose is interpolated within `stream`. A picture without a pose is
+/// left out. Throws InputError: nothing found, two sources of poses, no picture with a pose.
 Dataset load_dataset(const std::string& path, const DatasetOptions& options = {});
 
 /// Observations of a set of pairs: poses, no points.

@@ -1,17 +1,18 @@
 #include "calib/dataset/pose_file.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <functional>
 #include <map>
-#include <nlohmann/json.hpp>
 
+#include "calib/dataset/bare_poses.h"
+#include "calib/dataset/pose_json.h"
+#include "calib/dataset/pose_numbers.h"
+#include "calib/dataset/yaml_file.h"
+#include "calib/geometry/pose.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
-#include "data/json_reader.h"
 #include "data/text.h"
 #include "data/trajectory.h"
 
@@ -21,40 +22,6 @@ namespace {
 using data::input_error;
 using data::InputError;
 using Columns = std::map<std::string, std::size_t>;
-
-Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vector4d& xyzw,
-                          const std::string& path, const std::string& where) {
-  if (std::abs(xyzw.norm() - 1) > 1e-3)
-    throw input_error(
-        path, where,
-        "quaternion has length " + data::format_short(xyzw.norm()) + ", expected 1 (order x y z w)");
-  Eigen::Matrix<double, 7, 1> row;
-  row << translation, xyzw;
-  return data::from_vector(row);
-}
-
-Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path, const std::string& where) {
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  const double off = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm();
-  if (!(off < 1e-3) || rotation.determinant() < 0 ||
-      (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6)
-    throw input_error(path, where, "expected a rotation and a translation as 4 x 4, last row 0 0 0 1");
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
-  pose.translation() = matrix.topRightCorner<3, 1>();
-  return pose;
-}
-
-// No arm reaches 10 m: half of the poses beyond that are in another unit.
-void expect_metres(std::vector<double> distances, const std::string& path) {
-  if (distances.empty()) return;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  if (*middle > 10)
-    throw input_error(path, "translations",
-                      "half of them are beyond " + data::format_short(*middle) +
-                          " m, expected metres (are these millimetres?)");
-}
 
 void expect_plausible(const std::vector<RecordedPose>& poses, const std::string& path) {
   std::vector<double> distances;
@@ -120,7 +87,7 @@ struct CsvLine {
   }
 };
 
-RecordedPose pose_of(const CsvLine& line) {
+RecordedPose pose_of_line(const CsvLine& line) {
   RecordedPose pose;
   const std::string where = "line " + std::to_string(line.number);
   const Eigen::Vector3d translation = line.vector({"tx", "ty", "tz"});
@@ -187,42 +154,42 @@ std::vector<RecordedPose> load_csv(const std::string& path) {
       throw input_error(
           path, "line " + std::to_string(lines.number()),
           "found " + std::to_string(cells.size()) + " columns, expected " + std::to_string(columns.size()));
-    poses.push_back(pose_of(CsvLine{path, columns, std::move(cells), lines.number()}));
+    poses.push_back(pose_of_line(CsvLine{path, columns, std::move(cells), lines.number()}));
   }
   if (poses.empty()) throw InputError(path + ": found no poses below its header");
   return poses;
 }
 
-YAML::Node load_yaml(const std::string& path) {
-  std::string text = data::read_file(path);
-  if (text.starts_with("%YAML:")) text.erase(0, text.find('\n'));  // OpenCV's own first line is no YAML
-  try {
-    return YAML::Load(text);
-  } catch (const YAML::Exception& error) {
-    throw InputError(path + ": not valid YAML: line " + std::to_string(error.mark.line + 1) + ": " +
-                     error.msg);
+/// The words of the first line that holds any but comments.
+std::vector<std::string> first_words(const std::string& path) {
+  const std::string text = data::read_file(path);
+  data::LineReader lines(text);
+  for (std::string_view line; lines.next(line);) {
+    if (trimmed(line).empty() || line.front() == '#') continue;
+    std::vector<std::string> words;
+    for (const std::string_view word : data::split(line, " \t\r,;[]()"))
+      if (!word.empty()) words.emplace_back(word);
+    return words;
   }
+  throw InputError(path + ": found no poses");
 }
 
-double number(const YAML::Node& node, const std::string& path, const std::string& field) {
-  const std::optional<double> value =
-      node.IsDefined() && node.IsScalar() ? data::parse_number(node.Scalar()) : std::nullopt;
-  if (!value || !std::isfinite(*value)) throw input_error(path, field, "missing, expected a finite number");
-  return *value;
+bool has_header(const std::string& path) {
+  const std::vector<std::string> words = first_words(path);
+  return !words.empty() && !data::parse_number(words.front());
 }
 
-/// All numbers below a node, in order.
-std::vector<double> numbers(const YAML::Node& node, const std::string& path, const std::string& field) {
-  if (node.IsScalar()) return {number(node, path, field)};
-  std::vector<double> values;
-  for (const YAML::Node& item : node)
-    for (const double value : numbers(item, path, field)) values.push_back(value);
-  return values;
+/// Eight values parted by blanks are TUM's in a file of any name.
+bool is_tum(const std::string& path) {
+  if (data::lower_extension(path) == ".csv") return false;
+  const std::string text = data::read_file(path);
+  return text.find(',') == std::string::npos && text.find(';') == std::string::npos &&
+         first_words(path).size() == 8;
 }
 
 Eigen::Vector3d xyz(const YAML::Node& node, const std::string& path, const std::string& field) {
-  return {number(node["x"], path, field + ".x"), number(node["y"], path, field + ".y"),
-          number(node["z"], path, field + ".z")};
+  return {yaml_number(node["x"], path, field + ".x"), yaml_number(node["y"], path, field + ".y"),
+          yaml_number(node["z"], path, field + ".z")};
 }
 
 /// {translation, rotation} or {position, orientation}, each with named parts.
@@ -233,27 +200,10 @@ Eigen::Isometry3d named_pose(const YAML::Node& node, const std::string& path, co
   if (!node.IsMap() || !node[first] || !node[first].IsMap() || !node[second] || !node[second].IsMap())
     throw input_error(path, field, "expected translation {x, y, z} and rotation {x, y, z, w}");
   const Eigen::Vector3d axis = xyz(node[second], path, field + '.' + second);
-  return pose_of(xyz(node[first], path, field + '.' + first),
-                 {axis.x(), axis.y(), axis.z(), number(node[second]["w"], path, field + '.' + second + ".w")},
-                 path, field);
-}
-
-Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::string& path) {
-  if (values.size() == 16)
-    return pose_of(Eigen::Matrix<double, 4, 4, Eigen::RowMajor>(values.data()), path, "matrix");
-  if (values.size() == 6) {  // ViSP
-    const Eigen::Vector3d turn(values[3], values[4], values[5]);
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    if (turn.norm() > 0) pose.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-    pose.translation() << values[0], values[1], values[2];
-    return pose;
-  }
-  if (values.size() == 7)
-    return pose_of({values[0], values[1], values[2]}, {values[3], values[4], values[5], values[6]}, path,
-                   "pose");
-  throw InputError(
-      path + ": found " + std::to_string(values.size()) +
-      " numbers, expected a pose: 16 (matrix), 7 (x y z qx qy qz qw) or 6 (x y z and axis times angle)");
+  return pose_of(
+      xyz(node[first], path, field + '.' + first),
+      {axis.x(), axis.y(), axis.z(), yaml_number(node[second]["w"], path, field + '.' + second + ".w")}, path,
+      field);
 }
 
 std::vector<PosePair> load_samples(const std::string& path) {
@@ -273,41 +223,35 @@ std::vector<PosePair> load_samples(const std::string& path) {
   return pairs;
 }
 
-Eigen::Isometry3d json_matrix(const nlohmann::json& rows, const std::string& path, const std::string& field) {
-  Eigen::Matrix4d matrix;
-  const bool four = rows.is_array() && rows.size() == 4;
-  for (std::size_t r = 0; four && r < 4; ++r)
-    for (std::size_t c = 0; c < 4; ++c) {
-      if (!rows[r].is_array() || rows[r].size() != 4 || !rows[r][c].is_number())
-        throw input_error(path, field, "expected four rows of four numbers");
-      matrix(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = rows[r][c].get<double>();
-    }
-  if (!four) throw input_error(path, field, "expected four rows of four numbers");
-  return pose_of(matrix, path, field);
-}
-
-std::vector<PosePair> load_moveit(const std::string& path) {
-  const nlohmann::json file = data::load_json(path);
-  if (!file.is_array() || file.empty())
-    throw InputError(path + ": expected a list of [effector in world, object in sensor] matrices");
-  std::vector<PosePair> pairs;
-  for (std::size_t i = 0; i < file.size(); ++i) {
-    const std::string field = "pair " + std::to_string(i);
-    if (!file[i].is_array() || file[i].size() != 2)
-      throw input_error(path, field, "expected two 4 x 4 matrices");
-    pairs.push_back({json_matrix(file[i][0], path, field), json_matrix(file[i][1], path, field)});
-  }
-  return pairs;
-}
-
 }  // namespace
 
 Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& angles, const std::string& order) {
+  if (order == kRotationVector) return rotation_exp(angles);
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  for (int k = 0; k < 3; ++k)
-    rotation = Eigen::AngleAxisd(angles[k], Eigen::Vector3d::Unit(order[static_cast<std::size_t>(k)] - 'x')) *
-               rotation;
+  for (int k = 0; k < 3; ++k) {
+    const char axis = order[static_cast<std::size_t>(k)];
+    const bool turning = axis < 'a';
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(angles[k], Eigen::Vector3d::Unit(axis - (turning ? 'X' : 'x'))).toRotationMatrix();
+    rotation = turning ? Eigen::Matrix3d(rotation * turn) : Eigen::Matrix3d(turn * rotation);
+  }
   return rotation;
+}
+
+const std::vector<std::string>& angle_orders() {
+  static const std::vector<std::string> orders = [] {
+    std::vector<std::string> list;
+    for (const char* order :
+         {"xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz"}) {
+      list.emplace_back(order);
+      std::string turning = order;
+      for (char& axis : turning) axis = static_cast<char>(axis - 'x' + 'X');
+      list.push_back(turning);
+    }
+    list.emplace_back(kRotationVector);
+    return list;
+  }();
+  return orders;
 }
 
 std::optional<long> number_in_name(const std::string& path) {
@@ -319,17 +263,25 @@ std::optional<long> number_in_name(const std::string& path) {
   return data::parse_integer(name.substr(begin, end + 1 - begin));
 }
 
-std::vector<RecordedPose> load_pose_list(const std::string& path) {
-  std::vector<RecordedPose> poses;
-  if (data::lower_extension(path) == ".csv") {
-    poses = load_csv(path);
+PoseList load_pose_list(const std::string& path) {
+  const std::string extension = data::lower_extension(path);
+  if (extension == ".json") return load_json_poses(path);
+  PoseList list;
+  if (extension == ".samples") {
+    for (const PosePair& pair : load_samples(path))
+      list.poses.push_back({"", static_cast<double>(list.poses.size()), pair.T_base_gripper, std::nullopt});
+    list.in_order = true;
+    list.guess = path + ": its samples are taken to be in the order of the pictures";
+  } else if (extension != ".tum" && !is_tum(path)) {
+    if (!has_header(path)) return load_bare_poses(path);
+    list.poses = load_csv(path);
   } else {
     const data::Trajectory trajectory = data::load_tum(path);
     for (std::size_t i = 0; i < trajectory.times.size(); ++i)
-      poses.push_back({"", trajectory.times[i], trajectory.poses[i], std::nullopt});
+      list.poses.push_back({"", trajectory.times[i], trajectory.poses[i], std::nullopt});
   }
-  expect_plausible(poses, path);
-  return poses;
+  expect_plausible(list.poses, path);
+  return list;
 }
 
 RecordedPose load_pose_yaml(const std::string& path) {
@@ -342,15 +294,15 @@ RecordedPose load_pose_yaml(const std::string& path) {
   if (file.IsMap() && file["pose"]) file = file["pose"];
   if (file.IsMap() && file["qw"]) {
     pose.pose = pose_of(xyz(file, path, "pose"),
-                        {number(file["qx"], path, "qx"), number(file["qy"], path, "qy"),
-                         number(file["qz"], path, "qz"), number(file["qw"], path, "qw")},
+                        {yaml_number(file["qx"], path, "qx"), yaml_number(file["qy"], path, "qy"),
+                         yaml_number(file["qz"], path, "qz"), yaml_number(file["qw"], path, "qw")},
                         path, "pose");
   } else if (file.IsMap() && file["data"]) {
-    pose.pose = pose_of_numbers(numbers(file["data"], path, "data"), path);
+    pose.pose = pose_of_numbers(yaml_numbers(file["data"], path, "data"), path, "data");
   } else if (file.IsMap()) {
     pose.pose = named_pose(file, path, "pose");
   } else {
-    pose.pose = pose_of_numbers(numbers(file, path, "pose"), path);
+    pose.pose = pose_of_numbers(yaml_numbers(file, path, "pose"), path, "pose");
   }
   expect_metres({pose.pose.translation().norm()}, path);
   return pose;
@@ -358,7 +310,7 @@ RecordedPose load_pose_yaml(const std::string& path) {
 
 std::vector<PosePair> load_pose_pairs(const std::string& path) {
   const std::vector<PosePair> pairs =
-      data::lower_extension(path) == ".json" ? load_moveit(path) : load_samples(path);
+      data::lower_extension(path) == ".json" ? load_json_pairs(path) : load_samples(path);
   if (pairs.empty()) throw InputError(path + ": found no samples");
   std::vector<double> robot, tracking;
   for (const PosePair& pair : pairs) {

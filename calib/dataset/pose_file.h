@@ -15,6 +15,12 @@ struct RecordedPose {
   std::optional<Eigen::Vector3d> angles;  ///< as written, where the rotation came as three angles [rad]
 };
 
+struct PoseList {
+  std::vector<RecordedPose> poses;
+  bool in_order = false;  ///< without names or numbers: each belongs to the picture at its place
+  std::string guess;      ///< how numbers without a name were read; empty: all have one
+};
+
 /// Robot and target seen from the camera at the same moment, without a picture.
 struct PosePair {
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
@@ -25,21 +31,26 @@ struct PosePair {
 /// (also timestamp; EuRoC's in nanoseconds); tx ty tz (or x y z); qx qy qz qw, or rx ry rz (roll, pitch, yaw
 /// about fixed x, y, z [rad]; with the ending _deg in degrees), or rotvec_x rotvec_y rotvec_z [rad]. Throws
 /// InputError naming file and line: numbers missing, quaternions that are not unit to 1e-3, angles beyond a
-/// turn (degrees), translations of many metres (millimetres).
-std::vector<RecordedPose> load_pose_list(const std::string& path);
+/// turn (degrees), translations of many metres (millimetres). Other numbers are bare (load_bare_poses). JSON
+/// as load_json_poses reads it; the robot's poses of `.samples`.
+PoseList load_pose_list(const std::string& path);
 
 /// One pose in YAML: x y z qx qy qz qw; position and orientation, or translation and rotation, of named
 /// parts; a 4 x 4 matrix as {rows, cols, data} or a list of lists; ViSP's vector of translation and axis
 /// times angle. The stamp is the last number in the file name. Throws InputError.
 RecordedPose load_pose_yaml(const std::string& path);
 
-/// easy_handeye2 `.samples` (robot, tracking) or MoveIt `pose_samples.json` (effector in the world, object in
-/// the sensor). Throws InputError.
+/// easy_handeye2 `.samples` (robot, tracking) or JSON: MoveIt's `pose_samples.json` (effector in the world,
+/// object in the sensor) and others (load_json_pairs). Throws InputError.
 std::vector<PosePair> load_pose_pairs(const std::string& path);
 
-/// R = R_c(angles[2]) R_b(angles[1]) R_a(angles[0]) for an order "abc" about fixed axes, as "xyz" (roll,
-/// pitch, yaw).
+/// How three numbers are a rotation. About fixed axes, "xyz" (roll, pitch, yaw; Fanuc's W P R) and the other
+/// eleven orders: R = R_c(angles[2]) R_b(angles[1]) R_a(angles[0]) for "abc". About axes that turn along, in
+/// capitals: R = R_a(angles[0]) R_b(angles[1]) R_c(angles[2]) for "ABC", as "ZYX" (KUKA's A B C), "XYZ"
+/// (Staubli) and "ZYZ" (Kawasaki's O A T). And "rotvec": axis times angle (Universal Robots).
+constexpr const char* kRotationVector = "rotvec";
 Eigen::Matrix3d rotation_from_angles(const Eigen::Vector3d& angles, const std::string& order = "xyz");
+const std::vector<std::string>& angle_orders();
 
 /// The last whole number in a file name without its folder and ending: "frame_000012.png" is 12.
 std::optional<long> number_in_name(const std::string& path);

@@ -14,6 +14,7 @@ constexpr double kLargestDisc = 9;     // of a crossing [px]; beyond it little i
 constexpr double kSmallestDisc = 2.5;  // [px]
 constexpr int kSearchWidth = 800;      // of the picture that is searched [px]
 constexpr double kLeastShare = 0.8;    // of the corners must show a crossing
+constexpr double kSmoothing = 2;       // of a picture whose crossings show another pattern on top [px]
 
 /// Corners of a board, row by row.
 struct Grid {
@@ -91,11 +92,18 @@ Corners find_classic(const GreyImage& image, const Target& target) {
   return places;
 }
 
-Corners find_sectors(const GreyImage& image, const Target& target) {
+Corners find_sectors(const GreyImage& image, const Target& target, int flags = 0) {
   std::vector<cv::Point2f> corners;
   const bool found = cv::findChessboardCornersSB(as_mat(image), {target.columns, target.rows}, corners,
-                                                 cv::CALIB_CB_NORMALIZE_IMAGE);
+                                                 cv::CALIB_CB_NORMALIZE_IMAGE | flags);
   return found ? to_eigen(corners) : Corners();
+}
+
+GreyImage smoothed(const GreyImage& image) {
+  GreyImage result = image;
+  cv::Mat picture = as_mat(result);
+  cv::GaussianBlur(as_mat(image), picture, {}, kSmoothing);
+  return result;
 }
 
 Sighting all_points(const char* refiner, const Corners& corners) {
@@ -145,40 +153,67 @@ bool lacks_a_side(const Sighting& sighting, const Target& target) {
          2 * std::min(first_column, last_column) < target.rows;
 }
 
+/// What the library has found, with the fine model where the picture shows its crossings.
+struct Board {
+  std::vector<Grid> grids;  ///< by way of finding, those that were successful
+  bool by_sectors = false;  ///< the last of them is OpenCV's sectors
+  Sighting fitted{kImageModel, {}, {}};
+  std::size_t seed = 0;  ///< the grid that the fit started from
+};
+
+void fit(const GreyImage& image, const Rectifier& rectifier, Board& board) {
+  for (std::size_t i = 0; i < board.grids.size(); ++i) {
+    if (board.fitted.points.size() == board.grids[i].corners.size()) return;
+    Sighting candidate = fit_crossings(image, rectifier, board.grids[i]);
+    if (candidate.points.size() <= board.fitted.points.size()) continue;
+    board.fitted = std::move(candidate);
+    board.seed = i;
+  }
+}
+
+Board find_board(const GreyImage& image, const Target& target) {
+  Corners classic = find_classic(image, target), sectors = find_sectors(image, target);
+  if (classic.empty() && sectors.empty()) sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
+  Board board{.grids = {}, .by_sectors = !sectors.empty()};
+  for (Corners* corners : {&classic, &sectors}) {
+    if (corners->empty()) continue;
+    board.grids.push_back({target.columns, target.rows, std::move(*corners)});
+    put_in_order(image, board.grids.back());
+  }
+  return board;
+}
+
 }  // namespace
 
 Finder chessboard_finder(const Target& target, const Rectifier& rectifier) {
   return [target, &rectifier](const GreyImage& image) {
-    const int count = target.columns * target.rows;
+    const auto count = static_cast<std::size_t>(target.columns * target.rows);
     Found found;
-    Sighting fitted{kImageModel, {}, {}};
-    Grid seed;
-    const Corners classic = find_classic(image, target), sectors = find_sectors(image, target);
-    for (const Corners* corners : {&classic, &sectors}) {
-      if (corners->empty()) continue;
-      Grid grid{target.columns, target.rows, *corners};
-      put_in_order(image, grid);
-      if (corners == &sectors) found.sightings.push_back(all_points("sectors", grid.corners));
-      if (static_cast<int>(fitted.points.size()) == count) continue;
-      Sighting candidate = fit_crossings(image, rectifier, grid);
-      if (candidate.points.size() <= fitted.points.size()) continue;
-      fitted = std::move(candidate);
-      seed = std::move(grid);
-    }
-    if (classic.empty() && sectors.empty()) {
+    Board board = find_board(image, target);
+    if (board.grids.empty()) {
       found.reason = "no chessboard of " + std::to_string(target.columns) + " x " +
                      std::to_string(target.rows) + " inner corners";
       return found;
     }
-    if (static_cast<double>(fitted.points.size()) < kLeastShare * count || lacks_a_side(fitted, target)) {
-      found.sightings.clear();
-      found.reason = "a chessboard was found, but only " + std::to_string(fitted.points.size()) + " of its " +
-                     std::to_string(count) + " corners show a crossing";
+    const auto enough = [&] {
+      return static_cast<double>(board.fitted.points.size()) >= kLeastShare * static_cast<double>(count);
+    };
+    fit(image, rectifier, board);
+    // A pattern that is thrown on the board, as infrared cameras do, is finer than its squares.
+    if (!enough()) fit(smoothed(image), rectifier, board);
+    const bool half = 2 * board.fitted.points.size() >= count;
+    if (half && lacks_a_side(board.fitted, target)) {
+      found.reason = "a chessboard was found, but only " + std::to_string(board.fitted.points.size()) +
+                     " of its " + std::to_string(count) + " corners show a crossing";
       return found;
     }
+    if (board.by_sectors) found.sightings.push_back(all_points("sectors", board.grids.back().corners));
+    // Without the fine model the library's corners stay.
+    const Grid& seed = board.grids[enough() ? board.seed : 0];
+    const Sighting start = enough() ? board.fitted : all_points(kImageModel, seed.corners);
     found.sightings.push_back(
-        {"corner_sub_pix", fitted.points, corner_sub_pix(image, fitted.pixels, half_window(seed))});
-    found.sightings.push_back(std::move(fitted));
+        {"corner_sub_pix", start.points, corner_sub_pix(image, start.pixels, half_window(seed))});
+    if (enough()) found.sightings.push_back(std::move(board.fitted));
     return found;
   };
 }

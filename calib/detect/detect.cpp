@@ -5,6 +5,7 @@
 #include <exception>
 #include <mutex>
 #include <thread>
+#include <tuple>
 
 #include "calib/detect/detection_cache.h"
 #include "calib/detect/finder.h"
@@ -64,20 +65,23 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
+/// Throws data::InputError where the picture cannot be looked at: that is said of a place, not of a content.
 Found find_in(const Frame& frame, const Dataset& dataset, const Rectifier& rectifier, const Finder& finder) {
-  Found found;
+  const GreyImage image = load_grey_image(frame.image);
+  if (image.width == rectifier.width() && image.height == rectifier.height()) return finder(image);
+  throw data::InputError("the picture is " + size_text(image.width, image.height) + ", " +
+                         (dataset.camera ? dataset.camera_path : std::string("the first")) + " says " +
+                         size_text(rectifier.width(), rectifier.height()));
+}
+
+Found find_or_say(const Frame& frame, const DetectionCache& cache, const std::function<Found()>& find) {
   try {
-    const GreyImage image = load_grey_image(frame.image);
-    if (image.width != rectifier.width() || image.height != rectifier.height())
-      found.reason = "the picture is " + size_text(image.width, image.height) + ", " +
-                     (dataset.camera ? dataset.camera_path : std::string("the first")) + " says " +
-                     size_text(rectifier.width(), rectifier.height());
-    else
-      found = finder(image);
+    return cache.get(frame.image, find);
   } catch (const data::InputError& error) {
+    Found found;
     found.reason = error.what();
+    return found;
   }
-  return found;
 }
 
 /// A view that fits far worse than the others of its set shows wrong corners.
@@ -101,8 +105,8 @@ void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detect
   }
 }
 
-Rectifier make_rectifier(const Dataset& dataset) {
-  if (dataset.camera) return Rectifier(*dataset.camera);
+/// Width and height of the first picture that can be read.
+std::pair<int, int> picture_size(const Dataset& dataset) {
   std::string reason;
   for (const Frame& frame : dataset.frames) try {
       const GreyImage image = load_grey_image(frame.image);
@@ -113,7 +117,45 @@ Rectifier make_rectifier(const Dataset& dataset) {
   throw data::InputError(reason.empty() ? dataset.source + ": found no pictures" : reason);
 }
 
+Rectifier make_rectifier(const Dataset& dataset) {
+  if (dataset.camera) return Rectifier(*dataset.camera);
+  const auto [width, height] = picture_size(dataset);
+  return {width, height};
+}
+
+/// Where a board of a like number of corners is seen: people count squares, or outer corners. Else empty.
+std::string other_board(const Dataset& dataset, const Target& target, const Rectifier& rectifier) {
+  if (target.kind != TargetKind::chessboard) return {};
+  constexpr std::size_t kPictures = 3;
+  // Larger ones first: a smaller one may be a part of the board.
+  constexpr std::pair<int, int> kOff[] = {{1, 1}, {1, 0}, {0, 1}, {0, -1}, {-1, 0}, {-1, -1}, {-2, -2}};
+  for (const auto& [columns, rows] : kOff) {
+    Target other = target;
+    other.columns += columns;
+    other.rows += rows;
+    if (other.columns < 3 || other.rows < 3) continue;
+    const Finder finder = make_finder(other, rectifier);
+    for (std::size_t i = 0; i < std::min(kPictures, dataset.frames.size()); ++i) try {
+        if (find_in(dataset.frames[i], dataset, rectifier, finder).sightings.empty()) continue;
+        const std::string size = std::to_string(other.columns) + "x" + std::to_string(other.rows);
+        return "; but it shows one of " + size +
+               " inner corners, where four squares meet: --target chessboard:" + size + ":" +
+               data::format_short(target.spacing);
+      } catch (const data::InputError&) {
+        continue;  // a picture that cannot be read shows nothing
+      }
+  }
+  return {};
+}
+
 }  // namespace
+
+void take_picture_size(Dataset& dataset) {
+  if (!dataset.camera || dataset.camera->width > 0) return;
+  std::tie(dataset.camera->width, dataset.camera->height) = picture_size(dataset);
+  dataset.guesses.push_back(dataset.camera_path + ": does not say the size of its pictures; they are " +
+                            size_text(dataset.camera->width, dataset.camera->height));
+}
 
 std::vector<Detection> detect(const Dataset& dataset, const Target& target, const DetectSettings& settings,
                               const std::function<void(int, int)>& progress) {
@@ -134,7 +176,7 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
         const Frame& frame = dataset.frames[static_cast<std::size_t>(k)];
         Detection& detection = detections[static_cast<std::size_t>(k)];
         const Found found =
-            cache.get(frame.image, [&] { return find_in(frame, dataset, rectifier, finder); });
+            find_or_say(frame, cache, [&] { return find_in(frame, dataset, rectifier, finder); });
         detection.image = frame.name;
         detection.reason = found.reason;
         for (const Sighting& sighting : found.sightings)
@@ -164,7 +206,8 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
   if (none)
     throw data::InputError(
         dataset.source + ": the target is seen in none of " + std::to_string(count) + " pictures; " +
-        (detections.empty() ? "" : detections.front().image + ": " + detections.front().reason));
+        (detections.empty() ? "" : detections.front().image + ": " + detections.front().reason) +
+        other_board(dataset, target, rectifier));
   return detections;
 }
 

@@ -23,4 +23,8 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target,
                               const DetectSettings& settings = {},
                               const std::function<void(int, int)>& progress = {});
 
+/// Where the intrinsics say nothing of the size of the pictures, that of the first one that can be read; said
+/// among the guesses.
+void take_picture_size(Dataset& dataset);
+
 }  // namespace flash::calib

@@ -1,5 +1,6 @@
 #include "calib/detect/detection_cache.h"
 
+#include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
@@ -12,7 +13,7 @@
 namespace flash::calib {
 namespace {
 
-constexpr int kFinderVersion = 1;  // counts changes of what the finders return
+constexpr int kFinderVersion = 3;  // counts changes of what the finders return
 
 std::optional<Found> read(const std::string& path) {
   if (!std::filesystem::exists(path)) return std::nullopt;
@@ -52,11 +53,13 @@ DetectionCache::DetectionCache(std::string folder, const std::optional<data::Cam
   if (folder_.empty()) return;
   const auto add = [&](double value) { key_ += data::format_number(value) + ' '; };
   key_ = std::string(FLASH_VERSION) + ' ' + std::to_string(kFinderVersion) + ' ' + target.dictionary + ' ';
+  // Corners are the same whatever the size: only the shape counts.
+  const double size = target.spacing > 0 ? target.spacing : target.marker_size;
   for (const double value :
        {static_cast<double>(target.kind), static_cast<double>(target.columns),
-        static_cast<double>(target.rows), target.spacing, target.marker_size, target.marker_gap,
+        static_cast<double>(target.rows), target.marker_size / size, target.marker_gap / size,
         static_cast<double>(target.first_id), static_cast<double>(target.has_origin)})
-    add(value);
+    add(std::round(1e6 * value) / 1e6);
   if (!camera) return;
   for (const double value :
        {static_cast<double>(camera->width), static_cast<double>(camera->height), camera->fx, camera->fy,

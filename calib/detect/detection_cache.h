@@ -17,7 +17,8 @@ class DetectionCache {
   DetectionCache(std::string folder, const std::optional<data::CameraIntrinsics>& camera,
                  const Target& target);
 
-  /// What is kept for the picture, or what `find` returns. A file that cannot be understood is written anew.
+  /// What is kept for the picture, or what `find` returns; nothing is kept where `find` throws. A file that
+  /// cannot be understood is written anew.
   Found get(const std::string& image, const std::function<Found()>& find) const;
 
  private:

@@ -232,6 +232,7 @@ IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<
   estimate.rms = std::sqrt(squares / corners);
   const Eigen::MatrixXd variances = covariance(solution, points, views);
   const std::vector<int> used = unknowns(settings.model);
+  estimate.covariance(used, used) = variances;
   for (std::size_t i = 0; i < used.size(); ++i)
     estimate.sd[used[i]] =
         std::sqrt(std::max(0.0, variances(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(i))));

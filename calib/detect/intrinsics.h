@@ -25,7 +25,8 @@ struct IntrinsicsEstimate {
   data::CameraIntrinsics camera;
   IntrinsicsVector sd =
       IntrinsicsVector::Zero();  ///< standard deviations, from the residuals; poses marginalised
-  double rms = 0;                ///< reprojection, 2-D rms per corner [px]
+  LensCovariance covariance = LensCovariance::Zero();  ///< of which those are the diagonal
+  double rms = 0;                                      ///< reprojection, 2-D rms per corner [px]
   double corner_sd =
       0;  ///< of where the worst corner of the picture is projected, for a fixed ray; 100 at most [px]
   double coverage = 0;  ///< share of the picture within the outline of all corners

@@ -8,6 +8,7 @@ namespace flash::calib {
 /// fx fy cx cy, then k1 k2 p1 p2 k3 k4 k5 k6: the order of intrinsics as unknowns.
 constexpr int kIntrinsics = 12;
 using IntrinsicsVector = Eigen::Matrix<double, kIntrinsics, 1>;
+using LensCovariance = Eigen::Matrix<double, kIntrinsics, kIntrinsics>;
 
 IntrinsicsVector to_vector(const data::CameraIntrinsics& camera);
 

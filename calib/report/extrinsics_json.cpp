@@ -115,6 +115,15 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                {"covariance", rows(calibration.covariance)}};
   json["predicted_sd"] = {{"translation_mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
                           {"rotation_deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
+  const Vector6d in_parent = parent_deviations(calibration.poses.X, calibration.covariance);
+  json["predicted_sd"]["translation_parent_mm"] = list(Eigen::Vector3d(1e3 * in_parent.head<3>()));
+  json["predicted_sd"]["rotation_parent_deg"] = list(Eigen::Vector3d(kDegrees * in_parent.tail<3>()));
+  if (extrinsics.pixels) {
+    const Vector6d here =
+        parent_deviations(calibration.poses.X, calibration.refined.covariance.topLeftCorner<6, 6>());
+    json["predicted_sd"]["repeatable_parent_mm"] = list(Eigen::Vector3d(1e3 * here.head<3>()));
+    json["predicted_sd"]["repeatable_parent_deg"] = list(Eigen::Vector3d(kDegrees * here.tail<3>()));
+  }
   const auto px = [&](double value) { return extrinsics.pixels ? Json(value) : Json(nullptr); };
   json["sigmas"] = {
       {"corner_px", px(extrinsics.corner_px)},
@@ -131,9 +140,12 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   if (extrinsics.pixels) {
     const data::CameraIntrinsics& lens = calibration.refined.bundle.intrinsics.front();
     json["lens"] = {{"solved", calibration.unknowns.intrinsics > 0},
+                    {"as_stated", calibration.lens.far_off.empty()},
+                    {"size_px", {lens.width, lens.height}},
                     {"focal_px", {lens.fx, lens.fy}},
                     {"centre_px", {lens.cx, lens.cy}},
-                    {"distortion", lens.distortion}};
+                    {"distortion", lens.distortion},
+                    {"sd", list(Eigen::VectorXd(calibration.lens.sd.head(kLensUnknowns)))}};
   }
   json["depth"] = inputs.depth ? depth_json(*inputs.depth) : Json(nullptr);
   json["time_offset"] = inputs.time_offset ? Json{{"estimate_s", inputs.time_offset->estimate},
@@ -150,6 +162,10 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       {"weakest_deg", kDegrees * calibration.weakest.rotation}};
   json["convention_findings"] = Json::array();
   json["scale"] = calibration.size ? to_json(*calibration.size) : Json(nullptr);
+  if (calibration.size) {
+    json["scale"]["warp_mm"] = list(Eigen::Vector2d(1e3 * calibration.warp.estimate));
+    json["scale"]["warp_sd_mm"] = list(Eigen::Vector2d(1e3 * calibration.warp.sd));
+  }
   json["splits"] = nullptr;
   if (!calibration.splits.empty()) {
     json["splits"] = {{"covariance_factor", calibration.covariance_factor}};
@@ -157,6 +173,18 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
       json["splits"][to_string(check.split)] = {{"apart_mm", 1e3 * check.apart.head<3>().norm()},
                                                 {"apart_deg", kDegrees * check.apart.tail<3>().norm()},
                                                 {"chi_square", check.chi_square}};
+  }
+  if (calibration.other_part) {
+    const KnockedPart& other = *calibration.other_part;
+    const Vector6d& motion = other.knock.motion;
+    json["splits"]["knock"] = {{"view", other.view},
+                               {"what", other.knock.camera ? "camera" : "target"},
+                               {"told", other.knock.told},
+                               {"moved_mm", list(Eigen::Vector3d(1e3 * motion.head<3>()))},
+                               {"moved_deg", list(Eigen::Vector3d(kDegrees * motion.tail<3>()))},
+                               {"other_part", other.before ? "before" : "after"},
+                               {"other_views", other.views}};
+    if (other.poses) json["splits"]["knock"]["other_transform"] = list(data::to_vector(other.poses->X));
   }
   json["smooth_errors"] = nullptr;
   if (calibration.pose_errors) {

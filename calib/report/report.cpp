@@ -9,13 +9,12 @@
 #include "calib/detect/grey_image.h"
 #include "calib/geometry/chain.h"
 #include "calib/report/extrinsics_export.h"
+#include "calib/report/jpeg.h"
 #include "data/html_page.h"
 #include "data/trajectory.h"
 
 namespace flash::embedded {
 std::string_view calibration_report_template();
-std::string_view plotly();
-std::string_view plotly_licence();
 }  // namespace flash::embedded
 
 namespace flash::calib {
@@ -116,7 +115,7 @@ Json pictures(const std::vector<SeenView>& seen, const ReportInputs& inputs, con
     const data::Picture picture = corner_picture(load_grey_image(inputs.images[i]), seen[i].detected,
                                                  seen[i].projected, settings.picture);
     all.push_back({{"view", i},
-                   {"png", data::base64(data::encode_png(picture))},
+                   {"jpeg", data::base64(encode_jpeg(picture))},
                    {"width", picture.width},
                    {"height", picture.height}});
   }
@@ -154,12 +153,9 @@ Json outline(const Eigen::Matrix3Xd& points) {
 
 /// The standard deviations along and about the axes of the parent frame, in which the translation is written.
 Json sd_in_parent(const Calibration& calibration) {
-  const Eigen::Matrix3d R = calibration.poses.X.linear();
-  const auto sd = [&](const Eigen::Matrix3d& block) {
-    return Eigen::Vector3d((R * block * R.transpose()).diagonal().cwiseMax(0).cwiseSqrt());
-  };
-  return {{"mm", list(Eigen::Vector3d(1e3 * sd(calibration.covariance.topLeftCorner<3, 3>())))},
-          {"deg", list(Eigen::Vector3d(kDegrees * sd(calibration.covariance.bottomRightCorner<3, 3>())))}};
+  const Vector6d sd = parent_deviations(calibration.poses.X, calibration.covariance);
+  return {{"mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
+          {"deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
 }
 
 std::string sentence(const char* format, double value, double other = 0) {
@@ -220,9 +216,7 @@ std::string render_report(const Calibration& calibration, const Extrinsics& extr
   page["ros"] = ros_static_transform(extrinsics.transform);
   page["urdf"] = urdf_joint(extrinsics.transform);
   const std::string text = data::inside_script(page.dump(-1, ' ', false, Json::error_handler_t::replace));
-  return data::fill_page(
-      embedded::calibration_report_template(),
-      {{"@DATA@", text}, {"@PLOTLY_LICENCE@", embedded::plotly_licence()}, {"@PLOTLY@", embedded::plotly()}});
+  return data::fill_page(embedded::calibration_report_template(), {{"@DATA@", text}});
 }
 
 }  // namespace flash::calib

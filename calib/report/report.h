@@ -11,7 +11,7 @@ namespace flash::calib {
 
 struct ReportSettings {
   CornerPictureSettings picture{.width = 440};
-  int max_pictures = 60;  ///< photographs shown, those that fit worst first
+  int max_pictures = 24;  ///< photographs shown, those that fit worst first
 };
 
 /// What a calibration was made from, as far as the report shows it.
@@ -20,7 +20,7 @@ struct ReportInputs {
   std::vector<std::string> images;  ///< path of each view's picture; empty where there is none
 };
 
-/// One HTML file that opens offline, with the plotting library inside: warnings, the transform, how sure it
+/// One HTML file that opens offline: warnings, the transform, how sure it
 /// is, held-out residuals, what is weak and what to do next; detected over projected corners, residuals of
 /// every view, the poses in space, the comparison of methods, the views with the reasons of those left out.
 /// extrinsics: with the names of its frames; json: the file that stands beside the report.

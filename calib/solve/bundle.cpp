@@ -6,6 +6,19 @@
 
 namespace flash::calib {
 
+BundleView make_view(const Eigen::Matrix3Xd& target_points, const Observation& observation) {
+  BundleView view;
+  view.points = target_points(Eigen::all, observation.points);
+  view.bows = target_bows(target_points)(Eigen::all, observation.points);
+  view.pixels = observation.pixels;
+  view.depth_points = observation.depth_points;
+  return view;
+}
+
+Eigen::Matrix3Xd true_points(const Bundle& bundle, const BundleView& view) {
+  return shaped(view.points, view.bows, shape_of(bundle, static_cast<std::size_t>(view.target)));
+}
+
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
                    const std::vector<Observation>& observations, const HandEyePoses& seed) {
   Bundle bundle{.setup = setup,
@@ -24,11 +37,8 @@ Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eige
     pose.T_base_gripper = observation.T_base_gripper;
     pose.velocity = observation.velocity;
     bundle.poses.push_back(pose);
-    BundleView view;
+    BundleView view = make_view(target_points, observation);
     view.pose = static_cast<int>(i);
-    view.points = target_points(Eigen::all, observation.points);
-    view.pixels = observation.pixels;
-    view.depth_points = observation.depth_points;
     bundle.views.push_back(std::move(view));
   }
   return bundle;
@@ -62,10 +72,10 @@ Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected) {
 Eigen::Matrix2Xd residuals(const Bundle& bundle, const BundleView& view, bool corrected) {
   const Eigen::Isometry3d T = predicted_pose(bundle, view, corrected);
   const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics[static_cast<std::size_t>(view.camera)]);
-  const double scale = bundle.scales[static_cast<std::size_t>(view.target)];
-  Eigen::Matrix2Xd result(2, view.points.cols());
-  for (Eigen::Index i = 0; i < view.points.cols(); ++i)
-    result.col(i) = view.pixels.col(i) - project(intrinsics, T * (scale * view.points.col(i)));
+  const Eigen::Matrix3Xd points = true_points(bundle, view);
+  Eigen::Matrix2Xd result(2, points.cols());
+  for (Eigen::Index i = 0; i < points.cols(); ++i)
+    result.col(i) = view.pixels.col(i) - project(intrinsics, T * points.col(i));
   return result;
 }
 

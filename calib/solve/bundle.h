@@ -4,9 +4,11 @@
 #include <vector>
 
 #include "calib/dataset/observation.h"
+#include "calib/dataset/target_shape.h"
 #include "calib/geometry/chain.h"
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose.h"
+#include "calib/solve/lens_prior.h"
 #include "data/camera.h"
 
 namespace flash::calib {
@@ -24,6 +26,7 @@ struct BundleView {
   int pose = 0, camera = 0, target = 0;
   Eigen::Matrix3Xd points;        ///< in the target frame [m]
   Eigen::Matrix2Xd pixels;        ///< where they were seen [px]
+  Eigen::Matrix2Xd bows;          ///< how far each point rises per unit of the target's warp along x and y
   Eigen::Matrix3Xd depth_points;  ///< on the target's plane, measured by depth, in the camera frame [m]; or
                                   ///< none
 };
@@ -34,6 +37,8 @@ struct Priors {
   /// Of each target: full standard deviation of the scale that the pictures tell, over that of noise alone.
   /// The prior weighs as much more against residuals that are taken for noise. Empty: 1.
   std::vector<double> caution = {};
+  std::vector<LensPrior> lenses = {};  ///< of each camera; empty: nothing
+  std::vector<double> warp_sd = {};    ///< of each target's warp, an axis [m]; empty: flat
 };
 
 /// The standard deviation that the prior of a target's scale has among residuals of noise.
@@ -47,17 +52,30 @@ struct Bundle {
   Setup setup = Setup::eye_in_hand;
   std::vector<Eigen::Isometry3d> cameras;          ///< C: in the gripper (eye-in-hand) or the world
   std::vector<data::CameraIntrinsics> intrinsics;  ///< of each camera
-  std::vector<Eigen::Isometry3d> bases;    ///< B: of each arm in the world, which is the first arm's base
-  std::vector<Eigen::Isometry3d> targets;  ///< Z: in the world (eye-in-hand) or a gripper
-  std::vector<double> scales;              ///< of each target: true size over stated size
-  std::vector<double> time_offsets;        ///< tau of each arm [s]
-  std::vector<double> depth_scales = {};   ///< of each camera: depth over distance; empty: 1
-  std::vector<Eigen::Vector3d> pivots;     ///< of each arm, in its gripper: where errors of rotation and of
-                                           ///< translation are independent [m]
+  std::vector<Eigen::Isometry3d> bases;     ///< B: of each arm in the world, which is the first arm's base
+  std::vector<Eigen::Isometry3d> targets;   ///< Z: in the world (eye-in-hand) or a gripper
+  std::vector<double> scales;               ///< of each target: true size over stated size
+  std::vector<Eigen::Vector2d> warps = {};  ///< of each target, see target_bows(); empty: flat
+  std::vector<double> time_offsets;         ///< tau of each arm [s]
+  std::vector<double> depth_scales = {};    ///< of each camera: depth over distance; empty: 1
+  std::vector<Eigen::Vector3d> pivots;      ///< of each arm, in its gripper: where errors of rotation and of
+                                            ///< translation are independent [m]
   std::vector<RobotPose> poses;
   std::vector<BundleView> views;
   Priors priors = {};
 };
+
+/// A view of some points of a target.
+BundleView make_view(const Eigen::Matrix3Xd& target_points, const Observation& observation);
+
+inline TargetShape shape_of(const Bundle& bundle, std::size_t target) {
+  TargetShape shape{.scale = bundle.scales[target]};
+  if (!bundle.warps.empty()) shape.warp = bundle.warps[target];
+  return shape;
+}
+
+/// Where the points of a view are, in the target frame: of the target's true size and warp.
+Eigen::Matrix3Xd true_points(const Bundle& bundle, const BundleView& view);
 
 /// The bundle of one camera and one arm. points: the target's, 3 x N; poses: seed.
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,

@@ -18,6 +18,8 @@ namespace {
 using Jacobian7 = Eigen::Matrix<double, Eigen::Dynamic, 7, Eigen::RowMajor>;
 using PoseBlock = std::array<double, 7>;  // t, then q as x y z w
 
+const Eigen::Vector3d kBehind = Eigen::Vector3d::UnitZ();  // of a target
+
 PoseBlock block_of(const Eigen::Isometry3d& T) {
   const Eigen::Quaterniond q(T.linear());
   return {T.translation().x(), T.translation().y(), T.translation().z(), q.x(), q.y(), q.z(), q.w()};
@@ -90,16 +92,17 @@ class ViewChain {
   std::optional<Chain> chain_;
 };
 
-/// Blocks: camera, base, target, correction, intrinsics, scale, time offset.
-class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1> {
+/// Blocks: camera, base, target, correction, intrinsics, scale, time offset, warp.
+class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1, 2> {
  public:
-  CornerCost(std::shared_ptr<ViewChain> chain, const Eigen::Vector3d& point, const Eigen::Vector2d& pixel,
-             double sigma)
-      : chain_(std::move(chain)), point_(point), pixel_(pixel), weight_(1 / sigma) {}
+  CornerCost(std::shared_ptr<ViewChain> chain, Eigen::Vector3d point, const Eigen::Vector2d& bow,
+             const Eigen::Vector2d& pixel, double sigma)
+      : chain_(std::move(chain)), point_(std::move(point)), bow_(bow), pixel_(pixel), weight_(1 / sigma) {}
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const Chain& chain = chain_->at(x, *x[6]);
-    const Eigen::Vector3d p = *x[5] * point_;
+    const Eigen::Vector3d bowed = point_ + bow_.dot(Eigen::Map<const Eigen::Vector2d>(x[7])) * kBehind;
+    const Eigen::Vector3d p = *x[5] * bowed;
     const Eigen::Vector3d q = chain.target_in_camera() * p;
     if (!(q.z() > 1e-6)) return false;
     Eigen::Matrix<double, 2, 3> d_point;
@@ -119,15 +122,19 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
       Eigen::Map<Eigen::Matrix<double, 2, kIntrinsics, Eigen::RowMajor>> d(jacobians[4]);
       d = weight_ * d_intrinsics;
     }
-    if (jacobians[5]) Eigen::Map<Eigen::Vector2d>(jacobians[5], 2) = d_point * chain.d_scale(point_);
+    if (jacobians[5]) Eigen::Map<Eigen::Vector2d>(jacobians[5], 2) = d_point * chain.d_scale(bowed);
     if (jacobians[6]) Eigen::Map<Eigen::Vector2d>(jacobians[6], 2) = d_point * chain.d_time(d_correction);
+    if (jacobians[7]) {
+      Eigen::Map<Eigen::Matrix<double, 2, 2, Eigen::RowMajor>> d(jacobians[7]);
+      d = *x[5] * d_point * chain.d_scale(kBehind) * bow_.transpose();
+    }
     return true;
   }
 
  private:
   std::shared_ptr<ViewChain> chain_;
   Eigen::Vector3d point_;
-  Eigen::Vector2d pixel_;
+  Eigen::Vector2d bow_, pixel_;
   double weight_;
 };
 
@@ -198,14 +205,55 @@ class ScalePrior final : public ceres::SizedCostFunction<1, 1> {
   double weight_;
 };
 
+/// Likewise of its warp.
+class WarpPrior final : public ceres::SizedCostFunction<2, 2> {
+ public:
+  explicit WarpPrior(double sd) : weight_(1 / sd) {}
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    Eigen::Map<Eigen::Vector2d>(residual, 2) = weight_ * Eigen::Map<const Eigen::Vector2d>(x[0]);
+    if (jacobians && jacobians[0])
+      Eigen::Map<Eigen::Matrix2d>(jacobians[0], 2, 2) = weight_ * Eigen::Matrix2d::Identity();
+    return true;
+  }
+
+ private:
+  double weight_;
+};
+
+/// One part of what is known of a lens.
+class LensPart final : public ceres::CostFunction {
+ public:
+  LensPart(LensPrior::Rows rows, const IntrinsicsVector& stated) : rows_(std::move(rows)), stated_(stated) {
+    set_num_residuals(static_cast<int>(rows_.rows()));
+    mutable_parameter_block_sizes()->push_back(kIntrinsics);
+  }
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    Eigen::Map<Eigen::VectorXd>(residual, rows_.rows()) =
+        rows_ * (Eigen::Map<const IntrinsicsVector>(x[0]) - stated_);
+    if (jacobians && jacobians[0])
+      Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, kIntrinsics, Eigen::RowMajor>>(
+          jacobians[0], rows_.rows(), kIntrinsics) = rows_;
+    return true;
+  }
+
+ private:
+  LensPrior::Rows rows_;
+  IntrinsicsVector stated_;
+};
+
 /// The bundle as blocks of numbers, as Ceres wants it.
 struct Blocks {
   std::vector<PoseBlock> cameras, bases, targets, corrections;
   std::vector<IntrinsicsVector> intrinsics;
+  std::vector<Eigen::Vector2d> warps;
   std::vector<double> scales, time_offsets, depth_scales;
 
   explicit Blocks(const Bundle& bundle)
-      : scales(bundle.scales), time_offsets(bundle.time_offsets), depth_scales(bundle.depth_scales) {
+      : warps(bundle.warps),
+        scales(bundle.scales),
+        time_offsets(bundle.time_offsets),
+        depth_scales(bundle.depth_scales) {
+    warps.resize(bundle.targets.size(), Eigen::Vector2d::Zero());
     depth_scales.resize(bundle.cameras.size(), 1);
     for (const Eigen::Isometry3d& T : bundle.cameras) cameras.push_back(block_of(T));
     for (const Eigen::Isometry3d& T : bundle.bases) bases.push_back(block_of(T));
@@ -223,6 +271,7 @@ struct Blocks {
     for (std::size_t i = 0; i < intrinsics.size(); ++i)
       bundle.intrinsics[i] = with_vector(bundle.intrinsics[i], intrinsics[i]);
     bundle.scales = scales;
+    bundle.warps = warps;
     bundle.time_offsets = time_offsets;
     bundle.depth_scales = depth_scales;
   }
@@ -237,11 +286,13 @@ void add_views(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, co
     double* correction = blocks.corrections[static_cast<std::size_t>(view.pose)].data();
     const auto chain = std::make_shared<ViewChain>(bundle.setup, pose);
     for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
-      problem.AddResidualBlock(
-          new CornerCost(chain, view.points.col(i), view.pixels.col(i), noise.corner[camera]),
-          settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr, blocks.cameras[camera].data(),
-          blocks.bases[arm].data(), blocks.targets[target].data(), correction,
-          blocks.intrinsics[camera].data(), &blocks.scales[target], &blocks.time_offsets[arm]);
+      problem.AddResidualBlock(new CornerCost(chain, view.points.col(i), view.bows.col(i), view.pixels.col(i),
+                                              noise.corner[camera]),
+                               settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr,
+                               blocks.cameras[camera].data(), blocks.bases[arm].data(),
+                               blocks.targets[target].data(), correction, blocks.intrinsics[camera].data(),
+                               &blocks.scales[target], &blocks.time_offsets[arm],
+                               blocks.warps[target].data());
     }
     for (Eigen::Index i = 0; i < view.depth_points.cols(); ++i) {
       problem.AddResidualBlock(new DepthCost(chain, view.depth_points.col(i), noise.depth[camera]),
@@ -277,8 +328,15 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
       hold(problem, correction);
     }
   }
-  for (IntrinsicsVector& block : blocks.intrinsics) {
+  for (std::size_t camera = 0; camera < blocks.intrinsics.size(); ++camera) {
+    IntrinsicsVector& block = blocks.intrinsics[camera];
     if (!problem.HasParameterBlock(block.data())) continue;
+    if (unknowns.intrinsics > 0 && !bundle.priors.lenses.empty()) {
+      const LensPrior& prior = bundle.priors.lenses[camera];
+      for (const LensPrior::Rows& part : prior.parts)
+        problem.AddResidualBlock(new LensPart(part, prior.stated),
+                                 new ceres::CauchyLoss(std::sqrt(kLensTail)), block.data());
+    }
     std::vector<int> constant;
     for (int i = unknowns.intrinsics; i < kIntrinsics; ++i) constant.push_back(i);
     if (unknowns.intrinsics == 0)
@@ -292,6 +350,13 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
       hold(problem, scale);
     else if (problem.HasParameterBlock(scale))
       problem.AddResidualBlock(new ScalePrior(prior_scale_sd(bundle.priors, target)), nullptr, scale);
+  }
+  for (std::size_t target = 0; target < blocks.warps.size(); ++target) {
+    double* warp = blocks.warps[target].data();
+    if (!unknowns.warps)
+      hold(problem, warp);
+    else if (problem.HasParameterBlock(warp))
+      problem.AddResidualBlock(new WarpPrior(bundle.priors.warp_sd[target]), nullptr, warp);
   }
   for (double& tau : blocks.time_offsets)
     if (!unknowns.time_offsets) hold(problem, &tau);

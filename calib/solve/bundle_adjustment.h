@@ -16,8 +16,9 @@ struct NoiseLevels {
 /// What may change. The first arm's base never does.
 struct Unknowns {
   bool corrections = true;  ///< of robot poses, held by a prior of their noise: errors in variables
-  int intrinsics = 0;       ///< how many of fx fy cx cy k1 k2 p1 p2 k3 ...
+  int intrinsics = 0;       ///< how many of fx fy cx cy k1 k2 p1 p2 k3 ..., held by Priors::lenses
   bool scales = false;      ///< of targets, held by Priors::scale_sd
+  bool warps = false;       ///< of targets, held by Priors::warp_sd
   bool time_offsets = false;
   bool depth_scales = true;  ///< of cameras with depth: it tells shape and tilt, not how long a metre is
 };

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 #include "calib/dataset/pose_file.h"
 #include "calib/geometry/pose.h"
@@ -32,6 +33,13 @@ Poses reordered_quaternions(Poses poses) {
   return poses;
 }
 
+bool same_poses(const Poses& a, const Poses& b) {
+  constexpr double kSame = 1e-6;
+  for (std::size_t i = 0; i < a.size(); ++i)
+    if (!(motion_between(a[i], b[i]).cwiseAbs().maxCoeff() < kSame)) return false;
+  return true;
+}
+
 void add_pairings(const Reading& as_stated, std::vector<Reading>& readings) {
   const auto count = static_cast<int>(as_stated.T_base_gripper.size());
   for (const int shift : {-1, 1, -2, 2}) {
@@ -58,37 +66,41 @@ Poses with_angles(Poses poses, const std::vector<Eigen::Vector3d>& angles, const
   return poses;
 }
 
-Poses with_rotation_vectors(Poses poses, const std::vector<Eigen::Vector3d>& angles, double factor) {
-  for (std::size_t i = 0; i < poses.size(); ++i) poses[i].linear() = rotation_exp(factor * angles[i]);
-  return poses;
+std::string sentence_of(const std::string& order) {
+  const std::string option = " (--angles " + order + ")";
+  if (order == kRotationVector)
+    return "the three angles are a rotation vector, not roll, pitch, yaw" + option;
+  if (order.front() >= 'x') return "the three angles turn about fixed " + order + ", not fixed xyz" + option;
+  const std::string whose = order == "ZYX"   ? ", as KUKA's A B C"
+                            : order == "XYZ" ? ", as Staubli's rx ry rz"
+                            : order == "ZYZ" ? ", as Kawasaki's O A T"
+                                             : "";
+  return "the three angles turn about turning " + order + whose + ", not fixed xyz" + option;
 }
 
+/// The units that the numbers allow: no angle is beyond a full turn.
 void add_angle_readings(const Reading& as_stated, const std::vector<Eigen::Vector3d>& angles,
                         std::vector<Reading>& readings) {
   struct Unit {
     double factor;
     const char* text;
   };
-  constexpr double kDegree = M_PI / 180;
+  constexpr double kDegree = M_PI / 180, kTurn = 2 * M_PI + 1e-6;
   const std::array<Unit, 3> units{{{1, ""},
                                    {kDegree, "angles are degrees where radians were expected"},
                                    {1 / kDegree, "angles are radians where degrees were expected"}}};
+  double largest = 0;
+  for (const Eigen::Vector3d& a : angles) largest = std::max(largest, a.cwiseAbs().maxCoeff());
   for (const Unit& unit : units) {
+    if (unit.factor > 1 && unit.factor * largest > kTurn) continue;
     const std::string prefix = unit.text[0] == 0 ? "" : std::string(unit.text) + ", and ";
-    // Fixed axes in the order of the letters; turning axes in the reverse order are the same.
-    for (const char* order : {"xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "zxz", "zyz"}) {
-      if (unit.factor == 1 && std::string(order) == "xyz") continue;
+    for (const std::string& order : angle_orders()) {
+      if (unit.factor == 1 && order == "xyz") continue;
       Reading reading = as_stated;
       reading.T_base_gripper = with_angles(as_stated.T_base_gripper, angles, order, unit.factor);
-      reading.sentence = std::string(order) == "xyz"
-                             ? unit.text
-                             : prefix + "the three angles turn about fixed " + order + ", not fixed xyz";
+      reading.sentence = order == "xyz" ? unit.text : prefix + sentence_of(order);
       readings.push_back(std::move(reading));
     }
-    Reading reading = as_stated;
-    reading.T_base_gripper = with_rotation_vectors(as_stated.T_base_gripper, angles, unit.factor);
-    reading.sentence = prefix + "the three angles are a rotation vector, not roll, pitch, yaw";
-    readings.push_back(std::move(reading));
   }
 }
 
@@ -172,17 +184,28 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
                                         const std::vector<Eigen::Vector3d>& angles,
                                         const ConventionSettings& settings) {
   if (stated.found && stated.score < settings.suspicious) return std::nullopt;
-  Finding best{.sentence = {}, .stated = stated, .found = {}};
-  for (const Reading& reading : alternative_readings(setup, observations, angles)) {
-    const RobustSeed found = robust_seed_of(reading, observations, symmetries, settings.robust_seed);
-    if (!found.found || (stated.found && found.score * settings.better > stated.score)) continue;
-    // A simpler reading, which comes first, is left only for one that closes clearly better.
-    if (best.found.found && found.score > 0.7 * best.found.score) continue;
-    best.found = found;
-    best.sentence = reading.sentence;
-    if (reading.sentence.empty()) name_setup(setup, found, best.sentence);
+  const std::vector<Reading> readings = alternative_readings(setup, observations, angles);
+  std::vector<RobustSeed> seeds;
+  double least = std::numeric_limits<double>::infinity();
+  for (const Reading& reading : readings) {
+    seeds.push_back(robust_seed_of(reading, observations, symmetries, settings.robust_seed));
+    if (seeds.back().found) least = std::min(least, seeds.back().score);
   }
-  if (!best.found.found) return std::nullopt;
+  // Of those that close alike the simplest, which comes first.
+  const auto chosen = static_cast<std::size_t>(
+      std::find_if(seeds.begin(), seeds.end(),
+                   [&](const RobustSeed& seed) { return seed.found && 0.7 * seed.score <= least; }) -
+      seeds.begin());
+  if (chosen == seeds.size()) return std::nullopt;
+  const double score = seeds[chosen].score;
+  if (score > settings.plausible || (stated.found && score * settings.better > stated.score))
+    return std::nullopt;
+  for (std::size_t i = 0; i < seeds.size(); ++i)
+    if (seeds[i].found && seeds[i].score < settings.runner_up * score &&
+        !same_poses(readings[i].T_base_gripper, readings[chosen].T_base_gripper))
+      return std::nullopt;
+  Finding best{.sentence = readings[chosen].sentence, .stated = stated, .found = seeds[chosen]};
+  if (best.sentence.empty()) name_setup(setup, best.found, best.sentence);
   best.sentence += ": so the chain closes to " + closing_text(best.found) + ", as stated to " +
                    (stated.found ? closing_text(stated) : std::string("nothing consistent"));
   return best;

@@ -19,8 +19,8 @@ struct Reading {
 
 /// Readings of the same numbers under the conventions that people mix up: the other setup, inverted poses,
 /// both, millimetres and inches for metres, pairing off by one or two, quaternions w x y z for x y z w, and,
-/// where the file gave angles, other orders of the axes, degrees for radians and radians for degrees. angles:
-/// as the file gave them [rad], one a view, or none.
+/// where the file gave angles, all other readings of them (rotation_from_angles), degrees for radians and
+/// radians for degrees. angles: as the file gave them [rad], one a view, or none.
 std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
                                           const std::vector<Eigen::Vector3d>& angles = {});
 
@@ -28,6 +28,8 @@ struct ConventionSettings {
   RobustSeedSettings robust_seed{.triples = 100, .kept = 3};
   double suspicious = 0.035;  ///< closing error of the majority, rotation [rad] and translation over distance
   double better = 4;          ///< how many times better another reading has to close
+  double runner_up = 2;       ///< and how many times better than the next reading
+  double plausible = 0.07;    ///< and to how little at most, as `suspicious`
 };
 
 struct Finding {
@@ -35,8 +37,8 @@ struct Finding {
   RobustSeed stated, found;  ///< how the input closes as it is stated, and as the finding reads it
 };
 
-/// Tries the readings where the stated one closes badly. Empty where it closes well, or where no other closes
-/// clearly better.
+/// Tries the readings where the stated one closes badly. Empty where it closes well, where no other closes
+/// clearly better, or where two do.
 std::optional<Finding> check_convention(Setup setup, const std::vector<Observation>& observations,
                                         const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
                                         const std::vector<Eigen::Vector3d>& angles = {},

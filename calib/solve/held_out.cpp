@@ -29,7 +29,6 @@ void fit(Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target, 
     bundle = refine(std::move(bundle), anew).bundle;
     return;
   }
-  bundle.scales.assign(bundle.scales.size(), 1.0);
   if (method == Method::bundle) {
     for (RobotPose& pose : bundle.poses) pose.correction.setIdentity();
     solve_bundle(bundle, settings.noise, {.unknowns = {.corrections = false}, .huber = 0});
@@ -75,7 +74,7 @@ HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometr
   for (const BundleView& view : test.views) {
     const Eigen::Isometry3d predicted = predicted_pose(train, view, false);
     // With lens and size of the target as they were solved for.
-    const Eigen::Matrix3Xd points = train.scales[static_cast<std::size_t>(view.target)] * view.points;
+    const Eigen::Matrix3Xd points = true_points(train, view);
     const Eigen::Isometry3d seen =
         fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], points, view.pixels,
                     T_camera_target[static_cast<std::size_t>(view.pose)]);

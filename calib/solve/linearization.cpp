@@ -98,6 +98,27 @@ Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns)
     row[columns.count] = (bundle.scales[target] - 1) / sd;
     gram += row * row.transpose();
   }
+  for (std::size_t target = 0; target < bundle.targets.size(); ++target) {
+    if (columns.warps[target] < 0) continue;
+    const double weight = std::pow(bundle.priors.warp_sd[target], -2);
+    for (Eigen::Index axis = 0; axis < 2; ++axis) {
+      const Eigen::Index column = columns.warps[target] + axis;
+      const double warp = bundle.warps[target][axis];
+      gram(column, column) += weight;
+      gram(column, columns.count) += weight * warp;
+      gram(columns.count, column) += weight * warp;
+      gram(columns.count, columns.count) += weight * warp * warp;
+    }
+  }
+  for (std::size_t camera = 0; camera < bundle.priors.lenses.size(); ++camera) {
+    const int first = columns.intrinsics[camera], count = columns.intrinsics_count;
+    if (first < 0) continue;
+    std::vector<int> places;
+    for (int i = 0; i < count; ++i) places.push_back(first + i);
+    places.push_back(columns.count);
+    gram(places, places) +=
+        lens_prior_gram(bundle.priors.lenses[camera], to_vector(bundle.intrinsics[camera]), count);
+  }
   return gram;
 }
 
@@ -118,6 +139,7 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
   take(columns.intrinsics, bundle.cameras.size(), unknowns.intrinsics);
   columns.intrinsics_count = unknowns.intrinsics;
   take(columns.scales, bundle.targets.size(), unknowns.scales ? 1 : 0);
+  take(columns.warps, bundle.targets.size(), unknowns.warps ? 2 : 0);
   take(columns.time_offsets, bundle.bases.size(), unknowns.time_offsets ? 1 : 0);
   columns.depth_scales.assign(bundle.cameras.size(), -1);
   for (const BundleView& view : bundle.views) {
@@ -140,6 +162,9 @@ void move_shared(Bundle& bundle, const SharedColumns& columns, const Eigen::Vect
   move_poses(bundle.targets, columns.targets);
   move_poses(bundle.bases, columns.bases);
   move_numbers(bundle.scales, columns.scales);
+  bundle.warps.resize(bundle.targets.size(), Eigen::Vector2d::Zero());
+  for (std::size_t i = 0; i < bundle.warps.size(); ++i)
+    if (columns.warps[i] >= 0) bundle.warps[i] += step.segment<2>(columns.warps[i]);
   move_numbers(bundle.time_offsets, columns.time_offsets);
   bundle.depth_scales.resize(bundle.cameras.size(), 1);
   move_numbers(bundle.depth_scales, columns.depth_scales);
@@ -173,12 +198,13 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
   const auto camera = static_cast<std::size_t>(view.camera), target = static_cast<std::size_t>(view.target);
   const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics[camera]);
   const double scale = bundle.scales[target];
+  const Eigen::Matrix3Xd points = true_points(bundle, view);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(builder.width(), builder.width());
   Eigen::Matrix<double, 2, Eigen::Dynamic> rows;
   Eigen::Matrix<double, 2, 3> d_q;
   Eigen::Matrix<double, 2, kIntrinsics> d_intrinsics;
   for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
-    const Eigen::Vector3d p = scale * view.points.col(i);
+    const Eigen::Vector3d p = points.col(i);
     const Eigen::Vector3d q = builder.chain().target_in_camera() * p;
     const Eigen::Vector2d residual = project(intrinsics, q, &d_q, &d_intrinsics) - view.pixels.col(i);
     builder.fill<2>(d_q, p, q, rows);
@@ -186,8 +212,10 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
       rows.middleCols(builder.first_shared() + columns.intrinsics[camera], unknowns.intrinsics) =
           d_intrinsics.leftCols(unknowns.intrinsics);
     if (columns.scales[target] >= 0)
-      rows.col(builder.first_shared() + columns.scales[target]) =
-          d_q * builder.chain().d_scale(view.points.col(i));
+      rows.col(builder.first_shared() + columns.scales[target]) = d_q * builder.chain().d_scale(p / scale);
+    if (columns.warps[target] >= 0)
+      rows.middleCols<2>(builder.first_shared() + columns.warps[target]) =
+          scale * d_q * builder.chain().d_scale(Eigen::Vector3d::UnitZ()) * view.bows.col(i).transpose();
     rows.col(builder.width() - 1) = residual;
     const double weight = huber_weight(residual.norm(), sigma, huber);
     gram += weight * rows.transpose() * rows;

@@ -93,12 +93,18 @@ def some_jolted(poses):
     return [jolted(pose, rng) if i % 3 == 1 and i < 15 else pose for i, pose in enumerate(poses)]
 
 
-def as_angles(columns, unit):
-    """Poses as roll, pitch and yaw under the given names, multiplied by `unit`."""
+def as_angles(columns, unit, backwards=False, length=1):
+    """Poses as roll, pitch and yaw under the given names, multiplied by `unit`; backwards as KUKA writes them. Without
+    names: bare numbers, in the order of the pictures."""
     def spoil(folder):
-        rows = [f"index,tx,ty,tz,{columns}"]
+        rows = [f"index,tx,ty,tz,{columns}"] if columns else []
         for pose in read_poses(folder / "poses.tum"):
             turn = [unit * angle for angle in roll_pitch_yaw(pose[4:])]
+            if backwards:
+                turn.reverse()
+            if not columns:
+                rows.append(",".join(f"{value:.10g}" for value in (*(length * x for x in pose[1:4]), *turn)))
+                continue
             rows.append(",".join(f"{value:.10g}" for value in (int(pose[0]), *pose[1:4], *turn)))
         (folder / "poses.tum").unlink()
         (folder / "poses.csv").write_text("\n".join(rows) + "\n")
@@ -111,6 +117,12 @@ def shuffled(poses):
     places = [pose[1:] for pose in poses]
     random.Random(5).shuffle(places)
     return [[pose[0], *place] for pose, place in zip(poses, places)]
+
+
+def knocked(poses):
+    """The camera in the hand moves by 8 mm before the ninth picture, which looks as if the gripper had moved."""
+    return [pose if i < 8 else [pose[0], *(x + y for x, y in zip(pose[1:4], rotate(pose[4:], (0.006, -0.004, 0.0035)))),
+                                *pose[4:]] for i, pose in enumerate(poses)]
 
 
 def first_views(count):
@@ -150,6 +162,10 @@ def nothing(folder):
     return []
 
 
+def both(first, second):
+    return lambda folder: [*first(folder), *second(folder)]
+
+
 class Trap:
     """`spoil` a copy of the set; the program must end with `code`. Refused: one line with all `words`. Handled: the
     right answer from `used` views, and warnings with all `words`."""
@@ -170,6 +186,14 @@ def traps():
         yield Trap(f"{other}: degrees for radians", sound, as_angles("rx,ry,rz", math.degrees(1)), 2, "degrees?")
         yield Trap(f"{other}: radians for degrees", sound, as_angles("rx_deg,ry_deg,rz_deg", 1), 2,
                    "radians where degrees were expected")
+        yield Trap(f"{other}: KUKA's angles", sound, as_angles("rx_deg,ry_deg,rz_deg", math.degrees(1), True), 2,
+                   "--angles ZYX")
+        yield Trap(f"{other}: KUKA's angles, said", sound,
+                   both(as_angles("rx_deg,ry_deg,rz_deg", math.degrees(1), True), option("--angles", "ZYX")), 0, used=16)
+        yield Trap(f"{other}: bare degrees and millimetres", sound, as_angles("", math.degrees(1), length=1000), 0,
+                   "x y z [mm], three angles [deg]", used=16)
+        yield Trap(f"{other}: a pose is missing", sound, poses_changed(lambda p: p[:5] + p[6:]), 0,
+                   "005.png: no pose with number 5", "it is left out", used=15)
         yield Trap(f"{other}: millimetres", sound, poses_changed(millimetres), 2, "millimetres")
         yield Trap(f"{other}: squares 8 % too small", sound, option("--target", "chessboard:9x6:0.02315"), 3,
                    "the data want a target 1.0")
@@ -178,7 +202,8 @@ def traps():
                    used=11)
         yield Trap(f"{other}: copies", sound, copied, 0, "100.png: not used: a copy of 000.png",
                    "6 of 22 views were not used", used=16)
-        yield Trap(f"{other}: a picture cut off", sound, cut_picture, 0, "004.png: left out", used=15)
+        yield Trap(f"{other}: a picture cut off", sound, cut_picture, 0, "004.png: not used", used=15)
+    yield Trap("a knock half-way", "in_hand", poses_changed(knocked), 0, "the camera moved by", "before 008.png", used=8)
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")
     yield Trap("one axis", "one_axis", nothing, 2, "rotations turn about one axis only", "cannot be determined")

@@ -130,7 +130,9 @@ TEST(Register, SizeOfATargetIsNotSolvedForWhereArmsOnlyTurn) {
   EXPECT_FALSE(cell.sizes.front().wanted);
   EXPECT_NEAR(cell.sizes.front().sd, kPrintSd, 0.02 * kPrintSd);  // nothing but the prior tells it
   try {
-    solve_cell({member}, {}, std::numeric_limits<double>::infinity());
+    CellSettings settings;
+    settings.target_size_sd = std::numeric_limits<double>::infinity();
+    solve_cell({member}, settings);
     FAIL() << "accepted";
   } catch (const data::InputError& error) {
     EXPECT_NE(std::string(error.what()).find("do not tell the size of the targets"), std::string::npos);

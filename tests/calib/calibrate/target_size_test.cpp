@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "calib/calibrate/calibrate.h"
+#include "calib/calibrate/extrinsics.h"
 #include "calib/check/projection_check.h"
 #include "calib/solve/linearization.h"
 #include "tests/calib/hand_eye_scene.h"
@@ -57,13 +58,14 @@ TEST_P(TargetSizes, SizeThatIsNotKnownIsMeasuredAndNoLongerMovesTheCamera) {
   EXPECT_LT(millimetres_off(result, scene), 0.2 * 0.015 * distance);
 }
 
-TEST_P(TargetSizes, ValidationIsForTheSizeThatWasSolvedFor) {
+TEST_P(TargetSizes, ValidationIsForSizeWarpAndLensThatWereSolvedFor) {
   const HandEyeScene scene = scene_of(GetParam(), 1.015, 21);
   const Calibration result = calibrated(scene, kUnknown);
-  const double scale = result.refined.bundle.scales.front();
-  const ProjectionCheck check =
-      check_projection(scene.settings.setup, result.poses, scene.camera, parse_target("chessboard:9x6:0.025"),
-                       for_target_size(scene.observations, scale), scale);
+  const Target target = parse_target("chessboard:9x6:0.025");
+  const Extrinsics extrinsics = extrinsics_of(result, {});
+  const ProjectionCheck check = check_projection(
+      scene.settings.setup, result.poses, *extrinsics.lens, target,
+      with_poses_for(*extrinsics.lens, target, extrinsics.target, scene.observations), extrinsics.target);
   EXPECT_NEAR(check.corner_rms, result.chain_rms, 1e-9);  // the same sum, the other way round
 }
 

@@ -4,6 +4,7 @@
 #include <cstdio>
 
 #include "calib/calibrate/calibrate.h"
+#include "calib/calibrate/extrinsics.h"
 #include "calib/check/cloud_check.h"
 #include "calib/check/projection_check.h"
 #include "calib/detect/finder.h"
@@ -94,8 +95,10 @@ TEST_P(RenderedClosing, ExactRobotClosesBelowATwentiethOfAPixel) {
   const RenderedSet set = render(given.setup, given.target, small_camera(), given.views, given.least_distance,
                                  given.most_distance, 0.8);
   const Calibration calibration = calibrate(set);
-  const ProjectionCheck check =
-      check_projection(set.setup, calibration.poses, set.camera, set.target, set.observations);
+  const Extrinsics answer = extrinsics_of(calibration, {});
+  const ProjectionCheck check = check_projection(
+      set.setup, calibration.poses, *answer.lens, set.target,
+      with_poses_for(*answer.lens, set.target, answer.target, set.observations), answer.target);
   const double mm = 1e3 * (calibration.poses.X.translation() - set.truth.X.translation()).norm();
   const double deg =
       rotation_angle(calibration.poses.X.linear().transpose() * set.truth.X.linear()) * 180 / M_PI;

@@ -105,7 +105,9 @@ TEST(Dataset, ErrorsAreOneLineThatNamesTheCause) {
   write_pictures(folder, {"000.png", "001.png"});
   EXPECT_TRUE(contains(message_of(folder), "found no poses"));
   folder.write("poses.tum", "0 0.1 0 0 0 0 0 1\n");
-  EXPECT_TRUE(contains(message_of(folder), "001.png: no pose with number 1"));
+  EXPECT_TRUE(contains(load_dataset(folder / "").guesses.at(0), "001.png: no pose with number 1"));
+  folder.write("poses.tum", "7 0.1 0 0 0 0 0 1\n");
+  EXPECT_TRUE(contains(message_of(folder), "000.png: no pose with number 0"));
   folder.write("poses.tum", "0 0.1 0 0 0 0 0 1\n1 0.1 0 0 0 0 0 1.2\n");
   EXPECT_TRUE(contains(message_of(folder), "quaternion has length 1.2"));
   folder.write("poses.tum", "0 400 300 0 0 0 0 1\n1 410 300 20 0 0 0 1\n");

@@ -68,6 +68,30 @@ TEST(Detect, WhatIsKeptIsWhatWasFound) {
             first[0].readings[0].observation.pixels);
 }
 
+TEST(Detect, CornersAreThoseOfAnySizeOfTheTarget) {
+  const data::TemporaryFolder folder;
+  const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 1);
+  DetectSettings settings;
+  settings.cache = folder / "cache";
+  detect(dataset, parse_target("chessboard:7x5:0.03"), settings);
+  detect(dataset, parse_target("chessboard:7x5:0.0301"), settings);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder / "cache"), {}), 1);
+}
+
+TEST(Detect, PicturesOfAnotherSizeNameTheFileOfTheirOwnSet) {
+  const data::TemporaryFolder a, b, kept;
+  const Target target = parse_target("chessboard:7x5:0.03");
+  DetectSettings settings;
+  settings.cache = kept / "";
+  for (const data::TemporaryFolder* folder : {&a, &b}) {
+    Dataset dataset = write_set(*folder, target, 1);  // the same picture
+    dataset.camera->width += 2;
+    const std::string message = data::input_error_of([&] { detect(dataset, target, settings); });
+    EXPECT_NE(message.find("the picture is"), std::string::npos) << message;
+    EXPECT_NE(message.find(dataset.camera_path + " says"), std::string::npos) << message;
+  }
+}
+
 TEST(Detect, NoTargetAnywhereIsAnError) {
   const data::TemporaryFolder folder;
   const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 2);

@@ -26,8 +26,9 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
   bundle.intrinsics[0].model = data::DistortionModel::rational_polynomial;
   bundle.intrinsics[0].distortion = {0.1, -0.2, 0.001, -0.002, 0.05, 0.02, -0.03, 0.01};
   bundle.scales[0] = 1.02;
+  bundle.warps = {Eigen::Vector2d(0.004, -0.003)};
   const Unknowns unknowns{
-      .corrections = true, .intrinsics = kIntrinsics, .scales = true, .time_offsets = true};
+      .corrections = true, .intrinsics = kIntrinsics, .scales = true, .warps = true, .time_offsets = true};
   const SharedColumns columns = shared_columns(bundle, unknowns);
   double count = 0;
   const Eigen::MatrixXd gram = corner_gram(bundle, bundle.views[0], unknowns, columns, 1, 0, count);
@@ -49,6 +50,8 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
       b.intrinsics[0] = with_vector(b.intrinsics[0], v);
     }
     if (shared == columns.scales[0]) b.scales[0] += step;
+    if (shared >= columns.warps[0] && shared < columns.warps[0] + 2)
+      b.warps[0][shared - columns.warps[0]] += step;
     if (shared == columns.time_offsets[1]) b.time_offsets[1] += step;
     const Eigen::Matrix2Xd r = -residuals(b, b.views[0]);
     return Eigen::VectorXd(r.reshaped());
@@ -64,6 +67,34 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
   EXPECT_LT(
       (size.asDiagonal().inverse() * (gram - expected) * size.asDiagonal().inverse()).cwiseAbs().maxCoeff(),
       1e-6);
+}
+
+// The prior's Gram matrix against differences of its cost, in which each part's weight is held.
+TEST(LensPrior, StandsInTheLinearModelAsItsResidualsDo) {
+  const HandEyeScene scene = protocol_scene(Setup::eye_in_hand, 0, 0, 3);
+  LensCovariance covariance = LensCovariance::Zero();
+  covariance.topLeftCorner<2, 2>() << 4, 3, 3, 9;  // fx and fy; the others as usual
+  LensPrior prior = lens_prior(scene.camera, covariance);
+  IntrinsicsVector lens = to_vector(scene.camera);
+  lens[0] += 2;
+  lens[4] += 0.01;
+  const Eigen::Vector2d off(2, 0);
+  const Eigen::MatrixXd gram = lens_prior_gram(prior, lens, kLensUnknowns);
+  const double squared = off.dot(covariance.topLeftCorner<2, 2>().inverse() * off);
+  const Eigen::Matrix2d stated = covariance.topLeftCorner<2, 2>().inverse() / (1 + squared / kLensTail);
+  EXPECT_LT((gram.topLeftCorner<2, 2>() - stated).norm(), 1e-12);
+  EXPECT_LT((gram.col(kLensUnknowns).head<2>() - stated * off).norm(), 1e-12);
+  // k1 moves the picture's corner, 400 px away at f = 615, by 0.5 % of that where it is off by one deviation.
+  const double sd = 0.005 / (400.0 * 400.0 / (615.0 * 615.0)), k1 = 0.01 / sd;
+  EXPECT_NEAR(gram(4, 4), 1 / (sd * sd) / (1 + k1 * k1 / kLensTail), 1e-9 * gram(4, 4));
+}
+
+TEST(TargetWarp, LeavesTheEndsAndRaisesTheMiddle) {
+  const Eigen::Matrix2Xd bows = target_bows(board_points(5, 3));
+  EXPECT_EQ(bows.col(0), Eigen::Vector2d::Zero());
+  EXPECT_EQ(bows.col(7), Eigen::Vector2d::Ones());
+  EXPECT_EQ(bows.col(2), Eigen::Vector2d(1, 0));
+  EXPECT_TRUE(target_bows(tag_points()).isZero(0));
 }
 
 }  // namespace

@@ -1,0 +1,94 @@
+#include "calib/dataset/npz.h"
+
+#include <cstdint>
+#include <cstring>
+#include <string_view>
+
+#include "data/atomic_file.h"
+#include "data/error.h"
+
+namespace flash::calib {
+namespace {
+
+using data::InputError;
+
+/// A number of the ZIP format, little endian; throws beyond the end of the file.
+template <class Number>
+Number at(const std::string& file, std::size_t place, const std::string& path) {
+  if (place + sizeof(Number) > file.size()) throw InputError(path + ": ends within its data");
+  Number value;
+  std::memcpy(&value, file.data() + place, sizeof value);
+  return value;
+}
+
+/// The value of a key in the header of an array, a Python dictionary.
+std::string_view value_of(std::string_view header, std::string_view key, std::string_view ends) {
+  const std::size_t begin = header.find(key);
+  if (begin == std::string_view::npos) return {};
+  const std::string_view rest = header.substr(begin + key.size());
+  return rest.substr(0, rest.find_first_of(ends));
+}
+
+template <class Number>
+std::vector<double> converted(std::string_view bytes) {
+  std::vector<Number> numbers(bytes.size() / sizeof(Number));
+  std::memcpy(numbers.data(), bytes.data(), numbers.size() * sizeof(Number));
+  return {numbers.begin(), numbers.end()};
+}
+
+/// None of an array that is no list of real numbers.
+std::vector<double> array_of(std::string_view npy) {
+  if (!npy.starts_with("\x93NUMPY") || npy.size() < 12) return {};
+  const bool first_version = npy[6] == 1;
+  const std::size_t begin = first_version ? 10 : 12;
+  const auto byte = [&](std::size_t i) {
+    return static_cast<std::size_t>(static_cast<unsigned char>(npy[i]));
+  };
+  std::size_t length = byte(8) + 256 * byte(9);
+  if (!first_version) length += 65536 * byte(10);
+  if (begin + length > npy.size()) return {};
+  const std::string_view header = npy.substr(begin, length), bytes = npy.substr(begin + length);
+  const bool columns_first = value_of(header, "'fortran_order': ", ",}") == "True";
+  const std::string_view type = value_of(header, "'descr': '", "'");
+  std::vector<double> values;
+  if (type == "<f8") values = converted<double>(bytes);
+  if (type == "<f4") values = converted<float>(bytes);
+  if (type == "<i8") values = converted<std::int64_t>(bytes);
+  if (type == "<i4") values = converted<std::int32_t>(bytes);
+  if (columns_first && values.size() == 9)
+    for (const std::size_t i : {1U, 2U, 5U}) std::swap(values[i], values[3 * (i % 3) + i / 3]);
+  return values;
+}
+
+}  // namespace
+
+std::map<std::string, std::vector<double>> load_npz(const std::string& path) {
+  const std::string file = data::read_file(path);
+  const std::size_t end = file.rfind("PK\x05\x06");
+  if (end == std::string::npos) throw InputError(path + ": no .npz: found no table of contents");
+  std::map<std::string, std::vector<double>> arrays;
+  std::size_t entry = at<std::uint32_t>(file, end + 16, path);
+  const auto count = at<std::uint16_t>(file, end + 10, path);
+  for (std::uint16_t i = 0; i < count; ++i) {
+    const auto method = at<std::uint16_t>(file, entry + 10, path);
+    const auto size = at<std::uint32_t>(file, entry + 20, path);
+    const auto name_length = at<std::uint16_t>(file, entry + 28, path);
+    const auto extra = at<std::uint16_t>(file, entry + 30, path),
+               comment = at<std::uint16_t>(file, entry + 32, path);
+    const std::size_t local = at<std::uint32_t>(file, entry + 42, path);
+    at<char>(file, entry + 46 + name_length, path);
+    std::string name = file.substr(entry + 46, name_length);
+    if (name.ends_with(".npy")) name.resize(name.size() - 4);
+    if (method != 0)
+      throw InputError(path + ": " + name +
+                       " is compressed; write it with numpy.savez, or as camera_info.yaml");
+    const std::size_t begin =
+        local + 30 + at<std::uint16_t>(file, local + 26, path) + at<std::uint16_t>(file, local + 28, path);
+    if (begin + size > file.size()) throw InputError(path + ": " + name + ": ends within its data");
+    arrays[name] = array_of(std::string_view(file).substr(begin, size));
+    entry += 46U + name_length + extra + comment;
+  }
+  return arrays;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,82 @@
+#include "calib/dataset/pose_numbers.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "calib/geometry/pose.h"
+#include "data/error.h"
+#include "data/text.h"
+#include "data/trajectory.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr double kReach = 10;  // [m]
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+Eigen::Isometry3d pose_of(const Eigen::Vector3d& translation, const Eigen::Vector4d& xyzw,
+                          const std::string& path, const std::string& where) {
+  if (std::abs(xyzw.norm() - 1) > 1e-3)
+    throw data::input_error(
+        path, where,
+        "quaternion has length " + data::format_short(xyzw.norm()) + ", expected 1 (order x y z w)");
+  Eigen::Matrix<double, 7, 1> row;
+  row << translation, xyzw;
+  return data::from_vector(row);
+}
+
+Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path, const std::string& where) {
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  const double off = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).norm();
+  if (!(off < 1e-3) || rotation.determinant() < 0 ||
+      (matrix.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).norm() > 1e-6)
+    throw data::input_error(path, where, "expected a rotation and a translation as 4 x 4, last row 0 0 0 1");
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
+  pose.translation() = matrix.topRightCorner<3, 1>();
+  return pose;
+}
+
+Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::string& path,
+                                  const std::string& where) {
+  if (values.size() == 16 || values.size() == 12) {
+    Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+    const auto rows = static_cast<Eigen::Index>(values.size() / 4);
+    matrix.topRows(rows) =
+        Eigen::Map<const Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor>>(values.data(), rows, 4);
+    return pose_of(matrix, path, where);
+  }
+  if (values.size() == 7)
+    return pose_of({values[0], values[1], values[2]}, {values[3], values[4], values[5], values[6]}, path,
+                   where);
+  if (values.size() == 6) {
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() = rotation_exp({values[3], values[4], values[5]});
+    pose.translation() << values[0], values[1], values[2];
+    return pose;
+  }
+  throw data::input_error(path, where,
+                          "found " + std::to_string(values.size()) +
+                              " numbers, expected a pose: 16 or 12 (matrix), 7 (x y z qx qy qz qw) or 6 (x y "
+                              "z and axis times angle)");
+}
+
+bool beyond_reach(std::vector<double> distances) {
+  return !distances.empty() && median(std::move(distances)) > kReach;
+}
+
+void expect_metres(const std::vector<double>& distances, const std::string& path) {
+  if (beyond_reach(distances))
+    throw data::input_error(path, "translations",
+                            "half of them are beyond " + data::format_short(median(distances)) +
+                                " m, expected metres (are these millimetres?)");
+}
+
+}  // namespace flash::calib

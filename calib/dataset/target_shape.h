@@ -1,0 +1,22 @@
+#pragma once
+#include <Eigen/Core>
+
+namespace flash::calib {
+
+/// A target as it was printed: of another size than stated, and not quite flat.
+struct TargetShape {
+  double scale = 1;                                ///< true size over stated size
+  Eigen::Vector2d warp = Eigen::Vector2d::Zero();  ///< see target_bows() [m]
+};
+
+/// How a flat print bends: z = warp_x (1 - u^2) + warp_y (1 - v^2), u and v from -1 to 1 over the points
+/// along x and y. The warp [m] is by how much the middle stands behind the ends. Returns the factors of both.
+Eigen::Matrix2Xd target_bows(const Eigen::Matrix3Xd& target_points);
+
+/// What prints are usually off: 0.3 % of the longer side [m].
+double usual_warp_sd(const Eigen::Matrix3Xd& target_points);
+
+/// Where points with these bows are, in the target frame.
+Eigen::Matrix3Xd shaped(Eigen::Matrix3Xd points, const Eigen::Matrix2Xd& bows, const TargetShape& shape);
+
+}  // namespace flash::calib

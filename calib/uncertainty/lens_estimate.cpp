@@ -1,0 +1,88 @@
+#include "calib/uncertainty/lens_estimate.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <cstdio>
+
+#include "calib/solve/linearization.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr double kFar = 3;  // standard deviations
+
+/// What chi-square exceeds as rarely as a normal distribution its mean by kFar deviations (Wilson and
+/// Hilferty 1931).
+double far_chi_square(double freedom) {
+  const double share = 2 / (9 * freedom);
+  return freedom * std::pow(1 - share + kFar * std::sqrt(share), 3);
+}
+
+}  // namespace
+
+LensEstimate lens_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
+                           std::size_t camera) {
+  LensEstimate lens;
+  lens.stated = lens.estimate = to_vector(bundle.intrinsics[camera]);
+  const SharedColumns columns = shared_columns(bundle, unknowns);
+  const int first = columns.intrinsics[camera], count = columns.intrinsics_count;
+  if (first < 0) return lens;
+  const Eigen::MatrixXd own = covariance.block(first, first, count, count);
+  lens.sd.head(count) = own.diagonal().cwiseSqrt();
+  if (bundle.priors.lenses.empty()) return lens;
+  const LensPrior& prior = bundle.priors.lenses[camera];
+  lens.stated = prior.stated;
+  for (const LensPrior::Rows& part : prior.parts) {
+    const Eigen::MatrixXd rows = part.leftCols(count);
+    const Eigen::VectorXd off = part * (lens.estimate - lens.stated);
+    Eigen::MatrixXd variance = rows * own * rows.transpose();
+    variance.diagonal().array() += 1;
+    if (off.dot(variance.ldlt().solve(off)) < far_chi_square(static_cast<double>(part.rows()))) continue;
+    for (int i = 0; i < count; ++i)
+      if (rows.col(i).norm() > 0) lens.far_off.push_back(i);
+  }
+  return lens;
+}
+
+std::string lens_sentence(const LensEstimate& lens) {
+  constexpr const char* kNames[kLensUnknowns] = {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
+  std::string text = "the lens is not as stated:";
+  for (const int i : lens.far_off) {
+    char part[100];
+    std::snprintf(part, sizeof part,
+                  i < 4 ? " %s %.1f +- %.1f, stated %.1f;" : " %s %.3f +- %.3f, stated %.3f;", kNames[i],
+                  lens.estimate[i], 2 * lens.sd[i], lens.stated[i]);
+    text += part;
+  }
+  return text +
+         " the answer is for the lens solved for (--camera-info writes it); calibrate the lens (flash-calib "
+         "intrinsics)";
+}
+
+bool WarpEstimate::far_off() const {
+  return prior_sd > 0 &&
+         (estimate.array().abs() > kFar * (sd.array().square() + prior_sd * prior_sd).sqrt()).any();
+}
+
+WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
+                           std::size_t target) {
+  WarpEstimate warp;
+  const int first = shared_columns(bundle, unknowns).warps[target];
+  if (first < 0) return warp;
+  warp.estimate = bundle.warps[target];
+  warp.sd = covariance.diagonal().segment<2>(first).cwiseSqrt();
+  warp.prior_sd = bundle.priors.warp_sd[target];
+  return warp;
+}
+
+std::string warp_sentence(const WarpEstimate& warp) {
+  char text[240];
+  std::snprintf(
+      text, sizeof text,
+      "the target is not flat: its middle stands %.1f +- %.1f mm (2 sd) behind its ends along x, %.1f +- "
+      "%.1f mm along y; the answer takes it into account, a flat target needs no such guess",
+      1e3 * warp.estimate.x(), 2e3 * warp.sd.x(), 1e3 * warp.estimate.y(), 2e3 * warp.sd.y());
+  return text;
+}
+
+}  // namespace flash::calib

@@ -1,0 +1,41 @@
+#pragma once
+#include <string>
+
+#include "calib/solve/bundle_adjustment.h"
+#include "calib/solve/lens_prior.h"
+
+namespace flash::calib {
+
+/// What is known of a lens before a picture is taken.
+enum class LensKnowledge {
+  stated,  ///< it is what is stated, to the last digit
+  near,    ///< it is near to what is stated: by the covariance that is stated, else as lenses usually are
+  unknown  ///< nothing
+};
+
+/// A lens that was solved for.
+struct LensEstimate {
+  IntrinsicsVector stated = IntrinsicsVector::Zero(), estimate = stated, sd = stated;
+  std::vector<int> far_off;  ///< unknowns that are not what was stated, by three deviations of both together
+};
+
+/// covariance: of all shared unknowns.
+LensEstimate lens_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
+                           std::size_t camera = 0);
+
+/// "the lens is not as stated: fx 582.1 +- 1.2 (2 sd) px, stated 611.0 ...", of a lens that is far off.
+std::string lens_sentence(const LensEstimate& lens);
+
+/// By how much the middle of a target stands behind its ends, along x and y (target_bows).
+struct WarpEstimate {
+  Eigen::Vector2d estimate = Eigen::Vector2d::Zero(), sd = estimate;  ///< [m]
+  double prior_sd = 0;                                                ///< an axis [m]
+
+  /// More than prints usually bend, by three deviations of both together.
+  bool far_off() const;
+};
+WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
+                           std::size_t target = 0);
+std::string warp_sentence(const WarpEstimate& warp);
+
+}  // namespace flash::calib

@@ -1,0 +1,264 @@
+// The ways in which people hand over pictures, poses and intrinsics.
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <filesystem>
+
+#include "calib/dataset/dataset.h"
+#include "calib/dataset/intrinsics_file.h"
+#include "calib/dataset/npz.h"
+#include "data/error.h"
+#include "data/picture.h"
+#include "tests/data/temporary_folder.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr const char* kCamera =
+    "image_width: 8\nimage_height: 6\ncamera_matrix: {rows: 3, cols: 3, data: [10, 0, 4, 0, 10, 3, 0, 0, "
+    "1]}\n";
+
+/// Two pictures in `images`, and intrinsics.
+void write_pictures(const data::TemporaryFolder& folder, const std::string& images = "images",
+                    const std::vector<std::string>& names = {"a_9.png", "a_10.png"}) {
+  std::filesystem::create_directories(folder / images);
+  for (const std::string& name : names)
+    data::save_png(data::Picture(8, 6, {0, 0, 0}), folder / (images + "/" + name));
+  folder.write("camera_info.yaml", kCamera);
+}
+
+/// A quarter turn about z at (0.1, 0.2, 0.3).
+Eigen::Isometry3d quarter() {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  T.translation() << 0.1, 0.2, 0.3;
+  return T;
+}
+
+void expect_read(const data::TemporaryFolder& folder, const std::string& guess) {
+  const Dataset dataset = load_dataset(folder / "");
+  ASSERT_EQ(dataset.frames.size(), 2U);
+  // Numbers count, not letters: the ninth comes first.
+  EXPECT_EQ(dataset.frames[0].name, "a_9.png");
+  // Written to four digits, a rotation is right to 1e-4.
+  EXPECT_TRUE(dataset.frames[0].T_base_gripper.isApprox(quarter(), 1e-3));
+  EXPECT_LT((dataset.frames[1].T_base_gripper.translation() - Eigen::Vector3d(0.4, 0.5, 0.6)).norm(), 1e-9);
+  const std::string said = dataset.guesses.empty() ? "" : dataset.guesses.front();
+  EXPECT_NE(said.find(guess), std::string::npos) << said;
+  EXPECT_EQ(said.empty(), guess.empty());
+}
+
+TEST(Layouts, FoldersOfPicturesHaveManyNames) {
+  for (const char* name : {"img", "Images", "IMAGE", "rgb", "."}) {
+    const data::TemporaryFolder folder;
+    write_pictures(folder, name);
+    folder.write("poses.tum", "9 0 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+    EXPECT_EQ(load_dataset(folder / "").frames.size(), 2U) << name;
+  }
+}
+
+TEST(Layouts, BitmapsArePictures) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  for (const char* name : {"images/a_9", "images/a_10"})
+    std::filesystem::rename(folder / (std::string(name) + ".png"), folder / (std::string(name) + ".bmp"));
+  folder.write("poses.tum", "9 0 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+  EXPECT_EQ(load_dataset(folder / "").frames.size(), 2U);
+}
+
+TEST(Layouts, BarePosesAreReadAndTheReadingIsSaid) {
+  struct Case {
+    const char *file, *text, *guess;
+  };
+  const Case cases[] = {
+      {"poses.csv", "0.1,0.2,0.3,0,0,1.5708\n0.4,0.5,0.6,0,0,0\n", "x y z [m], three angles [rad]"},
+      {"poses.csv", "100,200,300,0,0,90\n400,500,600,0,0,0\n", "x y z [mm], three angles [deg]"},
+      {"poses.txt", "0.1, 0.2, 0.3, 0, 0, 0.7071, 0.7071\n0.4, 0.5, 0.6, 0, 0, 0, 1\n", "quaternion x y z w"},
+      {"poses.txt", "9 0.1 0.2 0.3 0 0 1.5708\n10 0.4 0.5 0.6 0 0 0\n", "the picture's number"},
+      {"poses.txt", "0 -1 0 0.1 1 0 0 0.2 0 0 1 0.3 0 0 0 1\n1 0 0 0.4 0 1 0 0.5 0 0 1 0.6 0 0 0 1\n",
+       "a matrix, row by row [m]; poses are in the order of the pictures"},
+      {"poses.txt", "0 -1 0 0.1\n1 0 0 0.2\n0 0 1 0.3\n0 0 0 1\n\n1 0 0 0.4\n0 1 0 0.5\n0 0 1 0.6\n0 0 0 1\n",
+       "a matrix, row by row"},
+      {"robot_poses.csv", "0,-1,0,100,1,0,0,200,0,0,1,300\n1,0,0,400,0,1,0,500,0,0,1,600\n", "[mm]"},
+  };
+  for (const Case& c : cases) {
+    const data::TemporaryFolder folder;
+    write_pictures(folder);
+    folder.write(c.file, c.text);
+    expect_read(folder, c.guess);
+  }
+}
+
+TEST(Layouts, MatrixPerTextFile) {
+  for (const char* beginning : {"poses/pose_", "poses/"}) {
+    const data::TemporaryFolder folder;
+    write_pictures(folder);
+    std::filesystem::create_directories(folder / "poses");
+    folder.write(beginning + std::string("9.txt"), "0 -1 0 0.1\n1 0 0 0.2\n0 0 1 0.3\n0 0 0 1\n");
+    folder.write(beginning + std::string("10.txt"), "1, 0, 0, 0.4\n0, 1, 0, 0.5\n0, 0, 1, 0.6\n0, 0, 0, 1\n");
+    expect_read(folder, "a matrix, row by row [m]");
+  }
+}
+
+TEST(Layouts, JsonLists) {
+  const char* const kTexts[] = {
+      R"([{"image": "a_10.png", "x": 0.4, "y": 0.5, "z": 0.6, "qx": 0, "qy": 0, "qz": 0, "qw": 1},
+          {"image": "a_9.png", "pose": [[0,-1,0,0.1],[1,0,0,0.2],[0,0,1,0.3],[0,0,0,1]]}])",
+      R"({"poses": [{"index": 9, "position": [0.1, 0.2, 0.3], "orientation": {"x": 0, "y": 0, "z": 0.7071068, "w": 0.7071068}},
+          {"index": 10, "translation": {"x": 0.4, "y": 0.5, "z": 0.6}, "rotation": [[1,0,0],[0,1,0],[0,0,1]]}]})"};
+  for (const char* text : kTexts) {
+    const data::TemporaryFolder folder;
+    write_pictures(folder);
+    folder.write("poses.json", text);
+    expect_read(folder, "");
+  }
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  folder.write("poses.json", "[[0.1,0.2,0.3,0,0,0.7071068,0.7071068],[0.4,0.5,0.6,0,0,0,1]]");
+  expect_read(folder, "in the order of the pictures");
+}
+
+TEST(Layouts, SamplesOfEasyHandeyeStandBesideTheirPictures) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  const std::string tracking =
+      "  tracking:\n    translation: {x: 0, y: 0, z: 1}\n    rotation: {x: 0, y: 0, z: 0, w: 1}\n";
+  folder.write(
+      "robot.samples",
+      "samples:\n- robot:\n    translation: {x: 0.1, y: 0.2, z: 0.3}\n    rotation: {x: 0, y: 0, z: "
+      "0.7071068, w: 0.7071068}\n" +
+          tracking +
+          "- robot:\n    translation: {x: 0.4, y: 0.5, z: 0.6}\n    rotation: {x: 0, y: 0, z: 0, w: 1}\n" +
+          tracking);
+  expect_read(folder, "in the order of the pictures");
+}
+
+TEST(Layouts, PairsWithNamedFields) {
+  const data::TemporaryFolder folder;
+  const std::string path = folder.write("pairs.json",
+                                        R"([{"gripper": [[1,0,0,1],[0,1,0,2],[0,0,1,3],[0,0,0,1]],
+           "target": {"position": {"x": 0, "y": 0, "z": 1}, "orientation": {"x": 1, "y": 0, "z": 0, "w": 0}}}])");
+  const std::vector<Observation> pairs = pair_observations(load_dataset(path));
+  ASSERT_EQ(pairs.size(), 1U);
+  EXPECT_EQ(pairs[0].T_base_gripper.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(pairs[0].T_camera_target.front().translation().z(), 1);
+  EXPECT_EQ(pairs[0].T_camera_target.front().linear()(1, 1), -1);
+}
+
+TEST(Layouts, PictureWithoutAPoseIsLeftOutByName) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  folder.write("poses.tum", "9 0 0 0 0 0 0 1\n");
+  const Dataset dataset = load_dataset(folder / "");
+  EXPECT_EQ(dataset.frames.size(), 1U);
+  ASSERT_EQ(dataset.guesses.size(), 1U);
+  EXPECT_NE(dataset.guesses[0].find("a_10.png: no pose with number 10"), std::string::npos)
+      << dataset.guesses[0];
+  EXPECT_NE(dataset.guesses[0].find("it is left out"), std::string::npos);
+  // Where poses go by their place alone, one that is missing moves all others.
+  std::filesystem::remove(folder / "poses.tum");
+  folder.write("poses.csv", "0.1,0.2,0.3,0,0,0\n");
+  const std::string message = data::input_error_of([&] { load_dataset(folder / ""); });
+  EXPECT_NE(message.find("1 poses without names or numbers for 2 pictures"), std::string::npos) << message;
+}
+
+TEST(Layouts, NumbersThatAreNoPoseAreNamed) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  folder.write("poses.txt", "1 2 3 4 5\n1 2 3 4 5\n");
+  EXPECT_NE(data::input_error_of([&] { load_dataset(folder / ""); }).find("found 5 numbers"),
+            std::string::npos);
+  folder.write("poses.txt", "0 0 0 0 0 0\n0 0 0 0 0\n");
+  EXPECT_NE(
+      data::input_error_of([&] { load_dataset(folder / ""); }).find("pose 2: found 5 numbers, expected 6"),
+      std::string::npos);
+  folder.write("poses.txt", "0 0 0 0 0 nan\n0 0 0 0 0 0\n");
+  EXPECT_NE(data::input_error_of([&] { load_dataset(folder / ""); }).find("line 1"), std::string::npos);
+}
+
+/// An archive with these arrays of doubles, not compressed.
+std::string npz(const std::vector<std::pair<std::string, std::vector<double>>>& arrays) {
+  std::string file, contents;
+  const auto number = [](std::string& text, auto value) {
+    text.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  for (const auto& [name, values] : arrays) {
+    std::string header =
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (" + std::to_string(values.size()) + ",), }\n";
+    std::string npy = "\x93NUMPY";
+    npy += std::string("\x01\x00", 2);
+    number(npy, static_cast<std::uint16_t>(header.size()));
+    npy += header;
+    for (const double value : values) number(npy, value);
+    const auto place = static_cast<std::uint32_t>(file.size()), size = static_cast<std::uint32_t>(npy.size());
+    const std::string entry = name + ".npy";
+    const auto length = static_cast<std::uint16_t>(entry.size());
+    file += std::string("PK\x03\x04", 4) + std::string(14, '\0');
+    number(file, size);
+    number(file, size);
+    number(file, length);
+    file += std::string(2, '\0') + entry + npy;
+    contents += std::string("PK\x01\x02", 4) + std::string(16, '\0');
+    number(contents, size);
+    number(contents, size);
+    number(contents, length);
+    contents += std::string(12, '\0');
+    number(contents, place);
+    contents += entry;
+  }
+  const auto begin = static_cast<std::uint32_t>(file.size()),
+             size = static_cast<std::uint32_t>(contents.size());
+  const auto count = static_cast<std::uint16_t>(arrays.size());
+  file += contents + std::string("PK\x05\x06", 4) + std::string(4, '\0');
+  number(file, count);
+  number(file, count);
+  number(file, size);
+  number(file, begin);
+  return file + std::string(2, '\0');
+}
+
+TEST(Layouts, IntrinsicsOfManyKinds) {
+  const data::TemporaryFolder folder;
+  const std::string files[] = {
+      folder.write(
+          "opencv.yml",
+          "%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   data: [ 10., "
+          "0., "
+          "4., 0., 11., 3., 0., 0., 1. ]\ndist_coeffs: !!opencv-matrix\n   rows: 1\n   cols: 5\n   dt: d\n   "
+          "data: [ -0.1, 0.01, 0.001, 0.002, 0. ]\n"),
+      folder.write(
+          "matrix.json",
+          R"({"mtx": [[10,0,4],[0,11,3],[0,0,1]], "dist": [[-0.1, 0.01, 0.001, 0.002, 0.0]], "rms": 0.2})"),
+      folder.write(
+          "parts.json",
+          R"({"intrinsics": {"fx": 10, "fy": 11, "ppx": 4, "ppy": 3, "coeffs": [-0.1, 0.01, 0.001, 0.002, 0]}})"),
+      folder.write("numpy.npz",
+                   npz({{"mtx", {10, 0, 4, 0, 11, 3, 0, 0, 1}}, {"dist", {-0.1, 0.01, 0.001, 0.002, 0}}}))};
+  for (const std::string& file : files) {
+    const data::CameraIntrinsics camera = load_intrinsics(file);
+    EXPECT_EQ(camera.width, 0) << file;
+    EXPECT_EQ(camera.fx, 10) << file;
+    EXPECT_EQ(camera.fy, 11) << file;
+    EXPECT_EQ(camera.cx, 4) << file;
+    EXPECT_EQ(camera.cy, 3) << file;
+    EXPECT_EQ(camera.distortion, (std::vector<double>{-0.1, 0.01, 0.001, 0.002, 0})) << file;
+  }
+  EXPECT_EQ(load_intrinsics(folder.write("camera_info.yaml", kCamera)).width, 8);
+}
+
+TEST(Layouts, IntrinsicsThatAreNoneAreNamed) {
+  const data::TemporaryFolder folder;
+  EXPECT_NE(data::input_error_of([&] {
+              load_intrinsics(folder.write("a.json", R"({"rms": 1})"));
+            }).find("camera_matrix: missing"),
+            std::string::npos);
+  EXPECT_NE(data::input_error_of([&] {
+              load_intrinsics(folder.write("b.json", R"({"K": [[10,1,4],[0,11,3],[0,0,1]]})"));
+            }).find("expected 3 x 3"),
+            std::string::npos);
+  for (const std::string& text : {std::string("no archive"), npz({{"mtx", {10}}}).substr(0, 60)})
+    EXPECT_THROW(load_intrinsics(folder.write("c.npz", text)), data::InputError);
+}
+
+}  // namespace
+}  // namespace flash::calib
