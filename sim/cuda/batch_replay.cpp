@@ -216,7 +216,7 @@ struct BatchReplay::Memory {
 
   DeviceArray<ReplayMaterial> materials;
   DeviceArray<Point> positions, velocities, loads;
-  DeviceArray<int> hold_starts, kept_index, order, entries, counters, steps;
+  DeviceArray<int> hold_starts, kept_index, order, steps;
   DeviceArray<HeldPlace> holds;
   DeviceArray<PlacedObstacle> obstacles;
   DeviceArray<FramePose> poses;
@@ -244,9 +244,6 @@ struct BatchReplay::Memory {
                                     [](const auto& e) { return e.material.stiffness_damping != 0; });
     const int most_obstacles_each = upload_obstacles(environments);
     lay_out_teams({front_plan, layout, settings.precision, damped, most_held, most_obstacles_each});
-    const int parts = all_steps / settings.restart_interval + 2;
-    entries = DeviceArray<int>(static_cast<std::size_t>(count) * static_cast<std::size_t>(parts));
-    counters = DeviceArray<int>(2);
     steps = DeviceArray<int>(environments.size());
 
     numbers.fronts = plan.fronts;
@@ -254,7 +251,7 @@ struct BatchReplay::Memory {
     numbers.teams = team_memory.data();
     check(cudaMallocHost(&stop, sizeof(int)));
     *stop = 0;
-    numbers.queue = {entries.data(), counters.data(), counters.data() + 1, steps.data(), stop, 0};
+    numbers.waiting = {steps.data(), count, stop};
     place_on_chip(settings.precision, numbers);
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
@@ -386,17 +383,10 @@ struct BatchReplay::Memory {
   void advance(int more) {
     require(more >= 0 && more <= settings.steps - step, "it cannot advance beyond its last step");
     if (more == 0) return;
-    const int end = step + more, interval = settings.restart_interval;
-    const int parts = (end - 1) / interval - step / interval + 1;
+    const int end = step + more;
     check(cudaStreamSynchronize(stream));
-    std::vector<int> queue(static_cast<std::size_t>(count) * static_cast<std::size_t>(parts), -1);
-    for (int e = 0; e < count; ++e) queue[static_cast<std::size_t>(e)] = e;
-    const int counts[2] = {0, count};
-    entries.write(0, queue.data(), queue.size());
-    counters.write(0, counts, 2);
     const std::vector<int> stand(static_cast<std::size_t>(count), step);
     steps.write(0, stand.data(), stand.size());
-    numbers.queue.size = static_cast<int>(queue.size());
     numbers.end_step = end;
     run_replay(settings.precision, numbers, teams, stream);
     step = end;

@@ -99,6 +99,7 @@ __device__ __noinline__ int generalized_residuals(const FrontTables& fronts, con
     const float* last = memory.basis + static_cast<long>(count) * size;
     __syncthreads();
     for (int i = first; i < size; i += team_threads) preconditioned[i] = last[i];
+    __syncthreads();
     solve(fronts, problem.factor, v.solve, chip);
     restrict_to_free(restrictions, preconditioned);
     __syncthreads();

@@ -4,7 +4,7 @@
 
 #include "sim/cuda/euler_step.cuh"
 #include "sim/cuda/launch.h"
-#include "sim/cuda/work_queue.cuh"
+#include "sim/cuda/waiting_environments.cuh"
 
 namespace flash::sim::cuda {
 namespace {
@@ -79,24 +79,23 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
 }
 
 /// A block is a team. It takes an environment through some steps, until the solver forgets what it holds,
-/// and then takes the next that waits. So none waits for another, and all end at nearly the same time.
+/// and then takes the one that is furthest behind. So none waits for another, and all end at nearly the same
+/// time.
 template <typename Stored>
 __global__ void __launch_bounds__(team_threads, resident_teams_each)
     replay_kernel(const __grid_constant__ ReplayNumbers replay) {
-  int* next = shared_memory<int>();
   const TeamMemory& memory = replay.teams[blockIdx.x];
   while (true) {
     __syncthreads();
-    if (threadIdx.x == 0) next[0] = take(replay.queue, &next[1]);
-    __syncthreads();
-    const int e = next[0], first = next[1];
+    int first = 0;
+    const int e = take(replay.waiting, &first);
     if (e < 0) return;
     const int interval = replay.restart_interval,
               end = min(replay.end_step, (first / interval + 1) * interval);
     advance<Stored>(replay, memory, e, first, end);
     count_phase(memory, ReplayPhase::rest);
     __syncthreads();
-    if (threadIdx.x == 0 && end < replay.end_step) add(replay.queue, e, end);
+    if (threadIdx.x == 0 && end < replay.end_step) add(replay.waiting, e, end);
   }
 }
 

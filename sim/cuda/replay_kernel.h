@@ -5,7 +5,7 @@
 
 namespace flash::sim::cuda {
 
-/// Teams that the device runs at the same time, on which the queue of a replay relies.
+/// Teams that the device runs at the same time.
 int resident_replay_teams(FactorPrecision precision, const FrontTables& fronts);
 
 /// Says what of a replay finds room on chip.

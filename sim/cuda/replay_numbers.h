@@ -104,21 +104,18 @@ struct TeamMemory {
   long long* clocks;    ///< ticks of the processor spent in each phase
 };
 
-/// The queue of work: environments, each as often as it has parts of its motion left.
-struct WorkQueue {
-  int* entries;  ///< -1 where nothing stands yet
-  int* taken;
-  int* added;
-  int* steps;       ///< where each environment stands
+/// The environments that no team works on.
+struct WaitingEnvironments {
+  int* steps;  ///< where each of them stands; -1: a team works on it, or it is at its end
+  int count;
   const int* stop;  ///< of the host: once set no team takes another environment
-  int size;         ///< entries in all
 };
 
 struct ReplayNumbers {
   FrontTables fronts;
   SheetTables sheet;
   const TeamMemory* teams;
-  WorkQueue queue;
+  WaitingEnvironments waiting;
   int places_on_chip;                    ///< whether there is room
   int forward_at, passed_at, search_at;  ///< these vectors of the linear problem on chip, -1 without room
 

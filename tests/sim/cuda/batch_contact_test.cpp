@@ -244,7 +244,7 @@ TEST(BatchContact, ABatchEqualsAloneBitwiseRunAfterRun) {
   SKIP_WITHOUT_DEVICE();
   // Those with a schedule of their own, and without: all in one batch.
   const std::vector<Scene> all = scenes();
-  constexpr int steps = 12;
+  constexpr int steps = 6;
   ReplaySettings settings = settings_of(steps, 1e-3);
   settings.restart_interval = 3;
   std::vector<ReplayEnvironment> environments;
