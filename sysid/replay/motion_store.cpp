@@ -99,7 +99,7 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
         m.poissons_ratio, m.areal_density, m.bending_rigidity, m.friction, m.air_drag, m.stiffness_damping,
         replay.start, replay.settings.solver.time_step, replay.settings.solver.tolerance,
         static_cast<double>(replay.settings.solver.max_iterations),
-        static_cast<double>(replay.recording.has_table)})
+        static_cast<double>(replay.settings.device), static_cast<double>(replay.recording.has_table)})
     bytes.add(value);
   bytes.add_matrix(replay.recording.table_point);
   bytes.add_matrix(replay.recording.table_normal);
