@@ -43,10 +43,10 @@ Environment above(const SheetPlan& plan, double height) {
   Environment environment = environment_of(plan.sheet);
   Points& x = environment.state.positions;
   for (int i = 0; i < x.rows(); ++i) x(i, 2) = height + 1e-4 * (1 + std::sin(20 * x(i, 0) + 30 * x(i, 1)));
-  environment.material.membrane_stiffness = 60;
-  environment.material.bending_rigidity = 5e-5;
-  environment.material.areal_density = 0.2;
-  environment.material.friction = 0.3;
+  environment.materials[0].membrane_stiffness = 60;
+  environment.materials[0].bending_rigidity = 5e-5;
+  environment.materials[0].areal_density = 0.2;
+  environment.materials[0].friction = 0.3;
   return environment;
 }
 
@@ -81,7 +81,7 @@ std::vector<Scene> scenes() {
   });
   add("lift from a smooth table", 0, 30, [&](Environment& e) {
     e.obstacles = {{Plane{}}};
-    e.material.friction = 0;
+    e.materials[0].friction = 0;
     lift(e);
   });
   add("over a box", 0.002, 25, [&](Environment& e) {
@@ -187,7 +187,7 @@ std::vector<Trajectory> by_device(const std::shared_ptr<const SheetPlan>& plan,
 }
 
 double weight_of(const Scene& scene) {
-  return 9.81 * scene.environment.material.areal_density * scene.plan->sheet.vertex_area.sum();
+  return 9.81 * scene.environment.materials[0].areal_density * scene.plan->sheet.vertex_area.sum();
 }
 
 double size_of(const SheetPlan& plan) {
@@ -268,9 +268,9 @@ Scene on_incline(double angle, double friction) {
   const auto plan = sheet(6);
   Scene scene{"incline", plan, environment_of(plan->sheet), 20};
   Environment& e = scene.environment;
-  e.material.membrane_stiffness = 60;
-  e.material.bending_rigidity = 5e-5;
-  e.material.friction = friction;
+  e.materials[0].membrane_stiffness = 60;
+  e.materials[0].bending_rigidity = 5e-5;
+  e.materials[0].friction = friction;
   e.gravity = 9.81 * Vector3d(std::sin(angle), 0, -std::cos(angle));
   e.obstacles = {{Plane{}}};
   return scene;
