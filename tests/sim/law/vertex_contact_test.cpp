@@ -107,7 +107,7 @@ TEST(VertexContact, IsDecidedAsInAContactSet) {
     project_to_feasible(step, linear, trial);
     const double potential = friction_potential(step, set, trial);
     double own_potential = 0;
-    const std::vector<Matrix3d> couplings = friction_couplings(step, set);
+    const std::vector<Matrix3d> couplings = friction_couplings(set);
 
     for (int i = 0; i < vertices; ++i) {
       const Vector3<double> from = vector3(start, i);
