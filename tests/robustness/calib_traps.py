@@ -121,7 +121,7 @@ def shuffled(poses):
 
 def knocked(poses):
     """The camera in the hand moves by 8 mm before the ninth picture, which looks as if the gripper had moved."""
-    return [pose if i < 8 else [pose[0], *(x + y for x, y in zip(pose[1:4], rotate(pose[4:], (0.006, -0.004, 0.0035)))),
+    return [pose if i >= 8 else [pose[0], *(x + y for x, y in zip(pose[1:4], rotate(pose[4:], (0.006, -0.004, 0.0035)))),
                                 *pose[4:]] for i, pose in enumerate(poses)]
 
 

@@ -45,7 +45,7 @@ def main():
             for unit, (_, marked) in cells.items():
                 worse[unit] += marked
             print(f"{name:32} " + " | ".join(text for text, _ in cells.values()) +
-                  (" lens solved" if result["lens"]["solved"] else ""), flush=True)
+                  (" lens not as stated" if not result["lens"]["as_stated"] else ""), flush=True)
     print("worse by more than two standard errors: " + ", ".join(f"{count} in {unit}" for unit, count in worse.items()))
 
 
