@@ -146,6 +146,18 @@ def check_values(options, folder):
         yield from refused(options, folder, words, *expected)
 
 
+def check_device(options, folder):
+    """--device cuda of verbs that no device does, and without one of those that it does."""
+    yield from refused(options, folder, [options.sim, "run", "short.json", "-o", "out", "--device", "cuda"],
+                       "--device cuda", "on the CPU alone")
+    synth = [options.sysid, "synth", "--asset", "cloth.json", "--kind", "hang", "-o", "out", "--device", "cuda"]
+    yield from refused(options, folder, synth, "--device cuda", "on the CPU alone")
+    # Without a device, whatever the machine has.
+    hidden = dict(os.environ, CUDA_VISIBLE_DEVICES="")
+    yield from refused(options, folder, [options.sim, "bench", "--device", "cuda"], "--device cuda", "CUDA",
+                       "use --device cpu or auto", env=hidden)
+
+
 def check_names(options, folder):
     """Names of thousands of letters are said, but not in full."""
     name = "x" * 5000
@@ -347,8 +359,8 @@ def main():
     parser.add_argument("--calib", type=pathlib.Path, help="the program flash-calib")
     parser.add_argument("--only", default="", help="checks whose name has this")
     options = parser.parse_args()
-    checks = [check_config, check_values, check_names, check_places, check_calibration, check_guess, check_kills,
-              check_digits, check_set_up, check_early_signals]
+    checks = [check_config, check_values, check_device, check_names, check_places, check_calibration, check_guess,
+              check_kills, check_digits, check_set_up, check_early_signals]
     done, failed = 0, 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = pathlib.Path(temporary)
