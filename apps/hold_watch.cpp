@@ -14,7 +14,7 @@ std::string name_of(const Hold& hold) {
 }
 
 /// Names the first vertex that two closed holds carry in one axis; empty where there is none.
-std::string contest(const Sheet& sheet, const Environment& environment) {
+std::string contest(const Environment& environment) {
   std::map<std::pair<int, int>, std::size_t> owner;  // of a vertex and an axis
   for (std::size_t k = 0; k < environment.holds.size(); ++k)
     for (const int vertex : environment.state.held[k].vertices)
@@ -22,36 +22,33 @@ std::string contest(const Sheet& sheet, const Environment& environment) {
         if (!environment.holds[k].axes[static_cast<std::size_t>(axis)]) continue;
         const auto [entry, fresh] = owner.try_emplace({vertex, axis}, k);
         if (fresh || entry->second == k) continue;
-        return vertex_name(sheet, vertex) + " is held by " + name_of(environment.holds[entry->second]) +
-               " and by " + name_of(environment.holds[k]) + " at " +
-               data::format_short(environment.state.time) + " s; it obeys " + name_of(environment.holds[k]);
+        return "vertex " + std::to_string(vertex) + " is held by " +
+               name_of(environment.holds[entry->second]) + " and by " + name_of(environment.holds[k]) +
+               " at " + data::format_short(environment.state.time) + " s; it obeys " +
+               name_of(environment.holds[k]);
       }
   return {};
 }
 
 }  // namespace
 
-void HoldWatch::see(const Sheet& sheet, const Environment& environment) {
+void HoldWatch::see(const Environment& environment) {
   std::vector<bool> now;
   for (const HeldVertices& held : environment.state.held) now.push_back(!held.vertices.empty());
   if (now == closed) return;
   closed = now;
   ever_closed.resize(now.size());
   for (std::size_t k = 0; k < now.size(); ++k) ever_closed[k] = ever_closed[k] || now[k];
-  if (contested.empty()) contested = contest(sheet, environment);
+  if (contested.empty()) contested = contest(environment);
 }
 
-std::vector<std::string> hold_warnings(const HoldWatch& watch, const Sheet& sheet,
-                                       const Environment& environment) {
+std::vector<std::string> hold_warnings(const HoldWatch& watch, const Environment& environment) {
   std::vector<std::string> warnings;
   for (std::size_t k = 0; k < environment.holds.size(); ++k) {
     const Hold& hold = environment.holds[k];
     if (k < watch.ever_closed.size() && watch.ever_closed[k]) continue;
-    const std::string& body = hold.reach              ? hold.reach->object
-                              : hold.vertices.empty() ? hold.name
-                                                      : sheet.bodies[body_of(sheet, hold.vertices[0])].name;
-    warnings.push_back(body + ": " + name_of(hold) + " never held anything: asked from " +
-                       data::format_short(hold.from) + " to " + data::format_short(hold.to) +
+    warnings.push_back(name_of(hold) + " never held anything: asked from " + data::format_short(hold.from) +
+                       " to " + data::format_short(hold.to) +
                        " s, and a hold acts in the steps whose middle lies between");
   }
   if (!watch.contested.empty()) warnings.push_back(watch.contested);

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "sim/scene/environment.h"
-#include "sim/scene/sheet.h"
 
 namespace flash::sim {
 
@@ -14,13 +13,12 @@ struct HoldWatch {
   std::string contested;  ///< the first time that two holds carried a vertex in one axis; empty: never
 
   /// To be called after each step.
-  void see(const Sheet& sheet, const Environment& environment);
+  void see(const Environment& environment);
 };
 
 /// What is wrong with the holds of an environment after a whole run: those that never closed, and the first
 /// vertex that two of them carried.
-std::vector<std::string> hold_warnings(const HoldWatch& watch, const Sheet& sheet,
-                                       const Environment& environment);
+std::vector<std::string> hold_warnings(const HoldWatch& watch, const Environment& environment);
 
 /// The name of the hold that a vertex obeys; "a support" where it has none of its own.
 std::string holder_of(const Environment& environment, int vertex);

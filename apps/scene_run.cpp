@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <map>
 #include <memory>
 #include <set>
@@ -29,14 +30,15 @@ using Eigen::Vector3d;
 /// Advances an environment by one step.
 using Stepper = std::function<StepReport(Environment&)>;
 
-Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sheet& sheet) {
+Stepper make_stepper(const data::SceneSolver& solver, double time_step, const SceneBody& body) {
   if (solver.integrator == "newton") {
     SolverSettings settings;
     settings.time_step = time_step;
     settings.max_iterations = solver.max_iterations;
     settings.tolerance = solver.tolerance;
     settings.exit_speed = solver.exit_speed;
-    return [newton = std::make_shared<Solver>(sheet, settings)](Environment& e) { return newton->step(e); };
+    return
+        [newton = std::make_shared<Solver>(body.sheet, settings)](Environment& e) { return newton->step(e); };
   }
   ProjectiveSettings settings;
   settings.time_step = time_step;
@@ -49,9 +51,25 @@ Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sh
   settings.constraints.tolerance = solver.constraint_tolerance;
   settings.constraints.max_force = solver.max_force;
   settings.constraints.linear.solver = dual_solver_from_name(solver.constraint_linear_solver);
-  return [projective = std::make_shared<ProjectiveSolver>(sheet, settings)](Environment& e) {
+  return [projective = std::make_shared<ProjectiveSolver>(body.sheet, settings)](Environment& e) {
     return projective->step(e);
   };
+}
+
+data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
+  data::TriangleMesh mesh;
+  Eigen::Index vertices = 0, triangles = 0;
+  for (const SceneBody& body : bodies) {
+    const data::Points& x = body.environment.state.positions;
+    const data::Triangles& t = body.sheet.rest.triangles;
+    mesh.vertices.conservativeResize(vertices + x.rows(), 3);
+    mesh.triangles.conservativeResize(triangles + t.rows(), 3);
+    mesh.vertices.bottomRows(x.rows()) = x;
+    mesh.triangles.bottomRows(t.rows()) = t.array() + int(vertices);
+    vertices += x.rows();
+    triangles += t.rows();
+  }
+  return mesh;
 }
 
 /// Without the last digits that adding up steps leaves.
@@ -61,7 +79,14 @@ std::string time_text(double seconds) {
   return text;
 }
 
-void check_memory(const data::Scene& scene, std::size_t vertices) {
+std::size_t vertices_of(const std::vector<SceneBody>& bodies) {
+  std::size_t vertices = 0;
+  for (const SceneBody& body : bodies) vertices += static_cast<std::size_t>(body.sheet.rest.vertices.rows());
+  return vertices;
+}
+
+void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies) {
+  const std::size_t vertices = vertices_of(bodies);
   const double needed = solver_bytes_per_vertex * static_cast<double>(vertices), limit = data::memory_limit();
   if (limit > 0 && needed > limit)
     throw data::input_error(scene.source, "objects",
@@ -72,15 +97,29 @@ void check_memory(const data::Scene& scene, std::size_t vertices) {
                                 " MB that there are; a coarser mesh is needed");
 }
 
-std::string log_row(int step, double time, const StepReport& report) {
+std::string log_row(int step, double time, const std::vector<StepReport>& reports) {
+  StepReport largest, sum;
+  bool converged = true;
+  for (const StepReport& r : reports) {
+    largest.residual = data::worst(largest.residual, r.residual);
+    largest.penetration_max = data::worst(largest.penetration_max, r.penetration_max);
+    largest.substeps = std::max(largest.substeps, r.substeps);
+    largest.complementarity = data::worst(largest.complementarity, r.complementarity);
+    sum.iterations += r.iterations;
+    sum.kinetic += r.kinetic;
+    sum.membrane += r.membrane;
+    sum.bending += r.bending;
+    sum.gravitational += r.gravitational;
+    converged = converged && r.converged;
+  }
   std::string row = std::to_string(step) + "," + time_text(time);
-  row += "," + data::format_number(report.residual) + "," + std::to_string(report.iterations);
-  for (double value : {report.penetration_max, report.complementarity, report.kinetic,
-                       report.membrane + report.bending, report.gravitational})
+  row += "," + data::format_number(largest.residual) + "," + std::to_string(sum.iterations);
+  for (double value : {largest.penetration_max, largest.complementarity, sum.kinetic,
+                       sum.membrane + sum.bending, sum.gravitational})
     row += "," + data::format_number(value);
-  row += report.converged ? ",1" : ",0";
-  return row + "," + data::format_number(report.membrane) + "," + data::format_number(report.bending) + "," +
-         std::to_string(report.substeps) + "\n";
+  row += converged ? ",1" : ",0";
+  return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "," +
+         std::to_string(largest.substeps) + "\n";
 }
 
 /// In quotes where a comma, a quote or a line break would end it.
@@ -91,15 +130,19 @@ std::string csv_field(const std::string& text) {
   return quoted + "\"";
 }
 
-std::string force_rows(double time, const Environment& environment, const StepReport& report) {
+std::string force_rows(double time, const std::vector<SceneBody>& bodies,
+                       const std::vector<StepReport>& reports) {
   std::map<std::string, Vector3d> forces;
   const auto add = [&](const std::string& body, const Vector3d& force) {
     forces.try_emplace(body, Vector3d::Zero()).first->second += force;
   };
-  for (std::size_t k = 0; k < environment.holds.size(); ++k)
-    add(environment.holds[k].name, report.hold_forces[k]);
-  for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
-    add(environment.obstacles[k].name, report.obstacle_forces[k]);
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    const Environment& environment = bodies[b].environment;
+    for (std::size_t k = 0; k < environment.holds.size(); ++k)
+      add(environment.holds[k].name, reports[b].hold_forces[k]);
+    for (std::size_t k = 0; k < environment.obstacles.size(); ++k)
+      add(environment.obstacles[k].name, reports[b].obstacle_forces[k]);
+  }
   std::string rows;
   for (const auto& [body, force] : forces) {
     rows += time_text(time) + "," + csv_field(body);
@@ -112,15 +155,17 @@ std::string force_rows(double time, const Environment& environment, const StepRe
 /// The deepest vertex of a kind that a run has seen.
 struct Deepest {
   Penetration penetration;
+  std::size_t body = 0;
   double time = 0;  ///< at the end of its step [s]
 
-  void see(const Penetration& seen, double at) {
-    if (seen.depth > penetration.depth) *this = {seen, at};
+  void see(const Penetration& seen, std::size_t in_body, double at) {
+    if (seen.depth > penetration.depth) *this = {seen, in_body, at};
   }
-  std::string place(const SimulatedScene& world) const {
-    return vertex_name(world.sheet, penetration.vertex) + " is " +
+  std::string place(const std::vector<SceneBody>& bodies) const {
+    const SceneBody& in = bodies[body];
+    return in.name + ": vertex " + std::to_string(penetration.vertex) + " is " +
            data::format_short(1e3 * penetration.depth) + " mm inside " +
-           world.environment.obstacles[static_cast<std::size_t>(penetration.obstacle)].name + " at " +
+           in.environment.obstacles[static_cast<std::size_t>(penetration.obstacle)].name + " at " +
            data::format_short(time) + " s";
   }
 };
@@ -139,9 +184,13 @@ std::set<int> frames_to_write(const data::Scene& scene, int steps) {
 }
 
 /// Takes away all velocity; returns the largest there was [m/s].
-double stop_motion(State& state) {
-  const double fastest = state.velocities.rowwise().norm().maxCoeff();
-  state.velocities.setZero();
+double stop_motion(std::vector<SceneBody>& bodies) {
+  double fastest = 0;
+  for (SceneBody& body : bodies) {
+    data::Points& velocities = body.environment.state.velocities;
+    fastest = std::max(fastest, velocities.rowwise().norm().maxCoeff());
+    velocities.setZero();
+  }
   return fastest;
 }
 
@@ -153,10 +202,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   SceneSummary summary;
   summary.notices = scene.notices;
   const int steps = run.steps >= 0 ? run.steps : scene.steps;
-  SimulatedScene world = simulated_scene(scene, steps, summary.notices);
-  Environment& environment = world.environment;
-  const auto vertices = static_cast<std::size_t>(environment.state.positions.rows());
-  check_memory(scene, vertices);
+  std::vector<SceneBody> bodies = scene_bodies(scene, steps, summary.notices);
+  check_memory(scene, bodies);
   if (scene.steps_by_default && run.steps < 0)
     summary.notices.push_back(scene.source + ": names no length: " + std::to_string(scene.steps) +
                               " steps are run, the default");
@@ -166,16 +213,16 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   const auto begins = [&](const std::string& what) {
     if (run.phase) run.phase(what);
   };
-  const std::string size = data::format_count(vertices) + " vertices";
+  const std::string size = data::format_count(vertices_of(bodies)) + " vertices";
   begins("setting up " + size);
-  const Stepper advance = make_stepper(scene.solver, scene.time_step, world.sheet);
+  std::vector<Stepper> steppers;
+  for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
 
   const std::set<int> frames = frames_to_write(scene, steps);
-  const auto write_frame = [&](int step, const data::Points& positions) {
+  const auto write_frame = [&](int step, const data::TriangleMesh& mesh) {
     char name[32];
     std::snprintf(name, sizeof name, "%06d.ply", step);
-    data::save_triangle_mesh({positions, world.sheet.rest.triangles},
-                             (fs::path(output_dir) / "frames" / name).string());
+    data::save_triangle_mesh(mesh, (fs::path(output_dir) / "frames" / name).string());
     ++summary.frames;
   };
   std::string log =
@@ -196,11 +243,12 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     tables_written = now;
   };
 
+  std::vector<StepReport> reports(bodies.size());
   Deepest held, started;
   double inside_at_end = 0;  // depth at the start of the last step [m]
   std::string holder;
-  HoldWatch watch;
-  const data::Points at_start = environment.state.positions;
+  std::vector<HoldWatch> watches(bodies.size());
+  const data::TriangleMesh at_start = merged(bodies);
   const auto begin_writing = [&] {
     // Of a former run; its tables first, so that they never stand beside frames of this one.
     for (const char* old : {"log.csv", "forces.csv", "frames"}) fs::remove_all(fs::path(output_dir) / old);
@@ -212,30 +260,46 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     bool done = false;
     begins("solving the first step of " + size);
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
-      const StepReport report = advance(environment);
+      std::vector<std::future<void>> pending;
+      const auto advance = [&](std::size_t b) { reports[b] = steppers[b](bodies[b].environment); };
+      for (std::size_t b = 0; b < bodies.size(); ++b)
+        if (run.threads > 1 && b + 1 < bodies.size())
+          pending.push_back(std::async(std::launch::async, advance, b));
+        else
+          advance(b);
+      for (std::future<void>& other : pending) other.get();
       if (step == 1) begin_writing();  // what the first step refuses leaves nothing behind
 
-      const double time = environment.state.time;
-      log += log_row(step, time, report);
-      forces += force_rows(time, environment, report);
-      watch.see(world.sheet, environment);
-      started.see(report.start_penetration, time - scene.time_step);
-      inside_at_end = report.start_penetration.depth;
-      if (report.held_penetration.depth > held.penetration.depth)
-        holder = holder_of(environment, report.held_penetration.vertex);
-      held.see(report.held_penetration, time);
-      summary.residual_max = data::worst(summary.residual_max, report.residual);
-      summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
-      summary.iterations += report.iterations;
-      summary.unconverged_steps += !report.converged;
-      summary.halved_steps += report.substeps > 1;
+      const double time = bodies.empty() ? step * scene.time_step : bodies.front().environment.state.time;
+      log += log_row(step, time, reports);
+      forces += force_rows(time, bodies, reports);
+      bool converged = true, halved = false;
+      inside_at_end = 0;
+      for (std::size_t b = 0; b < reports.size(); ++b) {
+        const StepReport& report = reports[b];
+        watches[b].see(bodies[b].environment);
+        converged = converged && report.converged;
+        halved = halved || report.substeps > 1;
+        started.see(report.start_penetration, b, time - scene.time_step);
+        inside_at_end = std::max(inside_at_end, report.start_penetration.depth);
+        if (report.held_penetration.depth > held.penetration.depth)
+          holder = holder_of(bodies[b].environment, report.held_penetration.vertex);
+        held.see(report.held_penetration, b, time);
+        summary.residual_max = data::worst(summary.residual_max, report.residual);
+        summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
+        summary.iterations += report.iterations;
+      }
+      summary.unconverged_steps += !converged;
+      summary.halved_steps += halved;
       summary.steps = step;
       if (scene.rest_motion) {
-        summary.last_motion = scene.time_step * stop_motion(environment.state);
-        done = summary.at_rest = motion_is_over(environment) && summary.last_motion <= *scene.rest_motion;
+        summary.last_motion = scene.time_step * stop_motion(bodies);
+        const bool over = std::all_of(bodies.begin(), bodies.end(),
+                                      [](const SceneBody& body) { return motion_is_over(body.environment); });
+        done = summary.at_rest = over && summary.last_motion <= *scene.rest_motion;
       }
       if (frames.count(step) || (scene.rest_motion && (done || step == steps)))
-        write_frame(step, environment.state.positions);
+        write_frame(step, merged(bodies));
       write_tables_at_times();
       if (run.progress && !run.progress(step, steps)) summary.interrupted = step < steps;
     }
@@ -244,16 +308,16 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     throw;
   }
   write_tables();
-  if (!summary.interrupted && summary.steps > 0)
-    for (const std::string& warning : hold_warnings(watch, world.sheet, environment))
-      summary.warnings.push_back(warning);
+  for (std::size_t b = 0; b < bodies.size() && !summary.interrupted && summary.steps > 0; ++b)
+    for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
+      summary.warnings.push_back(bodies[b].name + ": " + warning);
   summary.held_penetration_max = held.penetration.depth;
   summary.start_penetration_max = started.penetration.depth;
   if (held.penetration.depth > told_depth)
-    summary.warnings.push_back(held.place(world) + ", where " + holder +
+    summary.warnings.push_back(held.place(bodies) + ", where " + holder +
                                " holds it: is the height of the obstacle right, or the path?");
   if (started.penetration.depth > told_depth)
-    summary.warnings.push_back(started.place(world) + ", where a step starts: the obstacle lets it out at " +
+    summary.warnings.push_back(started.place(bodies) + ", where a step starts: the obstacle lets it out at " +
                                data::format_short(scene.solver.exit_speed) + " m/s" +
                                (inside_at_end > told_depth
                                     ? "; at the end it is still inside, by " +

@@ -10,13 +10,13 @@ namespace flash::sim {
 /// How a run of a scene went.
 struct SceneSummary {
   int steps = 0;                     ///< done
-  int unconverged_steps = 0;         ///< whose residual stayed above the tolerance
+  int unconverged_steps = 0;         ///< with an object whose residual stayed above the tolerance
   double residual_max = 0;           ///< worst |r| / |M g|
   int halved_steps = 0;              ///< that could not be solved as one, and were in parts
   double penetration_max = 0;        ///< [m]
   double held_penetration_max = 0;   ///< of vertices that supports or end effectors hold [m]
   double start_penetration_max = 0;  ///< of vertices that start a step inside an obstacle [m]
-  long iterations = 0;               ///< of all steps
+  long iterations = 0;               ///< of all objects and steps
   int frames = 0;                    ///< written
   double wall_seconds = 0;
   bool interrupted = false;
@@ -29,6 +29,7 @@ struct SceneSummary {
 
 struct SceneRun {
   int steps = -1;                                  ///< to run; below zero: the scene's
+  int threads = 1;                                 ///< objects step in parallel
   std::function<void(const std::string&)> notice;  ///< told each notice before the first step
   std::function<void(const std::string&)> phase;   ///< told what begins that may take minutes
   /// Before the first step and after each; false stops the run.

@@ -30,7 +30,7 @@ namespace {
 
 struct RunOptions {
   std::string scene, out, device = "auto";
-  int steps = -1;
+  int threads = 0, steps = -1;
   std::optional<double> duration;  // [s]
   bool quiet = false, verbose = false, json = false, force = false;
 };
@@ -130,6 +130,8 @@ int run(const RunOptions& options) {
   ProgressLine progress(!options.quiet);
   sim::SceneRun settings;
   settings.steps = steps_to_run(options, scene);
+  settings.threads =
+      options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   settings.notice = [&](const std::string& notice) {
     if (!options.quiet) std::cerr << data::message_line(notice) << '\n';
   };
@@ -186,6 +188,9 @@ void add_run_verb(CLI::App& app, Action& action) {
   verb.add_option("-o,--out", options->out, "Folder to write")->required();
   verb.add_option("--device", options->device, "Where the simulation runs")
       ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+      ->capture_default_str();
+  verb.add_option("--threads", options->threads, "Objects that step at the same time; 0: one a processor")
+      ->check(thread_number())
       ->capture_default_str();
   verb.add_option("--steps", options->steps, "In place of the scene's")
       ->check(whole_number(0, data::max_steps));

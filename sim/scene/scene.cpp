@@ -25,19 +25,13 @@ struct Timeline {
   }
 };
 
-/// The Coulomb coefficients of all objects against what has that name.
-std::vector<double> friction_against(const data::Scene& scene, const std::string& name) {
-  std::vector<double> friction;
-  for (const data::SceneObject& object : scene.objects)
-    friction.push_back(data::friction_between(scene, object.name, name).value_or(-1.0));
-  return friction;
-}
-
-Obstacle obstacle_of(const data::Scene& scene, const data::SceneObstacle& other, int frame) {
+Obstacle obstacle_of(const data::Scene& scene, const std::string& object, const data::SceneObstacle& other,
+                     int frame) {
   Obstacle obstacle;
   obstacle.name = other.name;
   obstacle.frame = frame;
-  obstacle.friction = friction_against(scene, other.name);
+  if (const auto friction = data::friction_between(scene, object, other.name))
+    obstacle.friction = {*friction};
   if (const auto* plane = std::get_if<data::ScenePlane>(&other.shape))
     obstacle.shape = Plane{plane->point, plane->normal};
   else if (const auto* box = std::get_if<data::SceneBox>(&other.shape))
@@ -69,15 +63,10 @@ data::Points start_positions(const data::Scene& scene, const data::SceneObject& 
   return start;
 }
 
-std::vector<int> vertices_of(const Body& body, std::vector<int> vertices) {
-  for (int& vertex : vertices) vertex += body.first_vertex;
-  return vertices;
-}
-
-Hold support_of(const data::SceneFixed& fixed, const Body& body, const data::Points& start) {
-  Hold hold{.name = fixed.name, .vertices = vertices_of(body, fixed.vertices), .axes = fixed.axes};
+Hold support_of(const data::SceneFixed& fixed, const data::Points& start) {
+  Hold hold{.name = fixed.name, .vertices = fixed.vertices, .axes = fixed.axes};
   if (fixed.all)
-    for (int i = 0; i < body.vertex_count; ++i) hold.vertices.push_back(body.first_vertex + i);
+    for (int i = 0; i < int(start.rows()); ++i) hold.vertices.push_back(i);
   hold.targets =
       fixed.positions.rows() > 0 ? fixed.positions : data::Points(start(hold.vertices, Eigen::all));
   if (fixed.over > 0) {
@@ -88,122 +77,103 @@ Hold support_of(const data::SceneFixed& fixed, const Body& body, const data::Poi
   return hold;
 }
 
-void add_supports(const data::Scene& scene, const data::SceneObject& object, const Body& body,
-                  Timeline& timeline, Environment& environment) {
+void add_supports(const data::Scene& scene, const data::SceneObject& object, Timeline& timeline,
+                  Environment& environment) {
+  const data::Points& start = environment.state.positions;
   for (const data::SceneFixed& fixed : object.fixed) {
-    check_vertices(scene, object, "fixed", fixed.vertices, body.vertex_count);
-    environment.holds.push_back(support_of(fixed, body, environment.state.positions));
+    check_vertices(scene, object, "fixed", fixed.vertices, start.rows());
+    environment.holds.push_back(support_of(fixed, start));
   }
   for (const data::SceneLoad& load : object.loads) {
-    check_vertices(scene, object, "loads", load.vertices, body.vertex_count);
-    for (int vertex : load.vertices) environment.loads.push_back({body.first_vertex + vertex, load.force});
+    check_vertices(scene, object, "loads", load.vertices, start.rows());
+    for (int vertex : load.vertices) environment.loads.push_back({vertex, load.force});
   }
   for (const data::ScenePrescribed& prescribed : object.prescribed) {
-    check_vertices(scene, object, "prescribed", prescribed.vertices, body.vertex_count);
+    check_vertices(scene, object, "prescribed", prescribed.vertices, start.rows());
     environment.holds.push_back({.name = prescribed.name,
-                                 .vertices = vertices_of(body, prescribed.vertices),
+                                 .vertices = prescribed.vertices,
                                  .frame = timeline.frame_of(prescribed.trajectory),
                                  .from = prescribed.from,
                                  .to = prescribed.to});
   }
 }
 
-void add_grasps(const data::Scene& scene, const Body& body, Timeline& timeline, Environment& environment) {
-  for (const data::SceneEndEffector& effector : scene.end_effectors)
-    for (const data::SceneGrasp& grasp : effector.grasps)
-      if (grasp.object == body.name)
-        environment.holds.push_back({.name = effector.name,
-                                     .frame = timeline.frame_of(effector.trajectory),
-                                     .at_origin = grasp.zero_length,
-                                     .from = grasp.from,
-                                     .to = grasp.to,
-                                     .closing_time = grasp.zero_length ? grasp.closing_time : 0.0,
-                                     .reach = Reach{.object = body.name,
-                                                    .first_vertex = body.first_vertex,
-                                                    .vertex_count = body.vertex_count,
-                                                    .half_extents = 0.5 * effector.size,
-                                                    .threshold = grasp.threshold}});
-}
-
-void add_obstacles(const data::Scene& scene, Timeline& timeline, Environment& environment) {
-  for (const data::SceneObstacle& other : scene.obstacles) {
-    const auto* box = std::get_if<data::SceneBox>(&other.shape);
-    const int frame = box == nullptr ? base_frame : timeline.frame_of(box->trajectory);
-    environment.obstacles.push_back(obstacle_of(scene, other, frame));
-  }
+void add_end_effectors(const data::Scene& scene, const std::string& object, Timeline& timeline,
+                       Environment& environment) {
   for (const data::SceneEndEffector& effector : scene.end_effectors) {
-    if (!effector.collides) continue;
-    const data::SceneObstacle box{effector.name, data::SceneBox{effector.size, {}, effector.trajectory},
-                                  effector.friction};
-    environment.obstacles.push_back(obstacle_of(scene, box, timeline.frame_of(effector.trajectory)));
+    const int frame = timeline.frame_of(effector.trajectory);
+    if (effector.collides) {
+      const data::SceneObstacle box{effector.name, data::SceneBox{effector.size, {}, effector.trajectory},
+                                    effector.friction};
+      environment.obstacles.push_back(obstacle_of(scene, object, box, frame));
+    }
+    for (const data::SceneGrasp& grasp : effector.grasps)
+      if (grasp.object == object)
+        environment.holds.push_back(
+            {.name = effector.name,
+             .frame = frame,
+             .at_origin = grasp.zero_length,
+             .from = grasp.from,
+             .to = grasp.to,
+             .closing_time = grasp.zero_length ? grasp.closing_time : 0.0,
+             .reach =
+                 Reach{.object = object, .half_extents = 0.5 * effector.size, .threshold = grasp.threshold}});
   }
 }
 
-/// The mesh of an object, and its material at the end of `materials`.
-Sheet load_body(const data::Scene& scene, const data::SceneObject& object,
-                std::vector<data::SheetMaterial>& materials, std::vector<std::string>& notices) {
+double total_area(const Sheet& sheet) { return sheet.vertex_area.sum(); }
+
+SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, Timeline& timeline,
+                    std::vector<std::string>& notices) {
   const data::Asset asset = data::load_asset(object.asset);
   if (asset.element_type != data::ElementType::triangle)
     throw data::input_error(asset.source, "element_type",
                             "TETRAHEDRON, but only sheets (TRIANGLE) can be simulated");
-  Sheet sheet = make_sheet(data::load_asset_mesh(asset), object.name);
-  const data::ResolvedSheet resolved = data::resolve_sheet(asset, sheet.vertex_area.sum());
+  SceneBody body;
+  body.name = object.name;
+  body.sheet = make_sheet(data::load_asset_mesh(asset));
+  const data::ResolvedSheet resolved = data::resolve_sheet(asset, total_area(body.sheet));
   for (const std::string& notice : resolved.notices) notices.push_back(object.name + ": " + notice);
-  if (resolved.uniform_vertex_mass) sheet.vertex_area.setConstant(sheet.vertex_area.mean());
-  materials.push_back(resolved.material);
-  if (scene.bending_model) materials.back().bending_model = *scene.bending_model;
-  return sheet;
-}
+  if (resolved.uniform_vertex_mass) body.sheet.vertex_area.setConstant(body.sheet.vertex_area.mean());
 
-State start_state(const data::Scene& scene, const Sheet& sheet) {
-  State state;
-  state.positions.resize(sheet.rest.vertices.rows(), 3);
-  state.velocities.resize(sheet.rest.vertices.rows(), 3);
-  for (std::size_t b = 0; b < sheet.bodies.size(); ++b) {
-    const Body& body = sheet.bodies[b];
-    const data::SceneObject& object = scene.objects[b];
-    rows_of(body, state.positions) = start_positions(scene, object, rows_of(body, sheet.rest.vertices));
-    rows_of(body, state.velocities) = object.start_velocity.transpose().replicate(body.vertex_count, 1);
+  Environment& environment = body.environment;
+  environment.materials[0] = resolved.material;
+  if (scene.bending_model) environment.materials[0].bending_model = *scene.bending_model;
+  environment.gravity = scene.gravity;
+  environment.state.positions = start_positions(scene, object, body.sheet.rest.vertices);
+  environment.state.velocities =
+      object.start_velocity.transpose().replicate(environment.state.positions.rows(), 1);
+  for (const data::SceneObstacle& other : scene.obstacles) {
+    const auto* box = std::get_if<data::SceneBox>(&other.shape);
+    const int frame = box == nullptr ? base_frame : timeline.frame_of(box->trajectory);
+    environment.obstacles.push_back(obstacle_of(scene, object.name, other, frame));
   }
-  return state;
+  add_supports(scene, object, timeline, environment);
+  add_end_effectors(scene, object.name, timeline, environment);
+  for (const Hold& hold : environment.holds)
+    if (hold.axes != std::array<bool, 3>{true, true, true} && !environment.obstacles.empty())
+      notices.push_back(object.name + ": " + hold.name +
+                        " holds its vertices in some axes alone: they meet no obstacle in the others");
+  return body;
 }
 
 }  // namespace
 
-SimulatedScene simulated_scene(const data::Scene& scene, int steps, std::vector<std::string>& notices) {
-  SimulatedScene world;
-  Environment& environment = world.environment;
-  environment.materials.clear();
-  std::vector<Sheet> sheets;
-  for (const data::SceneObject& object : scene.objects)
-    sheets.push_back(load_body(scene, object, environment.materials, notices));
-  world.sheet = joined(sheets);
-  environment.gravity = scene.gravity;
-  environment.state = start_state(scene, world.sheet);
-
+std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::vector<std::string>& notices) {
+  std::vector<SceneBody> bodies;
   Timeline timeline;
-  add_obstacles(scene, timeline, environment);
-  for (std::size_t b = 0; b < scene.objects.size(); ++b) {
-    const Body& body = world.sheet.bodies[b];
-    const std::size_t first = environment.holds.size();
-    add_supports(scene, scene.objects[b], body, timeline, environment);
-    add_grasps(scene, body, timeline, environment);
-    for (std::size_t k = first; k < environment.holds.size(); ++k)
-      if (environment.holds[k].axes != std::array<bool, 3>{true, true, true} &&
-          !environment.obstacles.empty())
-        notices.push_back(body.name + ": " + environment.holds[k].name +
-                          " holds its vertices in some axes alone: they meet no obstacle in the others");
-  }
+  for (const data::SceneObject& object : scene.objects)
+    bodies.push_back(make_body(scene, object, timeline, notices));
   std::vector<data::Trajectory> trajectories;
   for (const data::Trajectory* trajectory : timeline.trajectories) trajectories.push_back(*trajectory);
-  environment.schedule = make_schedule(trajectories, 0.0, scene.time_step, steps);
-
-  if (scene.objects.size() > 1) notices.push_back("the objects of this scene do not touch each other");
+  const auto schedule = make_schedule(trajectories, 0.0, scene.time_step, steps);
+  for (SceneBody& body : bodies) body.environment.schedule = schedule;
+  if (bodies.size() > 1) notices.push_back("the objects of this scene do not touch each other");
   if (scene.solver.integrator == "newton" && scene.solver.constraint_solver.starts_with("Lite"))
     notices.push_back(
         "contacts are met exactly by the newton integrator; solver.type projective has the inertia metric");
   if (data::asks_for_cuda(scene.solver)) notices.push_back("no CUDA backend here: running on the CPU");
-  return world;
+  return bodies;
 }
 
 }  // namespace flash::sim

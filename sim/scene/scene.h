@@ -8,15 +8,17 @@
 
 namespace flash::sim {
 
-/// A scene, ready to step: its objects are the bodies of one environment.
-struct SimulatedScene {
-  Sheet sheet;  ///< vertex_area carries the mass, even where the asset spreads it evenly over the vertices
+/// One object of a scene, ready to step.
+struct SceneBody {
+  std::string name;
+  Sheet sheet;  ///< vertex_area carries the mass: even where the asset spreads its mass evenly over the
+                ///< vertices
   Environment environment;
 };
 
-/// The scene with a schedule for `steps` steps. What was understood of units and what cannot be done goes to
-/// `notices`. Throws data::InputError: solids, start positions that do not fit the mesh, vertices out of
-/// range.
-SimulatedScene simulated_scene(const data::Scene& scene, int steps, std::vector<std::string>& notices);
+/// The objects of a scene, on one schedule for `steps` steps. What was understood of units and what cannot be
+/// done goes to `notices`. Throws data::InputError: solids, start positions that do not fit the mesh,
+/// vertices out of range.
+std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::vector<std::string>& notices);
 
 }  // namespace flash::sim

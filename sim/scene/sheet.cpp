@@ -102,9 +102,4 @@ int body_of(const Sheet& sheet, int vertex) {
   return body;
 }
 
-std::string vertex_name(const Sheet& sheet, int vertex) {
-  const Body& body = sheet.bodies[body_of(sheet, vertex)];
-  return (body.name.empty() ? "" : body.name + ": ") + "vertex " + std::to_string(vertex - body.first_vertex);
-}
-
 }  // namespace flash::sim

@@ -44,9 +44,6 @@ Sheet body_alone(const Sheet& sheet, const Body& body);
 /// Number of the body that a vertex belongs to.
 int body_of(const Sheet& sheet, int vertex);
 
-/// "towel: vertex 3", counted in its body, for messages.
-std::string vertex_name(const Sheet& sheet, int vertex);
-
 /// The body's rows of an array with a row for each vertex of the sheet.
 template <class Rows>
 auto rows_of(const Body& body, Rows& rows) {

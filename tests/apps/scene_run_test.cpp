@@ -183,13 +183,13 @@ TEST_F(SceneRunTest, PublishedSceneRunsAsItStands) {
     "planecollisions": {"point": [0, 0, 0], "normal": [0, 1, 0], "friction": 0.5}, "objects": {"cloth": "published.json"}})");
   const data::Scene scene = data::load_scene(path);
   std::vector<std::string> notices;
-  const SimulatedScene world = simulated_scene(scene, 2, notices);
-  ASSERT_EQ(world.sheet.bodies.size(), 1u);
-  const Environment& environment = world.environment;
+  const std::vector<SceneBody> bodies = scene_bodies(scene, 2, notices);
+  ASSERT_EQ(bodies.size(), 1u);
+  const Environment& environment = bodies[0].environment;
   EXPECT_EQ(environment.materials[0].constitutive, data::Constitutive::tri_arap);
   EXPECT_EQ(environment.materials[0].membrane_stiffness, 3e4);
   EXPECT_NEAR(environment.materials[0].bending_rigidity, 0.6, 1e-12);
-  const Eigen::VectorXd mass = environment.materials[0].areal_density * world.sheet.vertex_area;
+  const Eigen::VectorXd mass = environment.materials[0].areal_density * bodies[0].sheet.vertex_area;
   EXPECT_LT((mass.array() - 0.225).abs().maxCoeff(), 1e-12);  // evenly over four vertices
   EXPECT_EQ(environment.obstacles.size(), 1u);
   EXPECT_EQ(environment.obstacles[0].friction, (std::vector{0.5}));
@@ -204,6 +204,7 @@ TEST_F(SceneRunTest, StoppedRunKeepsWhatItDid) {
   const std::string path = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 50,
     "gravity": [0, 0, -9.81], "objects": {"cloth": "cloth.json", "other": "cloth.json"}})");
   SceneRun run;
+  run.threads = 2;
   run.progress = [](int done, int) { return done < 3; };
   const SceneSummary summary = run_scene(data::load_scene(path), run, out());
   EXPECT_TRUE(summary.interrupted);

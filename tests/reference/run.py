@@ -34,7 +34,7 @@ def solve(name, scenes, results, sim):
     folder = results / "runs" / name
     begin = time.monotonic()
     path = scene_files.write(scene, rest, folder, scenes)
-    done = subprocess.run([sim, "run", str(path), "-o", str(folder / "out"), "--force", "--quiet"],
+    done = subprocess.run([sim, "run", str(path), "-o", str(folder / "out"), "--force", "--quiet", "--threads", "1"],
                           capture_output=True, text=True)
     if done.returncode != 0:
         raise RuntimeError(f"exit code {done.returncode}: {done.stderr.strip()}")
