@@ -48,7 +48,8 @@ bool StepProblem::balanced(const Iterate& iterate, double tolerance) const {
         return false;
       squared_rounding += rounding * rounding;
     }
-    if (!(rows_of(body, iterate.residual).norm() <= tolerance * force_scales[b] + std::sqrt(squared_rounding)))
+    if (!(rows_of(body, iterate.residual).norm() <=
+          tolerance * force_scales[b] + std::sqrt(squared_rounding)))
       return false;
   }
   return true;

@@ -22,7 +22,8 @@ struct Gap {
 };
 Gap gap_of(const SurfaceGap<double>& gap);
 
-/// An obstacle as it stands in the frame that carries it, in both of its frames. `friction`: on the body at hand.
+/// An obstacle as it stands in the frame that carries it, in both of its frames. `friction`: on the body at
+/// hand.
 MovingObstacle<double> obstacle_in_frame(const Obstacle& obstacle, double friction);
 
 /// Whether a box stands beside another obstacle, so that one may continue the other.
