@@ -261,10 +261,13 @@ void check_values(const Summary& summary, const std::string& path) {
     const std::string field = "parameters." + finding.name;
     if (!summary.best.empty() && !summary.best.contains(finding.name))
       throw data::input_error(path, "best.parameters." + finding.name, "missing, expected a number");
-    if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
     if (finding.values.empty() || finding.values.size() != finding.scores.size())
       throw data::input_error(path, field + ".profile", "expected as many scores as values, one at least");
-    for (const double value : finding.values) check_value(path, "parameters", finding.name, value);
+    const ParameterInfo* const info = info_of(finding.name);
+    if (info == nullptr) throw data::input_error(path, field, "is no parameter");
+    if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
+    for (const double value : finding.values)
+      check_within(path, field + ".profile.values", value, info->low, info->high);
     check_answer(path, field, finding);
     for (const double score : finding.scores) check_score(path, field + ".profile.scores", score);
   }
