@@ -73,7 +73,7 @@ std::vector<double> Posterior::values() const {
 
 double Posterior::quantile(std::size_t k, double share) const {
   Eigen::VectorXd column = samples.col(static_cast<Eigen::Index>(k));
-  const auto at = static_cast<Eigen::Index>(share * static_cast<double>(column.size() - 1) + 0.5);
+  const auto at = static_cast<Eigen::Index>(std::lround(share * static_cast<double>(column.size() - 1)));
   std::nth_element(column.data(), column.data() + at, column.data() + column.size());
   return column[at];
 }
