@@ -93,21 +93,27 @@ Extent next_extent(const Extent& extent, const Posterior& posterior, const std::
   return fits ? extent : next;
 }
 
+std::vector<ReplayResult> motions_at(const Emulator& emulator, const std::vector<double>& values,
+                                     double share) {
+  std::vector<ReplayResult> motions;
+  for (std::size_t r = 0; r < emulator.models.size(); ++r)
+    motions.push_back(std::move(motions_of(emulator.models, share)(r, {values}).front()));
+  return motions;
+}
+
 Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>& axes,
                               const MotionLikelihood& likelihood, const GridSettings& grid,
                               const TellWork& told) {
   std::vector<TwoMeshMotions> all;
   for (const ModelledReplay& model : emulator.models) all.push_back(model.model);
   const std::size_t points = cartesian_product(axes).size();
-  std::vector<Eigen::MatrixXd> residuals(all.size());
+  Eigen::VectorXd deviance(static_cast<Eigen::Index>(points));
   const std::atomic<bool>* const stop = emulator.models.front().replay.settings.solver.stop;
-  for (std::size_t r = 0; r < all.size(); ++r)
-    residuals[r].resize(likelihood.model(r).rows(), static_cast<Eigen::Index>(points));
   const auto look = [&](const std::vector<TwoMeshMotions>& slices, std::size_t i) {
     if (stop != nullptr && *stop) throw data::Stopped();
-    for (std::size_t r = 0; r < slices.size(); ++r)
-      residuals[r].col(static_cast<Eigen::Index>(i)) =
-          likelihood.residuals(r, slices[r].at({}, emulator.share));
+    std::vector<Motion> motions;
+    for (const TwoMeshMotions& slice : slices) motions.push_back(slice.at({}, emulator.share));
+    deviance[static_cast<Eigen::Index>(i)] = likelihood.deviance(motions);
     if (told) told({0, 1}, {});
   };
   // Points that share their first values share the slices there.
@@ -122,7 +128,34 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
     });
   };
   visit(visit, all, 0, 0, points);
-  return likelihood.deviance(residuals);
+  return deviance;
+}
+
+std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<double>& values,
+                                   const Extent& extent, const std::vector<Axis>& axes) {
+  constexpr double kStep = 0.1;  // of the extent, to both sides
+  std::vector<Replay> replays;
+  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
+  std::vector<MotionChange> rates;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    if (axes[k].values.size() < 2) continue;
+    const double at = coordinate_of(axes[k], values[k]), low = coordinate_of(axes[k], extent[k][0]),
+                 high = coordinate_of(axes[k], extent[k][1]);
+    const std::array<double, 2> range = range_of(axes[k]);
+    std::array<double, 2> ends = {std::max(range[0], at - kStep * (high - low)),
+                                  std::min(range[1], at + kStep * (high - low))};
+    const double factor = (high - low) / (ends[1] - ends[0]);
+    MotionChange rate;
+    for (const std::size_t side : {0, 1}) {
+      std::vector<double> moved = values;
+      moved[k] = value_of(axes[k], ends[side]);
+      rate.push_back(
+          {side == 0 ? -factor : factor,
+           std::make_shared<const Motions>(Motions{replays, motions_at(emulator, moved, emulator.share)})});
+    }
+    rates.push_back(std::move(rate));
+  }
+  return rates;
 }
 
 Look narrow(const Emulator& emulator, const Extent& start, const std::vector<double>& at,
@@ -135,10 +168,8 @@ Look narrow(const Emulator& emulator, const Extent& start, const std::vector<dou
   std::optional<Look> look;
   int looked = 0;
   for (int round = 0; round < kRounds; ++round) {
-    std::vector<ReplayResult> reference;
-    for (std::size_t r = 0; r < replays.size(); ++r)
-      reference.push_back(std::move(motions_of(emulator.models, emulator.share)(r, {values}).front()));
-    MotionLikelihood likelihood(replays, reference, grid.score, repeatability, errors);
+    MotionLikelihood likelihood(replays, motions_at(emulator, values, emulator.share), grid.score,
+                                repeatability, errors, rates_at(emulator, values, extent, axes));
     const std::vector<Axis> here = axes_over(extent, axes);
     const Eigen::VectorXd deviance = deviance_over(emulator, here, likelihood, grid, told);
     looked += static_cast<int>(deviance.size());
@@ -189,6 +220,12 @@ std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searche
     }
   }
   return axes;
+}
+
+bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes) {
+  for (std::size_t k = 0; k < axes.size(); ++k)
+    if (axes[k].values.size() > 1 && cell_of(lattice[k]) <= 0.5 * cell_of(axes[k])) return true;
+  return false;
 }
 
 Extent next_lattice(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& searched) {

@@ -28,6 +28,14 @@ struct Emulator {
   double share = 0;                    ///< see TwoMeshMotions
 };
 
+/// Modelled motions at values inside the range, one a recording; `share`: see TwoMeshMotions.
+std::vector<ReplayResult> motions_at(const Emulator& emulator, const std::vector<double>& values,
+                                     double share);
+
+/// How modelled motions change about `values` with each searched parameter, over an extent of it.
+std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<double>& values,
+                                   const Extent& extent, const std::vector<Axis>& axes);
+
 /// The likelihood of modelled motions at every point of a grid, in order.
 Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>& axes,
                               const MotionLikelihood& likelihood, const GridSettings& grid,
@@ -53,6 +61,9 @@ int most_scores(const std::vector<Axis>& axes);
 /// where that is no wider than a cell of the search, else as many, to nine, as `at_most` points allow.
 std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,
                           std::size_t at_most);
+
+/// Whether a lattice has, in any direction, cells of no more than half those of `axes`.
+bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes);
 
 /// Where to simulate next: `extent` itself where nothing likely is beyond it within the searched range, and
 /// the posterior takes half of it or more. Else an extent about the estimate, twice as far on a side that

@@ -109,14 +109,6 @@ std::vector<Replay> replays_of(const Emulator& emulator) {
   return replays;
 }
 
-std::vector<ReplayResult> motions_at(const Emulator& emulator, const std::vector<double>& values,
-                                     double share) {
-  std::vector<ReplayResult> motions;
-  for (std::size_t r = 0; r < emulator.models.size(); ++r)
-    motions.push_back(std::move(motions_of(emulator.models, share)(r, {values}).front()));
-  return motions;
-}
-
 /// The estimate simulated, and what it says of errors of the solution.
 struct Estimate {
   std::vector<ReplayResult> motions;  ///< on the search's own mesh
@@ -178,29 +170,39 @@ std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emu
   return errors;
 }
 
+/// Motions simulated at values, as the emulator's mesh has them; empty where one diverged. `own`: on the
+/// search's own mesh.
+std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emulator& emulator,
+                                                     const std::vector<double>& values,
+                                                     std::vector<ReplayResult>& own) {
+  std::vector<ReplayResult> simulated = motions_at(emulator, values, emulator.share);
+  const std::vector<ReplayResult> own_model = motions_at(emulator, values, kOwn);
+  own.clear();
+  for (std::size_t r = 0; r < task.replays.size(); ++r) {
+    own.push_back(task.store.run(task.replays[r], candidate_at(values, task.grid)));
+    task.tell_motion();
+    if (!own.back().finite) return std::nullopt;
+    add(simulated[r].motion, 1, emulator.models[r].model.on_its_mesh(own.back().motion));
+    add(simulated[r].motion, -1, own_model[r].motion);
+  }
+  return simulated;
+}
+
 /// Empty where a motion diverged.
 std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
                                  const std::vector<double>& values) {
   Estimate estimate;
   const ReplayCandidate candidate = candidate_at(values, task.grid);
   const std::vector<Replay> on_model = replays_of(emulator);
-  const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share),
-                                  own_model = motions_at(emulator, values, kOwn);
-  std::vector<ReplayResult> simulated = model;
-  for (std::size_t r = 0; r < task.replays.size(); ++r) {
-    ReplayResult own = task.store.run(task.replays[r], candidate);
-    task.tell_motion();
-    if (!own.finite) return std::nullopt;
-    add(simulated[r].motion, 1, emulator.models[r].model.on_its_mesh(own.motion));
-    add(simulated[r].motion, -1, own_model[r].motion);
-    estimate.motions.push_back(std::move(own));
-  }
+  const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share);
+  auto simulated = simulate_at(task, emulator, values, estimate.motions);
+  if (!simulated) return std::nullopt;
   const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects) {
     const auto shared = [](Motions& motions) { return std::make_shared<const Motions>(std::move(motions)); };
     estimate.errors.push_back({{{-1, shared(from)}, {1, shared(to)}}, true, corrects});
     estimate.names.push_back(name);
   };
-  add_error("estimate_itself", {on_model, model}, {on_model, simulated}, true);
+  add_error("estimate_itself", {on_model, model}, {on_model, std::move(*simulated)}, true);
   if (!task.settings.solver_check) return estimate;
   if (emulator.share != kOwn)
     add_error("double_mesh", {on_model, motions_at(emulator, values, kFiner)}, {on_model, model}, false);
@@ -215,6 +217,7 @@ std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
 /// An emulator, and the posterior by it.
 struct Found {
   Emulator emulator;
+  std::vector<Axis> axes;  ///< of it: at their values it is exact
   Look look;
   Estimate estimate;
   std::vector<KnownError> errors;  ///< all that the look knows
@@ -237,7 +240,7 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   for (KnownError& error : errors_of_emulator(task, emulator, first.posterior))
     errors.push_back(std::move(error));
   Look second = look(extent_of(first.posterior.axes), first.posterior.values());
-  return Found{std::move(emulator), std::move(second), std::move(*estimate), std::move(errors)};
+  return Found{std::move(emulator), axes, std::move(second), std::move(*estimate), std::move(errors)};
 }
 
 /// Simulations of one recording in a round about the answer, on the own mesh and on the finer one, at most;
@@ -270,11 +273,88 @@ std::optional<Found> look_about(const Task& task, const Extent& extent, const st
   return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
 }
 
+/// The likelihood of motions on the mesh of `replays`, with all errors that are known but those of the
+/// emulator and `more`.
+MotionLikelihood likelihood_about(const Task& task, const Found& found, const std::vector<Replay>& replays,
+                                  const std::vector<double>& values,
+                                  const std::vector<ReplayResult>& reference, std::vector<KnownError> more) {
+  more.insert(more.end(), found.estimate.errors.begin() + 1, found.estimate.errors.end());
+  return {replays,
+          reference,
+          task.grid.score,
+          task.settings.repeatability,
+          more,
+          rates_at(found.emulator, values, extent_of(found.look.posterior.axes), found.axes)};
+}
+
+void set_estimate(Posterior& posterior, const std::vector<Axis>& axes, const std::vector<double>& values) {
+  for (std::size_t k = 0; k < values.size(); ++k)
+    posterior.estimate[static_cast<Eigen::Index>(k)] = coordinate_of(axes[k], values[k]);
+}
+
+std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
+  std::vector<Motion> motions;
+  for (const ReplayResult& result : results) motions.push_back(result.motion);
+  return motions;
+}
+
+/// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
+/// emulator's grid. Whether the mode is as likely as any such point and as the `best` of the search: it is
+/// not where folds fall another way between two simulations.
+bool settle(const Task& task, Found& found, const std::vector<double>& best,
+            const std::vector<KnownError>& held) {
+  constexpr double kMatters = 1;  // of a deviance
+  const std::vector<Replay> on_model = replays_of(found.emulator);
+  const std::vector<double> mode = found.look.posterior.values();
+  std::vector<ReplayResult> own;
+  auto simulated = simulate_at(task, found.emulator, mode, own);
+  if (!simulated) return false;
+  const MotionLikelihood likelihood = likelihood_about(
+      task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
+  const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
+  Eigen::Index likeliest;
+  const double least = of_points.minCoeff(&likeliest), of_mode = likelihood.deviance(motions_in(*simulated));
+  if (least < of_mode)
+    set_estimate(found.look.posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
+  if (of_mode > least + kMatters) return false;
+
+  // The best of the search may be beyond the emulator's grid: both are moved alike to cells of no size.
+  std::vector<KnownError> errors = held;
+  errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, own})},
+                     {1, std::make_shared<const Motions>(Motions{on_model, std::move(*simulated)})}},
+                    true,
+                    true});
+  const MotionLikelihood on_own = likelihood_about(task, found, task.replays, mode, own, std::move(errors));
+  std::vector<Motion> of_best;
+  for (const Replay& replay : task.replays)
+    of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)).motion);
+  return on_own.deviance(motions_in(own)) <= on_own.deviance(of_best) + kMatters;
+}
+
+/// The posterior by what was simulated alone, on the search's own mesh: likelihoods are interpolated, not
+/// motions, and the estimate is the likeliest point of the grid. No motion is corrected by what was seen at
+/// another.
+void keep_to_simulated(const Task& task, Found& found, const std::vector<double>& best,
+                       const std::vector<KnownError>& held) {
+  found.emulator.share = kOwn;
+  for (KnownError& error : found.estimate.errors) error.corrects = false;
+  found.look.likelihood = likelihood_about(task, found, replays_of(found.emulator), best,
+                                           motions_at(found.emulator, best, kOwn), held);
+  const Eigen::VectorXd deviance =
+      deviance_over(found.emulator, found.axes, found.look.likelihood, task.grid);
+  Posterior posterior = explore_posterior(found.axes, deviance);
+  Eigen::Index likeliest;
+  posterior.least = deviance.minCoeff(&likeliest);
+  set_estimate(posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
+  found.look.posterior = std::move(posterior);
+}
+
 /// Motions simulated anew about the answer where few simulations do, and again where it leaves them.
 Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held) {
   const bool finer = found.emulator.share != kOwn;
   Extent extent = extent_of(found.look.posterior.axes);
   for (int round = 0; round < kRounds; ++round) {
+    if (round == 0 && !is_finer(lattice(extent, task.grid.axes, 3, kFew), found.axes)) break;
     std::optional<Found> there =
         look_about(task, extent, found.look.posterior.values(), finer, found.errors, held);
     if (!there) break;
@@ -284,31 +364,6 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
     extent = next;
   }
   return found;
-}
-
-/// Of the residuals at the estimate, by the coordinates of the axes that were searched.
-Eigen::MatrixXd rates_at(const Found& found, std::size_t r) {
-  const Posterior& posterior = found.look.posterior;
-  std::vector<Eigen::VectorXd> columns;
-  for (std::size_t k = 0; k < posterior.axes.size(); ++k) {
-    const Axis& axis = posterior.axes[k];
-    if (axis.values.size() < 2) continue;
-    const double low = coordinate_of(axis, axis.values.front()),
-                 high = coordinate_of(axis, axis.values.back());
-    const double at = posterior.estimate[static_cast<Eigen::Index>(k)], step = 0.1 * (high - low);
-    const double from = std::max(low, at - step), to = std::min(high, at + step);
-    const auto residuals = [&](double coordinate) {
-      std::vector<double> values = posterior.values();
-      values[k] = value_of(axis, coordinate);
-      return found.look.likelihood.residuals(
-          r, motions_at(found.emulator, values, found.emulator.share)[r].motion);
-    };
-    columns.emplace_back((residuals(to) - residuals(from)) / (to - from));
-  }
-  if (columns.empty()) return {};
-  Eigen::MatrixXd rates(columns.front().size(), static_cast<Eigen::Index>(columns.size()));
-  for (std::size_t c = 0; c < columns.size(); ++c) rates.col(static_cast<Eigen::Index>(c)) = columns[c];
-  return rates;
 }
 
 /// How far each error moves the surface, and the parameters if they had to explain it.
@@ -361,7 +416,7 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
   constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
-  std::size_t motions = kAtEstimate + 1 + kHeld + kRounds * (own + kAtEstimate + (solver_check ? finer : 0));
+  std::size_t motions = kAtEstimate + 2 + kHeld + kRounds * (own + kAtEstimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(grid.axes)).size();
   const int looks = 2 * (own > 0 ? 1 + kRounds : 1);
   return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
@@ -385,7 +440,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   }
 
   GridSettings usable = grid;
-  usable.axes = axes_without_diverged(results, best);
+  usable.axes = in_own_coordinates(axes_without_diverged(results, best));
   if (cartesian_product(usable.axes).size() < results.candidates.size())
     answer.warnings.emplace_back(
         "some candidates diverged: the answer leaves out the values of a parameter at which they did");
@@ -409,15 +464,21 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
     return answer;
   }
-  found = simulate_about(task, std::move(*found), held);
+  Found about = simulate_about(task, *found, held);
+  if (settle(task, about, best, held)) {
+    found = std::move(about);
+  } else {
+    keep_to_simulated(task, *found, best, held);
+    answer.warnings.emplace_back(
+        "the motion changes too abruptly between the values searched: the answer is by these alone; search "
+        "more values");
+  }
 
   const Posterior& posterior = found->look.posterior;
   answer.values = posterior.values();
   for (std::size_t r = 0; r < replays.size(); ++r) {
     answer.motions.push_back(store.run(replays[r], candidate_at(answer.values, grid)));
-    const Eigen::VectorXd residuals = found->look.likelihood.residuals(
-        r, motions_at(found->emulator, answer.values, found->emulator.share)[r].motion);
-    answer.misfits.push_back(found->look.likelihood.model(r).describe(residuals, rates_at(*found, r)));
+    answer.misfits.push_back(found->look.likelihood.of_recording(r).misfit());
   }
   answer.estimate = score_motions(replays, answer.motions, grid.score);
   answer.estimate.values = answer.values;

@@ -7,16 +7,20 @@
 #include <limits>
 #include <numeric>
 
+#include "sysid/infer/local_noise.h"
+
 namespace flash::sysid {
 namespace {
 
-constexpr double kTimes[] = {0.125, 0.25, 0.5, 1};    // reaches over the duration
-constexpr double kSheets[] = {0.25, 0.5, 1};          // over the longest side of the sheet
-constexpr Eigen::Index kModes = 12;                   // along the sheet, at most
-constexpr Eigen::Index kCoordinates = 120;            // of a field, at most
-constexpr double kLeast = 1e-5;                       // variance of a coordinate over the largest
-constexpr int kSizes = 20;                            // values of tau,
-constexpr double kFirstSize = 0.03, kSizeStep = 1.7;  // the first over sigma, and their ratio
+constexpr double kTimes[] = {0.125, 0.25, 0.5, 1};   // reaches over the duration
+constexpr double kSheets[] = {0.125, 0.25, 0.5, 1};  // over the longest side of the sheet
+constexpr Eigen::Index kModes = 24;                  // along the sheet, at most
+constexpr Eigen::Index kCoordinates = 160;           // of a field, at most
+constexpr double kLeast = 1e-5;                      // variance of a coordinate over the largest
+constexpr int kSizes = 20;                           // values of tau, to that of the residuals
+constexpr double kFirstSize = 0.03;                  // over sigma
+constexpr double kLarge = 2.995732;                  // -log of one in twenty
+constexpr double kVague = 100;                       // of what is not known, over the residuals
 // Chi-square with 3 degrees of freedom: a size and two reaches.
 constexpr double kOnceInTwenty = 7.815;
 
@@ -28,13 +32,6 @@ double matern(double distance) {
 /// Row of (keyframe, channel) blocks, `modes` long each.
 Eigen::Index block(int keyframe, int channel, int channels, int modes) {
   return (static_cast<Eigen::Index>(keyframe) * channels + channel) * modes;
-}
-
-double log_mean_exp(const std::vector<double>& logs, const std::vector<double>& weights) {
-  const double largest = *std::max_element(logs.begin(), logs.end());
-  double sum = 0;
-  for (std::size_t i = 0; i < logs.size(); ++i) sum += weights[i] * std::exp(logs[i] - largest);
-  return largest + std::log(sum);
 }
 
 /// -2 log likelihood at one size from coordinates in which all is diagonal.
@@ -50,7 +47,12 @@ double diagonal_deviance(double squares, const Eigen::VectorXd& gains, const Eig
 DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals,
                                    std::optional<double> repeatability)
     : rows_(std::move(rows)), keyframes_(static_cast<int>(rows_.times.size())) {
-  if (rows_.known.rows() == 0) rows_.known.resize(residuals.size(), 0);
+  for (Eigen::MatrixXd* columns : {&rows_.known, &rows_.free, &rows_.rates})
+    if (columns->rows() == 0) columns->resize(residuals.size(), 0);
+  known_.resize(residuals.size(), rows_.known.cols() + rows_.free.cols() + rows_.rates.cols());
+  known_ << rows_.known, rows_.free, rows_.rates;
+  for (Eigen::Index c = rows_.known.cols(); c < known_.cols(); ++c)
+    if (const double norm = known_.col(c).norm(); norm > 0) known_.col(c) *= kVague * residuals.norm() / norm;
   channels_ = 1 + *std::max_element(rows_.channel.begin(), rows_.channel.end());
   duration_ = std::max(rows_.times.back() - rows_.times.front(), 1e-9);
   const Eigen::RowVector2d corner = rows_.places.colwise().minCoeff();
@@ -86,20 +88,27 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
     modes_modes_.middleCols(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_) +=
         rows_.weights[i] * phi_.row(i).transpose() * phi_.row(i);
   }
-  modes_known_ = sums(rows_.known).modes;
+  modes_known_ = sums(known_).modes;
   estimate_noise(residuals);
+  const double between = noise_between_neighbours(rows_, residuals);
+  misfit_.noise = between > 0 ? std::clamp(between, 1e-9, noise_) : noise_;
   if (repeatability)
-    explained_ = std::sqrt(std::max(0.0, M_PI / 4 * *repeatability * *repeatability - 0.5 * noise_ * noise_));
+    explained_ = std::sqrt(
+        std::max(0.0, M_PI / 4 * *repeatability * *repeatability - 0.5 * misfit_.noise * misfit_.noise));
   for (const Shape& shape : shapes()) fields_.push_back(field(shape));
-  // Half-Cauchy in what is beyond the explained; d tau = tau d log tau.
+  sizes_ = {explained_};
+  priors_ = {0};
+  const double first = kFirstSize * noise_, last = std::max(left_, 2 * first);
   double sum = 0;
   for (int i = 0; i < kSizes; ++i) {
-    const double beyond = kFirstSize * std::pow(kSizeStep, i);
-    sizes_.push_back(std::hypot(explained_, beyond * noise_));
-    priors_.push_back(beyond / (1 + beyond * beyond));
+    const double beyond = first * std::pow(last / first, static_cast<double>(i) / (kSizes - 1));
+    sizes_.push_back(std::hypot(explained_, beyond));
+    priors_.push_back(beyond * std::exp(-kLarge * beyond / noise_));  // d tau = tau d log tau
     sum += priors_.back();
   }
-  for (double& prior : priors_) prior /= sum * static_cast<double>(fields_.size());
+  for (double& prior : priors_) prior /= 2 * sum;
+  priors_.front() = 0.5;
+  weigh(residuals);
 }
 
 std::vector<DiscrepancyModel::Shape> DiscrepancyModel::shapes() const {
@@ -109,10 +118,23 @@ std::vector<DiscrepancyModel::Shape> DiscrepancyModel::shapes() const {
   return shapes;
 }
 
+Eigen::VectorXd DiscrepancyModel::along(const Shape& shape) const {
+  const Eigen::VectorXd variances = (1 + (shape.reach_sheet * wave_numbers_.array()).square() / 3).pow(-2.5);
+  return variances / variances.sum();
+}
+
+Eigen::MatrixXd DiscrepancyModel::in_time(const Shape& shape) const {
+  Eigen::MatrixXd kernel(keyframes_, keyframes_);
+  for (int k = 0; k < keyframes_; ++k)
+    for (int l = 0; l < keyframes_; ++l)
+      kernel(k, l) = matern(
+          std::abs(rows_.times[static_cast<std::size_t>(k)] - rows_.times[static_cast<std::size_t>(l)]) /
+          shape.reach_time);
+  return kernel;
+}
+
 Eigen::MatrixXd DiscrepancyModel::sheet_modes(const Shape& shape) const {
-  Eigen::VectorXd variances = (-0.5 * (shape.reach_sheet * wave_numbers_.array()).square()).exp();
-  variances /= variances.sum();
-  return phi_ * variances.cwiseSqrt().asDiagonal();
+  return phi_ * along(shape).cwiseSqrt().asDiagonal();
 }
 
 Eigen::MatrixXd DiscrepancyModel::covariance(std::size_t shape) const {
@@ -138,21 +160,14 @@ DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals) 
     sums.modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_)
         .noalias() += rows_.weights[i] * phi_.row(i).transpose() * residuals.row(i);
   }
-  sums.known = rows_.known.transpose() * rows_.weights.asDiagonal() * residuals;
+  sums.known = known_.transpose() * rows_.weights.asDiagonal() * residuals;
   sums.squares = (rows_.weights.asDiagonal() * residuals).cwiseProduct(residuals).colwise().sum().transpose();
   return sums;
 }
 
 DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
-  Eigen::MatrixXd kernel(keyframes_, keyframes_);
-  for (int k = 0; k < keyframes_; ++k)
-    for (int l = 0; l < keyframes_; ++l)
-      kernel(k, l) = matern(
-          std::abs(rows_.times[static_cast<std::size_t>(k)] - rows_.times[static_cast<std::size_t>(l)]) /
-          shape.reach_time);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> in_time(kernel);
-  Eigen::VectorXd along = (-0.5 * (shape.reach_sheet * wave_numbers_.array()).square()).exp();
-  along /= along.sum();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> times(in_time(shape));
+  const Eigen::VectorXd sheet = along(shape);
 
   // The coordinates of largest variance; each is one mode in time times one along the sheet.
   struct Coordinate {
@@ -162,7 +177,7 @@ DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
   std::vector<Coordinate> chosen;
   for (Eigen::Index i = 0; i < keyframes_; ++i)
     for (Eigen::Index j = 0; j < modes_; ++j)
-      chosen.push_back({i, j, std::max(0.0, in_time.eigenvalues()[i]) * along[j]});
+      chosen.push_back({i, j, std::max(0.0, times.eigenvalues()[i]) * sheet[j]});
   std::stable_sort(chosen.begin(), chosen.end(),
                    [](const Coordinate& a, const Coordinate& b) { return a.variance > b.variance; });
   const double least = kLeast * chosen.front().variance;
@@ -179,7 +194,7 @@ DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
       const Coordinate& at = chosen[static_cast<std::size_t>(c)];
       for (int k = 0; k < keyframes_; ++k)
         design(channel * per_channel + c, block(k, channel, channels_, modes_) + at.mode) =
-            std::sqrt(at.variance) * in_time.eigenvectors()(k, at.time);
+            std::sqrt(at.variance) * times.eigenvectors()(k, at.time);
     }
   // Information of the coordinates, in units of 1 / sigma^2; what errors of known shape explain taken out.
   Eigen::MatrixXd weighed(design.rows(), stacked);
@@ -218,11 +233,17 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
   const Shape flexible{kTimes[0] * duration_, kSheets[0] * length_};
   const double variance = 100 * noise_ * noise_;
   for (int round = 0; round < 8; ++round) {
-    const Eigen::Index count = rows_.known.cols();
-    const Eigen::MatrixXd known = rows_.known.transpose() * rows_.weights.asDiagonal() * rows_.known;
+    const Eigen::Index count = known_.cols();
+    const Eigen::MatrixXd known = known_.transpose() * rows_.weights.asDiagonal() * known_;
     inverse_known_ = (known + noise_ * noise_ * Eigen::MatrixXd::Identity(count, count))
                          .ldlt()
                          .solve(Eigen::MatrixXd::Identity(count, count));
+    if (round == 0) {
+      const Eigen::VectorXd left =
+          residuals -
+          known_ * (inverse_known_ * (known_.transpose() * (rows_.weights.asDiagonal() * residuals)));
+      left_ = std::sqrt(left.cwiseAbs2().dot(rows_.weights) / rows);
+    }
     fields_ = {field(flexible)};
     const Reduced reduced = reduce(residuals);
     const Eigen::ArrayXd gains = fields_[0].gains.array(), x = reduced.coordinates[0].col(0).array();
@@ -237,66 +258,16 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
   fields_.clear();
 }
 
-Eigen::VectorXd DiscrepancyModel::deviance(const Eigen::MatrixXd& residuals) const {
-  const Reduced reduced = reduce(residuals);
-  std::vector<double> weights;
-  for (std::size_t f = 0; f < fields_.size(); ++f)
-    weights.insert(weights.end(), priors_.begin(), priors_.end());
-  Eigen::VectorXd deviance(residuals.cols());
-  for (Eigen::Index c = 0; c < residuals.cols(); ++c) {
-    std::vector<double> logs;
-    for (std::size_t f = 0; f < fields_.size(); ++f)
-      for (const double tau : sizes_)
-        logs.push_back(-0.5 * diagonal_deviance(reduced.squares[c], fields_[f].gains,
-                                                reduced.coordinates[f].col(c), tau));
-    deviance[c] = -2 * log_mean_exp(logs, weights);
-  }
-  return deviance;
-}
-
 double DiscrepancyModel::deviance_at(const Eigen::VectorXd& residuals, std::size_t shape, double tau) const {
   const Reduced reduced = reduce(residuals);
   return diagonal_deviance(reduced.squares[0], fields_[shape].gains, reduced.coordinates[shape].col(0), tau);
 }
 
-double DiscrepancyModel::worth(const Field& field, double tau, const Eigen::MatrixXd& rates) const {
-  // Information with the discrepancy as it is, and as if it were independent from keyframe to keyframe.
-  const Eigen::MatrixXd weighed = rows_.weights.asDiagonal() * rates;
-  const Eigen::MatrixXd told =
-      rates - rows_.known * (inverse_known_ * (rows_.known.transpose() * weighed));  // not by known shapes
-  const Eigen::MatrixXd modes = sums(told).modes;
-  const double precision = 1 / (noise_ * noise_);
-  const Eigen::MatrixXd all = precision * told.transpose() * rows_.weights.asDiagonal() * told;
-  /// What a field of independent coordinates, columns of their part in the stacked modes, leaves of it.
-  const auto left = [&](const Eigen::MatrixXd& information, const Eigen::MatrixXd& seen) -> Eigen::MatrixXd {
-    const Eigen::Index count = information.rows();
-    return seen.transpose() * (information + Eigen::MatrixXd::Identity(count, count)).ldlt().solve(seen);
-  };
-  Eigen::MatrixXd field_information(field.modes.rows(), modes.rows());
-  Eigen::VectorXd along = (-0.5 * (field.shape.reach_sheet * wave_numbers_.array()).square()).exp();
-  const Eigen::VectorXd roots = tau * (along / along.sum()).cwiseSqrt();
-  Eigen::MatrixXd independent = all;
-  for (Eigen::Index first = 0; first < modes.rows(); first += modes_) {
-    const auto here = modes_modes_.middleCols(first, modes_);
-    field_information.middleCols(first, modes_).noalias() = field.modes.middleCols(first, modes_) * here;
-    independent -= left(precision * (roots.asDiagonal() * here * roots.asDiagonal()),
-                        precision * (roots.asDiagonal() * modes.middleRows(first, modes_)));
-  }
-  const Eigen::MatrixXd correlated =
-      all - left(precision * tau * tau * (field_information * field.modes.transpose()),
-                 precision * tau * (field.modes * modes));
-  const double ratio = correlated.determinant() / independent.determinant();
-  if (!(ratio > 0)) return std::numeric_limits<double>::quiet_NaN();
-  return keyframes_ * std::min(1.0, std::pow(ratio, 1 / static_cast<double>(rates.cols())));
-}
-
-Misfit DiscrepancyModel::describe(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& rates) const {
+void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
   const Reduced reduced = reduce(residuals);
-  Misfit misfit;
-  misfit.noise = noise_;
-  misfit.explained = explained_;
-  misfit.keyframes = keyframes_;
-  std::vector<double> logs;
+  misfit_.explained = explained_;
+  misfit_.keyframes = keyframes_;
+  std::vector<double> deviances;
   double least = std::numeric_limits<double>::infinity(), without = least;
   for (std::size_t f = 0; f < fields_.size(); ++f) {
     const auto at = [&](double tau) {
@@ -304,31 +275,56 @@ Misfit DiscrepancyModel::describe(const Eigen::VectorXd& residuals, const Eigen:
     };
     without = std::min(without, at(explained_));
     for (const double tau : sizes_) {
-      const double deviance = at(tau);
-      logs.push_back(-0.5 * deviance);
-      least = std::min(least, deviance);
+      deviances.push_back(at(tau));
+      least = std::min(least, deviances.back());
     }
   }
-  misfit.gain = std::max(0.0, without - least);
-  misfit.found = misfit.gain > kOnceInTwenty;
+  misfit_.gain = std::max(0.0, without - least);
+  misfit_.found = misfit_.gain > kOnceInTwenty;
+  variances_.assign(fields_.size(), 0);
   double total = 0;
-  const auto most = std::max_element(logs.begin(), logs.end());
   for (std::size_t f = 0, i = 0; f < fields_.size(); ++f)
     for (std::size_t s = 0; s < sizes_.size(); ++s, ++i) {
-      const double weight = priors_[s] * std::exp(logs[i] - *most);
+      const double weight = priors_[s] * std::exp(-0.5 * (deviances[i] - least));
       total += weight;
-      misfit.size += weight * sizes_[s];
-      misfit.reach_time += weight * fields_[f].shape.reach_time;
-      misfit.reach_sheet += weight * fields_[f].shape.reach_sheet;
+      variances_[f] += weight * sizes_[s] * sizes_[s];
+      misfit_.size += weight * sizes_[s];
+      misfit_.reach_time += weight * fields_[f].shape.reach_time;
+      misfit_.reach_sheet += weight * fields_[f].shape.reach_sheet;
     }
-  misfit.size /= total;
-  misfit.reach_time /= total;
-  misfit.reach_sheet /= total;
-  const auto likeliest = static_cast<std::size_t>(most - logs.begin());
-  misfit.worth = rates.cols() == 0
-                     ? keyframes_
-                     : worth(fields_[likeliest / sizes_.size()], sizes_[likeliest % sizes_.size()], rates);
-  return misfit;
+  for (double& variance : variances_) variance /= total;
+  misfit_.size /= total;
+  misfit_.reach_time /= total;
+  misfit_.reach_sheet /= total;
+}
+
+Eigen::MatrixXd DiscrepancyModel::covariance_of(const Eigen::MatrixXd& combinations, bool independent) const {
+  const Eigen::VectorXd spreads =
+      rows_.weights.unaryExpr([](double weight) { return weight > 0 ? 1 / weight : 0.0; });
+  const Eigen::MatrixXd known = combinations.transpose() * rows_.known;
+  Eigen::MatrixXd covariance =
+      noise_ * noise_ * combinations.transpose() * spreads.asDiagonal() * combinations +
+      known * known.transpose();
+  // Of each keyframe and channel, how much of each mode the combinations have.
+  Eigen::MatrixXd modes = Eigen::MatrixXd::Zero(block(keyframes_, 0, channels_, modes_), combinations.cols());
+  for (Eigen::Index i = 0; i < combinations.rows(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_).noalias() +=
+        phi_.row(i).transpose() * combinations.row(i);
+  }
+  for (std::size_t f = 0; f < fields_.size(); ++f) {
+    const Eigen::VectorXd sheet = variances_[f] * along(fields_[f].shape);
+    const Eigen::MatrixXd times = in_time(fields_[f].shape);
+    for (int channel = 0; channel < channels_; ++channel)
+      for (int k = 0; k < keyframes_; ++k)
+        for (int l = 0; l < keyframes_; ++l) {
+          if (independent && k != l) continue;
+          covariance.noalias() +=
+              times(k, l) * modes.middleRows(block(k, channel, channels_, modes_), modes_).transpose() *
+              sheet.asDiagonal() * modes.middleRows(block(l, channel, channels_, modes_), modes_);
+        }
+  }
+  return covariance;
 }
 
 }  // namespace flash::sysid

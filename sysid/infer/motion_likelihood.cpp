@@ -28,8 +28,7 @@ double scale_of(const LinearObservations::Row& row, const Objective& objective) 
 /// Distances beyond this count by less than their square: none without robustness.
 double limit_of(std::vector<double> distances, const Robust& robust) {
   constexpr double kSpread = 1.4826;  // standard deviation over the median of normal distances
-  if (robust.kind == RobustKind::plain) return INFINITY;
-  if (robust.kind == RobustKind::huber) return robust.huber_delta;
+  if (robust.kind != RobustKind::trimmed) return INFINITY;
   const auto at = [&](double share) {
     const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(distances.size() - 1));
     std::nth_element(distances.begin(), distances.begin() + k, distances.end());
@@ -51,8 +50,7 @@ Eigen::VectorXd robust_weights(const LinearObservations& places, const Robust& r
   for (Eigen::Index i = 0; i < places.rows(); ++i) {
     const auto row = places.row(i);
     const double ratio = limits[{row.observation, row.term}] / std::max(std::abs(row.distance), 1e-15);
-    const bool huber = robust.kind == RobustKind::huber;
-    weights[i] = row.term == Term::force || ratio >= 1 ? 1 : huber ? ratio : ratio * ratio;
+    weights[i] = row.term == Term::force || ratio >= 1 ? 1 : ratio * ratio;
   }
   return weights;
 }
@@ -92,8 +90,8 @@ ObservedRows rows_of(const Replay& replay, const LinearObservations& places, con
 
 MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                                    const std::vector<ReplayResult>& reference, const ScoreSettings& settings,
-                                   std::optional<double> repeatability,
-                                   const std::vector<KnownError>& errors) {
+                                   std::optional<double> repeatability, const std::vector<KnownError>& errors,
+                                   const std::vector<MotionChange>& rates) {
   const CandidateResult score = score_motions(replays, reference, settings);
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const Replay& replay = replays[r];
@@ -109,45 +107,72 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
       of_rows[i] = scale[i] / row.weight;  // from the rows of the other functions
     }
     ObservedRows rows = rows_of(replay, places, settings.objective.robust);
-    rows.known.resize(count, static_cast<Eigen::Index>(5 + errors.size()));
+    rows.known.resize(count, static_cast<Eigen::Index>(errors.size()));
     const Eigen::Matrix<double, Eigen::Dynamic, 5> moves =
         of_rows.asDiagonal() * places.registration_derivatives();
     const data::NuisanceBounds& bounds = replay.recording.nuisance;
     Eigen::Matrix<double, 5, 1> widths, found;
     widths << bounds.offset, bounds.yaw, bounds.time;
     found << fit.offset, fit.yaw, fit.time_offset;
-    rows.known.leftCols<5>() = moves * (widths / std::sqrt(3.0)).asDiagonal();
+    rows.free = moves * widths.asDiagonal();
+    const auto moved_by = [&](const MotionChange& change) {
+      Eigen::VectorXd moved = Eigen::VectorXd::Zero(count);
+      for (const MotionTerm& term : change)
+        moved += term.factor * of_rows.cwiseProduct(places.displacements(term.motions->replays[r],
+                                                                         term.motions->results[r].motion));
+      return moved;
+    };
+    rows.rates.resize(count, static_cast<Eigen::Index>(rates.size()));
+    for (std::size_t k = 0; k < rates.size(); ++k)
+      rows.rates.col(static_cast<Eigen::Index>(k)) = moved_by(rates[k]);
     Eigen::VectorXd correction = Eigen::VectorXd::Zero(count);
     for (std::size_t e = 0; e < errors.size(); ++e) {
       const KnownError& error = errors[e];
-      Eigen::VectorXd moved = Eigen::VectorXd::Zero(count);
-      for (const MotionTerm& term : error.terms)
-        moved += term.factor * of_rows.cwiseProduct(places.displacements(term.motions->replays[r],
-                                                                         term.motions->results[r].motion));
+      const Eigen::VectorXd moved = moved_by(error.terms);
       // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
       const double size = error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1;
-      rows.known.col(static_cast<Eigen::Index>(5 + e)) = size * moved;
+      rows.known.col(static_cast<Eigen::Index>(e)) = size * moved;
       if (error.corrects) correction += moved;
     }
-    const Eigen::VectorXd registered = moves * found;
-    DiscrepancyModel model(std::move(rows), residuals + registered - correction, repeatability);
+    const Robust& robust = settings.objective.robust;
+    ResidualLikelihood likelihood(
+        std::move(rows), residuals + moves * found - correction, repeatability,
+        robust.kind == RobustKind::huber ? std::optional<double>(robust.huber_delta) : std::nullopt);
     recordings_.push_back(
-        {replay, registration, settings.objective, scale, registered, correction, std::move(model)});
+        {replay, found, widths, settings.objective, scale, moves, correction, std::move(likelihood)});
   }
 }
 
-Eigen::VectorXd MotionLikelihood::residuals(std::size_t r, const Motion& motion) const {
-  const Recording& recording = recordings_[r];
-  const LinearObservations places(recording.replay, motion, recording.registration, recording.objective);
+Eigen::VectorXd MotionLikelihood::residuals(const Recording& recording, const Motion& motion,
+                                            const Nuisance& registration) {
+  const Registration applied{registration.head<3>(), registration[3], registration[4], recording.replay.pivot,
+                             recording.replay.up};
+  const LinearObservations places(recording.replay, motion, applied, recording.objective);
   Eigen::VectorXd residuals(places.rows());
   for (Eigen::Index i = 0; i < residuals.size(); ++i)
     residuals[i] = recording.scale[i] * places.row(i).distance;
-  return residuals + recording.registered - recording.correction;
+  return residuals + recording.registered * registration - recording.correction;
 }
 
-Eigen::VectorXd MotionLikelihood::deviance(const std::vector<Eigen::MatrixXd>& residuals) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(residuals.front().cols());
-  for (std::size_t r = 0; r < recordings_.size(); ++r) sum += recordings_[r].model.deviance(residuals[r]);
+double MotionLikelihood::deviance(const std::vector<Motion>& motions) const {
+  constexpr int kSteps = 3;
+  constexpr double kSame = 0.3;  // of the noise: what a registration moves rows by
+  double sum = 0;
+  for (std::size_t r = 0; r < recordings_.size(); ++r) {
+    const Recording& recording = recordings_[r];
+    Nuisance registration = recording.registration;
+    ResidualLikelihood::Fit fit;
+    for (int step = 0; step < kSteps; ++step) {
+      fit = recording.likelihood.fit(residuals(recording, motions[r], registration));
+      const Nuisance next = recording.bounds.cwiseProduct(fit.free);
+      const Eigen::VectorXd moved = recording.registered * (next - registration);
+      registration = next;
+      if (moved.norm() <
+          kSame * recording.likelihood.misfit().noise * std::sqrt(static_cast<double>(moved.size())))
+        break;
+    }
+    sum += fit.deviance;
+  }
   return sum;
 }
 

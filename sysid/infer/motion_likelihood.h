@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sysid/emulate/grid_search.h"
-#include "sysid/infer/discrepancy.h"
+#include "sysid/infer/residual_likelihood.h"
 #include "sysid/observe/linear_observations.h"
 
 namespace flash::sysid {
@@ -20,43 +20,50 @@ struct MotionTerm {
   std::shared_ptr<const Motions> motions;
 };
 
-/// An error of known shape, one standard deviation of it: a sum of motions whose factors add up to zero.
+/// A sum of motions whose factors add up to zero.
+using MotionChange = std::vector<MotionTerm>;
+
+/// An error of known shape, one standard deviation of it.
 struct KnownError {
-  std::vector<MotionTerm> terms;
+  MotionChange terms;
   bool shared = true;     ///< all recordings have the same error, not each its own
   bool corrects = false;  ///< the likelihood is that of motions moved by it; its size stays uncertain
 };
 
-/// How likely motions of several recordings are. Observed points keep their places and the registration is
-/// linear about that of a reference motion. The registration is normal about zero, of the standard deviation
-/// of an even distribution over its bounds (b / sqrt(3)), and integrated out with noise and discrepancy.
+/// How likely motions of several recordings are. The registration of each is fitted within its bounds, all
+/// alike likely; how rows change with it and with errors of known shape is that at a reference motion.
 class MotionLikelihood {
  public:
-  /// `reference`: a motion a replay, near those to be asked about.
+  /// `reference`: a motion a replay, near those to be asked about. `rates`: how motions change there with
+  /// each parameter, over about what is likely of it.
   MotionLikelihood(const std::vector<Replay>& replays, const std::vector<ReplayResult>& reference,
                    const ScoreSettings& settings, std::optional<double> repeatability,
-                   const std::vector<KnownError>& errors);
+                   const std::vector<KnownError>& errors, const std::vector<MotionChange>& rates);
 
   std::size_t recordings() const { return recordings_.size(); }
 
-  /// Signed distances of what was observed to a motion of recording r, as its rows (DiscrepancyModel) [m].
-  Eigen::VectorXd residuals(std::size_t r, const Motion& motion) const;
+  /// -2 log likelihood of motions, one a recording, up to a constant.
+  double deviance(const std::vector<Motion>& motions) const;
 
-  /// -2 log likelihood of sets of motions, from their residuals: a matrix a recording, a set a column.
-  Eigen::VectorXd deviance(const std::vector<Eigen::MatrixXd>& residuals) const;
-
-  const DiscrepancyModel& model(std::size_t r) const { return recordings_[r].model; }
+  const ResidualLikelihood& of_recording(std::size_t r) const { return recordings_[r].likelihood; }
 
  private:
+  using Nuisance = Eigen::Matrix<double, 5, 1>;  ///< offset [m], yaw [rad], time [s]
   struct Recording {
     Replay replay;
-    Registration registration;
+    Nuisance registration;  ///< of the reference
+    Nuisance bounds;
     Objective objective;
-    Eigen::VectorXd scale;       ///< of each row: by its stated error
-    Eigen::VectorXd registered;  ///< by what the registration moves each row [m]
-    Eigen::VectorXd correction;  ///< [m]
-    DiscrepancyModel model;
+    Eigen::VectorXd scale;                                ///< of each row: by its stated error
+    Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by what the registration moves each row
+    Eigen::VectorXd correction;                           ///< [m]
+    ResidualLikelihood likelihood;
   };
+  /// Signed distances of what was observed to a motion under a registration, as rows (ObservedRows), with
+  /// what the registration explains of them [m].
+  static Eigen::VectorXd residuals(const Recording& recording, const Motion& motion,
+                                   const Nuisance& registration);
+
   std::vector<Recording> recordings_;
 };
 

@@ -58,6 +58,14 @@ Eigen::MatrixXd walkers_of(const TensorSpline& spline, double least, unsigned se
 
 }  // namespace
 
+std::vector<Axis> in_own_coordinates(std::vector<Axis> axes) {
+  for (Axis& axis : axes)
+    for (const ParameterInfo& info : known_parameters())
+      if (info.name == axis.name && info.material && info.name != "poisson")
+        axis.logarithmic = axis.values.front() > 0;
+  return axes;
+}
+
 double coordinate_of(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
 double value_of(const Axis& axis, double coordinate) {
   const double value = axis.logarithmic ? std::exp(coordinate) : coordinate;

@@ -7,6 +7,10 @@
 
 namespace flash::sysid {
 
+/// Stiffnesses, weights, friction and damping count by their logarithm wherever they are above zero, however
+/// their values were listed.
+std::vector<Axis> in_own_coordinates(std::vector<Axis> axes);
+
 /// Coordinate of a value on its axis, the logarithm of a logarithmic one, and back.
 double coordinate_of(const Axis& axis, double value);
 double value_of(const Axis& axis, double coordinate);

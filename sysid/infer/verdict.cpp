@@ -1,6 +1,7 @@
 #include "sysid/infer/verdict.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -13,21 +14,20 @@ namespace {
 constexpr double kExcluded = 3.841459;  // deviance over the least: chi^2 of one degree of freedom, 95 %
 constexpr double kLeastBits = 1;
 
-/// Width of what is usual, 5 to 95 % of woven and knitted fabrics, paper and film, of the logarithm or of the
-/// value: bending of 618 fabrics 1.1 to 110 uN m, membranes of 10 to 2000 N/m.
-double usual_width(const Axis& axis) {
-  static const std::map<std::string, std::pair<double, double>> usual = {{"young", {10, 2000}},
-                                                                         {"poisson", {0, 0.5}},
-                                                                         {"bending", {1.1e-6, 1.1e-4}},
-                                                                         {"friction", {0.1, 1}},
-                                                                         {"areal_density", {0.03, 0.5}},
-                                                                         {"air_drag", {0.1, 10}},
-                                                                         {"stiffness_damping", {1e-4, 1e-1}}};
+/// What is usual, 5 to 95 % of woven and knitted fabrics, paper and film, as coordinates of an axis: bending
+/// of 618 fabrics 1.1 to 110 uN m, membranes of 10 to 2000 N/m. Of another parameter the searched range.
+std::array<double, 2> usual_of(const Axis& axis) {
+  static const std::map<std::string, std::array<double, 2>> usual = {{"young", {10, 2000}},
+                                                                     {"poisson", {0, 0.5}},
+                                                                     {"bending", {1.1e-6, 1.1e-4}},
+                                                                     {"friction", {0.1, 1}},
+                                                                     {"areal_density", {0.03, 0.5}},
+                                                                     {"air_drag", {0.1, 10}},
+                                                                     {"stiffness_damping", {1e-4, 1e-1}}};
   const auto found = usual.find(axis.name);
-  const double first = axis.values.front(), last = axis.values.back();
-  const auto [low, high] = found == usual.end() ? std::pair{first, last} : found->second;
-  const bool logarithmic = axis.logarithmic && low > 0;
-  return logarithmic ? std::log(high / low) : high - low;
+  const auto [low, high] =
+      found == usual.end() ? std::array{axis.values.front(), axis.values.back()} : found->second;
+  return axis.logarithmic ? std::array{std::log(low), std::log(high)} : std::array{low, high};
 }
 
 /// Least score at each value of an axis, over what was simulated.
@@ -87,10 +87,15 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
         return std::abs(end - of_range) <= 1e-9 * width && posterior.end(k, high) < kExcluded;
       };
       const bool below = open(false), above = open(true);
-      const double low = posterior.quantile(k, 0.025), high = posterior.quantile(k, 0.975);
+      // The most likely values of all parameters together may lie beyond what is likely of one by itself.
+      const double mode = posterior.estimate[static_cast<Eigen::Index>(k)];
+      const double low = std::min(mode, posterior.quantile(k, 0.025)),
+                   high = std::max(mode, posterior.quantile(k, 0.975));
       finding.interval95 = {below ? range.values.front() : value_of(looked, low),
                             above ? range.values.back() : value_of(looked, high)};
-      finding.bits = std::log2(usual_width(range) / std::max(high - low, 1e-12));
+      const std::array<double, 2> usual = usual_of(range);
+      const double from = below ? std::min(usual[0], low) : low, to = above ? std::max(usual[1], high) : high;
+      finding.bits = std::log2((usual[1] - usual[0]) / std::max(to - from, 1e-12));
       finding.identifiable = below && above               ? Identifiable::no
                              : below                      ? Identifiable::upper_bound
                              : above                      ? Identifiable::lower_bound

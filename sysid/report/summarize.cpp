@@ -66,18 +66,20 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
   return recording;
 }
 
-/// "lift: the model misses the cloth by 0.4 mm ..."; empty where it fits.
+/// "lift: the model does not fit: ..."; empty where it fits.
 std::string warning_of_misfit(const SummaryRecording& recording) {
   const Misfit& misfit = recording.misfit;
   if (!misfit.found) return "";
-  const auto mm = [](double metres) { return data::format_short(1000 * metres) + " mm"; };
+  const auto mm = [](double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; };
+  const double explained =
+      std::sqrt(2 / M_PI) * std::hypot(misfit.noise, misfit.explained);  // of a mean distance
   std::string worth;
   if (misfit.worth < misfit.keyframes)
     worth = "; " + std::to_string(misfit.keyframes) + " keyframes are worth " +
             data::format_short(std::round(10 * misfit.worth) / 10);
-  return recording.name + ": the model does not fit: it misses the cloth by " + mm(misfit.size) +
-         " beside noise of " + mm(misfit.noise) +
-         (misfit.explained > 0 ? ", where trials differ by " + mm(misfit.explained) : "") + worth +
+  return recording.name + ": the model does not fit: it misses the observed points by " +
+         mm(recording.score) + " where noise" +
+         (misfit.explained > 0 ? " and repeatability explain " : " explains ") + mm(explained) + worth +
          ". The intervals allow for it, but are those of a model that does not fit";
 }
 

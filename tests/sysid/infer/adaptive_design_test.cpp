@@ -135,5 +135,16 @@ TEST(Lattice, MotionsBetweenItsPointsAreThoseSimulated) {
   EXPECT_LT(near_off, whole_off / 4);
 }
 
+TEST(AdaptiveDesign, ALatticeIsFinerByHalfOfACellInAnyDirection) {
+  const std::vector<Axis> searched = {parse_axis("bending", "1e-5:1e-3:5:log"),
+                                      parse_axis("start_yaw", "0:1:5")};
+  std::vector<Axis> other = searched;
+  EXPECT_FALSE(is_finer(other, searched));
+  other[1] = parse_axis("start_yaw", "0:1:8");
+  EXPECT_FALSE(is_finer(other, searched));  // 4 / 7 of a cell
+  other[1] = parse_axis("start_yaw", "0:1:9");
+  EXPECT_TRUE(is_finer(other, searched));
+}
+
 }  // namespace
 }  // namespace flash::sysid

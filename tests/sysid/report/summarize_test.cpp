@@ -52,15 +52,17 @@ TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
   answer.estimate.score = 0.005;
   answer.estimate.status = CandidateStatus::ok;
   answer.estimate.recordings.resize(1);
+  answer.estimate.recordings[0].score = 0.0052;
   answer.misfits = {{0.001, 0.0052, 0.3, 0.1, 90, true, 0.0028, 80, 9}};
   const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
   const auto first = [&] { return summarize(results, answer, replays, grid).warnings; };
   ASSERT_FALSE(first().empty());
   EXPECT_EQ(
       first().front(),
-      "lift: the model does not fit: it misses the cloth by 5.2 mm beside noise of 1 mm, where trials "
-      "differ by 2.8 mm; 80 keyframes are worth 9. The intervals allow for it, but are those of a model "
-      "that does not fit");
+      // sqrt(2 / pi) of the root of 1 and 2.8 squared
+      "lift: the model does not fit: it misses the observed points by 5.2 mm where noise and repeatability "
+      "explain 2.37 mm; 80 keyframes are worth 9. The intervals allow for it, but are those of a model that "
+      "does not fit");
   answer.misfits[0].found = false;
   EXPECT_TRUE(first().empty());
 }
