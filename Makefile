@@ -16,7 +16,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
+.PHONY: help demo configure build test validate routes size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -55,6 +55,10 @@ validate: reference configure-test  ## Calibrate and fit what is in $(DATA), ren
 	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --calib $(BUILD)/bin/flash-calib --sim $(BUILD)/bin/flash-sim \
 	  --hand-eye-study $(BUILD)/tests/hand_eye_study --data $(DATA) --scenes $(REFERENCE)/scenes \
 	  --results $(BUILD)/reference --out $(BUILD)/validation --document docs/validation.md $(if $(ONLY),--only $(ONLY)) $(if $(TWINS),--twins $(TWINS))
+
+routes: configure-test  ## Say whether every route to an answer gives the same one, on a strip of known truth
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/routes.py --sysid $(sysid) --out $(BUILD)/routes
 
 size-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly, over 200 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target size_study

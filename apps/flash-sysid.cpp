@@ -18,9 +18,7 @@ int main(int argc, char** argv) {
   flash::Action action;
   flash::add_grid_verb(app, action);
   flash::add_replay_verb(app, action);
-#if FLASH_CERES
   flash::add_fit_verb(app, action);
-#endif
   flash::add_plan_verb(app, action);
   flash::add_repeatability_verb(app, action);
   flash::add_synth_verb(app, action);

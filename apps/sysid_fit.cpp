@@ -1,28 +1,17 @@
 #include <algorithm>
-#include <array>
-#include <chrono>
-#include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
-#include <optional>
-#include <utility>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
-#include "apps/prior_option.h"
 #include "apps/sysid_options.h"
+#include "apps/sysid_search.h"
 #include "apps/sysid_verbs.h"
-#include "data/atomic_file.h"
 #include "data/error.h"
-#include "data/json_reader.h"
 #include "data/text.h"
 #include "data/writable.h"
-#include "sysid/infer/fit/fit.h"
-#include "sysid/replay/memory_estimate.h"
-#include "sysid/report/parameter_label.h"
+#include "sysid/emulate/fingerprint.h"
+#include "sysid/emulate/search_memory.h"
 #include "sysid/report/search_folder.h"
 
 namespace flash {
@@ -36,11 +25,20 @@ struct FitOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::string start;
-  std::vector<std::string> freeze, priors;
+  std::vector<std::string> freeze;
   FixedTexts fixed;
-  int iterations = 15;
-  int generations = 0;
+  double repeatability = 0;  ///< [m]; 0: not given
+  bool no_solver_check = false;
+  bool no_horizon = false;
+  std::string rollouts;
   std::string out;
+};
+
+// What the search looked for, and where it goes on.
+struct Start {
+  sysid::GridSettings grid;
+  std::vector<double> values;
+  sysid::Extent around;
 };
 
 bool contains(const std::vector<std::string>& names, const std::string& name) {
@@ -57,188 +55,124 @@ void hold(const std::string& name, const sysid::Summary& found, std::vector<sysi
     fixed.push_back({name, {value->second}, false});
 }
 
-// 95 % of a normal distribution, within the range; empty where the covariance is.
-std::optional<std::array<double, 2>> interval_of(const sysid::FitResult& result, const sysid::Axis& axis,
-                                                 std::size_t k) {
-  if (result.covariance.size() == 0) return std::nullopt;
-  const auto i = static_cast<Eigen::Index>(k);
-  const double reach = 1.96 * std::sqrt(result.covariance(i, i)), value = result.values[k];
-  const double low = axis.logarithmic ? value * std::exp(-reach) : value - reach;
-  const double high = axis.logarithmic ? value * std::exp(reach) : value + reach;
-  return std::array<double, 2>{std::max(low, axis.values.front()), std::min(high, axis.values.back())};
-}
-
-// What the search looked for, over the range it searched; frozen ones stay where it found them.
-sysid::FitSettings fit_settings(const FitOptions& options, const sysid::Summary& found) {
-  sysid::FitSettings settings;
-  settings.grid.fixed = parse_fixed(options.fixed);
+// Frozen parameters stay where the search found them.
+Start start_of(const FitOptions& options, const sysid::SearchFolder& search) {
+  const sysid::Summary& found = search.summary;
+  Start start;
+  start.grid.fixed = parse_fixed(options.fixed);
   const auto is_fixed = [&](const std::string& name) {
-    return std::any_of(settings.grid.fixed.begin(), settings.grid.fixed.end(),
+    return std::any_of(start.grid.fixed.begin(), start.grid.fixed.end(),
                        [&](const sysid::Axis& axis) { return axis.name == name; });
   };
   for (const auto& [name, fixed] : found.fixed)
     if (!is_fixed(name) && fixed.source == "measured")
-      settings.grid.fixed.push_back({name, {fixed.value}, false});
+      start.grid.fixed.push_back({name, {fixed.value}, false});
   std::vector<std::string> searched;
   for (const sysid::ParameterFinding& finding : found.parameters) {
     searched.push_back(finding.name);
     if (is_fixed(finding.name)) continue;
     const double value = finding.estimate.value_or(found.best.at(finding.name));
     if (contains(options.freeze, finding.name)) {
-      settings.grid.fixed.push_back({finding.name, {value}, false});
+      start.grid.fixed.push_back({finding.name, {value}, false});
       continue;
     }
-    settings.grid.axes.push_back(
-        {finding.name, {finding.values.front(), finding.values.back()}, finding.logarithmic});
-    settings.start.push_back(value);
+    const auto axis = std::find_if(search.results.axes.begin(), search.results.axes.end(),
+                                   [&](const sysid::Axis& each) { return each.name == finding.name; });
+    start.grid.axes.push_back(*axis);
+    start.values.push_back(value);
+    start.around.push_back(
+        finding.interval95.value_or(std::array{finding.values.front(), finding.values.back()}));
   }
   for (const std::string& name : options.freeze)
-    if (!contains(searched, name)) hold(name, found, settings.grid.fixed);
-  if (settings.grid.axes.empty()) throw data::InputError("--freeze, --fix: no parameter is left to fit");
-  for (const std::string& text : options.priors) {
-    settings.priors.push_back(parse_prior(text));
-    const std::string& name = settings.priors.back().name;
-    if (std::none_of(settings.grid.axes.begin(), settings.grid.axes.end(),
-                     [&](const sysid::Axis& axis) { return axis.name == name; }))
-      throw data::InputError("--prior: " + name + ": is not among the parameters fitted");
-  }
-  settings.iterations = options.iterations;
-  settings.global.generations = options.generations;
-  settings.global.seed = options.common.seed;
-  settings.grid.score = score_settings(options.replay);
-  return settings;
+    if (!contains(searched, name)) hold(name, found, start.grid.fixed);
+  if (start.grid.axes.empty()) throw data::InputError("--freeze, --fix: no parameter is left to fit");
+  start.grid.score = score_settings(options.replay);
+  return start;
 }
 
-nlohmann::ordered_json fit_json(const sysid::FitResult& result, const sysid::FitSettings& settings) {
-  nlohmann::ordered_json json;
-  json["schema"] = "flash-sysid-fit/1";
-  const std::vector<sysid::Axis>& axes = settings.grid.axes;
-  for (std::size_t k = 0; k < axes.size(); ++k) {
-    nlohmann::ordered_json parameter;
-    parameter["estimate"] = result.values[k];
-    parameter["start"] = settings.start[k];
-    const auto interval = interval_of(result, axes[k], k);
-    parameter["interval95"] = interval ? nlohmann::ordered_json(*interval) : nlohmann::ordered_json(nullptr);
-    if (result.covariance.size() > 0) {
-      const auto i = static_cast<Eigen::Index>(k);
-      parameter["spread"] = std::sqrt(result.covariance(i, i));
-      parameter["spread_of"] = axes[k].logarithmic ? "logarithm" : "value";
-    } else {
-      parameter["spread"] = nullptr;
-    }
-    json["parameters"][axes[k].name] = parameter;
-  }
-  for (const sysid::Axis& axis : settings.grid.fixed) json["fixed"][axis.name] = axis.values.front();
-  json["score"] = result.best.score;
-  json["converged"] = result.best.converged;
-  json["refined"] = result.refined;
-  json["termination"] = result.termination;
-  json["path"] = nlohmann::ordered_json::array();
-  for (const sysid::FitStep& step : result.path) {
-    nlohmann::ordered_json entry;
-    for (std::size_t k = 0; k < axes.size(); ++k) entry[axes[k].name] = step.values[k];
-    entry["cost"] = step.cost;  // null where every candidate of a generation diverged
-    entry["accepted"] = step.accepted;
-    entry["stage"] = step.stage == sysid::FitStage::global ? "global" : "local";
-    json["path"].push_back(entry);
-  }
-  return json;
+// "sheet:0.2x0.2:0.02 (121 vertices)".
+std::string mesh_of(const sysid::Summary& found) {
+  const auto mesh = found.settings.find("mesh");
+  return mesh == found.settings.end() ? "" : mesh->second.substr(0, mesh->second.rfind(" ("));
 }
 
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   stop_on_signals();
-  require_cpu(options.common);
+  const auto begin = std::chrono::steady_clock::now();
+  const sim::Device device = choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
-  const sysid::Summary found = sysid::load_search_folder(options.start).summary;
+  const sysid::SearchFolder found = sysid::load_search_folder(options.start);
   const data::Asset asset =
-      load_asset_for(options.asset.empty() ? found.asset : options.asset, recordings.front());
-  sysid::FitSettings settings = fit_settings(options, found);
+      load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recordings.front());
+  Start start = start_of(options, found);
+  sysid::GridSettings& grid = start.grid;
+  const int threads = thread_count(options.common);
+  grid.threads = threads;
+  sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
+  replay.device = device;
+  if (replay.mesh.empty()) replay.mesh = mesh_of(found.summary);
   std::vector<sysid::Replay> replays;
-  for (const data::Recording& recording : recordings)
-    replays.push_back(
-        sysid::make_replay(recording, replay_settings(verb, options.replay, thread_count(options.common))));
+  std::vector<std::string> names;
+  for (const data::Recording& recording : recordings) {
+    replays.push_back(sysid::make_replay(recording, replay));
+    names.push_back(recording.name);
+  }
   std::vector<std::string> notices;
-  settings.grid.base = material_base(asset, replays.front().sheet().rest, notices);
-  const std::size_t batch =
-      std::max<std::size_t>(2 * settings.start.size() + 1, settings.global.generations > 0 ? 16 : 0);
-  sysid::check_job(
-      replays, static_cast<double>(batch) * (options.iterations + static_cast<double>(options.generations)),
-      sysid::estimate_batch(replays, batch));
+  grid.base = material_base(asset, replays.front().sheet().rest, notices, grid.fixed);
+  // One store of motions for the search and what goes on from it.
+  grid.rollouts =
+      options.rollouts.empty() ? (fs::path(options.start) / "motions").string() : options.rollouts;
+  sysid::AnswerSettings asked;
+  if (options.repeatability > 0) asked.repeatability = options.repeatability;
+  asked.horizon = !options.no_horizon;
+  asked.solver_check = !options.no_solver_check;
+  if (asked.solver_check)  // which halves the step
+    for (const sysid::Replay& each : replays)
+      sysid::steps_in(2.0 * each.steps * options.replay.time_step, options.replay.time_step);
+  sysid::check_job(replays, sysid::count_candidates(grid.axes),
+                   sysid::estimate_memory(replays, grid, asked.solver_check));
   data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
-
-  const std::vector<sysid::Axis>& axes = settings.grid.axes;
-  int generation = 0, iteration = 0;
-  auto last = std::chrono::steady_clock::now();
-  const sysid::FitResult result = sysid::fit(replays, settings, [&](const sysid::FitStep& step) {
-    const auto now = std::chrono::steady_clock::now();
-    const double seconds = std::chrono::duration<double>(now - std::exchange(last, now)).count();
-    std::string line =
-        step.stage == sysid::FitStage::global
-            ? "generation " + std::to_string(++generation) + " of " + std::to_string(options.generations)
-            : "step " + std::to_string(iteration++) + " of at most " + std::to_string(options.iterations);
-    line += ", took " + data::format_short(seconds) + " s: cost " + data::format_short(step.cost);
-    for (std::size_t k = 0; k < axes.size(); ++k)
-      line += "  " + axes[k].name + " " + data::format_short(step.values[k]);
-    say(options.common, line + (step.accepted ? "" : "  (left)"));
-  });
-  const std::string text = data::format_json(fit_json(result, settings));
-  end_after_signal();
-  data::write_atomically((fs::path(options.out) / "fit.json").string(), text);
-  if (options.common.json) {
-    std::cout << text;
-  } else {
-    for (std::size_t k = 0; k < axes.size(); ++k) {
-      const std::string unit = sysid::parameter_label(axes[k].name, asset.thickness.has_value()).unit;
-      const auto interval = interval_of(result, axes[k], k);
-      std::printf("%-16s %s%s%s  (%s)\n", axes[k].name.c_str(), data::format_short(result.values[k]).c_str(),
-                  unit.empty() ? "" : " ", unit.c_str(),
-                  interval ? ("95 %: " + data::format_short((*interval)[0]) + " to " +
-                              data::format_short((*interval)[1]) + ", by the scatter of the residuals alone")
-                                 .c_str()
-                           : "the recordings do not determine it");
-    }
-    std::printf("%.3f mm from the observed points; %s\n%s\n", 1000 * result.best.score,
-                result.termination.c_str(), (fs::path(options.out) / "fit.json").c_str());
+  {
+    AnswerLine line(options.common, sysid::most_design_work(grid, replays.size()));
+    grid.axes = sysid::design_about(
+        replays, grid, start.values, start.around, asked,
+        [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
   }
-  for (const data::Recording& recording : recordings) warn_of_camera(recording);
-  if (!result.best.converged)
-    warn("the fitted candidate missed a step: raise --iterations or lower --time-step");
-  if (result.stuck) warn(result.termination);
-  return result.best.converged && !result.stuck ? exit_done : exit_unusable;
+  end_after_signal();
+  sysid::ResultsStore store(options.out, grid.axes, names, sysid::fingerprint(replays, grid),
+                            options.common.force ? sysid::Existing::replace : sysid::Existing::refuse);
+  Search search{asset, std::move(replays), grid, asked, {}, device, options.out, begin};
+  return run_search(search, store, options.common);
 }
 
 }  // namespace
 
 void add_fit_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<FitOptions>();
-  CLI::App* verb =
-      app.add_subcommand("fit", "Refine what a grid found, by Levenberg-Marquardt, between its values");
+  CLI::App* verb = app.add_subcommand(
+      "fit", "Go on from a search: simulate about its estimate, to the same kind of answer");
   verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
   verb->add_option("--start", options->start, "Folder of the search to start from")->required();
   verb->add_option("--asset", options->asset, "The object; without one, that of the search");
   verb->add_option("--freeze", options->freeze,
                    "Parameters that stay where the search found them, or held them")
       ->delimiter(',');
-  verb->add_option("--prior", options->priors,
-                   "What is known beforehand, as bending=1e-5:2 (factor, one sigma)")
-      ->allow_extra_args(false);
   add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3");
-  verb->add_option("--steps", options->iterations, "Of the optimizer at most")
-      ->check(whole_number(1, 10000))
-      ->capture_default_str();
-  verb->add_option("--global", options->generations,
-                   "Generations of a search over the whole ranges before, of 16 candidates each; 0: none")
-      ->check(whole_number(0, 10000))
-      ->capture_default_str();
-  verb->add_option("-o,--out", options->out, "Folder for fit.json")->required();
+  verb->add_option("--repeatability", options->repeatability, "Trial-to-trial distance of a keyframe [m]")
+      ->check(positive_number());
+  verb->add_flag("--no-solver-check", options->no_solver_check,
+                 "Do not solve the estimate again under finer settings");
+  verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
+  verb->add_option("--rollouts", options->rollouts,
+                   "Folder that keeps the motions; without it, that of the search it starts from");
+  verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
   add_replay_options(*verb, options->replay);
-  add_seed_option(*verb, options->common);
   add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
-      "Exit code 3: a step did not converge, or nothing was refined, for the reason that is said.\n"
-      "Example:\n  flash-sysid fit lift --start run --freeze poisson --prior bending=1e-5:2 -o fitted");
+      "Exit code 3: the answer cannot be used, for the reason that is said.\n"
+      "Example:\n  flash-sysid fit lift --start run --freeze poisson -o fitted");
   verb->callback([verb, options, &action] { action = [verb, options] { return run_fit(*verb, *options); }; });
 }
 

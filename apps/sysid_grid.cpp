@@ -1,29 +1,19 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
-#include <iostream>
 #include <memory>
-#include <mutex>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
+#include "apps/sysid_search.h"
 #include "apps/sysid_verbs.h"
 #include "data/error.h"
-#include "data/message_line.h"
 #include "data/text.h"
 #include "data/writable.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
-#include "sysid/infer/answer.h"
-#include "sysid/infer/refine.h"
-#include "sysid/report/overlay.h"
-#include "sysid/report/parameter_label.h"
-#include "sysid/report/recording_names.h"
-#include "sysid/report/report.h"
-#include "sysid/report/summarize.h"
 
 namespace flash {
 namespace {
@@ -59,7 +49,8 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   settings.score = score_settings(options.replay);
   settings.envs = options.envs;
   settings.threads = threads;
-  settings.rollouts = options.rollouts;
+  settings.rollouts =
+      options.rollouts.empty() ? (fs::path(options.out) / "motions").string() : options.rollouts;
   for (const auto& [name, text] : options.axes) settings.axes.push_back(sysid::parse_axis(name, text));
   if (settings.axes.empty())
     throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
@@ -88,41 +79,6 @@ void check_options(const GridOptions& options) {
   }
 }
 
-std::string value_text(const sysid::ParameterFinding& finding, const std::string& unit) {
-  const auto text = [&](double value) {
-    return data::format_short(value) + (unit.empty() ? "" : " " + unit);
-  };
-  switch (finding.identifiable) {
-    case sysid::Identifiable::yes:
-      return text(*finding.estimate) + "  (95 %: " + data::format_short((*finding.interval95)[0]) + " to " +
-             data::format_short((*finding.interval95)[1]) + ")";
-    case sysid::Identifiable::lower_bound:
-      return "at least " + text((*finding.interval95)[0]);
-    case sysid::Identifiable::upper_bound:
-      return "at most " + text((*finding.interval95)[1]);
-    case sysid::Identifiable::no:
-      break;
-  }
-  return "not identifiable from the recordings";
-}
-
-void print_answer(const sysid::Summary& summary, const std::string& out) {
-  const bool has_thickness = summary.settings.count("thickness_m") > 0;
-  for (const sysid::ParameterFinding& finding : summary.parameters) {
-    const sysid::ParameterLabel label = sysid::parameter_label(finding.name, has_thickness);
-    std::printf("%-16s %s\n", finding.name.c_str(), value_text(finding, label.unit).c_str());
-  }
-  for (const sysid::SummaryRecording& recording : summary.recordings)
-    std::printf("%-16s %.2f mm from the observed points, offset %.1f %.1f %.1f mm, clock %.0f ms\n",
-                data::message_line(recording.name).c_str(), 1000 * recording.score,
-                1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
-                1000 * recording.time_offset);
-  for (const sysid::SolverCheck& check : summary.solver_check)
-    std::printf("%-24s moves the surface by %.2f mm, the score to %.2f mm\n", check.what.c_str(),
-                1000 * check.surface_change_m, 1000 * check.score);
-  std::printf("%s\n%s\n", (fs::path(out) / "summary.json").c_str(), (fs::path(out) / "report.html").c_str());
-}
-
 /// A search that goes on keeps the order of its recordings: its tables stand in it, and the first one names
 /// the asset. Others come last.
 void order_as(const std::vector<std::string>& names, std::vector<data::Recording>& recordings) {
@@ -143,92 +99,6 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
     for (const std::string& notice : replays.back().notices) say(options, recording.name + ": " + notice);
   }
   return replays;
-}
-
-// What all candidates had in common.
-void tell_what_was_shared(const std::vector<sysid::Replay>& replays, const CommonOptions& options) {
-  for (const sysid::Replay& replay : replays)
-    say(options, replay.recording.name + ": one plan of the mesh, " +
-                     std::to_string(sim::count_bending_operators(*replay.plan)) +
-                     " bending operators; held " + std::to_string(sysid::scored_steps(replay).size()) +
-                     " of " + std::to_string(replay.steps + 1) + " steps a candidate");
-}
-
-// The best candidate over the observations, recording by recording; kept with the run.
-std::vector<sysid::Overlay> keep_best(const sysid::GridResults& results, const sysid::Summary& summary,
-                                      const std::vector<sysid::Replay>& replays,
-                                      const sysid::GridSettings& settings, const std::string& out) {
-  std::vector<sysid::Overlay> overlays;
-  if (summary.best.empty()) return overlays;
-  const auto better = [](const auto& a, const auto& b) { return a.score < b.score; };
-  const sysid::CandidateResult& best =
-      *std::min_element(results.candidates.begin(), results.candidates.end(), better);
-  const std::vector<std::string> folders = sysid::file_names(results.recordings);
-  for (std::size_t r = 0; r < replays.size(); ++r) {
-    const sysid::ReplayResult motion =
-        std::move(sysid::run(replays[r], {sysid::candidate_at(best.values, settings)}).front());
-    overlays.push_back(sysid::make_overlay(replays[r], motion.motion, best.recordings[r]));
-    sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / folders[r]).string());
-  }
-  return overlays;
-}
-
-void write_results(const sysid::Summary& summary, const sysid::GridResults& results,
-                   const std::vector<sysid::Overlay>& overlays, const GridOptions& options) {
-  sysid::save_summary(summary, (fs::path(options.out) / "summary.json").string());
-  sysid::ReportSettings report;
-  for (std::size_t k = 0; k < options.map.size() && k < 2; ++k) report.map_axes[k] = options.map[k];
-  sysid::write_report(summary, results, overlays, report, (fs::path(options.out) / "report.html").string());
-}
-
-/// Shows how far the answer is, told by any thread.
-class AnswerLine {
- public:
-  AnswerLine(const CommonOptions& options, const sysid::AnswerWork& most) : line_(options), meter_(most) {}
-
-  void take(const sysid::AnswerWork& done, const sysid::AnswerWork& spared) {
-    const std::scoped_lock lock(mutex_);
-    const auto now = std::chrono::steady_clock::now();
-    meter_.take(done, spared, std::chrono::duration<double>(now - last_).count());
-    last_ = now;
-    line_.show(meter_);
-  }
-
- private:
-  std::mutex mutex_;
-  ProgressLine line_;
-  sysid::AnswerMeter meter_;
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
-};
-
-// Judges what was found and writes the answer.
-int conclude(const data::Asset& asset, std::vector<sysid::Replay>& replays,
-             const sysid::GridSettings& settings, const sysid::ResultsStore& store,
-             const GridOptions& options, sim::Device device, std::chrono::steady_clock::time_point begin) {
-  sysid::GridResults results = store.results();
-  sysid::AnswerSettings asked;
-  if (options.repeatability > 0) asked.repeatability = options.repeatability;
-  asked.horizon = !options.no_horizon;
-  asked.solver_check = !options.no_solver_check;
-  const sysid::Answer answer = [&] {
-    AnswerLine line(options.common, sysid::most_work(settings, replays.size(), asked.solver_check));
-    return sysid::find_answer(
-        results, replays, settings, asked,
-        [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
-  }();
-  sysid::Summary summary = sysid::summarize(results, answer, replays, settings, asked);
-  summary.asset = fs::absolute(asset.source).lexically_normal().string();
-  summary.device = device == sim::Device::cuda ? "cuda" : "cpu";
-  summary.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  write_results(summary, results, keep_best(results, summary, replays, settings, options.out), options);
-
-  for (const std::string& warning : summary.warnings) warn(warning);
-  if (options.common.json) {
-    std::cout << sysid::summary_text(summary);
-  } else {
-    print_answer(summary, options.out);
-  }
-  return summary.exit_code;
 }
 
 int run_grid(const CLI::App& verb, const GridOptions& options) {
@@ -272,32 +142,12 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
           " vertices, " + std::to_string(threads) + " threads, about " +
           data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) +
           " MB of memory, on the " + (device == sim::Device::cuda ? "CUDA device" : "CPU"));
-  if (!settings.rollouts.empty()) {
-    const sysid::AnswerWork most = sysid::most_work(settings, replays.size(), !options.no_solver_check);
-    say(options.common, "then the answer: at most " +
-                            data::format_count(static_cast<std::size_t>(most.motions)) +
-                            " motions more and " + data::format_count(static_cast<std::size_t>(most.scores)) +
-                            " scores between them");
-  }
-  const auto kept = [&] {
-    warn("stopped with " + data::format_count(store.results().candidates.size()) + " of " +
-         data::format_count(static_cast<std::size_t>(sysid::count_candidates(settings.axes))) +
-         " candidates, kept in " + options.out + "; --resume goes on");
-    return exit_failed;
-  };
-  try {
-    {
-      ProgressLine line(options.common);
-      if (!sysid::grid_search(
-              replays, settings, store, [&](const sysid::Progress& progress) { line.show(progress); },
-              &stop_on_signals()))
-        return kept();
-    }
-    if (options.common.verbose) tell_what_was_shared(replays, options.common);
-    return conclude(asset, replays, settings, store, options, device, begin);
-  } catch (const data::Stopped&) {
-    return kept();
-  }
+  sysid::AnswerSettings asked;
+  if (options.repeatability > 0) asked.repeatability = options.repeatability;
+  asked.horizon = !options.no_horizon;
+  asked.solver_check = !options.no_solver_check;
+  Search search{asset, std::move(replays), settings, asked, options.map, device, options.out, begin};
+  return run_search(search, store, options.common);
 }
 
 }  // namespace
@@ -322,7 +172,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
                  "Do not solve the best candidate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_option("--rollouts", options->rollouts,
-                   "Folder that keeps the motions, to score them again without simulating");
+                   "Folder that keeps the motions, for several searches; without it, motions/ of the run");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   add_parameter_options(*verb, options->axes);
   add_replay_options(*verb, options->replay);

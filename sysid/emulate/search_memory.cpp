@@ -8,7 +8,9 @@ namespace flash::sysid {
 
 namespace {
 
-constexpr double kFiner = 4;  // vertices of the mesh of half the cell, over those of the search's
+constexpr double kLikelihood = 1e6;  // bytes a keyframe: fields of the likelihoods at hand
+constexpr double kAtEstimate = 14;   // motions about the estimate that are kept
+constexpr double kFiner = 4;         // vertices of the mesh of half the cell, over those of the search's
 
 double kept_steps(const Replay& replay) {
   const std::vector<bool> read = steps_read(replay, replay.start, replay.settings.solver.time_step,
@@ -21,31 +23,28 @@ double kept_steps(const Replay& replay) {
 MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSettings& settings,
                                bool solver_check) {
   MemoryEstimate estimate;
-  double motion = 0, solver = 0, kept = 0;
+  double motion = 0, solver = 0, kept = 0, keyframes = 0;
   for (const Replay& replay : replays) {
     const double vertices = vertices_of(replay);
     solver = std::max(solver, sim::solver_bytes_per_vertex * vertices);
     motion += 2 * motion_bytes(replay);  // in its batch, and until all recordings are scored
+    keyframes += static_cast<double>(replay.observations.size());
     kept += kept_steps(replay) * vertices * bytes_per_position;
   }
   const double candidates = count_candidates(settings.axes);
   const double at_once = std::min<double>(settings.envs, candidates);
   const double threads = std::min<double>(settings.threads, at_once);
-  const bool keeps = !settings.rollouts.empty();
-  const double finer_at_once = keeps ? at_once : 1, finer_threads = keeps ? threads : 1;
   estimate.steps = at_once * motion;
   estimate.simulation = threads * solver + estimate.steps;
   if (solver_check) {
-    estimate.steps = std::max(estimate.steps, kFiner * finer_at_once * motion);
-    estimate.simulation =
-        std::max(estimate.simulation, kFiner * (finer_threads * solver + finer_at_once * motion));
+    estimate.steps = std::max(estimate.steps, kFiner * at_once * motion);
+    estimate.simulation = std::max(estimate.simulation, kFiner * (threads * solver + at_once * motion));
   }
-  if (!keeps) return estimate;
   const double finer = solver_check ? count_candidates(thinned(settings.axes)) : 0;
   // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer
   // one.
   const double own = candidates * kept, half_cell = finer * kFiner * kept;
-  estimate.kept = own + std::max(own, 2 * half_cell);
+  estimate.kept = own + std::max(own, 2 * half_cell) + kAtEstimate * kept + kLikelihood * keyframes;
   return estimate;
 }
 

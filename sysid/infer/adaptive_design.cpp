@@ -9,10 +9,8 @@
 namespace flash::sysid {
 namespace {
 
-double coordinate(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
-
 std::array<double, 2> range_of(const Axis& axis) {
-  return {coordinate(axis, axis.values.front()), coordinate(axis, axis.values.back())};
+  return {coordinate_of(axis, axis.values.front()), coordinate_of(axis, axis.values.back())};
 }
 
 /// Points an axis by how many are searched: some hundreds in all.
@@ -32,7 +30,7 @@ std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searc
     const double first = axis.values.front(), last = axis.values.back();
     axis.values.clear();
     for (int i = 0; i < points; ++i) {
-      const double from = coordinate(axis, extent[k][0]), to = coordinate(axis, extent[k][1]);
+      const double from = coordinate_of(axis, extent[k][0]), to = coordinate_of(axis, extent[k][1]);
       const double x = from + (to - from) * i / (points - 1);
       axis.values.push_back(std::clamp(axis.logarithmic ? std::exp(x) : x, first, last));
     }
@@ -40,8 +38,9 @@ std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searc
   return axes;
 }
 
-constexpr double kSame = 1e-9;  // of a width
-constexpr int kRounds = 16;     // of a zoom
+constexpr double kSame = 1e-9;   // of a width
+constexpr int kRounds = 12;      // of a look
+constexpr double kUnlikely = 9;  // deviance over the least: three standard deviations
 
 double distance(const Axis& axis, double from, double to) {
   return axis.logarithmic ? std::log(to / from) : to - from;
@@ -64,26 +63,26 @@ Extent extent_of(const std::vector<Axis>& axes) {
   return extent;
 }
 
-Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::vector<Axis>& axes) {
+Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes) {
   constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most
   constexpr double kSmallest = 1e-4;      // half extent over the range
   Extent next = extent;
   bool fits = true;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     if (axes[k].values.size() < 2) continue;
-    const auto at = [&](double value) { return coordinate(axes[k], value); };
+    const auto at = [&](double value) { return coordinate_of(axes[k], value); };
     const std::array<double, 2> range = range_of(axes[k]), now = {at(extent[k][0]), at(extent[k][1])};
     const double width = now[1] - now[0], spacing = width / (points_per_axis(axes) - 1);
-    const double best = at(*verdict.parameters[k].estimate);
+    const double best = posterior.estimate[static_cast<Eigen::Index>(k)];
     double reach = 0;  // the larger half of the interval
     for (const std::size_t side : {0, 1}) {
-      const double end = at((*verdict.parameters[k].interval95)[side]);
-      const bool open = std::abs(end - now[side]) < 1e-9 * width;
+      const bool open = posterior.end(k, side == 1) < kUnlikely;
       const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
       // Past an open end by a quarter of the width or more; a longer way would lose what the last extents
       // told.
-      const double past = std::max(0.75 * width, std::abs(end - best) + 0.25 * width);
-      reach = std::max(reach, open && more ? past / kRoom : std::abs(end - best));
+      const double past = std::max(0.75 * width, std::abs(now[side] - best) + 0.25 * width);
+      const double quantile = posterior.quantile(k, side == 0 ? 0.025 : 0.975);
+      reach = std::max(reach, open && more ? past / kRoom : std::abs(quantile - best));
       fits = fits && !(open && more);
     }
     const double half = std::max({kRoom * reach, spacing, kSmallest * (range[1] - range[0])});
@@ -94,86 +93,128 @@ Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::
   return fits ? extent : next;
 }
 
-GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
-                         double share, const GridSettings& settings, const TellWork& told) {
-  GridResults results;
-  results.axes = axes;
-  std::vector<Replay> replays;
+std::vector<ReplayResult> motions_at(const Emulator& emulator, const std::vector<double>& values,
+                                     double share) {
+  std::vector<ReplayResult> motions;
+  for (std::size_t r = 0; r < emulator.models.size(); ++r)
+    motions.push_back(std::move(motions_of(emulator.models, share)(r, {values}).front()));
+  return motions;
+}
+
+Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>& axes,
+                              const MotionLikelihood& likelihood, const GridSettings& grid,
+                              const TellWork& told) {
   std::vector<TwoMeshMotions> all;
-  for (const ModelledReplay& model : models) {
-    results.recordings.push_back(model.replay.recording.name);
-    replays.push_back(model.replay);
-    all.push_back(model.model);
-  }
-  const std::vector<std::vector<double>> points = cartesian_product(axes);
-  results.candidates.resize(points.size());
-  const std::atomic<bool>* const stop = models.front().replay.settings.solver.stop;
-  const auto score = [&](const std::vector<TwoMeshMotions>& slices, std::size_t i) {
+  for (const ModelledReplay& model : emulator.models) all.push_back(model.model);
+  const std::size_t points = cartesian_product(axes).size();
+  Eigen::VectorXd deviance(static_cast<Eigen::Index>(points));
+  const std::atomic<bool>* const stop = emulator.models.front().replay.settings.solver.stop;
+  const auto look = [&](const std::vector<TwoMeshMotions>& slices, std::size_t i) {
     if (stop != nullptr && *stop) throw data::Stopped();
-    std::vector<ReplayResult> motions(slices.size());
-    for (std::size_t r = 0; r < slices.size(); ++r) {
-      motions[r].motion = slices[r].at({}, share);
-      motions[r].converged = motions[r].finite = true;
-    }
-    results.candidates[i] = score_motions(replays, motions, settings.score);
-    results.candidates[i].id = static_cast<int>(i);
-    results.candidates[i].values = points[i];
+    std::vector<Motion> motions;
+    for (const TwoMeshMotions& slice : slices) motions.push_back(slice.at({}, emulator.share));
+    deviance[static_cast<Eigen::Index>(i)] = likelihood.deviance(motions);
     if (told) told({0, 1}, {});
   };
   // Points that share their first values share the slices there.
   const auto visit = [&](const auto& self, const std::vector<TwoMeshMotions>& slices, std::size_t k,
                          std::size_t first, std::size_t count) -> void {
-    if (k == axes.size()) return score(slices, first);
+    if (k == axes.size()) return look(slices, first);
     const std::size_t values = axes[k].values.size(), part = count / values;
-    data::for_each_in_parallel(values, k == 0 ? settings.threads : 1, [&](std::size_t i) {
+    data::for_each_in_parallel(values, k == 0 ? grid.threads : 1, [&](std::size_t i) {
       std::vector<TwoMeshMotions> held;
       for (const TwoMeshMotions& slice : slices) held.push_back(slice.slice(axes[k].values[i]));
       self(self, held, k + 1, first + i * part, part);
     });
   };
-  visit(visit, all, 0, 0, points.size());
-  return results;
+  visit(visit, all, 0, 0, points);
+  return deviance;
 }
 
-Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
-            const GridSettings& settings, std::optional<double> repeatability, const TellWork& told) {
-  Extent extent = start;
+std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<double>& values,
+                                   const Extent& extent, const std::vector<Axis>& axes) {
+  constexpr double kStep = 0.1;  // of the extent, to both sides
   std::vector<Replay> replays;
-  for (const ModelledReplay& model : models) replays.push_back(model.replay);
-  const MotionsAt motions = motions_of(models, share);
-  Zoomed found;
-  int scored = 0;
+  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
+  std::vector<MotionChange> rates;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    if (axes[k].values.size() < 2) continue;
+    const double at = coordinate_of(axes[k], values[k]), low = coordinate_of(axes[k], extent[k][0]),
+                 high = coordinate_of(axes[k], extent[k][1]);
+    const std::array<double, 2> range = range_of(axes[k]);
+    std::array<double, 2> ends = {std::max(range[0], at - kStep * (high - low)),
+                                  std::min(range[1], at + kStep * (high - low))};
+    const double factor = (high - low) / (ends[1] - ends[0]);
+    MotionChange rate;
+    for (const std::size_t side : {0, 1}) {
+      std::vector<double> moved = values;
+      moved[k] = value_of(axes[k], ends[side]);
+      rate.push_back(
+          {side == 0 ? -factor : factor,
+           std::make_shared<const Motions>(Motions{replays, motions_at(emulator, moved, emulator.share)})});
+    }
+    rates.push_back(std::move(rate));
+  }
+  return rates;
+}
+
+Look narrow(const Emulator& emulator, const Extent& start, const std::vector<double>& at,
+            const std::vector<Axis>& axes, const GridSettings& grid, std::optional<double> repeatability,
+            const std::vector<KnownError>& errors, const TellWork& told) {
+  std::vector<Replay> replays;
+  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
+  Extent extent = start;
+  std::vector<double> values = at;
+  std::optional<Look> look;
+  int looked = 0;
   for (int round = 0; round < kRounds; ++round) {
-    found.results = score_models(models, axes_over(extent, settings.axes), share, settings, told);
-    scored += static_cast<int>(found.results.candidates.size());
-    found.verdict = profile_grid(found.results, repeatability);
-    if (found.verdict.best < 0) break;
-    const std::vector<double> estimate(found.verdict.estimate.begin(), found.verdict.estimate.end());
-    found.information = keyframe_information(measure_sensitivity(replays, settings, estimate, true, motions));
-    found.verdict = profile_grid(found.results, {repeatability, {}, found.information});
-    const Extent next = next_extent(extent, found.verdict, settings.axes);
+    MotionLikelihood likelihood(replays, motions_at(emulator, values, emulator.share), grid.score,
+                                repeatability, errors, rates_at(emulator, values, extent, axes));
+    const std::vector<Axis> here = axes_over(extent, axes);
+    const Eigen::VectorXd deviance = deviance_over(emulator, here, likelihood, grid, told);
+    looked += static_cast<int>(deviance.size());
+    look.emplace(Look{std::move(likelihood), explore_posterior(here, deviance)});
+    values = look->posterior.values();
+    const Extent next = next_extent(extent, look->posterior, axes);
     if (next == extent) break;
     extent = next;
   }
-  if (told) told({}, {0, most_scores(settings.axes) - scored});
-  return found;
+  if (told) told({}, {0, most_scores(axes) - looked});
+  return std::move(*look);
 }
 
 int most_scores(const std::vector<Axis>& axes) {
   return kRounds * static_cast<int>(cartesian_product(axes_over(extent_of(axes), axes)).size());
 }
 
-std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count) {
+std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,
+                          std::size_t at_most) {
+  constexpr int kMost = 9;  // of a wide axis
   std::vector<Axis> axes = searched;
+  std::size_t narrow = 1, wide = 0;
+  const auto is_wide = [&](std::size_t k) {
+    return distance(searched[k], extent[k][0], extent[k][1]) > cell_of(searched[k]);
+  };
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    if (axes[k].values.size() < 2) continue;
+    if (is_wide(k))
+      ++wide;
+    else
+      narrow *= static_cast<std::size_t>(count);
+  }
+  int more = count;  // values of a wide axis: as many as there may be
+  while (more < kMost &&
+         static_cast<double>(narrow) * std::pow(more + 1, wide) <= static_cast<double>(at_most))
+    ++more;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     Axis& axis = axes[k];
     if (axis.values.size() < 2) continue;
     const double first = axis.values.front(), last = axis.values.back();
+    const int points = is_wide(k) ? more : count;
     const auto [low, high] = extent[k];
-    if (distance(axis, low, high) > cell_of(axis)) continue;
     axis.values.clear();
-    for (int i = 0; i < count; ++i) {
-      const double share = static_cast<double>(i) / (count - 1);
+    for (int i = 0; i < points; ++i) {
+      const double share = static_cast<double>(i) / (points - 1);
       const double value = axis.logarithmic ? low * std::pow(high / low, share) : low + share * (high - low);
       axis.values.push_back(std::clamp(value, first, last));
     }
@@ -181,25 +222,32 @@ std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searche
   return axes;
 }
 
-Extent next_lattice(const Extent& extent, const Extent& zoomed, const GridVerdict& verdict,
-                    const std::vector<Axis>& searched) {
+bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes) {
+  for (std::size_t k = 0; k < axes.size(); ++k)
+    if (axes[k].values.size() > 1 && cell_of(lattice[k]) <= 0.5 * cell_of(axes[k])) return true;
+  return false;
+}
+
+Extent next_lattice(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& searched) {
   constexpr double kPart = 0.5 - kSame;
-  Extent next = next_extent(zoomed, verdict, searched);
+  const Extent looked = extent_of(posterior.axes);
+  Extent next = next_extent(looked, posterior, searched);
   bool holds = true;
   for (std::size_t k = 0; k < searched.size(); ++k) {
     const Axis& axis = searched[k];
     if (axis.values.size() < 2) continue;
     const auto [low, high] = extent[k];
-    const auto [from, to] = *verdict.parameters[k].interval95;
     const double width = distance(axis, low, high), first = axis.values.front(), last = axis.values.back();
-    const auto leaves = [&](double end, double side, double range) {
-      return std::abs(distance(axis, end, side)) <= kSame * width &&
+    const auto leaves = [&](bool upper, double looked_to, double side, double range) {
+      return posterior.end(k, upper) < kUnlikely &&
+             std::abs(distance(axis, looked_to, side)) <= kSame * width &&
              std::abs(distance(axis, side, range)) > kSame * width;
     };
-    const bool below = leaves(from, low, first), above = leaves(to, high, last);
+    const bool below = leaves(false, looked[k][0], low, first),
+               above = leaves(true, looked[k][1], high, last);
     if (below) next[k][0] = std::max(first, moved(axis, low, -width));
     if (above) next[k][1] = std::min(last, moved(axis, high, width));
-    holds = holds && !below && !above && distance(axis, zoomed[k][0], zoomed[k][1]) >= kPart * width;
+    holds = holds && !below && !above && distance(axis, looked[k][0], looked[k][1]) >= kPart * width;
   }
   return holds ? extent : next;
 }

@@ -5,7 +5,8 @@
 
 #include "sysid/emulate/two_mesh_motions.h"
 #include "sysid/infer/answer_work.h"
-#include "sysid/infer/profile.h"
+#include "sysid/infer/motion_likelihood.h"
+#include "sysid/infer/posterior.h"
 
 namespace flash::sysid {
 
@@ -15,39 +16,58 @@ using Extent = std::vector<std::array<double, 2>>;
 /// From the first to the last value of each axis.
 Extent extent_of(const std::vector<Axis>& axes);
 
-/// One grid within the searched range, and what its scores say with no regard to solver or interpolation.
-struct Zoomed {
-  GridResults results;
-  GridVerdict verdict;
-  std::vector<Eigen::MatrixXd> information;  ///< of the keyframes at the estimate
+/// A posterior over one extent, and the likelihood that it is of.
+struct Look {
+  MotionLikelihood likelihood;
+  Posterior posterior;
 };
 
-/// Registers and scores modelled motions at every point of a grid. `share`: see TwoMeshMotions.
-GridResults score_models(const std::vector<ModelledReplay>& models, const std::vector<Axis>& axes,
-                         double share, const GridSettings& settings, const TellWork& told = {});
+/// What stands in for the simulations of a search.
+struct Emulator {
+  std::vector<ModelledReplay> models;  ///< one a recording
+  double share = 0;                    ///< see TwoMeshMotions
+};
+
+/// Modelled motions at values inside the range, one a recording; `share`: see TwoMeshMotions.
+std::vector<ReplayResult> motions_at(const Emulator& emulator, const std::vector<double>& values,
+                                     double share);
+
+/// How modelled motions change about `values` with each searched parameter, over an extent of it.
+std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<double>& values,
+                                   const Extent& extent, const std::vector<Axis>& axes);
+
+/// The likelihood of modelled motions at every point of a grid, in order.
+Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>& axes,
+                              const MotionLikelihood& likelihood, const GridSettings& grid,
+                              const TellWork& told = {});
 
 /// An extent about the estimate, of which the interval of every parameter takes a half or which ends with the
-/// range of `axes`; `extent`, on which the verdict stands, itself where it is not much too large and leaves
-/// no interval open.
-Extent next_extent(const Extent& extent, const GridVerdict& verdict, const std::vector<Axis>& axes);
+/// range of `axes`; `extent`, on which the posterior stands, itself where it is not much too large and cuts
+/// nothing likely off.
+Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes);
 
-/// Grids of some hundred points, each about the estimate of the one before, until the interval of every
-/// parameter takes a third to a half of the extent or ends with the searched range. A point costs a score, no
-/// simulation. `start`: the first extent.
-Zoomed zoom(const std::vector<ModelledReplay>& models, double share, const Extent& start,
-            const GridSettings& settings, std::optional<double> repeatability, const TellWork& told = {});
+/// Posteriors over some hundred points, each about the estimate of the one before, until the interval of
+/// every parameter takes a third to a half of the extent or ends with the range of `axes`. A point costs a
+/// look at the observations, no simulation. The likelihood is linear about the estimate before. `start`: the
+/// first extent; `at`: where it is linear first.
+Look narrow(const Emulator& emulator, const Extent& start, const std::vector<double>& at,
+            const std::vector<Axis>& axes, const GridSettings& grid, std::optional<double> repeatability,
+            const std::vector<KnownError>& errors, const TellWork& told = {});
 
-/// The most scores that zoom takes over such axes: the points of all its grids.
+/// The most points that narrow looks at over such axes.
 int most_scores(const std::vector<Axis>& axes);
 
-/// Values at which motions are simulated anew about an answer: `count` over the extent of an axis, evenly,
-/// where that is no wider than a cell of the search; else the values of the search.
-std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count);
+/// Values at which motions are simulated anew about an answer, evenly over the extent of each axis: `count`
+/// where that is no wider than a cell of the search, else as many, to nine, as `at_most` points allow.
+std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,
+                          std::size_t at_most);
 
-/// Where to simulate next: `extent` itself where every interval of the verdict ends inside it or with the
-/// searched range, and `zoomed`, the extent that it was read on, is half of it or more. Else an extent about
-/// the estimate, twice as far on a side that an interval leaves.
-Extent next_lattice(const Extent& extent, const Extent& zoomed, const GridVerdict& verdict,
-                    const std::vector<Axis>& searched);
+/// Whether a lattice has, in any direction, cells of no more than half those of `axes`.
+bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes);
+
+/// Where to simulate next: `extent` itself where nothing likely is beyond it within the searched range, and
+/// the posterior takes half of it or more. Else an extent about the estimate, twice as far on a side that
+/// the posterior leaves.
+Extent next_lattice(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& searched);
 
 }  // namespace flash::sysid

@@ -3,69 +3,489 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sysid/infer/refine.h"
+#include "data/text.h"
+#include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/held.h"
+#include "sysid/infer/verdict.h"
 #include "sysid/observe/horizon.h"
 
 namespace flash::sysid {
 namespace {
 
-/// The interpolation promised less than what was simulated at its minimum: the best candidate stands.
-void fall_back_on_best(const GridResults& results, GridVerdict& verdict) {
-  const std::vector<double>& best = results.candidates[static_cast<std::size_t>(verdict.best)].values;
-  for (std::size_t k = 0; k < best.size(); ++k) {
-    verdict.estimate[static_cast<Eigen::Index>(k)] = best[k];
-    verdict.parameters[k].estimate = best[k];
+constexpr int kRounds = 3;               // of motions about the answer
+constexpr int kWalk = 8;                 // of them on the way from a start
+constexpr std::size_t kFew = 30;         // of them in a round
+constexpr int kDraws = 4;                // at which an emulator is tried
+constexpr int kAtEstimate = 3 + kDraws;  // motions at an estimate: itself, two finer, and those
+constexpr double kOwn = 0, kFiner = 1, kLimit = 4.0 / 3;  // shares of a TwoMeshMotions
+
+/// What all steps of an answer need.
+struct Task {
+  const std::vector<Replay>& replays;
+  const GridSettings& grid;  ///< axes: of which every candidate has a motion
+  const AnswerSettings& settings;
+  const MotionStore& store;
+  const TellWork& told;
+
+  void tell_motion() const {
+    if (told) told({1, 0}, {});
   }
+};
+
+int best_of(const GridResults& results) {
+  int best = -1;
+  for (std::size_t i = 0; i < results.candidates.size(); ++i)
+    if (std::isfinite(results.candidates[i].score) &&
+        (best < 0 || results.candidates[i].score < results.candidates[static_cast<std::size_t>(best)].score))
+      best = static_cast<int>(i);
+  return best;
+}
+
+/// The values at which no candidate diverged: values that diverge most go first, the best candidate's stay.
+std::vector<Axis> axes_without_diverged(const GridResults& results, const std::vector<double>& best) {
+  std::vector<Axis> axes = results.axes;
+  const auto is_left = [&](const CandidateResult& candidate) {
+    for (std::size_t k = 0; k < axes.size(); ++k)
+      if (std::find(axes[k].values.begin(), axes[k].values.end(), candidate.values[k]) ==
+          axes[k].values.end())
+        return false;
+    return true;
+  };
+  while (true) {
+    std::size_t axis = 0, most = 0;
+    double value = 0;
+    for (std::size_t k = 0; k < axes.size(); ++k)
+      for (const double each : axes[k].values) {
+        if (each == best[k]) continue;
+        const auto count = static_cast<std::size_t>(
+            std::count_if(results.candidates.begin(), results.candidates.end(), [&](const auto& candidate) {
+              return !std::isfinite(candidate.score) && candidate.values[k] == each && is_left(candidate);
+            }));
+        if (count <= most) continue;
+        most = count;
+        axis = k;
+        value = each;
+      }
+    if (most == 0) return axes;
+    std::erase(axes[axis].values, value);
+  }
+}
+
+/// The cells of the grid around a candidate.
+Extent cells_around(const std::vector<double>& candidate, const std::vector<Axis>& axes) {
+  Extent extent;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const std::vector<double>& values = axes[k].values;
+    const auto at =
+        static_cast<std::size_t>(std::find(values.begin(), values.end(), candidate[k]) - values.begin());
+    extent.push_back({values[at > 0 ? at - 1 : 0], values[std::min(at + 1, values.size() - 1)]});
+  }
+  return extent;
+}
+
+/// The motions at every point of `axes`; with `finer` axes (none: empty) those of a finer mesh at theirs.
+/// Empty where one diverged or there is no finer mesh.
+std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
+                                      const std::vector<Axis>& finer, bool told_own) {
+  Emulator emulator{{}, finer.empty() ? kOwn : kLimit};
+  GridSettings grid = task.grid;
+  grid.axes = axes;
+  const std::function<void()> motion = [&] { task.tell_motion(); };
+  for (const Replay& replay : task.replays) {
+    const auto motions =
+        motion_interpolant(replay, grid, task.store, told_own ? motion : std::function<void()>());
+    if (!motions) return std::nullopt;
+    auto model = finer.empty() ? ModelledReplay{replay, TwoMeshMotions(*motions)}
+                               : with_finer_mesh(replay, *motions, finer, grid, task.store, motion);
+    if (!model) return std::nullopt;
+    emulator.models.push_back(std::move(*model));
+  }
+  return emulator;
+}
+
+std::vector<Replay> replays_of(const Emulator& emulator) {
+  std::vector<Replay> replays;
+  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
+  return replays;
+}
+
+/// The estimate simulated, and what it says of errors of the solution.
+struct Estimate {
+  std::vector<ReplayResult> motions;  ///< on the search's own mesh
+  std::vector<KnownError> errors;
+  std::vector<std::string> names;  ///< of the errors of the solution, as of a SolverCheck; they come first
+};
+
+bool all_finite(const std::vector<ReplayResult>& results) {
+  return std::all_of(results.begin(), results.end(),
+                     [](const ReplayResult& result) { return result.finite; });
+}
+
+/// By what is held and not measured, about an estimate: how the motion changes with it, and how that bends.
+/// What diverges is left out.
+std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
+                                       const std::vector<ReplayResult>& here) {
+  std::vector<KnownError> errors;
+  const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
+  for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
+    std::array<std::vector<ReplayResult>, 2> ends;
+    for (const std::size_t side : {0, 1})
+      for (const Replay& replay : task.replays) {
+        ends[side].push_back(
+            task.store.run(replay, candidate_with(values, task.grid, held.name, held.values[side])));
+        task.tell_motion();
+      }
+    if (!all_finite(ends[0]) || !all_finite(ends[1])) continue;
+    const auto low = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[0])}),
+               high = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[1])});
+    errors.push_back({{{-0.5, low}, {0.5, high}}, held.shared});
+    errors.push_back({{{0.5, low}, {-1, middle}, {0.5, high}}, held.shared});
+  }
+  return errors;
+}
+
+/// What the emulator misses at some draws of a posterior: errors of which any mixture is as likely.
+std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,
+                                           const Posterior& posterior) {
+  std::vector<KnownError> errors;
+  const Eigen::MatrixXd samples = samples_of(posterior);
+  const std::vector<Replay> on_model = replays_of(emulator);
+  const double share = 1 / std::sqrt(static_cast<double>(kDraws));
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd row = samples.row((2 * draw + 1) * samples.rows() / (2 * kDraws)).transpose();
+    const std::vector<double> values(row.begin(), row.end());
+    const ReplayCandidate candidate = candidate_at(values, task.grid);
+    Motions simulated{on_model, {}};
+    for (std::size_t r = 0; r < task.replays.size(); ++r) {
+      ReplayResult own = task.store.run(task.replays[r], candidate);
+      task.tell_motion();
+      simulated.results.push_back(own);
+      simulated.results.back().motion = emulator.models[r].model.on_its_mesh(own.motion);
+    }
+    if (!all_finite(simulated.results)) continue;
+    errors.push_back(
+        {{{-share, std::make_shared<const Motions>(Motions{on_model, motions_at(emulator, values, kOwn)})},
+          {share, std::make_shared<const Motions>(std::move(simulated))}}});
+  }
+  return errors;
+}
+
+/// Motions simulated at values, as the emulator's mesh has them; empty where one diverged. `own`: on the
+/// search's own mesh.
+std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emulator& emulator,
+                                                     const std::vector<double>& values,
+                                                     std::vector<ReplayResult>& own) {
+  std::vector<ReplayResult> simulated = motions_at(emulator, values, emulator.share);
+  const std::vector<ReplayResult> own_model = motions_at(emulator, values, kOwn);
+  own.clear();
+  for (std::size_t r = 0; r < task.replays.size(); ++r) {
+    own.push_back(task.store.run(task.replays[r], candidate_at(values, task.grid)));
+    task.tell_motion();
+    if (!own.back().finite) return std::nullopt;
+    add(simulated[r].motion, 1, emulator.models[r].model.on_its_mesh(own.back().motion));
+    add(simulated[r].motion, -1, own_model[r].motion);
+  }
+  return simulated;
+}
+
+/// Empty where a motion diverged.
+std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
+                                 const std::vector<double>& values) {
+  Estimate estimate;
+  const ReplayCandidate candidate = candidate_at(values, task.grid);
+  const std::vector<Replay> on_model = replays_of(emulator);
+  const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share);
+  auto simulated = simulate_at(task, emulator, values, estimate.motions);
+  if (!simulated) return std::nullopt;
+  const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects) {
+    const auto shared = [](Motions& motions) { return std::make_shared<const Motions>(std::move(motions)); };
+    estimate.errors.push_back({{{-1, shared(from)}, {1, shared(to)}}, true, corrects});
+    estimate.names.push_back(name);
+  };
+  add_error("estimate_itself", {on_model, model}, {on_model, std::move(*simulated)}, true);
+  if (!task.settings.solver_check) return estimate;
+  if (emulator.share != kOwn)
+    add_error("double_mesh", {on_model, motions_at(emulator, values, kFiner)}, {on_model, model}, false);
+  for (FinerSolution& finer : finer_solutions(task.replays, candidate, task.store)) {
+    for (std::size_t r = 0; r < task.replays.size(); ++r) task.tell_motion();
+    add_error(finer.what, {task.replays, estimate.motions},
+              {std::move(finer.replays), std::move(finer.motions)}, true);
+  }
+  return estimate;
+}
+
+/// An emulator, and the posterior by it.
+struct Found {
+  Emulator emulator;
+  std::vector<Axis> axes;  ///< of it: at their values it is exact
+  Look look;
+  Estimate estimate;
+  std::vector<KnownError> errors;  ///< all that the look knows
+};
+
+/// Looks twice: for the estimate, and again with what solving it says of errors. `held`: errors by what is
+/// held, found at the first estimate.
+std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
+                               const Extent& extent, const std::vector<double>& at,
+                               std::vector<KnownError> errors, std::vector<KnownError>& held) {
+  const auto look = [&](const Extent& start, const std::vector<double>& values) {
+    return narrow(emulator, start, values, axes, task.grid, task.settings.repeatability, errors, task.told);
+  };
+  const Look first = look(extent, at);
+  std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values());
+  if (!estimate) return std::nullopt;
+  if (held.empty()) held = errors_of_held(task, first.posterior.values(), estimate->motions);
+  errors = estimate->errors;
+  errors.insert(errors.end(), held.begin(), held.end());
+  for (KnownError& error : errors_of_emulator(task, emulator, first.posterior))
+    errors.push_back(std::move(error));
+  Look second = look(extent_of(first.posterior.axes), first.posterior.values());
+  return Found{std::move(emulator), axes, std::move(second), std::move(*estimate), std::move(errors)};
+}
+
+/// Simulations of one recording in a round about the answer, on the own mesh and on the finer one, at most;
+/// none where they would be too many.
+std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes) {
+  std::size_t fewest = 1, own = 1, finer = 1;
+  const std::vector<Axis> thin = thinned(axes);
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const std::size_t count = axes[k].values.size();
+    if (count < 2) continue;
+    fewest *= std::min<std::size_t>(count, 3);
+    own *= std::max<std::size_t>(count, 3);
+    finer *= std::max<std::size_t>(thin[k].values.size(), 2);
+  }
+  if (fewest > kFew) return {0, 0};
+  return {std::min(own, kFew), std::min(finer, kFew)};
+}
+
+/// One lattice over an extent, and what its motions say; empty where too many would be needed, or one
+/// diverged.
+std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
+                                bool finer, const std::vector<KnownError>& errors,
+                                std::vector<KnownError>& held) {
+  const std::vector<Axis>& searched = task.grid.axes;
+  const std::vector<Axis> axes = lattice(extent, searched, 3, kFew);
+  if (cartesian_product(axes).size() > kFew) return std::nullopt;
+  std::optional<Emulator> emulator = emulator_over(
+      task, axes, finer ? thinned(lattice(extent, searched, 2, kFew / 3)) : std::vector<Axis>{}, true);
+  if (!emulator) return std::nullopt;
+  return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
+}
+
+/// The likelihood of motions on the mesh of `replays`, with all errors that are known but those of the
+/// emulator and `more`.
+MotionLikelihood likelihood_about(const Task& task, const Found& found, const std::vector<Replay>& replays,
+                                  const std::vector<double>& values,
+                                  const std::vector<ReplayResult>& reference, std::vector<KnownError> more) {
+  more.insert(more.end(), found.estimate.errors.begin() + 1, found.estimate.errors.end());
+  return {replays,
+          reference,
+          task.grid.score,
+          task.settings.repeatability,
+          more,
+          rates_at(found.emulator, values, extent_of(found.look.posterior.axes), found.axes)};
+}
+
+void set_estimate(Posterior& posterior, const std::vector<Axis>& axes, const std::vector<double>& values) {
+  for (std::size_t k = 0; k < values.size(); ++k)
+    posterior.estimate[static_cast<Eigen::Index>(k)] = coordinate_of(axes[k], values[k]);
+}
+
+std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
+  std::vector<Motion> motions;
+  for (const ReplayResult& result : results) motions.push_back(result.motion);
+  return motions;
+}
+
+/// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
+/// emulator's grid. Whether the mode is as likely as any such point and as the `best` of the search: it is
+/// not where folds fall another way between two simulations.
+bool settle(const Task& task, Found& found, const std::vector<double>& best,
+            const std::vector<KnownError>& held) {
+  constexpr double kMatters = 1;  // of a deviance
+  const std::vector<Replay> on_model = replays_of(found.emulator);
+  const std::vector<double> mode = found.look.posterior.values();
+  std::vector<ReplayResult> own;
+  auto simulated = simulate_at(task, found.emulator, mode, own);
+  if (!simulated) return false;
+  const MotionLikelihood likelihood = likelihood_about(
+      task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
+  const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
+  Eigen::Index likeliest;
+  const double least = of_points.minCoeff(&likeliest), of_mode = likelihood.deviance(motions_in(*simulated));
+  if (least < of_mode)
+    set_estimate(found.look.posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
+  if (of_mode > least + kMatters) return false;
+
+  // The best of the search may be beyond the emulator's grid: both are moved alike to cells of no size.
+  std::vector<KnownError> errors = held;
+  errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, own})},
+                     {1, std::make_shared<const Motions>(Motions{on_model, std::move(*simulated)})}},
+                    true,
+                    true});
+  const MotionLikelihood on_own = likelihood_about(task, found, task.replays, mode, own, std::move(errors));
+  std::vector<Motion> of_best;
+  for (const Replay& replay : task.replays)
+    of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)).motion);
+  return on_own.deviance(motions_in(own)) <= on_own.deviance(of_best) + kMatters;
+}
+
+/// The posterior by what was simulated alone, on the search's own mesh: likelihoods are interpolated, not
+/// motions, and the estimate is the likeliest point of the grid. No motion is corrected by what was seen at
+/// another.
+void keep_to_simulated(const Task& task, Found& found, const std::vector<double>& best,
+                       const std::vector<KnownError>& held) {
+  found.emulator.share = kOwn;
+  for (KnownError& error : found.estimate.errors) error.corrects = false;
+  found.look.likelihood = likelihood_about(task, found, replays_of(found.emulator), best,
+                                           motions_at(found.emulator, best, kOwn), held);
+  const Eigen::VectorXd deviance =
+      deviance_over(found.emulator, found.axes, found.look.likelihood, task.grid);
+  Posterior posterior = explore_posterior(found.axes, deviance);
+  Eigen::Index likeliest;
+  posterior.least = deviance.minCoeff(&likeliest);
+  set_estimate(posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
+  found.look.posterior = std::move(posterior);
+}
+
+/// Motions simulated anew about the answer where few simulations do, and again where it leaves them.
+Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held) {
+  const bool finer = found.emulator.share != kOwn;
+  Extent extent = extent_of(found.look.posterior.axes);
+  for (int round = 0; round < kRounds; ++round) {
+    if (round == 0 && !is_finer(lattice(extent, task.grid.axes, 3, kFew), found.axes)) break;
+    std::optional<Found> there =
+        look_about(task, extent, found.look.posterior.values(), finer, found.errors, held);
+    if (!there) break;
+    found = std::move(*there);
+    const Extent next = next_lattice(extent, found.look.posterior, task.grid.axes);
+    if (next == extent) break;
+    extent = next;
+  }
+  return found;
+}
+
+/// How far each error moves the surface, and the parameters if they had to explain it.
+std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
+  const std::vector<Replay> on_model = replays_of(found.emulator);
+  GridSettings grid = task.grid;
+  grid.axes = found.look.posterior.axes;
+  const Sensitivity sensitivity =
+      measure_sensitivity(on_model, grid, found.look.posterior.values(), true,
+                          motions_of(found.emulator.models, found.emulator.share));
+  std::vector<SolverCheck> checks;
+  for (std::size_t e = 0; e < found.estimate.names.size(); ++e) {
+    const std::vector<MotionTerm>& terms = found.estimate.errors[e].terms;
+    const Motions &from = *terms[0].motions, &to = *terms[1].motions;
+    checks.push_back(compare_solutions(found.estimate.names[e], sensitivity, from.replays, from.results,
+                                       to.replays, to.results, task.grid));
+  }
+  return checks;
 }
 
 }  // namespace
 
+AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
+  constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
+  const std::size_t motions = kWalk * (2 * kFew + kAtEstimate) + kHeld;
+  return {static_cast<int>(recordings * motions), 2 * kWalk * most_scores(grid.axes)};
+}
+
+std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
+                               const std::vector<double>& start, const Extent& around,
+                               const AnswerSettings& settings, const TellWork& told) {
+  const MotionStore store(grid.rollouts);
+  const Task task{replays, grid, settings, store, told};
+  Extent extent = around;
+  std::vector<double> at = start;
+  std::vector<KnownError> held;
+  for (int round = 0; round < kWalk; ++round) {
+    std::optional<Found> found;
+    if (settings.solver_check) found = look_about(task, extent, at, true, {}, held);
+    if (!found) found = look_about(task, extent, at, false, {}, held);
+    if (!found) break;
+    at = found->look.posterior.values();
+    const Extent next = next_lattice(extent, found->look.posterior, grid.axes);
+    if (next == extent) break;
+    extent = next;
+  }
+  return lattice(extent, grid.axes, 3, kFew);
+}
+
+AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
+  const auto [own, finer] = most_motions(grid.axes);
+  constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
+  std::size_t motions = kAtEstimate + 2 + kHeld + kRounds * (own + kAtEstimate + (solver_check ? finer : 0));
+  if (solver_check) motions += cartesian_product(thinned(grid.axes)).size();
+  const int looks = 2 * (own > 0 ? 1 + kRounds : 1);
+  return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
+}
+
 Answer find_answer(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
                    const AnswerSettings& settings, const TellWork& told) {
   Answer answer;
-  GridVerdict& verdict = answer.verdict;
-  std::vector<SolverCheck>& checks = answer.checks;
   answer.horizons.resize(replays.size());
-  verdict = profile_grid(results, settings.repeatability);
-  if (verdict.best < 0) return answer;
-
-  const auto values = [&] {
-    return std::vector<double>(verdict.estimate.data(), verdict.estimate.data() + verdict.estimate.size());
-  };
+  answer.best = best_of(results);
+  if (answer.best < 0) return answer;
+  std::vector<double> best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   if (settings.horizon) {
-    const ReplayCandidate best = candidate_at(values(), grid);
+    const ReplayCandidate candidate = candidate_at(best, grid);
     for (std::size_t r = 0; r < replays.size(); ++r)
-      answer.horizons[r] = predictability_horizon(replays[r], best);
+      answer.horizons[r] = predictability_horizon(replays[r], candidate);
     drop_beyond_horizons(answer.horizons, results);
     for (std::size_t r = 0; r < replays.size(); ++r) drop_beyond_horizon(answer.horizons[r], replays[r]);
-    verdict = profile_grid(results, settings.repeatability);
+    answer.best = best_of(results);
+    best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   }
-  SolverError error;
-  std::optional<Refined> refined;
-  if (!grid.rollouts.empty())
-    refined = refine(results, verdict, replays, grid, settings.repeatability, settings.solver_check, told);
-  if (refined) {
-    verdict = refined->verdict;
-    checks = std::move(refined->checks);
-    error.interpolation = refined->interpolation;
-  } else if (settings.solver_check) {
-    checks = check_solver(replays, grid, values());
-    if (!checks.empty()) error.interpolation = std::abs(checks.front().score - verdict.estimate_score);
-    for (const SolverCheck& check : checks) {
-      error.score = std::max(error.score, std::hypot(verdict.score, check.surface_change_m) - verdict.score);
-      SolverShift& shift = error.shifts.emplace_back(static_cast<Eigen::Index>(grid.axes.size()));
-      for (std::size_t k = 0; k < grid.axes.size(); ++k)
-        shift[static_cast<Eigen::Index>(k)] = check.shift.at(grid.axes[k].name);
-    }
-    verdict = profile_grid(results, settings.repeatability, error);
-    if (!checks.empty() && checks.front().score > verdict.score) fall_back_on_best(results, verdict);
+
+  GridSettings usable = grid;
+  usable.axes = in_own_coordinates(axes_without_diverged(results, best));
+  if (cartesian_product(usable.axes).size() < results.candidates.size())
+    answer.warnings.emplace_back(
+        "some candidates diverged: the answer leaves out the values of a parameter at which they did");
+  const MotionStore store(grid.rollouts);
+  const Task task{replays, usable, settings, store, told};
+  std::optional<Emulator> emulator;
+  if (settings.solver_check) emulator = emulator_over(task, usable.axes, thinned(usable.axes), false);
+  if (!emulator) emulator = emulator_over(task, usable.axes, {}, false);
+  std::optional<Found> found;
+  std::vector<KnownError> held;
+  if (emulator) {
+    const Extent around = cells_around(best, usable.axes);
+    found = look_with(task, std::move(*emulator), usable.axes, around, best, {}, held);
+  }
+  if (!found) {
+    answer.values = best;
+    answer.estimate = results.candidates[static_cast<std::size_t>(answer.best)];
+    for (const Replay& replay : replays)
+      answer.motions.push_back(store.run(replay, candidate_at(best, grid)));
+    answer.parameters = findings_without_posterior(results, best);
+    answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
+    return answer;
+  }
+  Found about = simulate_about(task, *found, held);
+  if (settle(task, about, best, held)) {
+    found = std::move(about);
   } else {
-    // Nothing was simulated at the estimate: where the interpolation lies below every simulated score, that
-    // is not known to be more than its own error.
-    error.interpolation = verdict.score - verdict.estimate_score;
-    verdict = profile_grid(results, settings.repeatability, error);
+    keep_to_simulated(task, *found, best, held);
+    answer.warnings.emplace_back(
+        "the motion changes too abruptly between the values searched: the answer is by these alone; search "
+        "more values");
   }
-  answer.interpolation = error.interpolation;
+
+  const Posterior& posterior = found->look.posterior;
+  answer.values = posterior.values();
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    answer.motions.push_back(store.run(replays[r], candidate_at(answer.values, grid)));
+    answer.misfits.push_back(found->look.likelihood.of_recording(r).misfit());
+  }
+  answer.estimate = score_motions(replays, answer.motions, grid.score);
+  answer.estimate.values = answer.values;
+  answer.parameters = findings_of(results, usable.axes, posterior);
+  answer.covariance_log = covariance_of_logarithms(posterior);
+  answer.samples = samples_of(posterior);
+  if (settings.solver_check) answer.checks = checks_of(task, *found);
   return answer;
 }
 

@@ -1,10 +1,13 @@
 #pragma once
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/answer_work.h"
-#include "sysid/infer/profile.h"
+#include "sysid/infer/discrepancy.h"
+#include "sysid/infer/finding.h"
 #include "sysid/infer/solver_check.h"
 
 namespace flash::sysid {
@@ -12,22 +15,51 @@ namespace flash::sysid {
 struct AnswerSettings {
   std::optional<double> repeatability;  ///< trial-to-trial distance of a keyframe [m]
   bool horizon = true;                  ///< drop keyframes beyond the predictable
-  bool solver_check = true;             ///< solve the best candidate again under finer settings
+  bool solver_check = true;             ///< solve the estimate again under finer settings
 };
 
 /// What a search says of its parameters, and how that was checked.
 struct Answer {
-  GridVerdict verdict;
+  int best = -1;                             ///< candidate of least score; -1: none was usable
+  std::vector<double> values;                ///< the estimate, one an axis
+  CandidateResult estimate;                  ///< simulated there and scored
+  std::vector<ReplayResult> motions;         ///< of the estimate, one a recording
+  std::vector<ParameterFinding> parameters;  ///< one an axis, in order
+  Eigen::MatrixXd covariance_log;   ///< of log(parameter) in order of the axes; empty where one may be zero
+  Eigen::MatrixXd samples;          ///< of the posterior, values of the axes, a draw a row
+  std::vector<Misfit> misfits;      ///< one a recording
   std::vector<SolverCheck> checks;  ///< of the estimate; empty without them
-  double interpolation = 0;         ///< by which the interpolated score is off at the estimate [m]
   std::vector<std::optional<double>> horizons;  ///< of each recording [s]
+  std::vector<std::string> warnings;
 };
 
-/// From the results of a search to its answer: measures how long the best candidate's motion can be predicted
-/// and takes the weight from later keyframes (in `results` and `replays`), solves the estimate under finer
-/// settings, and lets what these shift widen the intervals. `told`: where motions were kept, of the work that
-/// most_work counts.
+/// From a finished search to its answer, by the motions that it kept (`grid.rollouts`), which are simulated
+/// again where they are gone.
+///
+/// Keyframes beyond the time to which the best candidate can be predicted lose their weight (in `results` and
+/// `replays`). Motions between the candidates are interpolated (TwoMeshMotions), with `solver_check` as cells
+/// of no size would move, from a second mesh of half the cell. How likely they are, the signed distances of
+/// what was observed say under noise and a discrepancy of the model (MotionLikelihood). Where few simulations
+/// do, a small lattice about what is found is simulated on both meshes, and the answer comes from its
+/// motions. Errors of the solution are known shapes in the likelihood: what the interpolation misses at the
+/// estimate, at some draws of the posterior, the last third to the mesh of no cells, and what half the step
+/// and four times the iterations change. The motions are corrected by all but the second. So are the errors
+/// of what the search holds without a measurement (held_parameters). `told`: of the work that most_work
+/// counts.
 Answer find_answer(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,
                    const AnswerSettings& settings, const TellWork& told = {});
+
+/// Where a search goes on from a `start` inside the range of `grid.axes`, one value an axis: three values of
+/// each parameter, as far about what its motions make likely as the posterior needs. `around`: the first
+/// three. A parameter that is not told to a cell of `grid.axes` has more, thirty simulations in all.
+std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
+                               const std::vector<double>& start, const Extent& around,
+                               const AnswerSettings& settings, const TellWork& told = {});
+
+/// The most work that design_about takes.
+AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings);
+
+/// The most work that find_answer takes. The motions of the grid itself are kept already and do not count.
+AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check);
 
 }  // namespace flash::sysid

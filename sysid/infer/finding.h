@@ -18,11 +18,12 @@ struct ParameterFinding {
   std::optional<double> estimate;  ///< in the unit of the asset field
   std::optional<std::array<double, 2>> interval95;  ///< 95 % confidence
   Identifiable identifiable = Identifiable::no;
+  std::optional<double> bits;  ///< information gained over what is usual; none without an interval
   RangeEdge edge = RangeEdge::none;
   std::string note;            ///< why, one line
   bool logarithmic = false;    ///< searched on a logarithmic axis
-  std::vector<double> values;  ///< profile: values of this parameter, increasing
-  std::vector<double> scores;  ///< profile: best score over all others at each value [m]
+  std::vector<double> values;  ///< profile: values of this parameter that were simulated, increasing
+  std::vector<double> scores;  ///< profile: best score of a candidate with each value [m]
 };
 
 std::string to_string(Identifiable identifiable);

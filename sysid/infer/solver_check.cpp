@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <optional>
 
 #include "sysid/observe/motion_distance.h"
-#include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 namespace {
@@ -34,24 +32,6 @@ std::vector<Replay> changed(const std::vector<Replay>& replays, const Change& ch
   std::vector<Replay> result;
   for (const Replay& replay : replays) result.push_back(changed(replay, change));
   return result;
-}
-
-std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays) {
-  std::vector<Replay> result;
-  for (const Replay& replay : replays) {
-    std::optional<Replay> finer = on_half_the_cell(replay);
-    if (!finer) return {};
-    result.push_back(std::move(*finer));
-  }
-  return result;
-}
-
-std::vector<ReplayResult> simulated(const std::vector<Replay>& replays, const ReplayCandidate& candidate,
-                                    const MotionStore* store) {
-  std::vector<ReplayResult> results;
-  for (const Replay& replay : replays)
-    results.push_back(store ? store->run(replay, candidate) : std::move(run(replay, {candidate}).front()));
-  return results;
 }
 
 bool all_finite(const std::vector<ReplayResult>& results) {
@@ -95,42 +75,15 @@ SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensit
   return found;
 }
 
-std::vector<SolverCheck> check_solver(const std::vector<Replay>& replays, const GridSettings& grid,
-                                      const std::vector<double>& values) {
-  const Sensitivity sensitivity = measure_sensitivity(replays, grid, values);
-  if (!all_finite(sensitivity.motions)) return {};
-  const ReplayCandidate candidate = candidate_at(values, grid);
-  std::vector<SolverCheck> checks(1);
-  checks[0].what = "estimate_itself";
-  checks[0].score = score_motions(replays, sensitivity.motions, grid.score).score;
-  for (const Axis& axis : grid.axes) checks[0].shift[axis.name] = 0;
-  const auto add = [&](const std::string& what, const std::vector<Replay>& finer) {
-    if (finer.empty()) return;
-    const std::vector<ReplayResult> results = simulated(finer, candidate, nullptr);
-    if (all_finite(results))
-      checks.push_back(
-          compare_solutions(what, sensitivity, replays, sensitivity.motions, finer, results, grid));
-  };
-  add(kFinerSteps[0].first, changed(replays, kFinerSteps[0].second));
-  add("double_mesh", on_half_the_cell(replays));
-  add(kFinerSteps[1].first, changed(replays, kFinerSteps[1].second));
-  return checks;
-}
-
-std::vector<SolverCheck> check_steps(const std::vector<Replay>& replays, const Sensitivity& sensitivity,
-                                     const GridSettings& grid, const std::vector<double>& values,
-                                     const MotionStore& store) {
-  const ReplayCandidate candidate = candidate_at(values, grid);
-  const std::vector<ReplayResult> motions = simulated(replays, candidate, &store);
-  std::vector<SolverCheck> checks;
-  if (!all_finite(motions)) return checks;
+std::vector<FinerSolution> finer_solutions(const std::vector<Replay>& replays,
+                                           const ReplayCandidate& candidate, const MotionStore& store) {
+  std::vector<FinerSolution> solutions;
   for (const auto& [what, change] : kFinerSteps) {
-    const std::vector<Replay> finer = changed(replays, change);
-    const std::vector<ReplayResult> results = simulated(finer, candidate, &store);
-    if (all_finite(results))
-      checks.push_back(compare_solutions(what, sensitivity, replays, motions, finer, results, grid));
+    FinerSolution solution{what, changed(replays, change), {}};
+    for (const Replay& replay : solution.replays) solution.motions.push_back(store.run(replay, candidate));
+    if (all_finite(solution.motions)) solutions.push_back(std::move(solution));
   }
-  return checks;
+  return solutions;
 }
 
 }  // namespace flash::sysid

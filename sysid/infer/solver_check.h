@@ -8,32 +8,30 @@
 
 namespace flash::sysid {
 
-/// The best candidate solved once more under finer settings.
+/// The estimate under other settings of the solution.
 struct SolverCheck {
-  std::string what;                       ///< "half_step", "double_mesh", "four_times_iterations"
-  double score = 0;                       ///< [m]
-  double surface_change_m = 0;            ///< mean distance between the two surfaces [m]
+  std::string what;             ///< "estimate_itself", "half_step", "double_mesh", "four_times_iterations"
+  double score = 0;             ///< [m]
+  double surface_change_m = 0;  ///< mean distance between the two surfaces [m]
   std::map<std::string, double> shift{};  ///< error that the search's own settings cause in each parameter:
                                           ///< of its logarithm where it was searched so, else in its unit
 };
 
-/// The candidate at `values` (one an axis of `grid.axes`; they need not be on the grid) simulated as it is
-/// ("estimate_itself"), then solved again at half the time step, on a mesh of
-/// half the cell (sheets given by a specification only) and with four times the iterations at a tenth of the
-/// tolerance. `surface_change_m`: mean over the weighing keyframes of the mean distance from the vertices of
-/// the finer run to the surface of the run under the search's own settings, before any registration. `score`:
-/// with the registration fitted anew. `shift`: of the parameters, for the search's own settings to move as
-/// the finer ones do (see explain); a search of a recording made by the finer solver errs by as much.
-std::vector<SolverCheck> check_solver(const std::vector<Replay>& replays, const GridSettings& grid,
-                                      const std::vector<double>& values);
+/// Motions of a candidate under finer settings of the solver.
+struct FinerSolution {
+  std::string what;  ///< "half_step", "four_times_iterations"
+  std::vector<Replay> replays;
+  std::vector<ReplayResult> motions;
+};
 
-/// Half the step and four times the iterations at a candidate of the grid, from the store where it has them.
-/// `sensitivity` may be of another mesh and of values nearby.
-std::vector<SolverCheck> check_steps(const std::vector<Replay>& replays, const Sensitivity& sensitivity,
-                                     const GridSettings& grid, const std::vector<double>& values,
-                                     const MotionStore& store);
+/// Half the step, and four times the iterations at a tenth of the tolerance, from the store where it has
+/// them. What diverges is left out.
+std::vector<FinerSolution> finer_solutions(const std::vector<Replay>& replays,
+                                           const ReplayCandidate& candidate, const MotionStore& store);
 
-/// One entry: how far `finer_motions` are from `motions`, and the change of the parameters that explains it.
+/// How far `finer_motions` are from `motions`, and the change of the parameters that explains it.
+/// `surface_change_m`: mean over the weighing keyframes of the mean distance from the vertices of the finer
+/// run to the surface of the other, before any registration. `score`: of the finer, registered anew.
 SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensitivity,
                               const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
                               const std::vector<Replay>& finer,

@@ -52,6 +52,7 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
     const Eigen::Vector3i corners = replay.recording.mesh.triangles.row(nearest.triangle);
     place.position = nearest.position;
     place.velocity = at(velocities, corners, nearest.barycentric);
+    place.rest = at(replay.recording.mesh.vertices, corners, nearest.barycentric);
     const bool mark = place.term == Term::mark;
     place.weight = std::sqrt(common.weight / static_cast<double>(count));
     for (int k = 0; k < (mark ? 3 : 1); ++k) {
@@ -60,6 +61,7 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
                             ? normal_of(positions, corners)
                             : border_normal(positions, corners, nearest.barycentric);
       place.residual = place.direction.dot(point - place.position);
+      place.axis = k;
       places_.push_back(place);
     }
   }
@@ -105,9 +107,15 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
     for (int axis = 0; axis < 3; ++axis) {
       place.direction = Eigen::Vector3d::Unit(axis);
       place.residual = place.direction.dot(*observation.force - place.position);
+      place.axis = axis;
       places_.push_back(place);
     }
   }
+}
+
+LinearObservations::Row LinearObservations::row(Eigen::Index i) const {
+  const Place& place = places_[static_cast<std::size_t>(i)];
+  return {place.observation, place.term, place.axis, place.rest, place.residual, place.weight};
 }
 
 std::vector<Eigen::Index> LinearObservations::rows_of_keyframes() const {

@@ -22,6 +22,18 @@ class LinearObservations {
 
   Eigen::Index rows() const { return static_cast<Eigen::Index>(places_.size()); }
 
+  /// What a row is of.
+  enum class Term { surface, border, mark, force };
+  struct Row {
+    std::size_t observation = 0;  ///< index of the keyframe
+    Term term = Term::surface;
+    int axis = 0;          ///< of a mark or a force: x, y or z
+    Eigen::Vector3d rest;  ///< where on the sheet at rest [m]; of a force zero
+    double distance = 0;   ///< signed [m]; of a force [N]
+    double weight = 1;     ///< by which the rows of the other functions were multiplied
+  };
+  Row row(Eigen::Index i) const;
+
   /// Rows of each weighing keyframe, in order.
   std::vector<Eigen::Index> rows_of_keyframes() const;
 
@@ -36,13 +48,14 @@ class LinearObservations {
   Eigen::Matrix<double, Eigen::Dynamic, 5> registration_derivatives() const;
 
  private:
-  enum class Term { surface, border, mark, force };
   struct Place {
     Term term;
-    std::size_t observation;    // index of the keyframe
-    std::size_t mark = 0;       // index in the keyframe
-    double weight = 0;          // root of the row's share
-    double residual = 0;        // [m]
+    std::size_t observation;  // index of the keyframe
+    std::size_t mark = 0;     // index in the keyframe
+    double weight = 0;        // root of the row's share
+    double residual = 0;      // [m]
+    int axis = 0;
+    Eigen::Vector3d rest = Eigen::Vector3d::Zero();
     Eigen::Vector3d direction;  // unit, frame of the simulation
     Eigen::Vector3d position;   // [m]; of a force [N]
     Eigen::Vector3d velocity;   // of the sheet there [m/s]

@@ -30,6 +30,19 @@ Json covariance(const Summary& summary) {
   return json;
 }
 
+/// Draws of the posterior, to train on: parameters trade off along valleys that ranges do not show.
+Json samples(const Summary& summary) {
+  if (summary.samples.rows() == 0) return nullptr;
+  Json json = {{"parameters", Json::array()}, {"values", Json::array()}};
+  for (const ParameterFinding& finding : summary.parameters) json["parameters"].push_back(finding.name);
+  for (Eigen::Index i = 0; i < summary.samples.rows(); ++i) {
+    Json row = Json::array();
+    for (Eigen::Index j = 0; j < summary.samples.cols(); ++j) row.push_back(number(summary.samples(i, j)));
+    json["values"].push_back(row);
+  }
+  return json;
+}
+
 /// Where the base has its values from: by its own identification, or assumed.
 std::string source_of(const data::Asset& base, const std::string& name) {
   const Json known = Json::parse(base.identification, nullptr, false);
@@ -66,6 +79,7 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
       json["fixed"][finding.name] = {{"value", base_values.at(finding.name)},
                                      {"source", source_of(base, finding.name)}};
   json["covariance_log"] = covariance(summary);
+  json["samples"] = samples(summary);
   json["score_m"] = number(summary.best_score);
   json["horizon_s"] = horizon ? Json(*horizon) : Json(nullptr);
   json["solver"] = summary.settings;

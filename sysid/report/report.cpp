@@ -63,6 +63,7 @@ Json parameters_of(const Summary& summary, bool has_thickness) {
     entry["estimate"] = optional(finding.estimate);
     entry["interval95"] = optional(finding.interval95);
     entry["identifiable"] = to_string(finding.identifiable);
+    entry["bits"] = optional(finding.bits);
     entry["edge"] = to_string(finding.edge);
     entry["note"] = finding.note;
     entry["logarithmic"] = finding.logarithmic;
@@ -97,8 +98,11 @@ Json recordings_of(const Summary& summary) {
                     {"time_offset", recording.time_offset},
                     {"nuisance", recording.nuisance},
                     {"score", number(recording.score)},
-                    {"sigma_m", number(recording.sigma_m)},
-                    {"sigma_source", recording.sigma_source},
+                    {"noise_m", number(recording.misfit.noise)},
+                    {"misfit_m", number(recording.misfit.size)},
+                    {"fits", !recording.misfit.found},
+                    {"keyframes", recording.misfit.keyframes},
+                    {"worth", number(recording.misfit.worth)},
                     {"horizon_s", optional(recording.horizon_s)},
                     {"frames", frames}});
   }
@@ -195,7 +199,6 @@ std::string render_report(const Summary& summary, const GridResults& results,
   json["fixed"] = fixed_of(summary, has_thickness);
   json["recordings"] = recordings_of(summary);
   json["score"] = number(summary.best_score);
-  json["level95"] = number(summary.level95);
   json["candidates"] = summary.candidates;
   json["unconverged"] = summary.unconverged;
   json["exit_code"] = summary.exit_code;

@@ -9,7 +9,6 @@
 #include "data/recording_digest.h"
 #include "data/text.h"
 #include "sysid/emulate/candidate_lines.h"
-#include "sysid/infer/modes.h"
 #include "sysid/observe/registration_parameter.h"
 
 namespace flash::sysid {
@@ -51,8 +50,7 @@ std::map<std::string, FixedParameter> fixed_of(const Summary& summary, const Gri
   return fixed;
 }
 
-SummaryRecording summarize_recording(const Replay& replay, const RecordingScore& score,
-                                     const GridVerdict& verdict,
+SummaryRecording summarize_recording(const Replay& replay, const RecordingScore& score, const Misfit& misfit,
                                      const std::map<std::string, double>& nuisance) {
   SummaryRecording recording;
   recording.name = replay.recording.name;
@@ -62,11 +60,27 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
   recording.time_offset = score.time_offset;
   recording.nuisance = nuisance;
   recording.score = score.score;
-  recording.sigma_m = verdict.sigma;
-  recording.sigma_source = verdict.sigma_source;
+  recording.misfit = misfit;
   for (const KeyframeScore& frame : score.keyframes)
     if (frame.points > 0) recording.frames.push_back({frame.t, frame.score, frame.weight});
   return recording;
+}
+
+/// "lift: the model does not fit: ..."; empty where it fits.
+std::string warning_of_misfit(const SummaryRecording& recording) {
+  const Misfit& misfit = recording.misfit;
+  if (!misfit.found) return "";
+  const auto mm = [](double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; };
+  const double explained =
+      std::sqrt(2 / M_PI) * std::hypot(misfit.noise, misfit.explained);  // of a mean distance
+  std::string worth;
+  if (misfit.worth < misfit.keyframes)
+    worth = "; " + std::to_string(misfit.keyframes) + " keyframes are worth " +
+            data::format_short(std::round(10 * misfit.worth) / 10);
+  return recording.name + ": the model does not fit: it misses the observed points by " +
+         mm(recording.score) + " where noise" +
+         (misfit.explained > 0 ? " and repeatability explain " : " explains ") + mm(explained) + worth +
+         ". The intervals allow for it, but are those of a model that does not fit";
 }
 
 std::vector<std::string> warnings_of(const Summary& summary, const CandidateResult& best,
@@ -103,9 +117,9 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
                    is_at_bound(candidate.recordings[r].bounds_hit, parameter);
           });
       warnings.push_back(summary.recordings[r].name + ": " +
-                         at_bound_text(parameter, replays[r].recording.nuisance) +
-                         " (the best candidate and " + std::to_string(count) + " of all " +
-                         std::to_string(candidates.size()) + " end at it)");
+                         at_bound_text(parameter, replays[r].recording.nuisance) + " (the estimate and " +
+                         std::to_string(count) + " of all " + std::to_string(candidates.size()) +
+                         " candidates end at it)");
     }
   // A few millimetres are what a table's height is known to.
   if (best.penetration_max > 5e-3)
@@ -123,7 +137,7 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
 // Empty where the answer can be used.
 std::string reason_unusable(const Summary& summary, const CandidateResult& best) {
   if (best.status != CandidateStatus::ok)
-    return "the best candidate did not converge (residual " + data::format_short(best.residual_max) +
+    return "the estimate did not converge (residual " + data::format_short(best.residual_max) +
            "): raise --iterations or lower --time-step";
   const auto is_searched_material = [](const ParameterFinding& finding) { return is_material(finding.name); };
   const auto is_known = [&](const ParameterFinding& finding) {
@@ -159,10 +173,23 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
                                          : "mean";
 }
 
+/// Every so many draws, of the parameters that were searched.
+Eigen::MatrixXd some_samples(const Answer& answer) {
+  constexpr Eigen::Index kSamples = 64;
+  std::vector<Eigen::Index> columns;
+  for (std::size_t k = 0; k < answer.parameters.size(); ++k)
+    if (answer.parameters[k].values.size() > 1) columns.push_back(static_cast<Eigen::Index>(k));
+  const Eigen::Index count = std::min(kSamples, answer.samples.rows());
+  Eigen::MatrixXd samples(count, static_cast<Eigen::Index>(columns.size()));
+  for (Eigen::Index i = 0; i < count; ++i)
+    samples.row(i) = answer.samples.row(i * answer.samples.rows() / count)(columns);
+  return samples;
+}
+
 }  // namespace
 
-Summary summarize(const GridResults& results, const GridVerdict& verdict, const std::vector<Replay>& replays,
-                  const GridSettings& settings) {
+Summary summarize(const GridResults& results, const Answer& answer, const std::vector<Replay>& replays,
+                  const GridSettings& settings, const AnswerSettings& asked) {
   Summary summary;
   summary.tool_version = FLASH_VERSION;
   summary.results_digest = digest_of(results);
@@ -170,55 +197,48 @@ Summary summarize(const GridResults& results, const GridVerdict& verdict, const 
   for (const CandidateResult& candidate : results.candidates)
     summary.unconverged += candidate.status != CandidateStatus::ok;
   add_settings(summary, replays, settings);
-  if (verdict.best < 0) {
+  if (answer.best < 0) {
     summary.exit_code = 3;
     summary.best_score = INFINITY;
     summary.warnings = {summary.candidates == 0 ? "no candidate was simulated"
                                                 : "every candidate diverged: none has a score"};
     return summary;
   }
-  const CandidateResult& best = results.candidates[static_cast<std::size_t>(verdict.best)];
-  const ReplayCandidate candidate = candidate_at(best.values, settings);
+  const CandidateResult& estimate = answer.estimate;
+  const ReplayCandidate candidate = candidate_at(answer.values, settings);
   summary.best = parameters_of(candidate.material, settings.base.thickness);
   summary.membrane_stiffness = candidate.material.membrane_stiffness;
-  summary.best_score = verdict.score;
-  summary.level95 = verdict.level95;
+  summary.best_score = estimate.score;
   std::map<std::string, double> nuisance;
   for (const std::vector<Axis>* axes : {&settings.axes, &settings.fixed})
     for (std::size_t k = 0; k < axes->size(); ++k)
       if (!is_material((*axes)[k].name)) {
-        const double value = axes == &settings.fixed ? (*axes)[k].values.front() : best.values[k];
+        const double value = axes == &settings.fixed ? (*axes)[k].values.front() : answer.values[k];
         nuisance[(*axes)[k].name] = summary.best[(*axes)[k].name] = value;
       }
-  for (const ParameterFinding& finding : verdict.parameters)
+  for (const ParameterFinding& finding : answer.parameters)
     if (finding.values.size() > 1) summary.parameters.push_back(finding);
-  if (summary.parameters.size() == verdict.parameters.size()) summary.covariance_log = verdict.covariance_log;
+  if (summary.parameters.size() == answer.parameters.size()) summary.covariance_log = answer.covariance_log;
+  if (answer.samples.rows() > 0) summary.samples = some_samples(answer);
   summary.fixed = fixed_of(summary, settings);
-  for (std::size_t r = 0; r < replays.size(); ++r)
-    summary.recordings.push_back(summarize_recording(replays[r], best.recordings[r], verdict, nuisance));
-  summary.warnings = warnings_of(summary, best, results.candidates, replays, settings);
-  if (const std::string warning = warning_of_modes(results, verdict.level95); !warning.empty())
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    const Misfit misfit = r < answer.misfits.size() ? answer.misfits[r] : Misfit{};
+    summary.recordings.push_back(summarize_recording(replays[r], estimate.recordings[r], misfit, nuisance));
+    if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
+  }
+  for (const SummaryRecording& recording : summary.recordings)
+    if (const std::string warning = warning_of_misfit(recording); !warning.empty())
+      summary.warnings.push_back(warning);
+  for (const std::string& warning : warnings_of(summary, estimate, results.candidates, replays, settings))
     summary.warnings.push_back(warning);
-  if (const std::string reason = reason_unusable(summary, best); !reason.empty()) {
+  summary.warnings.insert(summary.warnings.end(), answer.warnings.begin(), answer.warnings.end());
+  summary.solver_check = answer.checks;
+  summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
+  summary.settings["horizon"] = asked.horizon ? "yes" : "no";
+  if (const std::string reason = reason_unusable(summary, estimate); !reason.empty()) {
     summary.exit_code = 3;
     summary.warnings.insert(summary.warnings.begin(), reason);
   }
-  return summary;
-}
-
-Summary summarize(const GridResults& results, const Answer& answer, const std::vector<Replay>& replays,
-                  const GridSettings& grid, const AnswerSettings& settings) {
-  Summary summary = summarize(results, answer.verdict, replays, grid);
-  if (answer.verdict.best < 0) return summary;
-  summary.solver_check = answer.checks;
-  summary.settings["solver_check"] = settings.solver_check ? "yes" : "no";
-  summary.settings["horizon"] = settings.horizon ? "yes" : "no";
-  constexpr double kCoarse = 0.05;  // of the score
-  if (answer.interpolation > kCoarse * answer.verdict.score)
-    summary.warnings.push_back("between the values of the grid the score is known to " +
-                               data::format_short(1000 * answer.interpolation) +
-                               " mm only, which widens the intervals: search more values or narrower ranges");
-  for (std::size_t r = 0; r < replays.size(); ++r) summary.recordings[r].horizon_s = answer.horizons[r];
   return summary;
 }
 

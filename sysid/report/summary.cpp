@@ -14,7 +14,7 @@ namespace flash::sysid {
 namespace {
 
 using Json = nlohmann::ordered_json;
-constexpr const char* schema = "flash-sysid-summary/1";
+constexpr const char* schema = "flash-sysid-summary/2";
 
 /// Of all fields but the digest itself, whatever their order and layout.
 std::string digest_of(nlohmann::json fields) {
@@ -40,6 +40,7 @@ Json to_json(const ParameterFinding& finding) {
   json["estimate"] = optional(finding.estimate);
   json["interval95"] = optional(finding.interval95);
   json["identifiable"] = to_string(finding.identifiable);
+  json["bits"] = optional(finding.bits);
   json["edge"] = finding.edge == RangeEdge::none ? Json(nullptr) : Json(to_string(finding.edge));
   json["note"] = finding.note;
   json["logarithmic"] = finding.logarithmic;
@@ -56,8 +57,15 @@ Json to_json(const SummaryRecording& recording) {
   json["time_offset"] = recording.time_offset;
   json["nuisance"] = recording.nuisance;
   json["score"] = number(recording.score);
-  json["sigma_m"] = number(recording.sigma_m);
-  json["sigma_source"] = recording.sigma_source;
+  json["noise_m"] = number(recording.misfit.noise);
+  json["misfit_m"] = number(recording.misfit.size);
+  json["misfit_explained_m"] = number(recording.misfit.explained);
+  json["misfit_reach_s"] = number(recording.misfit.reach_time);
+  json["misfit_reach_m"] = number(recording.misfit.reach_sheet);
+  json["misfit_gain"] = number(recording.misfit.gain);
+  json["model_fits"] = !recording.misfit.found;
+  json["keyframes"] = recording.misfit.keyframes;
+  json["keyframes_worth"] = number(recording.misfit.worth);
   json["horizon_s"] = optional(recording.horizon_s);
   json["frames"] = Json::array();
   for (const SummaryFrame& frame : recording.frames)
@@ -108,7 +116,8 @@ Identifiable identifiable_of(const data::JsonObject& json) {
 }
 
 ParameterFinding read_finding(const std::string& name, const data::JsonObject& json) {
-  json.expect_fields({"estimate", "interval95", "identifiable", "edge", "note", "logarithmic", "profile"});
+  json.expect_fields(
+      {"estimate", "interval95", "identifiable", "bits", "edge", "note", "logarithmic", "profile"});
   ParameterFinding finding;
   finding.name = name;
   finding.estimate = json.optional_number("estimate");
@@ -117,6 +126,7 @@ ParameterFinding read_finding(const std::string& name, const data::JsonObject& j
     finding.interval95 = {interval[0], interval[1]};
   }
   finding.identifiable = identifiable_of(json);
+  finding.bits = json.optional_number("bits");
   const std::string edge = json.string("edge", "");
   finding.edge = edge == "low" ? RangeEdge::low : edge == "high" ? RangeEdge::high : RangeEdge::none;
   finding.note = json.string("note");
@@ -128,8 +138,9 @@ ParameterFinding read_finding(const std::string& name, const data::JsonObject& j
 }
 
 SummaryRecording read_recording(const data::JsonObject& json) {
-  json.expect_fields({"name", "sha256", "offset", "yaw", "time_offset", "nuisance", "score", "sigma_m",
-                      "sigma_source", "horizon_s", "frames"});
+  json.expect_fields({"name", "sha256", "offset", "yaw", "time_offset", "nuisance", "score", "noise_m",
+                      "misfit_m", "misfit_explained_m", "misfit_reach_s", "misfit_reach_m", "misfit_gain",
+                      "model_fits", "keyframes", "keyframes_worth", "horizon_s", "frames"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -138,22 +149,33 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   recording.time_offset = json.number("time_offset");
   recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
   recording.score = score_of(json, "score");
-  recording.sigma_m = score_of(json, "sigma_m");
-  recording.sigma_source = json.string("sigma_source");
+  Misfit& misfit = recording.misfit;
+  misfit.noise = score_of(json, "noise_m");
+  misfit.size = score_of(json, "misfit_m");
+  misfit.explained = score_of(json, "misfit_explained_m");
+  misfit.reach_time = score_of(json, "misfit_reach_s");
+  misfit.reach_sheet = score_of(json, "misfit_reach_m");
+  misfit.gain = score_of(json, "misfit_gain");
+  misfit.found = !json.boolean("model_fits", true);
+  misfit.keyframes = json.integer("keyframes");
+  misfit.worth = score_of(json, "keyframes_worth");
   recording.horizon_s = json.optional_number("horizon_s");
   for (const data::JsonObject& frame : json.objects("frames"))
     recording.frames.push_back({frame.number("t"), score_of(frame, "score"), frame.number("weight")});
   return recording;
 }
 
-Eigen::MatrixXd read_matrix(const data::JsonObject& json, const char* key) {
+/// `columns`: -1: as many as rows.
+Eigen::MatrixXd read_matrix(const data::JsonObject& json, const char* key, Eigen::Index columns = -1) {
   const nlohmann::json& rows = json.raw(key);
   const auto size = static_cast<Eigen::Index>(rows.size());
-  Eigen::MatrixXd matrix(size, size);
+  if (columns < 0) columns = size;
+  Eigen::MatrixXd matrix(size, columns);
   for (Eigen::Index i = 0; i < size; ++i) {
     const nlohmann::json& row = rows[static_cast<std::size_t>(i)];
-    if (row.size() != rows.size()) throw json.error(key, "a square matrix");
-    for (Eigen::Index j = 0; j < size; ++j)
+    if (static_cast<Eigen::Index>(row.size()) != columns)
+      throw json.error(key, "rows of " + std::to_string(columns) + " numbers");
+    for (Eigen::Index j = 0; j < columns; ++j)
       matrix(i, j) = finite_or_infinite(row[static_cast<std::size_t>(j)]);
   }
   return matrix;
@@ -235,15 +257,17 @@ void check_values(const Summary& summary, const std::string& path) {
   for (const auto& [name, fixed] : summary.fixed) check_value(path, "fixed", name, fixed.value);
   check_score(path, "best.score", summary.best_score);
   check_score(path, "best.membrane_stiffness", summary.membrane_stiffness);
-  check_score(path, "level95", summary.level95);
   for (const ParameterFinding& finding : summary.parameters) {
     const std::string field = "parameters." + finding.name;
     if (!summary.best.empty() && !summary.best.contains(finding.name))
       throw data::input_error(path, "best.parameters." + finding.name, "missing, expected a number");
-    if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
     if (finding.values.empty() || finding.values.size() != finding.scores.size())
       throw data::input_error(path, field + ".profile", "expected as many scores as values, one at least");
-    for (const double value : finding.values) check_value(path, "parameters", finding.name, value);
+    const ParameterInfo* const info = info_of(finding.name);
+    if (info == nullptr) throw data::input_error(path, field, "is no parameter");
+    if (finding.estimate) check_value(path, "parameters", finding.name, *finding.estimate);
+    for (const double value : finding.values)
+      check_within(path, field + ".profile.values", value, info->low, info->high);
     check_answer(path, field, finding);
     for (const double score : finding.scores) check_score(path, field + ".profile.scores", score);
   }
@@ -252,7 +276,8 @@ void check_values(const Summary& summary, const std::string& path) {
     throw data::input_error(path, "covariance_log", "expected a row for each of axes, or none");
   for (const SummaryRecording& recording : summary.recordings) {
     check_score(path, "recordings." + recording.name + ".score", recording.score);
-    check_score(path, "recordings." + recording.name + ".sigma_m", recording.sigma_m);
+    check_score(path, "recordings." + recording.name + ".noise_m", recording.misfit.noise);
+    check_score(path, "recordings." + recording.name + ".misfit_m", recording.misfit.size);
     for (const SummaryFrame& frame : recording.frames) {
       check_score(path, "recordings." + recording.name + ".frames.score", frame.score);
       check_score(path, "recordings." + recording.name + ".frames.weight", frame.weight);
@@ -273,7 +298,6 @@ std::string summary_text(const Summary& summary) {
   json["best"] = {{"parameters", summary.best},
                   {"membrane_stiffness", number(summary.membrane_stiffness)},
                   {"score", number(summary.best_score)}};
-  json["level95"] = number(summary.level95);
   json["axes"] = Json::array();
   json["parameters"] = Json::object();
   for (const ParameterFinding& finding : summary.parameters) {
@@ -284,6 +308,7 @@ std::string summary_text(const Summary& summary) {
   for (const auto& [name, fixed] : summary.fixed)
     json["fixed"][name] = {{"value", fixed.value}, {"source", fixed.source}};
   json["covariance_log"] = to_json(summary.covariance_log);
+  json["samples"] = to_json(summary.samples);
   json["recordings"] = Json::array();
   for (const SummaryRecording& recording : summary.recordings)
     json["recordings"].push_back(to_json(recording));
@@ -314,8 +339,8 @@ Summary load_summary(const std::string& path) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject json(file, path);
   if (json.string("schema") != schema) throw json.error("schema", schema);
-  json.expect_fields({"schema",       "tool_version", "best",           "level95",        "axes",
-                      "parameters",   "fixed",        "covariance_log", "recordings",     "solver_check",
+  json.expect_fields({"schema",       "tool_version", "best",           "axes",           "parameters",
+                      "fixed",        "samples",      "covariance_log", "recordings",     "solver_check",
                       "settings",     "asset",        "candidates",     "unconverged",    "device",
                       "wall_seconds", "warnings",     "exit_code",      "results_digest", "digest"});
   check_version(json);
@@ -325,13 +350,13 @@ Summary load_summary(const std::string& path) {
   summary.best = typed<std::map<std::string, double>>(best, "parameters", "numbers by name");
   summary.membrane_stiffness = score_of(best, "membrane_stiffness");
   summary.best_score = score_of(best, "score");
-  summary.level95 = score_of(json, "level95");
   const data::JsonObject parameters = json.object("parameters");
   for (const std::string& name : typed<std::vector<std::string>>(json, "axes", "a list of names"))
     summary.parameters.push_back(read_finding(name, parameters.object(name.c_str())));
   for (const auto& [name, fixed] : json.members("fixed"))
     summary.fixed[name] = {fixed.number("value"), fixed.string("source")};
   summary.covariance_log = read_matrix(json, "covariance_log");
+  summary.samples = read_matrix(json, "samples", static_cast<Eigen::Index>(summary.parameters.size()));
   for (const data::JsonObject& recording : json.objects("recordings"))
     summary.recordings.push_back(read_recording(recording));
   for (const data::JsonObject& check : json.objects("solver_check"))

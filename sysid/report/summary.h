@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
 #include "sysid/infer/solver_check.h"
 
@@ -23,7 +24,7 @@ struct SummaryFrame {
   double weight = 1;  ///< 0: dropped (beyond the predictability horizon)
 };
 
-/// How the best candidate fits one recording, and the nuisance values found for it.
+/// How the estimate fits one recording, and the nuisance values found for it.
 struct SummaryRecording {
   std::string name;
   std::string sha256;                                ///< of recording.json and the files it names
@@ -32,21 +33,20 @@ struct SummaryRecording {
   double time_offset = 0;                            ///< [s]
   std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
   double score = 0;                                  ///< [m]
-  double sigma_m = 0;                                ///< spread of one keyframe's score [m]
-  std::string sigma_source;                          ///< "repeatability", "residual", "given"
+  Misfit misfit;                                     ///< error of the model itself
   std::optional<double> horizon_s;                   ///< predictable until here [s]
   std::vector<SummaryFrame> frames;
 };
 
-/// All that a search found: the file summary.json (schema "flash-sysid-summary/1").
+/// All that a search found: the file summary.json (schema "flash-sysid-summary/2").
 struct Summary {
-  std::map<std::string, double> best;        ///< every material parameter of the best candidate
-  double membrane_stiffness = 0;             ///< E t of the best candidate [N/m]
-  double best_score = 0;                     ///< [m]
-  double level95 = 0;                        ///< score below which a candidate is inside the 95 % region [m]
+  std::map<std::string, double> best;        ///< every parameter of the estimate
+  double membrane_stiffness = 0;             ///< E t of the estimate [N/m]
+  double best_score = 0;                     ///< of the estimate, simulated [m]
   std::vector<ParameterFinding> parameters;  ///< the searched ones, in the order of the axes
   std::map<std::string, FixedParameter> fixed;
   Eigen::MatrixXd covariance_log;  ///< of log(parameter) in the order of `parameters`; empty: not estimated
+  Eigen::MatrixXd samples;         ///< of the posterior: a draw a row, in the order of `parameters`
   std::vector<SummaryRecording> recordings;
   std::vector<SolverCheck> solver_check;
   std::map<std::string, std::string> settings;  ///< constitutive, bending_model, mesh, time_step_s, ...
@@ -68,7 +68,7 @@ std::string summary_text(const Summary& summary);
 /// when the folder cannot be written.
 void save_summary(const Summary& summary, const std::string& path);
 
-/// Throws data::InputError naming file and field unless the file is of schema "flash-sysid-summary/1", was
+/// Throws data::InputError naming file and field unless the file is of schema "flash-sysid-summary/2", was
 /// written by this program or an earlier one of the same major version, and holds values that a search can
 /// find, as they were written: `digest` is that of its other fields.
 Summary load_summary(const std::string& path);

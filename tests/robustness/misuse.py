@@ -195,7 +195,7 @@ def check_places(options, folder):
     search = ["recording", "--asset", "asset.json"]
     places = [("plain/out", "Not a directory"), ("/proc/out", "/proc/out: ")]
     for place, *expected in places:
-        for words in (*([["fit", *search, "--start", "run"]] if options.calib else []), ["replay", *search], ["plan", *search],
+        for words in (["fit", *search, "--start", "run"], ["replay", *search], ["plan", *search],
                       ["grid", *search, "--bending", "1e-4,2e-4"], ["synth", "--asset", "cloth.json"],
                       ["segment", "view"], ["export", "run"], ["report", "run"],
                       ["import", "recording/frames", "--trajectory", "recording/gripper.tum", "--sheet", "0.2x0.2",
@@ -229,7 +229,7 @@ def check_calibration(options, folder):
         camera = json.loads((folder / "lift" / "recording.json").read_text())["camera"]
         yield camera.get("warnings") == texts, f"recording.json keeps {camera.get('warnings')}"
         for verb, more in (("replay", []), ("grid", ["--bending", "1e-5,1e-4", "--no-solver-check", "--no-horizon"]),
-                           *([("fit", ["--start", "lift_grid", "--steps", "1"])] if options.calib else [])):
+                           ("fit", ["--start", "lift_grid", "--no-solver-check", "--no-horizon"])):
             done = program.call(options.sysid, verb, "lift", "--asset", "cloth.json", *more, "--force", "-o", f"lift_{verb}",
                                 cwd=folder)
             yield done.returncode in (0, 3), f"{verb}: exit code {done.returncode}: {done.stderr}"
@@ -332,8 +332,7 @@ def check_early_signals(options, folder):
     jobs = [[options.sysid, *words] for words in
             (grid, ["replay", *search], ["plan", *search], ["fit", *search, "--start", "run"],
              ["synth", "--asset", "cloth.json", "--duration", "5", "--mesh", "sheet:0.2x0.2:0.005", "-o", "early"],
-             ["segment", "many", "--no-table", "-o", "early"])
-            if options.calib or words[0] != "fit"]
+             ["segment", "many", "--no-table", "-o", "early"])]
     jobs += [[options.sim, "run", "slow.json", "-o", "early"], [options.sim, "bench", "--vertices", "5000"]]
     for words in jobs:
         for number in (signal.SIGINT, signal.SIGTERM):

@@ -100,12 +100,6 @@ def stops_late(sysid, root, asset, recording, run):
         shutil.rmtree(out, ignore_errors=True)
 
     for number in (signal.SIGINT, signal.SIGTERM):
-        for step in (0, 1, 2):
-            job = start(sysid, "fit", recording, "--asset", asset, "--start", run, "--steps", "2", "--threads", "1",
-                        "-o", out)
-            wait_for(job, f"step {step} of")
-            job.send_signal(number)
-            ended(job, f"fit: {number.name} after step {step}", "nothing was written", "it is written")
         job = start(sysid, "replay", recording, "--asset", asset, "--every-step", "--time-step", "1e-3", "-o", out)
         while not (out / "steps").exists() and job.poll() is None:
             time.sleep(0.001)

@@ -14,7 +14,6 @@ inline Summary example_summary() {
                   {"areal_density", 0.2}, {"air_drag", 0.0}, {"stiffness_damping", 0.0}};
   summary.membrane_stiffness = 30;
   summary.best_score = 0.004;
-  summary.level95 = 0.005;
   ParameterFinding bending;
   bending.name = "bending";
   bending.estimate = 1.1e-4;
@@ -33,6 +32,9 @@ inline Summary example_summary() {
   poisson.scores = {0.0041, 0.004, INFINITY};
   summary.parameters = {poisson, bending};
   summary.fixed = {{"friction", {0.3, "measured"}}, {"areal_density", {0.2, "assumed"}}};
+  bending.bits = 2.5;
+  summary.samples = Eigen::MatrixXd(2, 2);
+  summary.samples << 0.1, 1e-4, 0.3, 1.2e-4;
   summary.covariance_log = Eigen::Matrix2d::Identity() * 0.01;
   SummaryRecording recording;
   recording.name = "lift";
@@ -42,8 +44,7 @@ inline Summary example_summary() {
   recording.time_offset = 0.04;
   recording.nuisance = {{"start_yaw", 0.2}};
   recording.score = 0.004;
-  recording.sigma_m = 0.004;
-  recording.sigma_source = "residual";
+  recording.misfit = {0.001, 0.003, 0.2, 0.1, 40, true, 0.002, 2, 1.4};
   recording.horizon_s = 1.9;
   recording.frames = {{1.0, 0.003, 1}, {1.5, 0.005, 1}, {2.0, 0.02, 0}};
   summary.recordings = {recording};

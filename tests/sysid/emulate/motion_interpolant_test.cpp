@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "sysid/emulate/score_interpolant.h"
 #include "sysid/emulate/sensitivity.h"
 #include "sysid/emulate/two_mesh_motions.h"
 #include "tests/sysid/short_lift.h"
@@ -48,36 +47,6 @@ struct Lift {
     grid.rollouts = folder / "rollouts";
   }
 };
-
-TEST(MotionInterpolant, MeetsTheSimulatedScoreWhereTheSplineOfScoresDoesNot) {
-  const Lift lift;
-  const MotionStore store(lift.grid.rollouts);
-  const auto surface = motion_interpolant(lift.replay, lift.grid, store);
-  ASSERT_TRUE(surface);
-  GridResults results;
-  results.axes = lift.grid.axes;
-  const auto simulated = [&](double bending) {
-    CandidateResult result =
-        score_motions({lift.replay}, {store.run(lift.replay, candidate_at({bending}, lift.grid))}, {});
-    result.values = {bending};
-    return result;
-  };
-  for (const double bending : lift.grid.axes[0].values) results.candidates.push_back(simulated(bending));
-  const ScoreInterpolant scores(results);
-  double worst_of_motions = 0, worst_of_scores = 0;
-  for (std::size_t i = 0; i + 1 < 5; ++i) {
-    const double between = std::sqrt(lift.grid.axes[0].values[i] * lift.grid.axes[0].values[i + 1]);
-    const double truth = simulated(between).score;
-    ReplayResult modelled;
-    modelled.motion = surface->at({between});
-    modelled.finite = true;
-    const Eigen::VectorXd x = Eigen::VectorXd::Constant(1, std::log(between));
-    worst_of_motions =
-        std::max(worst_of_motions, std::abs(score_motions({lift.replay}, {modelled}, {}).score - truth));
-    worst_of_scores = std::max(worst_of_scores, std::abs(scores.weights().dot(scores.scores(x)) - truth));
-  }
-  EXPECT_LT(worst_of_motions, 0.5 * worst_of_scores);
-}
 
 TEST(TwoMeshMotions, IsTheFinerSimulationWhereThatWasMade) {
   const Lift lift;

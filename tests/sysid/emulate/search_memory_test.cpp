@@ -21,8 +21,6 @@ TEST(SearchMemory, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_lift(folder)};
   GridSettings grid = grid_over("1e-4:4e-4:3:log");
-  EXPECT_EQ(estimate_memory(replays, grid, true).kept, 0);
-  grid.rollouts = folder / "rollouts";
 
   const Replay& replay = replays.front();
   std::set<long> steps = {0, replay.steps};
@@ -35,7 +33,8 @@ TEST(SearchMemory, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
   const double motion = static_cast<double>(steps.size() * sizeof(double)) *
                         static_cast<double>(replay.sheet().rest.vertices.size());
   // Three of the search's mesh while three of four times as many vertices are made splines of, held twice.
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).kept, (3 + 2 * 3 * 4) * motion);
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).kept,
+                   (3 + 2 * 3 * 4 + 14) * motion + 1e6 * static_cast<double>(replay.observations.size()));
 }
 
 TEST(SearchMemory, GrowsWithWhatIsInWorkAtOnce) {
@@ -53,9 +52,9 @@ TEST(SearchMemory, GrowsWithWhatIsInWorkAtOnce) {
   EXPECT_DOUBLE_EQ(simulation(9, 1) - simulation(4, 1), 5 * 2 * motion_bytes(replays.front()));
   EXPECT_DOUBLE_EQ(simulation(64, 1), simulation(9, 1));  // there are no more candidates
   EXPECT_DOUBLE_EQ(simulation(5, 6), simulation(5, 5));   // nor threads than environments
-  // The check on half the cell takes one candidate of four times as many vertices.
-  const double one = simulation(1, 1);
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * one);
+  // Half the cell: four times as many vertices, as many at once.
+  const double several = simulation(5, 2);
+  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).simulation, 4 * several);
 }
 
 }  // namespace

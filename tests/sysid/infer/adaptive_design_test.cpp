@@ -13,89 +13,94 @@ namespace {
 const std::vector<Axis> kSearched = {parse_axis("young", "3:48:5:log"), parse_axis("friction", "0.1:0.5:5"),
                                      parse_axis("poisson", "0.3")};
 
-TEST(Zoom, ExtentGrowsPastAnOpenEndWhereverTheEstimateStands) {
-  GridVerdict verdict;
-  for (int k = 0; k < 3; ++k) verdict.parameters.emplace_back();
+/// Of a normal likelihood: centre and standard deviation in the coordinate of each axis.
+Posterior posterior_of(const Extent& extent, const std::vector<std::array<double, 2>>& normal) {
+  std::vector<Axis> axes = kSearched;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const auto [low, high] = extent[k];
+    axes[k].values = {low};
+    for (int i = 1; i <= 8 && low < high; ++i)
+      axes[k].values.push_back(axes[k].logarithmic ? low * std::pow(high / low, i / 8.0)
+                                                   : low + (high - low) * i / 8.0);
+    axes[k].values.back() = high;
+  }
+  const std::vector<std::vector<double>> points = cartesian_product(axes);
+  Eigen::VectorXd deviance = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    for (std::size_t k = 0; k < axes.size(); ++k)
+      deviance[static_cast<Eigen::Index>(i)] +=
+          std::pow((coordinate_of(axes[k], points[i][k]) - normal[k][0]) / normal[k][1], 2);
+  return explore_posterior(axes, deviance);
+}
+
+TEST(NextExtent, GrowsPastAnOpenEndWhereverTheEstimateStands) {
   const Extent extent = {{6, 12}, {0.1, 0.2}, {0.3, 0.3}};
-  const auto next = [&](double young, double friction) {
-    verdict.parameters[0].estimate = young;
-    verdict.parameters[0].interval95 = {7, 12};
-    verdict.parameters[1].estimate = friction;
-    verdict.parameters[1].interval95 = {0.1, 0.2};
-    verdict.parameters[2].estimate = 0.3;
-    verdict.parameters[2].interval95 = {0.3, 0.3};
-    return next_extent(extent, verdict, kSearched);
-  };
-  for (const double young : {7.5, 8.5, 11.9}) EXPECT_GT(next(young, 0.15)[0][1], 12);
+  for (const double young : {7.5, 8.5, 11.9, 14.0})
+    EXPECT_GT(next_extent(extent, posterior_of(extent, {{{std::log(young), 0.4}, {0.15, 0.1}, {0.3, 1}}}),
+                          kSearched)[0][1],
+              12);
   for (const double friction : {0.1, 0.15, 0.2}) {
-    const auto [low, high] = next(8, friction)[1];
-    EXPECT_EQ(low, 0.1);  // the range ends there
-    EXPECT_GT(high, 0.2);
+    const Extent next = next_extent(
+        extent, posterior_of(extent, {{{std::log(8.0), 0.01}, {friction, 0.1}, {0.3, 1}}}), kSearched);
+    EXPECT_EQ(next[1][0], 0.1);  // the range ends there
+    EXPECT_GT(next[1][1], 0.2);
   }
 }
 
-TEST(Zoom, ExtentsReachAMinimumFarOutside) {
-  // A sharp minimum at 40: what is seen of it is its nearest point, with a narrow interval.
+TEST(NextExtent, ReachesAMinimumFarOutside) {
   Extent extent = {{3.5, 4}, {0.2, 0.2}, {0.3, 0.3}};
   const std::vector<Axis> searched = {kSearched[0], parse_axis("friction", "0.2"), kSearched[2]};
-  GridVerdict verdict = {};
-  for (int k = 0; k < 3; ++k) verdict.parameters.emplace_back();
-  for (int round = 0; round < 16; ++round) {
-    const auto [low, high] = extent[0];
-    const double best = std::clamp(40.0, low, high);
-    verdict.parameters[0].estimate = best;
-    verdict.parameters[0].interval95 = {std::max(low, best - 0.01), std::min(high, best + 0.01)};
-    for (const std::size_t k : {1U, 2U}) {
-      verdict.parameters[k].estimate = extent[k][0];
-      verdict.parameters[k].interval95 = {extent[k][0], extent[k][1]};
-    }
-    extent = next_extent(extent, verdict, searched);
+  int rounds = 0;
+  for (; rounds < 12; ++rounds) {
+    const Extent next =
+        next_extent(extent, posterior_of(extent, {{{std::log(40.0), 0.01}, {0.2, 1}, {0.3, 1}}}), searched);
+    if (next == extent) break;
+    extent = next;
   }
+  EXPECT_LT(rounds, 12);
   EXPECT_LT(extent[0][0], 40);
   EXPECT_GT(extent[0][1], 40);
+  // Four standard deviations to both sides, up to half as many more.
+  EXPECT_GT(std::log(extent[0][1] / extent[0][0]), 0.075);
+  EXPECT_LT(std::log(extent[0][1] / extent[0][0]), 0.13);
 }
 
-TEST(Lattice, HasValuesOfItsOwnWhereTheExtentIsNarrowerThanACellOfTheSearch) {
-  const std::vector<Axis> axes = lattice({{4, 6.25}, {0.15, 0.35}, {0.3, 0.3}}, kSearched, 3);
+TEST(Lattice, HasMoreValuesWhereTheExtentIsWiderThanACellOfTheSearch) {
+  const std::vector<Axis> axes = lattice({{4, 6.25}, {0.15, 0.35}, {0.3, 0.3}}, kSearched, 3, 16);
   ASSERT_EQ(axes[0].values.size(), 3u);
   EXPECT_DOUBLE_EQ(axes[0].values[0], 4);
   EXPECT_DOUBLE_EQ(axes[0].values[1], 5);  // even in the logarithm
   EXPECT_DOUBLE_EQ(axes[0].values[2], 6.25);
-  EXPECT_EQ(axes[1].values, kSearched[1].values);  // wider
+  ASSERT_EQ(axes[1].values.size(), 5u);  // wider: five times three are no more than 16
+  EXPECT_DOUBLE_EQ(axes[1].values[1], 0.2);
   EXPECT_EQ(axes[2].values, kSearched[2].values);
 }
 
-GridVerdict verdict_of(const Extent& intervals) {
-  GridVerdict verdict;
-  for (const auto& [low, high] : intervals) {
-    verdict.parameters.emplace_back();
-    verdict.parameters.back().interval95 = {low, high};
-    verdict.parameters.back().estimate = std::sqrt(low * high);
-  }
-  return verdict;
+TEST(Lattice, StaysWhereNothingLikelyIsBeyondItOrTheRangeEnds) {
+  const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}};
+  EXPECT_EQ(next_lattice(extent, posterior_of(extent, {{{std::log(5.2), 0.15}, {0.2, 0.0125}, {0.3, 1}}}),
+                         kSearched),
+            extent);
+  EXPECT_EQ(next_lattice(extent, posterior_of(extent, {{{std::log(3.2), 0.2}, {0.2, 0.0125}, {0.3, 1}}}),
+                         kSearched),
+            extent);
 }
 
-TEST(Lattice, StaysWhereIntervalsEndInsideOrWithTheRange) {
+TEST(Lattice, GoesTwiceAsFarOnTheSideThatThePosteriorLeaves) {
   const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}};
-  for (const Extent& inside :
-       std::vector<Extent>{{{4, 8}, {0.16, 0.24}, {0.3, 0.3}}, {{3, 8}, {0.16, 0.24}, {0.3, 0.3}}})
-    EXPECT_EQ(next_lattice(extent, extent, verdict_of(inside), kSearched), extent);
-}
-
-TEST(Lattice, GoesTwiceAsFarOnTheSideThatAnIntervalLeaves) {
-  const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}};
-  const Extent up = next_lattice(extent, extent, verdict_of({{4, 9}, {0.18, 0.22}, {0.3, 0.3}}), kSearched);
+  const Extent up =
+      next_lattice(extent, posterior_of(extent, {{{std::log(8.0), 0.2}, {0.2, 0.01}, {0.3, 1}}}), kSearched);
   EXPECT_DOUBLE_EQ(up[0][1], 27);  // 9 times the extent's factor of 3
-  EXPECT_LT(up[0][0], 4);
   EXPECT_LT(up[1][1], 0.5);
-  const Extent down = next_lattice(extent, extent, verdict_of({{4, 8}, {0.15, 0.22}, {0.3, 0.3}}), kSearched);
+  const Extent down = next_lattice(
+      extent, posterior_of(extent, {{{std::log(5.2), 0.15}, {0.16, 0.01}, {0.3, 1}}}), kSearched);
   EXPECT_EQ(down[1][0], 0.1);  // the range ends there
 }
 
 TEST(Lattice, OneFarWiderThanTheAnswerNeedsIsSimulatedAgain) {
-  const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}}, needed = {{3, 9}, {0.19, 0.21}, {0.3, 0.3}};
-  const Extent next =
-      next_lattice(extent, needed, verdict_of({{4, 8}, {0.196, 0.204}, {0.3, 0.3}}), kSearched);
+  const Extent extent = {{3, 9}, {0.15, 0.25}, {0.3, 0.3}}, looked = {{3, 9}, {0.19, 0.21}, {0.3, 0.3}};
+  const Extent next = next_lattice(
+      extent, posterior_of(looked, {{{std::log(5.2), 0.15}, {0.2, 0.002}, {0.3, 1}}}), kSearched);
   EXPECT_GT(next[1][0], 0.18);
   EXPECT_LT(next[1][1], 0.22);
 }
@@ -111,7 +116,7 @@ TEST(Lattice, MotionsBetweenItsPointsAreThoseSimulated) {
   grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log"), parse_axis("friction", "0.15:0.6:3:log")};
   const MotionStore store(folder / "rollouts");
   GridSettings local = grid;
-  local.axes = lattice({{1.7e-4, 2.5e-4}, {0.25, 0.36}}, grid.axes, 3);
+  local.axes = lattice({{1.7e-4, 2.5e-4}, {0.25, 0.36}}, grid.axes, 3, 30);
   const MotionInterpolant whole = *motion_interpolant(replay, grid, store),
                           near = *motion_interpolant(replay, local, store);
   double whole_off = 0, near_off = 0, count = 0;  // sums of squares [m^2]
@@ -128,6 +133,17 @@ TEST(Lattice, MotionsBetweenItsPointsAreThoseSimulated) {
     }
   EXPECT_LT(std::sqrt(near_off / count), 1e-5);  // far below the 0.04 mm that a millimetre of noise leaves
   EXPECT_LT(near_off, whole_off / 4);
+}
+
+TEST(AdaptiveDesign, ALatticeIsFinerByHalfOfACellInAnyDirection) {
+  const std::vector<Axis> searched = {parse_axis("bending", "1e-5:1e-3:5:log"),
+                                      parse_axis("start_yaw", "0:1:5")};
+  std::vector<Axis> other = searched;
+  EXPECT_FALSE(is_finer(other, searched));
+  other[1] = parse_axis("start_yaw", "0:1:8");
+  EXPECT_FALSE(is_finer(other, searched));  // 4 / 7 of a cell
+  other[1] = parse_axis("start_yaw", "0:1:9");
+  EXPECT_TRUE(is_finer(other, searched));
 }
 
 }  // namespace

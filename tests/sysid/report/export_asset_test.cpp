@@ -32,6 +32,8 @@ TEST(ExportAsset, TakesEstimatesWhereKnownAndTheAssetsValueElsewhere) {
   EXPECT_EQ(identification["fixed"]["poisson"]["value"], 0.3);
   EXPECT_EQ(identification["fixed"]["poisson"]["source"], "assumed");
   EXPECT_EQ(identification["interval95"]["bending"][0], 8e-5);
+  EXPECT_EQ(identification["samples"]["parameters"], (std::vector<std::string>{"poisson", "bending"}));
+  EXPECT_EQ(identification["samples"]["values"][1], (std::vector<double>{0.3, 1.2e-4}));
 }
 
 TEST(ExportAsset, AValueThatIsKeptKeepsItsSource) {

@@ -18,24 +18,53 @@ TEST(Summarize, ABendingFoundWithoutGravityIsDoubted) {
   best.values = {2e-4};
   best.score = 0.001;
   best.recordings.resize(1);
-  GridVerdict verdict;
-  verdict.best = 0;
-  verdict.parameters.resize(1);
-  verdict.parameters[0].name = "bending";
-  verdict.parameters[0].values = grid.axes[0].values;
-  verdict.parameters[0].scores = {0.002, 0.001, 0.003};
-  verdict.parameters[0].identifiable = Identifiable::upper_bound;
+  Answer answer;
+  answer.best = 0;
+  answer.values = best.values;
+  answer.estimate = best;
+  ParameterFinding& bending = answer.parameters.emplace_back();
+  bending.name = "bending";
+  bending.values = grid.axes[0].values;
+  bending.scores = {0.002, 0.001, 0.003};
+  bending.identifiable = Identifiable::upper_bound;
   const auto doubted = [&] {
     const GridResults results{grid.axes, {"lift"}, {best}};
-    for (const std::string& warning : summarize(results, verdict, replays, grid).warnings)
+    for (const std::string& warning : summarize(results, answer, replays, grid).warnings)
       if (warning.find("lift: gravity is zero in recording.json") == 0) return true;
     return false;
   };
   EXPECT_FALSE(doubted());
   replays[0].recording.gravity.setZero();
   EXPECT_TRUE(doubted());
-  verdict.parameters[0].identifiable = Identifiable::no;
+  bending.identifiable = Identifiable::no;
   EXPECT_FALSE(doubted());
+}
+
+TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_lift(folder)};
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
+  Answer answer;
+  answer.best = 0;
+  answer.values = {2e-4};
+  answer.estimate.score = 0.005;
+  answer.estimate.status = CandidateStatus::ok;
+  answer.estimate.recordings.resize(1);
+  answer.estimate.recordings[0].score = 0.0052;
+  answer.misfits = {{0.001, 0.0052, 0.3, 0.1, 90, true, 0.0028, 80, 9}};
+  const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
+  const auto first = [&] { return summarize(results, answer, replays, grid).warnings; };
+  ASSERT_FALSE(first().empty());
+  EXPECT_EQ(
+      first().front(),
+      // sqrt(2 / pi) of the root of 1 and 2.8 squared
+      "lift: the model does not fit: it misses the observed points by 5.2 mm where noise and repeatability "
+      "explain 2.37 mm; 80 keyframes are worth 9. The intervals allow for it, but are those of a model that "
+      "does not fit");
+  answer.misfits[0].found = false;
+  EXPECT_TRUE(first().empty());
 }
 
 }  // namespace

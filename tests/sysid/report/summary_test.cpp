@@ -32,7 +32,7 @@ TEST(Summary, ComesBackFromItsFileAsItWas) {
 
 TEST(Summary, HasTheFieldsOfItsSchema) {
   const nlohmann::json json = nlohmann::json::parse(summary_text(example_summary()));
-  EXPECT_EQ(json["schema"], "flash-sysid-summary/1");
+  EXPECT_EQ(json["schema"], "flash-sysid-summary/2");
   EXPECT_EQ(json["best"]["parameters"]["bending"], 1e-4);
   EXPECT_EQ(json["best"]["membrane_stiffness"], 30);
   EXPECT_EQ(json["best"]["score"], 0.004);
@@ -41,7 +41,7 @@ TEST(Summary, HasTheFieldsOfItsSchema) {
   EXPECT_EQ(json["parameters"]["poisson"]["edge"], "low");
   EXPECT_TRUE(json["parameters"]["bending"]["edge"].is_null());
   EXPECT_EQ(json["recordings"][0]["frames"][1]["t"], 1.5);
-  for (const char* field : {"offset", "time_offset", "score", "sigma_m", "sigma_source", "horizon_s"})
+  for (const char* field : {"offset", "time_offset", "score", "noise_m", "misfit_m", "horizon_s"})
     EXPECT_TRUE(json["recordings"][0].contains(field)) << field;
   for (const char* field : {"solver_check", "candidates", "device", "wall_seconds", "warnings", "exit_code"})
     EXPECT_TRUE(json.contains(field)) << field;
@@ -56,7 +56,7 @@ TEST(Summary, SaysWhichFieldIsWrong) {
     const std::string path = folder.write("summary.json", changed);
     return data::input_error_of([&] { load_summary(path); });
   };
-  EXPECT_NE(message_of("summary/1", "summary/2").find("summary.json: schema:"), std::string::npos);
+  EXPECT_NE(message_of("summary/2", "summary/3").find("summary.json: schema:"), std::string::npos);
   EXPECT_NE(message_of("\"identifiable\": \"yes\"", "\"identifiable\": \"maybe\"")
                 .find("parameters.bending.identifiable"),
             std::string::npos);

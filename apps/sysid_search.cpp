@@ -1,0 +1,149 @@
+#include "apps/sysid_search.h"
+
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+
+#include "apps/command_line.h"
+#include "data/error.h"
+#include "data/message_line.h"
+#include "data/text.h"
+#include "sysid/report/overlay.h"
+#include "sysid/report/parameter_label.h"
+#include "sysid/report/recording_names.h"
+#include "sysid/report/report.h"
+#include "sysid/report/summarize.h"
+
+namespace flash {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string value_text(const sysid::ParameterFinding& finding, const std::string& unit) {
+  const auto text = [&](double value) {
+    return data::format_short(value) + (unit.empty() ? "" : " " + unit);
+  };
+  switch (finding.identifiable) {
+    case sysid::Identifiable::yes:
+      return text(*finding.estimate) + "  (95 %: " + data::format_short((*finding.interval95)[0]) + " to " +
+             data::format_short((*finding.interval95)[1]) + ")";
+    case sysid::Identifiable::lower_bound:
+      return "at least " + text((*finding.interval95)[0]);
+    case sysid::Identifiable::upper_bound:
+      return "at most " + text((*finding.interval95)[1]);
+    case sysid::Identifiable::no:
+      break;
+  }
+  return "not identifiable from the recordings";
+}
+
+void print_answer(const sysid::Summary& summary, const std::string& out) {
+  const bool has_thickness = summary.settings.count("thickness_m") > 0;
+  for (const sysid::ParameterFinding& finding : summary.parameters) {
+    const sysid::ParameterLabel label = sysid::parameter_label(finding.name, has_thickness);
+    std::printf("%-16s %s\n", finding.name.c_str(), value_text(finding, label.unit).c_str());
+  }
+  for (const sysid::SummaryRecording& recording : summary.recordings)
+    std::printf("%-16s %.2f mm from the observed points, offset %.1f %.1f %.1f mm, clock %.0f ms\n",
+                data::message_line(recording.name).c_str(), 1000 * recording.score,
+                1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
+                1000 * recording.time_offset);
+  for (const sysid::SolverCheck& check : summary.solver_check)
+    std::printf("%-24s moves the surface by %.2f mm, the score to %.2f mm\n", check.what.c_str(),
+                1000 * check.surface_change_m, 1000 * check.score);
+  std::printf("%s\n%s\n", (fs::path(out) / "summary.json").c_str(), (fs::path(out) / "report.html").c_str());
+}
+
+// What all candidates had in common.
+void tell_what_was_shared(const std::vector<sysid::Replay>& replays, const CommonOptions& options) {
+  for (const sysid::Replay& replay : replays)
+    say(options, replay.recording.name + ": one plan of the mesh, " +
+                     std::to_string(sim::count_bending_operators(*replay.plan)) +
+                     " bending operators; held " + std::to_string(sysid::scored_steps(replay).size()) +
+                     " of " + std::to_string(replay.steps + 1) + " steps a candidate");
+}
+
+// The estimate over the observations, recording by recording; kept with the run.
+std::vector<sysid::Overlay> keep_estimate(const std::vector<std::string>& recordings,
+                                          const sysid::Answer& answer,
+                                          const std::vector<sysid::Replay>& replays, const std::string& out) {
+  std::vector<sysid::Overlay> overlays;
+  if (answer.best < 0) return overlays;
+  const std::vector<std::string> folders = sysid::file_names(recordings);
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    overlays.push_back(
+        sysid::make_overlay(replays[r], answer.motions[r].motion, answer.estimate.recordings[r]));
+    sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / folders[r]).string());
+  }
+  return overlays;
+}
+
+// Judges what was found and writes the answer.
+int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptions& options) {
+  sysid::GridResults results = store.results();
+  const sysid::Answer answer = [&] {
+    AnswerLine line(options,
+                    sysid::most_work(search.settings, search.replays.size(), search.asked.solver_check));
+    return sysid::find_answer(
+        results, search.replays, search.settings, search.asked,
+        [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
+  }();
+  sysid::Summary summary = sysid::summarize(results, answer, search.replays, search.settings, search.asked);
+  summary.asset = fs::absolute(search.asset.source).lexically_normal().string();
+  summary.device = search.device == sim::Device::cuda ? "cuda" : "cpu";
+  summary.wall_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - search.begin).count();
+  sysid::save_summary(summary, (fs::path(search.out) / "summary.json").string());
+  sysid::ReportSettings report;
+  for (std::size_t k = 0; k < search.map.size() && k < 2; ++k) report.map_axes[k] = search.map[k];
+  const std::vector<sysid::Overlay> overlays =
+      keep_estimate(results.recordings, answer, search.replays, search.out);
+  sysid::write_report(summary, results, overlays, report, (fs::path(search.out) / "report.html").string());
+
+  for (const std::string& warning : summary.warnings) warn(warning);
+  if (options.json) {
+    std::cout << sysid::summary_text(summary);
+  } else {
+    print_answer(summary, search.out);
+  }
+  return summary.exit_code;
+}
+
+}  // namespace
+
+void AnswerLine::take(const sysid::AnswerWork& done, const sysid::AnswerWork& spared) {
+  const std::scoped_lock lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  meter_.take(done, spared, std::chrono::duration<double>(now - last_).count());
+  last_ = now;
+  line_.show(meter_);
+}
+
+int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& options) {
+  const auto total = static_cast<std::size_t>(sysid::count_candidates(search.settings.axes));
+  const sysid::AnswerWork most =
+      sysid::most_work(search.settings, search.replays.size(), search.asked.solver_check);
+  say(options, "then the answer: at most " + data::format_count(static_cast<std::size_t>(most.motions)) +
+                   " motions more and " + data::format_count(static_cast<std::size_t>(most.scores)) +
+                   " scores between them");
+  const auto kept = [&] {
+    warn("stopped with " + data::format_count(store.results().candidates.size()) + " of " +
+         data::format_count(total) + " candidates, kept in " + search.out + "; --resume goes on");
+    return exit_failed;
+  };
+  try {
+    {
+      ProgressLine line(options);
+      if (!sysid::grid_search(
+              search.replays, search.settings, store,
+              [&](const sysid::Progress& progress) { line.show(progress); }, &stop_on_signals()))
+        return kept();
+    }
+    if (options.verbose) tell_what_was_shared(search.replays, options);
+    return conclude(search, store, options);
+  } catch (const data::Stopped&) {
+    return kept();
+  }
+}
+
+}  // namespace flash

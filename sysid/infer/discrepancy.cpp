@@ -1,0 +1,330 @@
+#include "sysid/infer/discrepancy.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "sysid/infer/local_noise.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kTimes[] = {0.125, 0.25, 0.5, 1};   // reaches over the duration
+constexpr double kSheets[] = {0.125, 0.25, 0.5, 1};  // over the longest side of the sheet
+constexpr Eigen::Index kModes = 24;                  // along the sheet, at most
+constexpr Eigen::Index kCoordinates = 160;           // of a field, at most
+constexpr double kLeast = 1e-5;                      // variance of a coordinate over the largest
+constexpr int kSizes = 20;                           // values of tau, to that of the residuals
+constexpr double kFirstSize = 0.03;                  // over sigma
+constexpr double kLarge = 2.995732;                  // -log of one in twenty
+constexpr double kVague = 100;                       // of what is not known, over the residuals
+// Chi-square with 3 degrees of freedom: a size and two reaches.
+constexpr double kOnceInTwenty = 7.815;
+
+double matern(double distance) {
+  const double x = std::sqrt(5.0) * distance;
+  return (1 + x + x * x / 3) * std::exp(-x);
+}
+
+/// Row of (keyframe, channel) blocks, `modes` long each.
+Eigen::Index block(int keyframe, int channel, int channels, int modes) {
+  return (static_cast<Eigen::Index>(keyframe) * channels + channel) * modes;
+}
+
+/// -2 log likelihood at one size from coordinates in which all is diagonal.
+double diagonal_deviance(double squares, const Eigen::VectorXd& gains, const Eigen::VectorXd& coordinates,
+                         double tau) {
+  const double variance = tau * tau;
+  const Eigen::ArrayXd scale = 1 + variance * gains.array();
+  return squares + scale.log().sum() - (variance * coordinates.array().square() / scale).sum();
+}
+
+}  // namespace
+
+DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals,
+                                   std::optional<double> repeatability)
+    : rows_(std::move(rows)), keyframes_(static_cast<int>(rows_.times.size())) {
+  for (Eigen::MatrixXd* columns : {&rows_.known, &rows_.free, &rows_.rates})
+    if (columns->rows() == 0) columns->resize(residuals.size(), 0);
+  known_.resize(residuals.size(), rows_.known.cols() + rows_.free.cols() + rows_.rates.cols());
+  known_ << rows_.known, rows_.free, rows_.rates;
+  for (Eigen::Index c = rows_.known.cols(); c < known_.cols(); ++c)
+    if (const double norm = known_.col(c).norm(); norm > 0) known_.col(c) *= kVague * residuals.norm() / norm;
+  channels_ = 1 + *std::max_element(rows_.channel.begin(), rows_.channel.end());
+  duration_ = std::max(rows_.times.back() - rows_.times.front(), 1e-9);
+  const Eigen::RowVector2d corner = rows_.places.colwise().minCoeff();
+  const Eigen::Vector2d sides = (rows_.places.colwise().maxCoeff() - corner).transpose().cwiseMax(1e-9);
+  length_ = sides.maxCoeff();
+
+  struct Mode {
+    int a, b;
+    double wave_number;
+  };
+  std::vector<Mode> modes;
+  for (int a = 0; a < kModes; ++a)
+    for (int b = 0; b < kModes; ++b) modes.push_back({a, b, M_PI * std::hypot(a / sides[0], b / sides[1])});
+  std::stable_sort(modes.begin(), modes.end(),
+                   [](const Mode& one, const Mode& other) { return one.wave_number < other.wave_number; });
+  modes.resize(kModes);
+  modes_ = kModes;
+  wave_numbers_.resize(modes_);
+  phi_.resize(residuals.size(), modes_);
+  for (int j = 0; j < modes_; ++j) {
+    const auto [a, b, wave_number] = modes[static_cast<std::size_t>(j)];
+    wave_numbers_[j] = wave_number;
+    const double scale = std::sqrt((a > 0 ? 2.0 : 1.0) * (b > 0 ? 2.0 : 1.0));  // mean square 1
+    const auto x = (rows_.places.col(0).array() - corner[0]) / sides[0];
+    const auto y = (rows_.places.col(1).array() - corner[1]) / sides[1];
+    phi_.col(j) = scale * (M_PI * a * x).cos() * (M_PI * b * y).cos();
+  }
+
+  const Eigen::Index stacked = block(keyframes_, 0, channels_, modes_);
+  modes_modes_ = Eigen::MatrixXd::Zero(modes_, stacked);
+  for (Eigen::Index i = 0; i < residuals.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    modes_modes_.middleCols(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_) +=
+        rows_.weights[i] * phi_.row(i).transpose() * phi_.row(i);
+  }
+  modes_known_ = sums(known_).modes;
+  estimate_noise(residuals);
+  const double between = noise_between_neighbours(rows_, residuals);
+  misfit_.noise = between > 0 ? std::clamp(between, 1e-9, noise_) : noise_;
+  if (repeatability)
+    explained_ = std::sqrt(
+        std::max(0.0, M_PI / 4 * *repeatability * *repeatability - 0.5 * misfit_.noise * misfit_.noise));
+  for (const Shape& shape : shapes()) fields_.push_back(field(shape));
+  sizes_ = {explained_};
+  priors_ = {0};
+  const double first = kFirstSize * noise_, last = std::max(left_, 2 * first);
+  double sum = 0;
+  for (int i = 0; i < kSizes; ++i) {
+    const double beyond = first * std::pow(last / first, static_cast<double>(i) / (kSizes - 1));
+    sizes_.push_back(std::hypot(explained_, beyond));
+    priors_.push_back(beyond * std::exp(-kLarge * beyond / noise_));  // d tau = tau d log tau
+    sum += priors_.back();
+  }
+  for (double& prior : priors_) prior /= 2 * sum;
+  priors_.front() = 0.5;
+  weigh(residuals);
+}
+
+std::vector<DiscrepancyModel::Shape> DiscrepancyModel::shapes() const {
+  std::vector<Shape> shapes;
+  for (const double time : kTimes)
+    for (const double sheet : kSheets) shapes.push_back({time * duration_, sheet * length_});
+  return shapes;
+}
+
+Eigen::VectorXd DiscrepancyModel::along(const Shape& shape) const {
+  const Eigen::VectorXd variances = (1 + (shape.reach_sheet * wave_numbers_.array()).square() / 3).pow(-2.5);
+  return variances / variances.sum();
+}
+
+Eigen::MatrixXd DiscrepancyModel::in_time(const Shape& shape) const {
+  Eigen::MatrixXd kernel(keyframes_, keyframes_);
+  for (int k = 0; k < keyframes_; ++k)
+    for (int l = 0; l < keyframes_; ++l)
+      kernel(k, l) = matern(
+          std::abs(rows_.times[static_cast<std::size_t>(k)] - rows_.times[static_cast<std::size_t>(l)]) /
+          shape.reach_time);
+  return kernel;
+}
+
+Eigen::MatrixXd DiscrepancyModel::sheet_modes(const Shape& shape) const {
+  return phi_ * along(shape).cwiseSqrt().asDiagonal();
+}
+
+Eigen::MatrixXd DiscrepancyModel::covariance(std::size_t shape) const {
+  const Shape reach = shapes()[shape];
+  const Eigen::MatrixXd modes = sheet_modes(reach);
+  Eigen::MatrixXd covariance = modes * modes.transpose();
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i)
+    for (Eigen::Index j = 0; j < covariance.cols(); ++j) {
+      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
+      const double apart = rows_.times[static_cast<std::size_t>(rows_.keyframe[a])] -
+                           rows_.times[static_cast<std::size_t>(rows_.keyframe[b])];
+      covariance(i, j) *=
+          rows_.channel[a] == rows_.channel[b] ? matern(std::abs(apart) / reach.reach_time) : 0.0;
+    }
+  return covariance;
+}
+
+DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals) const {
+  Sums sums;
+  sums.modes = Eigen::MatrixXd::Zero(block(keyframes_, 0, channels_, modes_), residuals.cols());
+  for (Eigen::Index i = 0; i < residuals.rows(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    sums.modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_)
+        .noalias() += rows_.weights[i] * phi_.row(i).transpose() * residuals.row(i);
+  }
+  sums.known = known_.transpose() * rows_.weights.asDiagonal() * residuals;
+  sums.squares = (rows_.weights.asDiagonal() * residuals).cwiseProduct(residuals).colwise().sum().transpose();
+  return sums;
+}
+
+DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> times(in_time(shape));
+  const Eigen::VectorXd sheet = along(shape);
+
+  // The coordinates of largest variance; each is one mode in time times one along the sheet.
+  struct Coordinate {
+    Eigen::Index time, mode;
+    double variance;
+  };
+  std::vector<Coordinate> chosen;
+  for (Eigen::Index i = 0; i < keyframes_; ++i)
+    for (Eigen::Index j = 0; j < modes_; ++j)
+      chosen.push_back({i, j, std::max(0.0, times.eigenvalues()[i]) * sheet[j]});
+  std::stable_sort(chosen.begin(), chosen.end(),
+                   [](const Coordinate& a, const Coordinate& b) { return a.variance > b.variance; });
+  const double least = kLeast * chosen.front().variance;
+  const auto enough = std::find_if(chosen.begin(), chosen.end(),
+                                   [&](const Coordinate& coordinate) { return coordinate.variance < least; });
+  chosen.resize(std::min<std::size_t>(static_cast<std::size_t>(enough - chosen.begin()),
+                                      static_cast<std::size_t>(kCoordinates / channels_)));
+
+  const auto per_channel = static_cast<Eigen::Index>(chosen.size());
+  const Eigen::Index stacked = block(keyframes_, 0, channels_, modes_);
+  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(per_channel * channels_, stacked);
+  for (int channel = 0; channel < channels_; ++channel)
+    for (Eigen::Index c = 0; c < per_channel; ++c) {
+      const Coordinate& at = chosen[static_cast<std::size_t>(c)];
+      for (int k = 0; k < keyframes_; ++k)
+        design(channel * per_channel + c, block(k, channel, channels_, modes_) + at.mode) =
+            std::sqrt(at.variance) * times.eigenvectors()(k, at.time);
+    }
+  // Information of the coordinates, in units of 1 / sigma^2; what errors of known shape explain taken out.
+  Eigen::MatrixXd weighed(design.rows(), stacked);
+  for (Eigen::Index first = 0; first < stacked; first += modes_)
+    weighed.middleCols(first, modes_).noalias() =
+        design.middleCols(first, modes_) * modes_modes_.middleCols(first, modes_);
+  const double precision = 1 / (noise_ * noise_);
+  const Eigen::MatrixXd to_known = design * modes_known_;
+  const Eigen::MatrixXd information =
+      precision * (weighed * design.transpose() - to_known * inverse_known_ * to_known.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  Field field{shape, {}, {}, eigen.eigenvalues().cwiseMax(0.0)};
+  field.modes = eigen.eigenvectors().transpose() * design;
+  field.known = -precision * (eigen.eigenvectors().transpose() * to_known * inverse_known_);
+  return field;
+}
+
+DiscrepancyModel::Reduced DiscrepancyModel::reduce(const Eigen::MatrixXd& residuals) const {
+  const Sums sums = this->sums(residuals);
+  Reduced reduced;
+  reduced.squares =
+      (sums.squares -
+       sums.known.cwiseProduct(inverse_known_ * sums.known).colwise().sum().transpose().eval()) /
+      (noise_ * noise_);
+  for (const Field& field : fields_)
+    reduced.coordinates.emplace_back(field.modes * sums.modes / (noise_ * noise_) + field.known * sums.known);
+  return reduced;
+}
+
+/// The fixed point of sigma^2 = squares of what is left / (rows - what was fitted), under a discrepancy that
+/// is all but free (Fellner 1986).
+void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
+  const double rows = rows_.weights.sum();
+  const double all = std::sqrt(residuals.cwiseAbs2().dot(rows_.weights) / rows);
+  noise_ = std::max(all, 1e-9);
+  const Shape flexible{kTimes[0] * duration_, kSheets[0] * length_};
+  const double variance = 100 * noise_ * noise_;
+  for (int round = 0; round < 8; ++round) {
+    const Eigen::Index count = known_.cols();
+    const Eigen::MatrixXd known = known_.transpose() * rows_.weights.asDiagonal() * known_;
+    inverse_known_ = (known + noise_ * noise_ * Eigen::MatrixXd::Identity(count, count))
+                         .ldlt()
+                         .solve(Eigen::MatrixXd::Identity(count, count));
+    if (round == 0) {
+      const Eigen::VectorXd left =
+          residuals -
+          known_ * (inverse_known_ * (known_.transpose() * (rows_.weights.asDiagonal() * residuals)));
+      left_ = std::sqrt(left.cwiseAbs2().dot(rows_.weights) / rows);
+    }
+    fields_ = {field(flexible)};
+    const Reduced reduced = reduce(residuals);
+    const Eigen::ArrayXd gains = fields_[0].gains.array(), x = reduced.coordinates[0].col(0).array();
+    const Eigen::ArrayXd fitted = variance * x / (1 + variance * gains);
+    const double left = reduced.squares[0] - 2 * (fitted * x).sum() + (fitted * fitted * gains).sum();
+    const double freedom =
+        rows - (variance * gains / (1 + variance * gains)).sum() - static_cast<double>(count);
+    const double before = noise_;
+    noise_ = std::max(noise_ * std::sqrt(std::max(left, 0.0) / std::max(freedom, 0.1 * rows)), 1e-9);
+    if (std::abs(noise_ - before) < 1e-3 * before) break;
+  }
+  fields_.clear();
+}
+
+double DiscrepancyModel::deviance_at(const Eigen::VectorXd& residuals, std::size_t shape, double tau) const {
+  const Reduced reduced = reduce(residuals);
+  return diagonal_deviance(reduced.squares[0], fields_[shape].gains, reduced.coordinates[shape].col(0), tau);
+}
+
+void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
+  const Reduced reduced = reduce(residuals);
+  misfit_.explained = explained_;
+  misfit_.keyframes = keyframes_;
+  std::vector<double> deviances;
+  double least = std::numeric_limits<double>::infinity(), without = least;
+  for (std::size_t f = 0; f < fields_.size(); ++f) {
+    const auto at = [&](double tau) {
+      return diagonal_deviance(reduced.squares[0], fields_[f].gains, reduced.coordinates[f].col(0), tau);
+    };
+    without = std::min(without, at(explained_));
+    for (const double tau : sizes_) {
+      deviances.push_back(at(tau));
+      least = std::min(least, deviances.back());
+    }
+  }
+  misfit_.gain = std::max(0.0, without - least);
+  misfit_.found = misfit_.gain > kOnceInTwenty;
+  variances_.assign(fields_.size(), 0);
+  double total = 0;
+  for (std::size_t f = 0, i = 0; f < fields_.size(); ++f)
+    for (std::size_t s = 0; s < sizes_.size(); ++s, ++i) {
+      const double weight = priors_[s] * std::exp(-0.5 * (deviances[i] - least));
+      total += weight;
+      variances_[f] += weight * sizes_[s] * sizes_[s];
+      misfit_.size += weight * sizes_[s];
+      misfit_.reach_time += weight * fields_[f].shape.reach_time;
+      misfit_.reach_sheet += weight * fields_[f].shape.reach_sheet;
+    }
+  for (double& variance : variances_) variance /= total;
+  misfit_.size /= total;
+  misfit_.reach_time /= total;
+  misfit_.reach_sheet /= total;
+}
+
+Eigen::MatrixXd DiscrepancyModel::covariance_of(const Eigen::MatrixXd& combinations, bool independent) const {
+  const Eigen::VectorXd spreads =
+      rows_.weights.unaryExpr([](double weight) { return weight > 0 ? 1 / weight : 0.0; });
+  const Eigen::MatrixXd known = combinations.transpose() * rows_.known;
+  Eigen::MatrixXd covariance =
+      noise_ * noise_ * combinations.transpose() * spreads.asDiagonal() * combinations +
+      known * known.transpose();
+  // Of each keyframe and channel, how much of each mode the combinations have.
+  Eigen::MatrixXd modes = Eigen::MatrixXd::Zero(block(keyframes_, 0, channels_, modes_), combinations.cols());
+  for (Eigen::Index i = 0; i < combinations.rows(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_).noalias() +=
+        phi_.row(i).transpose() * combinations.row(i);
+  }
+  for (std::size_t f = 0; f < fields_.size(); ++f) {
+    const Eigen::VectorXd sheet = variances_[f] * along(fields_[f].shape);
+    const Eigen::MatrixXd times = in_time(fields_[f].shape);
+    for (int channel = 0; channel < channels_; ++channel)
+      for (int k = 0; k < keyframes_; ++k)
+        for (int l = 0; l < keyframes_; ++l) {
+          if (independent && k != l) continue;
+          covariance.noalias() +=
+              times(k, l) * modes.middleRows(block(k, channel, channels_, modes_), modes_).transpose() *
+              sheet.asDiagonal() * modes.middleRows(block(l, channel, channels_, modes_), modes_);
+        }
+  }
+  return covariance;
+}
+
+}  // namespace flash::sysid

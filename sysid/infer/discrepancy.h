@@ -1,0 +1,119 @@
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+namespace flash::sysid {
+
+/// Signed residuals of one recording, a row each: where they are, and how much each counts.
+struct ObservedRows {
+  std::vector<double> times;  ///< of the keyframes, increasing [s]
+  std::vector<int> keyframe;  ///< of each row, index into `times`
+  std::vector<int> channel;   ///< of each row, from 0: each channel has a discrepancy of its own
+  Eigen::MatrixX2d places;    ///< of each row on the sheet at rest [m]
+  Eigen::VectorXd weights;    ///< of each row: the variance of its noise is sigma^2 / weight; 0 leaves it out
+  Eigen::MatrixXd known = {};  ///< errors of known shape, a column each, of unit variance [m]
+  Eigen::MatrixXd free = {};   ///< errors of known shape between -1 and 1, all alike likely [m]
+  Eigen::MatrixXd rates = {};  ///< by each parameter, a column each, over about what is likely of it [m]
+};
+
+/// What the residuals say of the error of the model itself.
+struct Misfit {
+  double noise = 0;        ///< standard deviation by which neighbours differ [m]
+  double size = 0;         ///< tau: that of the discrepancy, posterior mean [m]
+  double reach_time = 0;   ///< over which it agrees, posterior mean [s]
+  double reach_sheet = 0;  ///< [m]
+  double gain = 0;         ///< fall of -2 log likelihood against a discrepancy of the size `explained`
+  bool found = false;      ///< the gain is more than chance gives once in twenty
+  double explained = 0;    ///< discrepancy that the repeatability of trials accounts for [m]
+  int keyframes = 0;
+  double worth = 0;  ///< keyframes of independent discrepancies that would tell the parameters as well
+};
+
+/// Covariance of residuals under a model that is wrong: noise, errors of known shape, and a discrepancy that
+/// is smooth in time and along the sheet (Kennedy and O'Hagan 2001),
+///
+///     y = K a + d + e,  a ~ N(0, 1),  e ~ N(0, sigma^2 / w),
+///     cov d(t, s) d(t', s') = tau^2 k(|t - t'| / reach_time) sum_j l_j phi_j(s) phi_j(s')
+///
+/// k is Matern's of 5/2; phi_j are the cosines of least wave number on the box of the sheet (Solin and Sarkka
+/// 2020), l_j falls with it as for Matern's of 3/2 and reach_sheet, and tau^2 is the mean variance over the
+/// sheet. A discrepancy needs a prior, or it takes the place of the parameters (Brynjarsdottir and O'Hagan
+/// 2014): what of tau is beyond `explained` is nothing, as likely as not, or exponential, above sigma once in
+/// twenty (Simpson et al. 2017), and no larger than the residuals are themselves. Reaches are an eighth to
+/// the whole of the recording and of the sheet, alike. Their likelihood is restricted: what the parameters or
+/// free errors could explain counts for none.
+class DiscrepancyModel {
+ public:
+  /// Sigma is estimated from `residuals`, with the most flexible discrepancy taken out. `repeatability`: mean
+  /// distance d between two trials [m]. Each trial differs from what both have in common by `explained`,
+  /// pi / 2 d^2 = noise^2 + 2 explained^2, and tau is no less.
+  DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals,
+                   std::optional<double> repeatability = {});
+
+  double noise() const { return noise_; }  ///< sigma: what is rough in the discrepancy counts as noise [m]
+  /// Of the residuals, without what free errors and the parameters explain [m].
+  double residual_size() const { return left_; }
+  const ObservedRows& rows() const { return rows_; }
+
+  /// Covariance of combinations^T y, a combination of rows a column, as the residuals make it likely.
+  /// `independent`: were the discrepancies of keyframes so.
+  Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& combinations, bool independent = false) const;
+
+  /// Of the residuals given to the constructor; `worth` is left to the likelihood.
+  const Misfit& misfit() const { return misfit_; }
+
+  /// -2 log restricted likelihood at one discrepancy, for tests. `shape`: see shapes().
+  double deviance_at(const Eigen::VectorXd& residuals, std::size_t shape, double tau) const;
+
+  struct Shape {
+    double reach_time, reach_sheet;  ///< [s], [m]
+  };
+  std::vector<Shape> shapes() const;
+
+  /// Covariance of the discrepancy between rows over tau^2, of a shape; for tests.
+  Eigen::MatrixXd covariance(std::size_t shape) const;
+
+ private:
+  /// Sums over the rows of each keyframe and channel.
+  struct Sums {
+    Eigen::MatrixXd modes;    ///< modes x (keyframe, channel), stacked, by column of residuals
+    Eigen::MatrixXd known;    ///< known columns by column of residuals
+    Eigen::VectorXd squares;  ///< of each column
+  };
+  /// One pair of reaches, in the coordinates in which the discrepancy's information is diagonal.
+  struct Field {
+    Shape shape;
+    Eigen::MatrixXd modes;  ///< rows: coordinates; columns: (keyframe, channel, mode)
+    Eigen::MatrixXd known;  ///< from Sums::known
+    Eigen::VectorXd gains;  ///< information of each coordinate over its prior at tau = 1 m
+  };
+  struct Reduced {
+    Eigen::VectorXd squares;                   ///< of what errors of known shape leave
+    std::vector<Eigen::MatrixXd> coordinates;  ///< of each field, by column of residuals
+  };
+  Sums sums(const Eigen::MatrixXd& residuals) const;
+  Field field(const Shape& shape) const;
+  Reduced reduce(const Eigen::MatrixXd& residuals) const;
+  void estimate_noise(const Eigen::VectorXd& residuals);
+  void weigh(const Eigen::VectorXd& residuals);
+  Eigen::VectorXd along(const Shape& shape) const;        ///< variances of the modes, of sum one
+  Eigen::MatrixXd in_time(const Shape& shape) const;      ///< correlation between keyframes
+  Eigen::MatrixXd sheet_modes(const Shape& shape) const;  ///< scaled, a row each
+
+  ObservedRows rows_;
+  Eigen::MatrixXd known_;  ///< errors of known shape and, of no known size, free ones and the parameters
+  int channels_ = 1, keyframes_ = 0, modes_ = 0;
+  double noise_ = 0, left_ = 0, explained_ = 0, duration_ = 0, length_ = 0;
+  Eigen::MatrixXd phi_;           ///< modes of each row, unscaled
+  Eigen::VectorXd wave_numbers_;  ///< of the modes [1/m]
+  Eigen::MatrixXd modes_modes_;   ///< (keyframe, channel) blocks of sum w phi phi^T, side by side
+  Eigen::MatrixXd modes_known_;   ///< (keyframe, channel, mode) by known
+  Eigen::MatrixXd inverse_known_;
+  std::vector<Field> fields_;
+  std::vector<double> sizes_, priors_;  ///< tau [m] and the prior of each
+  std::vector<double> variances_;       ///< of each shape: tau^2 times how likely both are, summed over tau
+  Misfit misfit_;
+};
+
+}  // namespace flash::sysid

@@ -1,0 +1,26 @@
+#pragma once
+#include <array>
+#include <string>
+#include <vector>
+
+#include "sysid/emulate/grid_search.h"
+
+namespace flash::sysid {
+
+/// What moves the cloth and was neither searched nor measured, one standard deviation to both sides.
+struct HeldParameter {
+  std::string name;
+  std::array<double, 2> values;  ///< low, high
+  bool shared = true;            ///< one value for all recordings
+};
+
+/// Friction within a factor of 2 of the value that the search holds it at: it competes with bending where a
+/// sheet is lifted off a table. The bounds of a recording on start yaw and table height, over sqrt(3), where
+/// it has any. The other properties of the asset, the grasp and what was fixed count as known.
+std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays);
+
+/// The candidate at `values`, with one parameter at another value than the search holds it at.
+ReplayCandidate candidate_with(const std::vector<double>& values, const GridSettings& grid,
+                               const std::string& name, double value);
+
+}  // namespace flash::sysid

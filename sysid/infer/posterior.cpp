@@ -1,0 +1,151 @@
+#include "sysid/infer/posterior.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <random>
+
+#include "sysid/infer/ensemble_sampler.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr Eigen::Index kWalkers = 64;
+constexpr double kFarthest = 200;  // deviance over the least beyond which a spline need not follow
+
+std::vector<Eigen::VectorXd> knots_of(const std::vector<Axis>& axes) {
+  std::vector<Eigen::VectorXd> knots;
+  for (const Axis& axis : axes) {
+    Eigen::VectorXd& each = knots.emplace_back(static_cast<Eigen::Index>(axis.values.size()));
+    for (std::size_t i = 0; i < axis.values.size(); ++i)
+      each[static_cast<Eigen::Index>(i)] = coordinate_of(axis, axis.values[i]);
+  }
+  return knots;
+}
+
+Eigen::VectorXd node_of(const TensorSpline& spline, Eigen::Index i) {
+  Eigen::VectorXd x(spline.dimensions());
+  for (Eigen::Index k = spline.dimensions(); k-- > 0;) {
+    const Eigen::Index count = spline.knots(k).size();
+    x[k] = spline.knots(k)[i % count];
+    i /= count;
+  }
+  return x;
+}
+
+/// Walkers about nodes drawn by their density.
+Eigen::MatrixXd walkers_of(const TensorSpline& spline, double least, unsigned seed) {
+  std::mt19937_64 random(seed);
+  const auto uniform = [&] { return static_cast<double>(random() >> 11U) * 0x1p-53; };
+  std::vector<double> sums;
+  for (const double deviance : spline.values())
+    sums.push_back((sums.empty() ? 0 : sums.back()) + std::exp(-0.5 * std::max(0.0, deviance - least)));
+  Eigen::MatrixXd walkers(kWalkers, spline.dimensions());
+  for (Eigen::Index w = 0; w < kWalkers; ++w) {
+    const auto drawn = std::upper_bound(sums.begin(), sums.end() - 1, uniform() * sums.back());
+    walkers.row(w) = node_of(spline, drawn - sums.begin()).transpose();
+    for (Eigen::Index k = 0; k < spline.dimensions(); ++k) {
+      const Eigen::VectorXd& knots = spline.knots(k);
+      const Eigen::Index last = knots.size() - 1;
+      if (last == 0) continue;
+      const double spacing = (knots[last] - knots[0]) / static_cast<double>(last);
+      walkers(w, k) = std::clamp(walkers(w, k) + (uniform() - 0.5) * spacing, knots[0], knots[last]);
+    }
+  }
+  return walkers;
+}
+
+}  // namespace
+
+std::vector<Axis> in_own_coordinates(std::vector<Axis> axes) {
+  for (Axis& axis : axes)
+    for (const ParameterInfo& info : known_parameters())
+      if (info.name == axis.name && info.material && info.name != "poisson")
+        axis.logarithmic = axis.values.front() > 0;
+  return axes;
+}
+
+double coordinate_of(const Axis& axis, double value) { return axis.logarithmic ? std::log(value) : value; }
+double value_of(const Axis& axis, double coordinate) {
+  const double value = axis.logarithmic ? std::exp(coordinate) : coordinate;
+  return std::clamp(value, axis.values.front(), axis.values.back());
+}
+
+std::vector<double> Posterior::values() const {
+  std::vector<double> values;
+  for (std::size_t k = 0; k < axes.size(); ++k)
+    values.push_back(value_of(axes[k], estimate[static_cast<Eigen::Index>(k)]));
+  return values;
+}
+
+double Posterior::quantile(std::size_t k, double share) const {
+  Eigen::VectorXd column = samples.col(static_cast<Eigen::Index>(k));
+  const auto at = static_cast<Eigen::Index>(std::lround(share * static_cast<double>(column.size() - 1)));
+  std::nth_element(column.data(), column.data() + at, column.data() + column.size());
+  return column[at];
+}
+
+double Posterior::end(std::size_t k, bool high) const {
+  const auto axis = static_cast<Eigen::Index>(k);
+  const Eigen::VectorXd& knots = deviance.knots(axis);
+  const double there = high ? knots[knots.size() - 1] : knots[0];
+  double end = std::numeric_limits<double>::infinity();
+  for (Eigen::Index i = 0; i < deviance.values().size(); ++i)
+    if (node_of(deviance, i)[axis] == there) end = std::min(end, deviance.values()[i]);
+  return std::max(0.0, end - least);
+}
+
+Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance, unsigned seed) {
+  // Far from what is likely the values do not matter, and a spline through them would swing about.
+  const double lowest = deviance.minCoeff();
+  const Eigen::VectorXd above = (deviance.array() - lowest).matrix();
+  const Eigen::VectorXd bent = above.unaryExpr([](double rise) {
+    if (!std::isfinite(rise)) return 2 * kFarthest;
+    return rise < kFarthest ? rise : kFarthest * (2 - kFarthest / rise);  // slope 1 at the joint
+  });
+  Posterior posterior{axes, TensorSpline(knots_of(axes), bent), {}, 0, {}};
+  Eigen::Index best;
+  bent.minCoeff(&best);
+  posterior.estimate = node_of(posterior.deviance, best);
+  posterior.least = posterior.deviance.minimize(posterior.estimate);
+  const TensorSpline& spline = posterior.deviance;
+  std::vector<Eigen::Index> free;  // an axis of one value is no direction
+  for (Eigen::Index k = 0; k < spline.dimensions(); ++k)
+    if (spline.knots(k).size() > 1) free.push_back(k);
+  if (free.empty()) {
+    posterior.samples = posterior.estimate.transpose();
+    return posterior;
+  }
+  Eigen::VectorXd x = posterior.estimate;
+  const auto log_density = [&](const Eigen::VectorXd& moved) {
+    x(free) = moved;
+    for (const Eigen::Index k : free) {
+      const Eigen::VectorXd& knots = spline.knots(k);
+      if (x[k] < knots[0] || x[k] > knots[knots.size() - 1]) return -std::numeric_limits<double>::infinity();
+    }
+    return -0.5 * spline(x);
+  };
+  const Eigen::MatrixXd start = walkers_of(spline, posterior.least, seed);
+  const Eigen::MatrixXd draws = sample_ensemble(log_density, start(Eigen::all, free), {200, 800, 4, seed});
+  posterior.samples = posterior.estimate.transpose().replicate(draws.rows(), 1);
+  posterior.samples(Eigen::all, free) = draws;
+  // A draw may have found a lower valley than the nodes.
+  Eigen::Index lowest_draw = 0;
+  double lowest_there = std::numeric_limits<double>::infinity();
+  for (Eigen::Index i = 0; i < draws.rows(); i += 8) {
+    const double there = spline(posterior.samples.row(i).transpose());
+    if (there < lowest_there) {
+      lowest_there = there;
+      lowest_draw = i;
+    }
+  }
+  Eigen::VectorXd other = posterior.samples.row(lowest_draw).transpose();
+  if (const double there = spline.minimize(other); there < posterior.least) {
+    posterior.least = there;
+    posterior.estimate = other;
+  }
+  return posterior;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,122 @@
+#include "sysid/infer/residual_likelihood.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kEfficient = 1.345;  // 95 % of least squares under normal noise
+constexpr double kUntold = 1e-8;      // information of a direction over that of the best
+constexpr double kFree = 1e-6;        // precision of an error that may be anything within its bounds
+constexpr int kRounds = 30, kFits = 20;
+constexpr double kSame = 1e-3, kSameFit = 1e-6;
+
+/// Columns that make the information 1; directions of none are left out.
+Eigen::MatrixXd inverse_root(const Eigen::MatrixXd& information) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
+  const Eigen::VectorXd& values = eigen.eigenvalues();
+  std::vector<Eigen::Index> told;
+  for (Eigen::Index i = 0; i < values.size(); ++i)
+    if (values[i] > kUntold * values[values.size() - 1]) told.push_back(i);
+  return eigen.eigenvectors()(Eigen::all, told) * values(told).cwiseSqrt().cwiseInverse().asDiagonal();
+}
+
+/// The solution of which the first `bounded` coordinates end at -1 and 1.
+Eigen::VectorXd solve_within(const Eigen::MatrixXd& normal, const Eigen::VectorXd& right,
+                             Eigen::Index bounded) {
+  Eigen::VectorXd solution = normal.llt().solve(right);
+  std::vector<Eigen::Index> held, left;
+  for (Eigen::Index i = 0; i < solution.size(); ++i)
+    (i < bounded && std::abs(solution[i]) > 1 ? held : left).push_back(i);
+  while (!held.empty() && !left.empty()) {
+    solution(held) = solution(held).cwiseMax(-1).cwiseMin(1).eval();
+    solution(left) = normal(left, left).llt().solve(right(left) - normal(left, held) * solution(held)).eval();
+    const auto beyond = std::find_if(
+        left.begin(), left.end(), [&](Eigen::Index i) { return i < bounded && std::abs(solution[i]) > 1; });
+    if (beyond == left.end()) break;
+    held.push_back(*beyond);
+    left.erase(beyond);
+  }
+  solution.head(bounded) = solution.head(bounded).cwiseMax(-1).cwiseMin(1).eval();
+  return solution;
+}
+
+}  // namespace
+
+ResidualLikelihood::Fit ResidualLikelihood::fit(const Eigen::VectorXd& residuals) const {
+  const double precision = 1 / (spread_ * spread_);
+  Fit fit{0, {}, residuals, weights_};
+  Eigen::VectorXd errors = Eigen::VectorXd::Zero(known_.cols());
+  double before = INFINITY;
+  for (int round = 0; round < kFits; ++round) {
+    // Where rho is a distance, its weight is that of a square of the same slope.
+    fit.weights = weights_.cwiseProduct(
+        fit.left.unaryExpr([&](double y) { return std::abs(y) <= limit_ ? 1 : limit_ / std::abs(y); }));
+    const Eigen::MatrixXd weighed = fit.weights.asDiagonal() * known_;
+    Eigen::MatrixXd normal = precision * known_.transpose() * weighed;
+    normal.diagonal() += priors_;
+    errors = solve_within(normal, precision * (weighed.transpose() * residuals), free_);
+    fit.left = residuals - known_ * errors;
+    double sum = 0;
+    for (Eigen::Index i = 0; i < fit.left.size(); ++i) {
+      const double size = std::abs(fit.left[i]);
+      sum += weights_[i] * (size <= limit_ ? size * size : limit_ * (2 * size - limit_));
+    }
+    fit.deviance = precision * sum + errors.cwiseAbs2().dot(priors_);
+    fit.free = errors.head(free_);
+    if (before - fit.deviance < kSameFit * (1 + fit.deviance)) break;
+    before = fit.deviance;
+  }
+  return fit;
+}
+
+Eigen::MatrixXd ResidualLikelihood::weigh(const Eigen::MatrixXd& columns,
+                                          const Eigen::VectorXd& weights) const {
+  const Eigen::MatrixXd weighed = weights.asDiagonal() * columns, known = weights.asDiagonal() * known_;
+  Eigen::MatrixXd normal = known_.transpose() * known;
+  normal.diagonal() += spread_ * spread_ * priors_;
+  return (weighed - known * normal.llt().solve(known.transpose() * columns)) / (spread_ * spread_);
+}
+
+ResidualLikelihood::ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd& residuals,
+                                       std::optional<double> repeatability, std::optional<double> limit)
+    : weights_(rows.weights), free_(rows.free.cols()), known_(residuals.size(), free_ + rows.known.cols()) {
+  if (free_ > 0) known_.leftCols(free_) = rows.free;
+  if (rows.known.cols() > 0) known_.rightCols(rows.known.cols()) = rows.known;
+  priors_ = Eigen::VectorXd::Ones(known_.cols());
+  priors_.head(free_).setConstant(kFree);
+  const DiscrepancyModel model(std::move(rows), residuals, repeatability);
+  misfit_ = model.misfit();
+  misfit_.worth = misfit_.keyframes;
+  limit_ = limit.value_or(kEfficient * misfit_.noise);
+  spread_ = misfit_.noise;
+  const Eigen::MatrixXd& rates = model.rows().rates;
+  if (rates.cols() == 0) return;
+  for (int round = 0; round < kRounds; ++round) {
+    const Fit here = fit(residuals);
+    const Eigen::VectorXd bent =
+        here.left.unaryExpr([&](double y) { return std::abs(y) <= limit_ ? 1.0 : 0.0; })
+            .cwiseProduct(weights_);
+    const Eigen::MatrixXd root = inverse_root(rates.transpose() * weigh(rates, bent));
+    if (root.cols() == 0) {  // nothing moves with the parameters
+      spread_ = std::max(model.residual_size(), misfit_.noise);
+      return;
+    }
+    const Eigen::MatrixXd slopes = weigh(rates, here.weights) * root;
+    const Eigen::MatrixXd covariance = model.covariance_of(slopes);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
+    const Eigen::Index last = covariance.cols() - 1;
+    const Eigen::VectorXd worst = eigen.eigenvectors().col(last);
+    misfit_.worth = misfit_.keyframes * std::min(1.0, worst.dot(model.covariance_of(slopes, true) * worst) /
+                                                          eigen.eigenvalues()[last]);
+    const double next = std::max(spread_ * std::sqrt(eigen.eigenvalues()[last]), misfit_.noise);
+    if (!(std::abs(next - spread_) > kSame * spread_)) break;
+    spread_ = next;
+  }
+}
+
+}  // namespace flash::sysid

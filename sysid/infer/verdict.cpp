@@ -1,0 +1,145 @@
+#include "sysid/infer/verdict.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "data/text.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kExcluded = 3.841459;  // deviance over the least: chi^2 of one degree of freedom, 95 %
+constexpr double kLeastBits = 1;
+
+/// What is usual, 5 to 95 % of woven and knitted fabrics, paper and film, as coordinates of an axis: bending
+/// of 618 fabrics 1.1 to 110 uN m, membranes of 10 to 2000 N/m. Of another parameter the searched range.
+std::array<double, 2> usual_of(const Axis& axis) {
+  static const std::map<std::string, std::array<double, 2>> usual = {{"young", {10, 2000}},
+                                                                     {"poisson", {0, 0.5}},
+                                                                     {"bending", {1.1e-6, 1.1e-4}},
+                                                                     {"friction", {0.1, 1}},
+                                                                     {"areal_density", {0.03, 0.5}},
+                                                                     {"air_drag", {0.1, 10}},
+                                                                     {"stiffness_damping", {1e-4, 1e-1}}};
+  const auto found = usual.find(axis.name);
+  const auto [low, high] =
+      found == usual.end() ? std::array{axis.values.front(), axis.values.back()} : found->second;
+  return axis.logarithmic ? std::array{std::log(low), std::log(high)} : std::array{low, high};
+}
+
+/// Least score at each value of an axis, over what was simulated.
+void add_profile(const GridResults& results, std::size_t k, ParameterFinding& finding) {
+  for (const double value : results.axes[k].values) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const CandidateResult& candidate : results.candidates)
+      if (candidate.values[k] == value) least = std::min(least, candidate.score);
+    if (!std::isfinite(least)) continue;
+    finding.values.push_back(value);
+    finding.scores.push_back(least);
+  }
+}
+
+ParameterFinding empty_finding(const GridResults& results, std::size_t k) {
+  ParameterFinding finding;
+  finding.name = results.axes[k].name;
+  finding.logarithmic = results.axes[k].logarithmic;
+  add_profile(results, k, finding);
+  return finding;
+}
+
+std::string note_of(const ParameterFinding& finding, bool open_below, bool open_above) {
+  std::string note;
+  const auto add = [&](const std::string& sentence) { note += (note.empty() ? "" : "; ") + sentence; };
+  const std::string low = data::format_short(finding.values.front()),
+                    high = data::format_short(finding.values.back());
+  if (finding.identifiable == Identifiable::no && open_below && open_above)
+    add("every value from " + low + " to " + high + " is likely");
+  if (finding.identifiable == Identifiable::no && !(open_below && open_above))
+    add("the recordings tell it no better than what is usual for cloth");
+  if (finding.identifiable == Identifiable::lower_bound)
+    add("only values below " + data::format_short((*finding.interval95)[0]) + " are excluded");
+  if (finding.identifiable == Identifiable::upper_bound)
+    add("only values above " + data::format_short((*finding.interval95)[1]) + " are excluded");
+  if (finding.edge == RangeEdge::low) add("the best value is the lowest searched: search lower");
+  if (finding.edge == RangeEdge::high) add("the best value is the highest searched: search higher");
+  return note;
+}
+
+}  // namespace
+
+std::vector<ParameterFinding> findings_of(const GridResults& results, const std::vector<Axis>& searched,
+                                          const Posterior& posterior) {
+  std::vector<ParameterFinding> findings;
+  for (std::size_t k = 0; k < searched.size(); ++k) {
+    ParameterFinding finding = empty_finding(results, k);
+    const Axis& range = searched[k];
+    const Axis& looked = posterior.axes[k];
+    const double estimate = posterior.values()[k];
+    finding.estimate = estimate;
+    if (looked.values.size() > 1) {
+      const double width = looked.values.back() - looked.values.front();
+      const auto open = [&](bool high) {
+        const double end = high ? looked.values.back() : looked.values.front();
+        const double of_range = high ? range.values.back() : range.values.front();
+        return std::abs(end - of_range) <= 1e-9 * width && posterior.end(k, high) < kExcluded;
+      };
+      const bool below = open(false), above = open(true);
+      // The most likely values of all parameters together may lie beyond what is likely of one by itself.
+      const double mode = posterior.estimate[static_cast<Eigen::Index>(k)];
+      const double low = std::min(mode, posterior.quantile(k, 0.025)),
+                   high = std::max(mode, posterior.quantile(k, 0.975));
+      finding.interval95 = {below ? range.values.front() : value_of(looked, low),
+                            above ? range.values.back() : value_of(looked, high)};
+      const std::array<double, 2> usual = usual_of(range);
+      const double from = below ? std::min(usual[0], low) : low, to = above ? std::max(usual[1], high) : high;
+      finding.bits = std::log2((usual[1] - usual[0]) / std::max(to - from, 1e-12));
+      finding.identifiable = below && above               ? Identifiable::no
+                             : below                      ? Identifiable::upper_bound
+                             : above                      ? Identifiable::lower_bound
+                             : *finding.bits < kLeastBits ? Identifiable::no
+                                                          : Identifiable::yes;
+      finding.edge = estimate <= range.values.front()  ? RangeEdge::low
+                     : estimate >= range.values.back() ? RangeEdge::high
+                                                       : RangeEdge::none;
+      finding.note = note_of(finding, below, above);
+    } else {
+      finding.interval95 = {estimate, estimate};
+    }
+    findings.push_back(std::move(finding));
+  }
+  return findings;
+}
+
+std::vector<ParameterFinding> findings_without_posterior(const GridResults& results,
+                                                         const std::vector<double>& values) {
+  std::vector<ParameterFinding> findings;
+  for (std::size_t k = 0; k < results.axes.size(); ++k) {
+    ParameterFinding finding = empty_finding(results, k);
+    finding.estimate = values[k];
+    finding.interval95 = {results.axes[k].values.front(), results.axes[k].values.back()};
+    findings.push_back(std::move(finding));
+  }
+  return findings;
+}
+
+Eigen::MatrixXd samples_of(const Posterior& posterior) {
+  Eigen::MatrixXd samples = posterior.samples;
+  for (std::size_t k = 0; k < posterior.axes.size(); ++k)
+    for (double& value : samples.col(static_cast<Eigen::Index>(k)))
+      value = value_of(posterior.axes[k], value);
+  return samples;
+}
+
+Eigen::MatrixXd covariance_of_logarithms(const Posterior& posterior) {
+  for (const Axis& axis : posterior.axes)
+    if (axis.values.front() <= 0 || axis.values.size() < 2) return {};
+  const Eigen::MatrixXd logarithms = samples_of(posterior).array().log();
+  const Eigen::MatrixXd from_mean = logarithms.rowwise() - logarithms.colwise().mean();
+  return from_mean.transpose() * from_mean /
+         static_cast<double>(std::max<Eigen::Index>(1, logarithms.rows() - 1));
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,59 @@
+#include "sysid/infer/held.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/sysid/short_lift.h"
+
+namespace flash::sysid {
+namespace {
+
+std::vector<std::string> names_of(const std::vector<HeldParameter>& held) {
+  std::vector<std::string> names;
+  for (const HeldParameter& each : held) names.push_back(each.name);
+  return names;
+}
+
+TEST(Held, FrictionIsUncertainUnlessItWasSearchedOrMeasured) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_lift(folder)};
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.base.material.friction = 0.3;
+  grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  const std::vector<HeldParameter> held = held_parameters(grid, replays);
+  ASSERT_EQ(names_of(held), std::vector<std::string>{"friction"});
+  EXPECT_DOUBLE_EQ(held[0].values[0], 0.15);
+  EXPECT_DOUBLE_EQ(held[0].values[1], 0.6);
+  EXPECT_EQ(candidate_with({2e-4}, grid, "friction", 0.6).material.friction, 0.6);
+  EXPECT_EQ(candidate_with({2e-4}, grid, "friction", 0.6).material.bending_rigidity, 2e-4);
+
+  // One value on the command line is an assumption, like the asset's.
+  GridSettings one = grid;
+  one.axes.push_back(parse_axis("friction", "0.5"));
+  EXPECT_DOUBLE_EQ(held_parameters(one, replays)[0].values[1], 1.0);
+  GridSettings searched = grid;
+  searched.axes.push_back(parse_axis("friction", "0.1:0.5:3"));
+  EXPECT_TRUE(held_parameters(searched, replays).empty());
+  GridSettings measured = grid;
+  measured.fixed = {parse_fixed("friction=0.3")};
+  EXPECT_TRUE(held_parameters(measured, replays).empty());
+}
+
+TEST(Held, BoundsOfTheRecordingAreThoseOfAnEvenDistribution) {
+  const data::TemporaryFolder folder;
+  std::vector<Replay> replays = {short_lift(folder)};
+  replays[0].recording.has_table = false;
+  replays[0].recording.nuisance.start_yaw = 0.2;
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  const std::vector<HeldParameter> held = held_parameters(grid, replays);
+  ASSERT_EQ(names_of(held), std::vector<std::string>{"start_yaw"});
+  EXPECT_DOUBLE_EQ(held[0].values[1], 0.2 / std::sqrt(3.0));
+  EXPECT_FALSE(held[0].shared);
+}
+
+}  // namespace
+}  // namespace flash::sysid

@@ -1,0 +1,133 @@
+#include "sysid/infer/posterior.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "sysid/infer/ensemble_sampler.h"
+
+namespace flash::sysid {
+namespace {
+
+/// Deviance at the points of a grid of two axes.
+template <class Function>
+Eigen::VectorXd over(const std::vector<Axis>& axes, const Function& deviance) {
+  const std::vector<std::vector<double>> points = cartesian_product(axes);
+  Eigen::VectorXd values(static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    values[static_cast<Eigen::Index>(i)] =
+        deviance(coordinate_of(axes[0], points[i][0]), coordinate_of(axes[1], points[i][1]));
+  return values;
+}
+
+/// A curved valley that a range cuts off.
+double valley(double x, double y) {
+  const double across = y - 0.4 - 0.5 * x * x;
+  return std::pow((x - 0.2) / 0.5, 2) + std::pow(across / 0.1, 2);
+}
+
+TEST(Posterior, QuantilesAreThoseOfNestedQuadrature) {
+  const std::vector<Axis> axes = {parse_axis("start_yaw", "-1:1:17"), parse_axis("friction", "0:1:17")};
+  const Posterior posterior = explore_posterior(axes, over(axes, valley));
+  constexpr int kFine = 800;
+  std::vector<double> x_mass(kFine, 0), y_mass(kFine, 0);
+  double total = 0;
+  for (int i = 0; i < kFine; ++i)
+    for (int j = 0; j < kFine; ++j) {
+      const double mass = std::exp(-0.5 * valley(-1 + 2 * (i + 0.5) / kFine, (j + 0.5) / kFine));
+      x_mass[static_cast<std::size_t>(i)] += mass;
+      y_mass[static_cast<std::size_t>(j)] += mass;
+      total += mass;
+    }
+  const auto share_below = [&](const std::vector<double>& mass, double position) {
+    double sum = 0;
+    for (int i = 0; i < static_cast<int>(position * kFine); ++i) sum += mass[static_cast<std::size_t>(i)];
+    return sum / total;
+  };
+  // 12,800 draws of some 30 sweeps' memory are worth 1,600 or more: 3 sd of a share at the median and the
+  // ends.
+  for (const double share : {0.025, 0.25, 0.5, 0.75, 0.975}) {
+    const double tolerance = 3 * std::sqrt(share * (1 - share) / 1600);
+    EXPECT_NEAR(share_below(x_mass, (posterior.quantile(0, share) + 1) / 2), share, tolerance);
+    EXPECT_NEAR(share_below(y_mass, posterior.quantile(1, share)), share, tolerance);
+  }
+  EXPECT_NEAR(posterior.estimate[0], 0.2, 1e-2);
+  EXPECT_NEAR(posterior.estimate[1], 0.42, 1e-2);
+}
+
+TEST(Posterior, BothOfTwoValleysAreDrawnFrom) {
+  const std::vector<Axis> axes = {parse_axis("start_yaw", "-1:1:33"), parse_axis("friction", "0.3")};
+  const Posterior posterior =
+      explore_posterior(axes, over(axes, [](double x, double) {
+                          return -2 * std::log(0.3 * std::exp(-0.5 * std::pow((x + 0.6) / 0.08, 2)) +
+                                               0.7 * std::exp(-0.5 * std::pow((x - 0.5) / 0.08, 2)));
+                        }));
+  const double left = (posterior.samples.col(0).array() < 0).cast<double>().mean();
+  EXPECT_NEAR(left, 0.3, 0.15);  // of 64 walkers few change sides: sd 0.06
+  EXPECT_EQ(posterior.samples.col(1).minCoeff(), 0.3);
+}
+
+// Simulation-based calibration (Talts et al. 2018): parameters from the prior, data from the parameters; the
+// rank of the truth among draws of its posterior is even.
+TEST(Posterior, RanksOfTheTruthAreEven) {
+  constexpr int kProblems = 300, kBins = 10;
+  const std::vector<Axis> axes = {parse_axis("start_yaw", "-1:1:13"), parse_axis("friction", "0:1:13")};
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> normal;
+  std::array<std::array<int, kBins>, 2> ranks{};
+  for (int problem = 0; problem < kProblems; ++problem) {
+    const std::array<double, 2> truth = {2 * uniform(random) - 1, uniform(random)};
+    // Two nonlinear looks with an error that leaves a valley.
+    const auto first = [](double x, double y) { return std::sin(x) + 0.8 * y; };
+    const auto second = [](double x, double y) { return x * y - 0.3 * x; };
+    const double a = first(truth[0], truth[1]) + 0.1 * normal(random);
+    const double b = second(truth[0], truth[1]) + 0.3 * normal(random);
+    const Posterior posterior = explore_posterior(axes,
+                                                  over(axes,
+                                                       [&](double x, double y) {
+                                                         return std::pow((first(x, y) - a) / 0.1, 2) +
+                                                                std::pow((second(x, y) - b) / 0.3, 2);
+                                                       }),
+                                                  static_cast<unsigned>(problem + 1));
+    for (const Eigen::Index k : {0, 1}) {
+      const double below =
+          (posterior.samples.col(k).array() < truth[static_cast<std::size_t>(k)]).cast<double>().mean();
+      ++ranks[static_cast<std::size_t>(k)][static_cast<std::size_t>(std::min(kBins - 1.0, below * kBins))];
+    }
+  }
+  for (const auto& counts : ranks) {
+    double chi2 = 0;
+    for (const int count : counts)
+      chi2 += std::pow(count - kProblems / kBins, 2) / (static_cast<double>(kProblems) / kBins);
+    EXPECT_LT(chi2, 21.67);  // 99 % at 9 degrees of freedom
+  }
+}
+
+TEST(Ensemble, DrawsHaveMeanAndCovarianceOfANormalOfAnyScale) {
+  Eigen::Matrix3d root;
+  root << 1, 0, 0, 300, 40, 0, 1e-3, 2e-3, 1e-3;
+  const Eigen::Matrix3d covariance = root * root.transpose(), inverse = covariance.inverse();
+  const Eigen::Vector3d mean(1, -20, 3e-3);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  Eigen::MatrixXd start(64, 3);
+  for (Eigen::Index i = 0; i < 64; ++i)
+    start.row(i) << mean[0] + uniform(random), mean[1] + 300 * uniform(random),
+        mean[2] + 2e-3 * uniform(random);
+  const Eigen::MatrixXd draws =
+      sample_ensemble([&](const Eigen::VectorXd& x) { return -0.5 * (x - mean).dot(inverse * (x - mean)); },
+                      start, {500, 4000, 4, 5});
+  const Eigen::RowVectorXd found = draws.colwise().mean();
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const double sd = std::sqrt(covariance(k, k));
+    const double spread = std::sqrt((draws.col(k).array() - found[k]).square().mean());
+    EXPECT_NEAR(found[k], mean[k], 0.06 * sd);  // 64,000 draws worth 4,000 or more: 4 sd
+    EXPECT_NEAR(spread, sd, 0.06 * sd);
+  }
+}
+
+}  // namespace
+}  // namespace flash::sysid

@@ -1,0 +1,89 @@
+#!/usr/bin/env python3
+"""One strip of known truth by every route to its answer: whether they agree, hold the truth, and claim no more at a higher
+frame rate where the friction is wrong. Exits with 1 where a claim fails."""
+import argparse
+import json
+import math
+import pathlib
+import subprocess
+import sys
+
+import synthetic
+
+D, FRICTION, RATES = 2e-4, 0.3, (10, 20, 40, 80)
+COARSE = ("--mesh", synthetic.STRIP + "0.0125", "--clamp-slopes", "--force", "--quiet")
+
+
+def finding(sysid, out, verb, recording, *options):
+    done = subprocess.run([sysid, verb, recording, *options, *COARSE, "-o", out], capture_output=True, text=True)
+    if done.returncode not in (0, 3):
+        sys.exit(done.stderr)
+    summary = json.loads((out / "summary.json").read_text())
+    return summary["parameters"]["bending"], all(r["model_fits"] for r in summary["recordings"])
+
+
+def half_width(found):
+    low, high = found["interval95"]
+    return math.log(high / low) / 2
+
+
+def show(name, found, fits):
+    low, high = (1e4 * end for end in found["interval95"])
+    print(f"{name:42} D {1e4 * found['estimate']:.3f}e-4 ({low:.3f} to {high:.3f}), "
+          f"{'fits' if fits else 'does not fit'}", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sysid", required=True, help="the program flash-sysid")
+    parser.add_argument("--out", required=True, type=pathlib.Path)
+    parser.add_argument("--seed", default="7")
+    options = parser.parse_args()
+    out, failed = options.out, []
+    asset = synthetic.write_asset(out)
+    lift = list(synthetic.LIFT)
+    at = lift.index("--rate")
+
+    def claim(text, holds):
+        if not holds:
+            failed.append(text)
+
+    recordings = {}
+    for rate in RATES:
+        lift[at + 1] = str(rate)
+        recordings[rate] = out / f"recording_{rate}"
+        subprocess.run([options.sysid, "synth", "--asset", asset, *lift, "--seed", options.seed, "--quiet", "--force", "-o",
+                        recordings[rate]], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+    search = ("--asset", asset, "--bending", "1e-4:4e-4:5:log", "--fix", f"friction={FRICTION}")
+    routes = {"grid": ("grid", *search), "grid, motions kept elsewhere": ("grid", *search, "--rollouts", out / "motions"),
+              "grid, a wide range": ("grid", "--asset", asset, "--bending", "1e-6:1e-3:8:log", "--fix", f"friction={FRICTION}"),
+              "fit": ("fit", "--start", out / "grid", "--fix", f"friction={FRICTION}")}
+    found = {}
+    for name, (verb, *words) in routes.items():
+        found[name], fits = finding(options.sysid, out / name.split(",")[0] if name in ("grid", "fit") else out / "other", verb,
+                                    recordings[20], *words)
+        show(name, found[name], fits)
+        low, high = found[name]["interval95"]
+        claim(f"{name}: holds the truth", low <= D <= high)
+        claim(f"{name}: D as of grid to 1 %", abs(found[name]["estimate"] / found["grid"]["estimate"] - 1) <= 0.01)
+        claim(f"{name}: interval as of grid to 10 %", abs(half_width(found[name]) / half_width(found["grid"]) - 1) <= 0.1)
+    widths = {}
+    for words, name in ((("--fix", f"friction={FRICTION}"), "friction measured"), (("--friction", "0.5"), "friction taken for 0.5")):
+        for rate in RATES:
+            each, fits = finding(options.sysid, out / "rate", "grid", recordings[rate], "--asset", asset, "--bending",
+                                 "1e-4:4e-4:5:log", *words)
+            show(f"{name}, {rate} frames per second", each, fits)
+            low, high = each["interval95"]
+            widths[name, rate] = half_width(each)
+            claim(f"{name}, {rate} Hz: holds the truth or does not fit", low <= D <= high or not fits)
+    ratio = widths["friction taken for 0.5", 80] / widths["friction taken for 0.5", 10]
+    print(f"half width at 80 over that at 10 frames per second: {ratio:.2f} where friction is taken for 0.5, "
+          f"{widths['friction measured', 80] / widths['friction measured', 10]:.2f} where it is measured")
+    for text in failed:
+        print("WRONG ", text)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
