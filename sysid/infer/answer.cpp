@@ -340,13 +340,8 @@ void keep_to_simulated(const Task& task, Found& found, const std::vector<double>
   for (KnownError& error : found.estimate.errors) error.corrects = false;
   found.look.likelihood = likelihood_about(task, found, replays_of(found.emulator), best,
                                            motions_at(found.emulator, best, kOwn), held);
-  const Eigen::VectorXd deviance =
-      deviance_over(found.emulator, found.axes, found.look.likelihood, task.grid);
-  Posterior posterior = explore_posterior(found.axes, deviance);
-  Eigen::Index likeliest;
-  posterior.least = deviance.minCoeff(&likeliest);
-  set_estimate(posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
-  found.look.posterior = std::move(posterior);
+  found.look.posterior = explore_at_points(
+      found.axes, deviance_over(found.emulator, found.axes, found.look.likelihood, task.grid));
 }
 
 /// Motions simulated anew about the answer where few simulations do, and again where it leaves them.

@@ -1,6 +1,7 @@
 #include "sysid/infer/posterior.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -96,17 +97,33 @@ double Posterior::end(std::size_t k, bool high) const {
   return std::max(0.0, end - least);
 }
 
-Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance, unsigned seed) {
-  // Far from what is likely the values do not matter, and a spline through them would swing about.
+namespace {
+
+/// The deviance over that of the likeliest point. Far from what is likely the values do not matter, and a
+/// spline through them would swing about.
+TensorSpline spline_of(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance) {
   const double lowest = deviance.minCoeff();
   const Eigen::VectorXd above = (deviance.array() - lowest).matrix();
   const Eigen::VectorXd bent = above.unaryExpr([](double rise) {
     if (!std::isfinite(rise)) return 2 * kFarthest;
     return rise < kFarthest ? rise : kFarthest * (2 - kFarthest / rise);  // slope 1 at the joint
   });
-  Posterior posterior{axes, TensorSpline(knots_of(axes), bent), {}, 0, {}};
+  return {knots_of(axes), bent};
+}
+
+/// The part of an axis that is nearer to one of its knots than to any other.
+std::array<double, 2> cell_of(const Eigen::VectorXd& knots, double knot) {
+  const auto at = std::find(knots.begin(), knots.end(), knot) - knots.begin();
+  return {at > 0 ? 0.5 * (knots[at - 1] + knot) : knot,
+          at + 1 < knots.size() ? 0.5 * (knot + knots[at + 1]) : knot};
+}
+
+}  // namespace
+
+Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance, unsigned seed) {
+  Posterior posterior{axes, spline_of(axes, deviance), {}, 0, {}};
   Eigen::Index best;
-  bent.minCoeff(&best);
+  posterior.deviance.values().minCoeff(&best);
   posterior.estimate = node_of(posterior.deviance, best);
   posterior.least = posterior.deviance.minimize(posterior.estimate);
   const TensorSpline& spline = posterior.deviance;
@@ -144,6 +161,37 @@ Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd
   if (const double there = spline.minimize(other); there < posterior.least) {
     posterior.least = there;
     posterior.estimate = other;
+  }
+  return posterior;
+}
+
+Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance, unsigned seed) {
+  constexpr Eigen::Index kDraws = 12'800;
+  Posterior posterior{axes, spline_of(axes, deviance), {}, 0, {}};
+  const TensorSpline& points = posterior.deviance;
+  Eigen::Index likeliest;
+  posterior.least = points.values().minCoeff(&likeliest);
+  posterior.estimate = node_of(points, likeliest);
+  std::vector<double> sums;
+  for (Eigen::Index i = 0; i < points.values().size(); ++i) {
+    const Eigen::VectorXd node = node_of(points, i);
+    double mass = std::exp(-0.5 * points.values()[i]);
+    for (Eigen::Index k = 0; k < points.dimensions(); ++k) {
+      const auto [low, high] = cell_of(points.knots(k), node[k]);
+      if (high > low) mass *= high - low;
+    }
+    sums.push_back((sums.empty() ? 0 : sums.back()) + mass);
+  }
+  std::mt19937_64 random(seed);
+  const auto uniform = [&] { return static_cast<double>(random() >> 11U) * 0x1p-53; };
+  posterior.samples.resize(kDraws, points.dimensions());
+  for (Eigen::Index draw = 0; draw < kDraws; ++draw) {
+    const auto drawn = std::upper_bound(sums.begin(), sums.end() - 1, uniform() * sums.back());
+    const Eigen::VectorXd node = node_of(points, drawn - sums.begin());
+    for (Eigen::Index k = 0; k < points.dimensions(); ++k) {
+      const auto [low, high] = cell_of(points.knots(k), node[k]);
+      posterior.samples(draw, k) = low + uniform() * (high - low);
+    }
   }
   return posterior;
 }

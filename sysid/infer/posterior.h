@@ -18,7 +18,7 @@ double value_of(const Axis& axis, double coordinate);
 /// What a likelihood says over a grid of parameter values, flat before in the coordinates of the axes.
 struct Posterior {
   std::vector<Axis> axes;    ///< of the grid
-  TensorSpline deviance;     ///< -2 log likelihood over coordinates
+  TensorSpline deviance;     ///< -2 log likelihood over coordinates, above that of the likeliest point
   Eigen::VectorXd estimate;  ///< coordinates where it is least
   double least = 0;          ///< deviance there
   Eigen::MatrixXd samples;   ///< coordinates, a draw a row
@@ -30,6 +30,11 @@ struct Posterior {
 
 /// `deviance`: of each point of the grid of `axes`, the last axis fastest; a point without one is infinite.
 Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance,
+                            unsigned seed = 1);
+
+/// What a likelihood says that is known at the points of the grid alone and changes abruptly between them:
+/// each point speaks for all that is nearer to it than to any other. The estimate is the likeliest point.
+Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance,
                             unsigned seed = 1);
 
 }  // namespace flash::sysid
