@@ -331,9 +331,8 @@ bool settle(const Task& task, Found& found, const std::vector<double>& best,
   return on_own.deviance(motions_in(own)) <= on_own.deviance(of_best) + kMatters;
 }
 
-/// The posterior by what was simulated alone, on the search's own mesh: likelihoods are interpolated, not
-/// motions, and the estimate is the likeliest point of the grid. No motion is corrected by what was seen at
-/// another.
+/// The posterior by what was simulated alone, on the search's own mesh (explore_at_points). No motion is
+/// corrected by what was seen at another.
 void keep_to_simulated(const Task& task, Found& found, const std::vector<double>& best,
                        const std::vector<KnownError>& held) {
   found.emulator.share = kOwn;

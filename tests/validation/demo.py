@@ -1,0 +1,38 @@
+#!/usr/bin/env python3
+"""The main job of `make demo`, whose commands this reads from the Makefile: the recorded truth lies inside the intervals that
+it ends with, and the tuned asset has the estimates."""
+import argparse
+import json
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def commands(sysid, out):
+    target = re.search(r"^demo:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE).group(1)
+    lines = [line for line in target.splitlines() if "$(sysid)" in line]
+    return [shlex.split(line.strip().replace("$(sysid)", sysid).replace("$(DEMO)", str(out))) for line in lines]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sysid", required=True, help="the program flash-sysid")
+    parser.add_argument("--out", required=True, type=pathlib.Path)
+    options = parser.parse_args()
+    for command in commands(options.sysid, options.out):
+        subprocess.run(command, cwd=ROOT, check=True)
+    truth = json.loads((options.out / "recording/truth.json").read_text())["parameters"]
+    found = json.loads((options.out / "run/summary.json").read_text())["parameters"]
+    tuned = json.loads((options.out / "tuned.json").read_text())["identification"]["estimate"]
+    wrong = [name for name, finding in found.items()
+             if finding["identifiable"] != "yes" or tuned[name] != finding["estimate"]
+             or not finding["interval95"][0] <= truth[name] <= finding["interval95"][1]]
+    sys.exit(f"not told, or not as exported: {', '.join(wrong)}" if wrong or len(found) != 2 else 0)
+
+
+if __name__ == "__main__":
+    main()
