@@ -134,6 +134,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
   {
+    asked.ranges = grid.axes;
     AnswerLine line(options.common, sysid::most_design_work(grid, replays.size()));
     grid.axes = sysid::design_about(
         replays, grid, start.values, start.around, asked,

@@ -476,7 +476,9 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   }
   answer.estimate = score_motions(replays, answer.motions, grid.score);
   answer.estimate.values = answer.values;
-  answer.parameters = findings_of(results, usable.axes, posterior);
+  const std::vector<Axis> ranges =
+      settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
+  answer.parameters = findings_of(results, ranges, posterior);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, *found);

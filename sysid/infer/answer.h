@@ -16,6 +16,7 @@ struct AnswerSettings {
   std::optional<double> repeatability;  ///< trial-to-trial distance of a keyframe [m]
   bool horizon = true;                  ///< drop keyframes beyond the predictable
   bool solver_check = true;             ///< solve the estimate again under finer settings
+  std::vector<Axis> ranges = {};        ///< searched before the grid at hand; empty: its own
 };
 
 /// What a search says of its parameters, and how that was checked.

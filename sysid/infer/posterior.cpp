@@ -111,11 +111,10 @@ TensorSpline spline_of(const std::vector<Axis>& axes, const Eigen::VectorXd& dev
   return {knots_of(axes), bent};
 }
 
-/// The part of an axis that is nearer to one of its knots than to any other.
-std::array<double, 2> cell_of(const Eigen::VectorXd& knots, double knot) {
+/// The part of an axis between the neighbours of one of its knots.
+std::array<double, 2> cells_about(const Eigen::VectorXd& knots, double knot) {
   const auto at = std::find(knots.begin(), knots.end(), knot) - knots.begin();
-  return {at > 0 ? 0.5 * (knots[at - 1] + knot) : knot,
-          at + 1 < knots.size() ? 0.5 * (knot + knots[at + 1]) : knot};
+  return {knots[std::max<Eigen::Index>(at - 1, 0)], knots[std::min<Eigen::Index>(at + 1, knots.size() - 1)]};
 }
 
 }  // namespace
@@ -177,7 +176,7 @@ Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd
     const Eigen::VectorXd node = node_of(points, i);
     double mass = std::exp(-0.5 * points.values()[i]);
     for (Eigen::Index k = 0; k < points.dimensions(); ++k) {
-      const auto [low, high] = cell_of(points.knots(k), node[k]);
+      const auto [low, high] = cells_about(points.knots(k), node[k]);
       if (high > low) mass *= high - low;
     }
     sums.push_back((sums.empty() ? 0 : sums.back()) + mass);
@@ -189,7 +188,7 @@ Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd
     const auto drawn = std::upper_bound(sums.begin(), sums.end() - 1, uniform() * sums.back());
     const Eigen::VectorXd node = node_of(points, drawn - sums.begin());
     for (Eigen::Index k = 0; k < points.dimensions(); ++k) {
-      const auto [low, high] = cell_of(points.knots(k), node[k]);
+      const auto [low, high] = cells_about(points.knots(k), node[k]);
       posterior.samples(draw, k) = low + uniform() * (high - low);
     }
   }

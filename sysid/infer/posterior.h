@@ -33,7 +33,7 @@ Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd
                             unsigned seed = 1);
 
 /// What a likelihood says that is known at the points of the grid alone and changes abruptly between them:
-/// each point speaks for all that is nearer to it than to any other. The estimate is the likeliest point.
+/// each point speaks for all up to its neighbours. The estimate is the likeliest point.
 Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance,
                             unsigned seed = 1);
 

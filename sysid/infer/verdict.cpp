@@ -80,12 +80,8 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
     const double estimate = posterior.values()[k];
     finding.estimate = estimate;
     if (looked.values.size() > 1) {
-      const double width = looked.values.back() - looked.values.front();
-      const auto open = [&](bool high) {
-        const double end = high ? looked.values.back() : looked.values.front();
-        const double of_range = high ? range.values.back() : range.values.front();
-        return std::abs(end - of_range) <= 1e-9 * width && posterior.end(k, high) < kExcluded;
-      };
+      // What a look leaves likely at its end may be likely up to the end of the range.
+      const auto open = [&](bool high) { return posterior.end(k, high) < kExcluded; };
       const bool below = open(false), above = open(true);
       // The most likely values of all parameters together may lie beyond what is likely of one by itself.
       const double mode = posterior.estimate[static_cast<Eigen::Index>(k)];

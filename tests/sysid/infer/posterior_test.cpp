@@ -57,30 +57,29 @@ TEST(Posterior, QuantilesAreThoseOfNestedQuadrature) {
   EXPECT_NEAR(posterior.estimate[1], 0.42, 1e-2);
 }
 
-TEST(Posterior, EachPointSpeaksForItsCellWhateverTheLevelOfTheDeviance) {
-  // Cells of 1/8, 1/4, ... 1/8 along the first axis; the second is of one value.
+TEST(Posterior, EachPointSpeaksUpToItsNeighboursWhateverTheLevelOfTheDeviance) {
+  // The second axis is of one value.
   const std::vector<Axis> axes = {parse_axis("start_yaw", "0:1:5"), parse_axis("friction", "0.3")};
   Eigen::VectorXd deviance(5);
   deviance << 2.2, 0, 3.0, 900, 1.4;
-  const Eigen::VectorXd mass =
-      (-0.5 * deviance.array()).exp() * Eigen::Array<double, 5, 1>(0.125, 0.25, 0.25, 0.25, 0.125);
+  // Between two points there is half of what an inner one has, and all of what one at an end has.
+  Eigen::VectorXd mass = (-0.5 * deviance.array()).exp() * Eigen::Array<double, 5, 1>(1, 2, 2, 2, 1);
+  mass /= mass.sum();
+  const Eigen::Vector4d between(mass[0] + mass[1] / 2, mass[1] / 2 + mass[2] / 2, mass[2] / 2 + mass[3] / 2,
+                                mass[3] / 2 + mass[4]);
   for (const double level : {-2e4, 0.0, 2e4}) {
     const Posterior posterior = explore_at_points(axes, deviance.array() + level);
     EXPECT_EQ(posterior.values(), (std::vector<double>{0.25, 0.3}));
     EXPECT_NEAR(posterior.end(0, false), 2.2, 1e-9);
     EXPECT_NEAR(posterior.end(0, true), 1.4, 1e-9);
-    const Eigen::VectorXd draws = posterior.samples.col(0);
-    double below = 0;
-    for (int k = 0; k < 4; ++k) {
-      below += mass[k] / mass.sum();
-      const double edge = 0.125 + 0.25 * k;
-      const double share = static_cast<double>((draws.array() < edge).count()) / draws.size();
-      EXPECT_NEAR(share, below, 4 * std::sqrt(below * (1 - below) / draws.size()));
-    }
-    // Uniform within a cell: half of the draws of the likeliest lie in its lower half.
-    const double all = ((draws.array() > 0.125) && (draws.array() < 0.375)).count();
-    const double lower = ((draws.array() > 0.125) && (draws.array() < 0.25)).count();
-    EXPECT_NEAR(lower / all, 0.5, 4 * std::sqrt(0.25 / all));
+    const Eigen::ArrayXd draws = posterior.samples.col(0);
+    const auto count = static_cast<double>(draws.size());
+    for (int k = 0; k < 4; ++k)
+      for (const int half : {1, 2}) {  // even between two points
+        const double low = 0.25 * k, high = low + 0.125 * half, share = between[k] * half / 2;
+        const auto inside = static_cast<double>(((draws > low) && (draws < high)).count());
+        EXPECT_NEAR(inside / count, share, 4 * std::sqrt(share * (1 - share) / count));
+      }
   }
 }
 
