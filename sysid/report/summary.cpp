@@ -212,7 +212,7 @@ void check_value(const std::string& path, const std::string& field, const std::s
   check_within(path, field + "." + name, value, info->low, info->high);
 }
 
-/// Estimate and interval: there as the verdict says, both in what was searched.
+/// Estimate and interval: there as the verdict says, in what was searched.
 void check_answer(const std::string& path, const std::string& field, const ParameterFinding& finding) {
   const auto rounding = [](double value) { return 1e-9 * std::abs(value); };  // of a logarithm and back
   if (finding.identifiable == Identifiable::yes && !finding.estimate)
@@ -226,8 +226,14 @@ void check_answer(const std::string& path, const std::string& field, const Param
   const auto [low, high] = *finding.interval95;
   if (!(low <= high)) throw data::input_error(path, field + ".interval95", "expected its lower end first");
   const double first = finding.values.front(), last = finding.values.back();
+  // What is open may reach beyond these values, to the ends of an earlier search.
+  const ParameterInfo* const info = info_of(finding.name);
+  const bool open = info != nullptr && finding.identifiable != Identifiable::yes;
+  const bool below = open && finding.identifiable != Identifiable::lower_bound,
+             above = open && finding.identifiable != Identifiable::upper_bound;
   for (const double end : {low, high})
-    check_within(path, field + ".interval95", end, first - rounding(first), last + rounding(last));
+    check_within(path, field + ".interval95", end, below ? info->low : first - rounding(first),
+                 above ? info->high : last + rounding(last));
   if (finding.estimate)
     check_within(path, field + ".estimate", *finding.estimate, first - rounding(first),
                  last + rounding(last));
