@@ -12,12 +12,15 @@ namespace {
 constexpr int coupled_after = 20;   ///< iterations of a part after which friction follows the normal forces
 constexpr int linear_problems = 6;  ///< an iteration, each with the contacts that the one before asks for
 constexpr double linear_tolerance = 0.3;  ///< of a linear problem, as a share of the step's
-constexpr double armijo_share = 1e-4;     ///< of the decrease of the potential that the slope promises
-constexpr double residual_share = 0.1;    ///< of the decrease of the residual that a full step promises
-constexpr double least_length = 1e-3;     ///< down to which a step is halved
-constexpr int most_forced_moves = 6;      ///< a step: moves that neither criterion accepts
-constexpr double greatest_length = 30;    ///< up to which a step is lengthened
-constexpr double flat_slope = 0.2;        ///< share of the first slope from which on a line is flat
+/// Of the tolerance, for the place where a step starts to be taken for its end as it is. With the whole
+/// tolerance forces below it would move nothing, however long they act.
+constexpr double start_tolerance_share = 1e-3;
+constexpr double armijo_share = 1e-4;   ///< of the decrease of the potential that the slope promises
+constexpr double residual_share = 0.1;  ///< of the decrease of the residual that a full step promises
+constexpr double least_length = 1e-3;   ///< down to which a step is halved
+constexpr int most_forced_moves = 6;    ///< a step: moves that neither criterion accepts
+constexpr double greatest_length = 30;  ///< up to which a step is lengthened
+constexpr double flat_slope = 0.2;      ///< share of the first slope from which on a line is flat
 constexpr double least_growth = 1.5, greatest_growth = 3.0;  ///< of a length at a time
 constexpr double residual_growth = 10;  ///< of the residual by a lengthened step, at most
 
@@ -61,7 +64,7 @@ void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWor
   assemble_matrix(problem, stuck, w);
   const Linearization iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
   const double lightest = *std::min_element(problem.force_scales.begin(), problem.force_scales.end());
-  const double enough = linear_tolerance * w.settings.tolerance * lightest;
+  const double enough = linear_tolerance * std::min(w.settings.tolerance * lightest, w.now.residual.norm());
   w.linear = w.now.contacts;
   w.gradient = w.now.residual;
   w.refactor = false;
@@ -144,7 +147,9 @@ void iterate_to_balance(const StepProblem& problem, NewtonWorkspace& w, StepRepo
   w.longer.contacts = w.trial.contacts = w.now.contacts;
   bool stuck = false;
   int forced_moves = 0;
-  while (report.iterations < w.settings.max_iterations && !problem.balanced(w.now, w.settings.tolerance)) {
+  double tolerance = start_tolerance_share * w.settings.tolerance;
+  while (report.iterations < w.settings.max_iterations && !problem.balanced(w.now, tolerance)) {
+    tolerance = w.settings.tolerance;
     ++report.iterations;
     if (w.refactor) {
       if (!factorize(problem, w)) return;
@@ -157,6 +162,7 @@ void iterate_to_balance(const StepProblem& problem, NewtonWorkspace& w, StepRepo
                           w.now.residual.cwiseProduct(w.direction).sum()};
     const LinePoint point = line_search(line, w.trial);
     if (!acceptable(line, point, w.trial)) {
+      if (problem.balanced(w.now, tolerance)) return;
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
         stuck = w.refactor = true;
