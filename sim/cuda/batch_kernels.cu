@@ -20,17 +20,14 @@ __device__ float* result_of(const BatchNumbers& batch, int e) {
 __device__ const Point* places_of(const BatchNumbers& batch, int e) {
   return batch.positions + static_cast<long>(batch.sheet.size) * e;
 }
-template <typename Stored>
-__device__ Stored* factor_of(const BatchNumbers& batch, int e) {
-  return static_cast<Stored*>(batch.factors) + batch.fronts.factor_size * e;
+template <int parts>
+__device__ __half* factor_of(const BatchNumbers& batch, int e) {
+  return batch.factors + static_cast<long>(batch.fronts.factor_tiles) * parts * solve_tile_numbers * e;
 }
 __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
   const long team = blockIdx.x, size = 3L * batch.sheet.size;
-  return {batch.residuals + size * team,
-          batch.images + size * team,
-          batch.searches + batch.sheet.size * team,
-          batch.searches + batch.sheet.size * team,
-          {batch.forward + 2 * size * team, batch.passed + batch.fronts.vector_size * team}};
+  return {batch.residuals + size * team, batch.images + size * team, batch.searches + batch.sheet.size * team,
+          batch.searches + batch.sheet.size * team, batch.solved + batch.fronts.vector_size * team};
 }
 
 // A kernel's block goes through the environments that are its own.
@@ -69,29 +66,29 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
   }
 }
 
-template <typename Stored>
+template <int parts>
 __global__ void __launch_bounds__(team_threads, resident_teams_each)
     factorize_kernel(const __grid_constant__ BatchNumbers batch, float) {
   FOR_OWN_ENVIRONMENTS(batch, e) {
     if (threadIdx.x == 0) batch.positive[e] = 1;
-    const bool positive = factorize(batch.fronts, batch.blocks + 9L * batch.sheet.block_count * e,
-                                    batch.updates + batch.fronts.update_size * blockIdx.x,
-                                    factor_of<Stored>(batch, e), shared_memory<float>());
+    const bool positive = factorize<parts>(batch.fronts, batch.blocks + 9L * batch.sheet.block_count * e,
+                                           batch.updates + batch.fronts.update_size * blockIdx.x,
+                                           factor_of<parts>(batch, e), shared_memory<float>());
     if (!positive) batch.positive[e] = 0;
   }
 }
 
-template <typename Stored>
+template <int parts>
 __global__ void __launch_bounds__(team_threads, resident_teams_each)
     solve_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int size = 3 * batch.sheet.size;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    const SolveVectors v = linear_vectors(batch).solve;
+    const LinearVectors v = linear_vectors(batch);
     for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
-      v.forward[size + i] = vector_of(batch, e)[i];
-    solve(batch.fronts, factor_of<Stored>(batch, e), v, shared_memory<char>());
+      v.solved[size + i] = vector_of(batch, e)[i];
+    solve<parts>(batch.fronts, factor_of<parts>(batch, e), v, shared_memory<char>());
     for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
-      result_of(batch, e)[i] = v.forward[size + i];
+      result_of(batch, e)[i] = v.solved[size + i];
     __syncthreads();
   }
 }
@@ -111,22 +108,22 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
   }
 }
 
-template <typename Stored>
+template <int parts>
 __global__ void __launch_bounds__(team_threads, resident_teams_each)
     find_directions_kernel(const __grid_constant__ BatchNumbers batch, float tolerance) {
   float* chip = shared_memory<float>();
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    const LinearProblem<Stored> problem = {
+    const LinearProblem problem = {
         batch.block_rows + batch.block_row_size * e,
         static_cast<float>(batch.environments[e].rigidity),
         {},
-        factor_of<Stored>(batch, e),
+        factor_of<parts>(batch, e),
         vector_of(batch, e),
         {batch.restrictions + static_cast<long>(batch.restrictions_each) * e, batch.restriction_counts[e]},
         tolerance};
-    const int solves = conjugate_gradients(batch.fronts, batch.sheet, problem, linear_vectors(batch),
-                                           result_of(batch, e), batch.changes + 3L * batch.sheet.size * e,
-                                           chip, reinterpret_cast<char*>(chip + team_warps));
+    const int solves = conjugate_gradients<parts>(
+        batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
+        batch.changes + 3L * batch.sheet.size * e, chip, reinterpret_cast<char*>(chip + team_warps));
     if (threadIdx.x == 0) batch.solves[e] = solves;
   }
 }
@@ -145,9 +142,9 @@ Choice evaluation(int size) {
              : Choice{evaluate_kernel<false>, gradient_memory(size, false)};
 }
 
-template <typename Stored>
+template <int parts>
 Choice choice(BatchKernel kernel, const FrontTables& fronts) {
-  const int number = sizeof(float), solve_bytes = solve_memory<Stored>(fronts.solve_depth);
+  const int number = sizeof(float), solve_bytes = solve_memory<parts>(fronts.solve_depth);
   switch (kernel) {
     case BatchKernel::evaluate:
       return evaluation(fronts.size);
@@ -156,19 +153,20 @@ Choice choice(BatchKernel kernel, const FrontTables& fronts) {
     case BatchKernel::assemble_preconditioner:
       return {assemble_kernel<true>, hessian_memory * number};
     case BatchKernel::factorize:
-      return {factorize_kernel<Stored>, number * factor_memory(fronts.shared_panel)};
+      return {factorize_kernel<parts>, number * factor_memory(fronts.shared_panel)};
     case BatchKernel::multiply:
       return {multiply_kernel, 0};
     case BatchKernel::solve:
-      return {solve_kernel<Stored>, solve_bytes};
+      return {solve_kernel<parts>, solve_bytes};
     case BatchKernel::find_directions:
       break;
   }
-  return {find_directions_kernel<Stored>, solve_bytes + number * team_warps};
+  return {find_directions_kernel<parts>, solve_bytes + number * team_warps};
 }
 
 Choice choice(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts) {
-  return precision == FactorPrecision::half ? choice<__half>(kernel, fronts) : choice<float>(kernel, fronts);
+  return precision == FactorPrecision::half ? choice<half_parts>(kernel, fronts)
+                                            : choice<single_parts>(kernel, fronts);
 }
 
 }  // namespace

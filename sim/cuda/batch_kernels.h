@@ -1,4 +1,5 @@
 #pragma once
+#include <cuda_fp16.h>
 #include <cuda_runtime.h>
 
 #include "sim/cuda/environment_numbers.h"
@@ -24,11 +25,11 @@ struct BatchNumbers {
   ElasticEnergies* energies;
   long block_row_size;
   float *block_rows, *blocks;
-  void* factors;
+  __half* factors;
   int *positive, *solves;
   // Of a team.
   double* triangle_gradients;
-  float *shares, *updates, *passed, *forward, *residuals, *images;
+  float *shares, *updates, *solved, *residuals, *images;
   Four<float>* searches;
 };
 

@@ -150,7 +150,6 @@ struct FlatMotions {
 struct TeamSizes {
   const FrontPlan& fronts;
   const SheetLayout& layout;
-  FactorPrecision precision;
   bool damped;
   int most_held, most_obstacles;
 };
@@ -158,8 +157,7 @@ struct TeamSizes {
 TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   const auto number = [](long count) { return static_cast<std::size_t>(count); };
   const std::size_t size = number(sizes.layout.size), triangles = number(sizes.layout.triangle_count),
-                    hinges = number(sizes.layout.hinge_count), held = number(sizes.most_held),
-                    factor = number(sizes.fronts.factor_size);
+                    hinges = number(sizes.layout.hinge_count), held = number(sizes.most_held);
   TeamMemory m{};
   for (int k = 0; k < 3; ++k) {
     m.positions[k] = arena.take<Point>(size);
@@ -167,14 +165,13 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   }
   for (float** vector : {&m.gradient, &m.direction, &m.change, &m.residual, &m.image})
     *vector = arena.take<float>(3 * size);
-  m.forward = arena.take<float>(6 * size);
-  m.passed = arena.take<float>(number(sizes.fronts.vector_size));
+  m.solved = arena.take<float>(number(sizes.fronts.vector_size));
   m.search = arena.take<Four<float>>(size);
   m.shares = arena.take<float>(36 * triangles);
   m.updates = arena.take<float>(number(sizes.fronts.update_size));
   m.block_rows = arena.take<float>(number(sizes.layout.slice_starts.back()) * slice_numbers);
   m.blocks = arena.take<float>(9 * number(sizes.layout.block_count));
-  m.factor = arena.take<float>(sizes.precision == FactorPrecision::half ? (factor + 1) / 2 : factor);
+  m.factor = arena.take<__half>(solve_tile_numbers * number(sizes.fronts.factor_tiles));
   m.triangle_gradients = arena.take<double>(9 * triangles);
   m.hinge_gradients = arena.take<double>(12 * hinges);
   m.hinge_matrix = arena.take<float>(12 * hinges);
@@ -243,7 +240,7 @@ struct BatchReplay::Memory {
     const bool damped = std::any_of(environments.begin(), environments.end(),
                                     [](const auto& e) { return e.material.stiffness_damping != 0; });
     const int most_obstacles_each = upload_obstacles(environments);
-    lay_out_teams({front_plan, layout, settings.precision, damped, most_held, most_obstacles_each});
+    lay_out_teams({front_plan, layout, damped, most_held, most_obstacles_each});
     steps = DeviceArray<int>(environments.size());
 
     numbers.fronts = plan.fronts;
@@ -252,7 +249,7 @@ struct BatchReplay::Memory {
     check(cudaMallocHost(&stop, sizeof(int)));
     *stop = 0;
     numbers.waiting = {steps.data(), count, stop};
-    place_on_chip(settings.precision, numbers);
+    place_on_chip(numbers);
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
     numbers.max_iterations = settings.max_iterations;
@@ -357,12 +354,13 @@ struct BatchReplay::Memory {
   }
 
   void lay_out_teams(const TeamSizes& sizes) {
-    teams = std::min(count, resident_replay_teams(settings.precision, plan.fronts));
+    teams = std::min(count, resident_replay_teams(plan.fronts));
     require(teams > 0, "the sheet is too large for the device");
     DeviceArena counting(nullptr);
     lay_out_team(sizes, counting);
     const std::size_t bytes = counting.used();
     arena = DeviceArray<char>(static_cast<std::size_t>(teams) * bytes);
+    check(cudaMemset(arena.data(), 0, static_cast<std::size_t>(teams) * bytes));
     std::vector<TeamMemory> all;
     const std::vector<int> none(size(), -1);
     for (int t = 0; t < teams; ++t) {
@@ -388,7 +386,7 @@ struct BatchReplay::Memory {
     const std::vector<int> stand(static_cast<std::size_t>(count), step);
     steps.write(0, stand.data(), stand.size());
     numbers.end_step = end;
-    run_replay(settings.precision, numbers, teams, stream);
+    run_replay(numbers, teams, stream);
     step = end;
   }
 

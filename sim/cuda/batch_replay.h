@@ -53,7 +53,6 @@ struct ReplaySettings {
   int steps = 0;                  ///< the last one
   std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; step 0 is the start
   int restart_interval = 10;      ///< steps after which a solver forgets its factor and may change its team
-  FactorPrecision precision = FactorPrecision::half;
   FrontSettings fronts{};
 };
 

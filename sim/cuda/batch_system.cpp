@@ -29,12 +29,13 @@ struct BatchSystem::Memory {
 
   DeviceArray<EnvironmentNumbers> environments;
   DeviceArray<Point> positions;
-  DeviceArray<float> vectors, results, changes, block_rows, blocks, factors;
+  DeviceArray<float> vectors, results, changes, block_rows, blocks;
+  DeviceArray<__half> factors;
   DeviceArray<VertexRestriction> restrictions;
   DeviceArray<double> gradients, triangle_gradients;
   DeviceArray<ElasticEnergies> energies;
   DeviceArray<int> restriction_counts, positive, solves;
-  DeviceArray<float> shares, updates, passed, forward, residuals, images;
+  DeviceArray<float> shares, updates, solved, residuals, images;
   DeviceArray<Four<float>> searches;
   int teams;
   BatchNumbers numbers{};
@@ -53,7 +54,8 @@ struct BatchSystem::Memory {
     const size_t environment_count = materials.size(), team_count = static_cast<size_t>(teams);
     const size_t size = static_cast<size_t>(layout.size), triangles = layout.areas.size();
     const size_t row_size = static_cast<size_t>(layout.slice_starts.back()) * slice_numbers;
-    const size_t factor_size = static_cast<size_t>(front_plan.factor_size);
+    const size_t parts = precision == FactorPrecision::half ? 1 : 2,
+                 factor_size = parts * solve_tile_numbers * static_cast<size_t>(front_plan.factor_tiles);
     positions = DeviceArray<Point>(environment_count * size);
     vectors = DeviceArray<float>(environment_count * 3 * size);
     results = DeviceArray<float>(environment_count * 3 * size);
@@ -62,8 +64,8 @@ struct BatchSystem::Memory {
     energies = DeviceArray<ElasticEnergies>(environment_count);
     block_rows = DeviceArray<float>(environment_count * row_size);
     blocks = DeviceArray<float>(environment_count * 9 * static_cast<size_t>(layout.block_count));
-    factors = DeviceArray<float>(environment_count *
-                                 (precision == FactorPrecision::half ? (factor_size + 1) / 2 : factor_size));
+    factors = DeviceArray<__half>(environment_count * factor_size);
+    check(cudaMemset(factors.data(), 0, environment_count * factor_size * sizeof(__half)));
     restrictions = DeviceArray<VertexRestriction>(environment_count * size);
     restriction_counts = DeviceArray<int>(environment_count);
     positive = DeviceArray<int>(environment_count);
@@ -71,8 +73,7 @@ struct BatchSystem::Memory {
     triangle_gradients = DeviceArray<double>(team_count * 9 * triangles);
     shares = DeviceArray<float>(team_count * 36 * triangles);
     updates = DeviceArray<float>(team_count * static_cast<size_t>(front_plan.update_size));
-    passed = DeviceArray<float>(team_count * static_cast<size_t>(front_plan.vector_size));
-    forward = DeviceArray<float>(team_count * 6 * size);
+    solved = DeviceArray<float>(team_count * static_cast<size_t>(front_plan.vector_size));
     residuals = DeviceArray<float>(team_count * 3 * size);
     images = DeviceArray<float>(team_count * 3 * size);
     searches = DeviceArray<Four<float>>(team_count * size);
@@ -98,8 +99,7 @@ struct BatchSystem::Memory {
                triangle_gradients.data(),
                shares.data(),
                updates.data(),
-               passed.data(),
-               forward.data(),
+               solved.data(),
                residuals.data(),
                images.data(),
                searches.data()};

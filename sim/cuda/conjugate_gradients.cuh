@@ -1,6 +1,7 @@
 #pragma once
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/front_solve.cuh"
+#include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_product.cuh"
 
 namespace flash::sim::cuda {
@@ -9,12 +10,11 @@ namespace flash::sim::cuda {
 // i + team_threads, ... of each vector.
 
 /// The linear problem of an environment.
-template <typename Stored>
 struct LinearProblem {
   const float* block_rows;
   float rigidity;
   HingeMatrix hinges;
-  const Stored* factor;
+  const __half* factor;
   const float* gradient;
   Restrictions restrictions;
   float tolerance;
@@ -25,8 +25,19 @@ struct LinearVectors {
   float *residual, *image;
   Four<float>* search;  ///< four
   Four<float>* near;    ///< four: a copy of `search` for products on chip, free during a solve; or `search`
-  SolveVectors solve;
+  float* solved;        ///< what a solve works on (solve_chunk.h)
+  bool solved_on_chip = false;
+  PhaseClock clock = {};
 };
+
+template <int parts>
+__device__ void solve(const FrontTables& fronts, const __half* factor, const LinearVectors& v,
+                      const char* chip) {
+  if (v.solved_on_chip)
+    solve<parts, true>(fronts, factor, v.solved, chip);
+  else
+    solve<parts, false>(fronts, factor, v.solved, chip);
+}
 
 __device__ inline void restrict_to_free(const Restrictions& restrictions, float* x) {
   if (restrictions.count == 0) return;
@@ -45,14 +56,14 @@ __device__ inline void restrict_to_free(const Restrictions& restrictions, float*
 /// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
 /// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, a number a warp
 /// and solve_memory.
-template <typename Stored>
+template <int parts>
 __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
-                                   const LinearProblem<Stored>& problem, const LinearVectors& v,
-                                   float* direction, float* change, float* partial, char* chip) {
+                                   const LinearProblem& problem, const LinearVectors& v, float* direction,
+                                   float* change, float* partial, char* chip) {
   constexpr int most = 20;
   const int size = 3 * sheet.size, first = static_cast<int>(threadIdx.x);
   float* search = reinterpret_cast<float*>(v.search);
-  float* preconditioned = v.solve.forward + size;
+  float* preconditioned = v.solved + size;
   const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
   const auto restricted = [&](float* x) { restrict_to_free(problem.restrictions, x); };
   for (int i = first; i < size; i += team_threads) {
@@ -99,7 +110,9 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   int iteration = 0;
   while (norm > target && iteration < most) {
     ++iteration;
-    solve(fronts, problem.factor, v.solve, chip);
+    v.clock.count(ReplayPhase::directions);
+    solve<parts>(fronts, problem.factor, v, chip);
+    v.clock.count(ReplayPhase::solves);
     restricted(preconditioned);
     float product = 0;
     for (int i = first; i < size; i += team_threads) product += v.residual[i] * preconditioned[i];
@@ -113,8 +126,10 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
       near[slot(i)] = own;
     }
     __syncthreads();
+    v.clock.count(ReplayPhase::directions);
     product = multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
     const float curvature = sum_over_team(product, partial);
+    v.clock.count(ReplayPhase::products);
     // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
     if (curvature <= 0 && iteration > 1) break;
     const float step = curvature > 0 ? along / curvature : 1;

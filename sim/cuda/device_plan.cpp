@@ -25,14 +25,13 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
   fronts.vector_size = plan.vector_size;
-  constexpr int room_for_two = 128 * 1024;  // chunks in half precision, with their tables
+  constexpr int room_for_two = 160 * 1024;  // chunks of a warp, with their tables, and two parts a number
   fronts.solve_depth = most_memory() >= room_for_two ? 2 : 1;
-  fronts.factor_size = plan.factor_size;
+  fronts.factor_tiles = plan.factor_tiles;
   fronts.update_size = plan.update_size;
   fronts.fronts = upload(plan.fronts, fronts_);
   fronts.levels = upload(plan.levels, levels_);
   fronts.panel_rows = upload(plan.panel_rows, ints_);
-  fronts.entries = upload(plan.entries, ints_);
   fronts.blocks = upload(plan.blocks, places_);
   const SolvePlan solve = plan_solve(plan);
   fronts.chunks = upload(solve.chunks, chunks_);

@@ -18,7 +18,8 @@ struct EnvironmentNumbers {
   FLASH_HOST_DEVICE double effective_rigidity() const { return rigidity * (1 + damping_share); }
 };
 
-/// How the numbers of a factor are stored. Half of them cost less to read, and change a preconditioner alone.
+/// How the numbers of a factor are stored: in half precision, which changes a preconditioner alone, or each
+/// as the sum of two such numbers.
 enum class FactorPrecision { single, half };
 
 /// Strains and angles at the start of a step, for damping; null without.

@@ -179,14 +179,13 @@ struct PartEnd {
 };
 
 /// Solves a part of a step, of which w.now becomes the end, at `share` of the whole.
-template <typename Stored>
 __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const StepMotion& motion, double share,
                                            ReplayStats& stats) {
   constexpr double rounding_tolerance = 1e-6;
   predict(w, step, motion, share);
   project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
   evaluate(w, step, nullptr, w.now);
-  iterate_to_balance<Stored>(w, step, stats);
+  iterate_to_balance(w, step, stats);
   const double tolerance = w.replay.tolerance;
   const StepEnd end = judge_end(w, step);
   return {end, end.sound &&
@@ -195,7 +194,6 @@ __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const Ste
 
 /// A sheet that starts inside obstacles takes the first exit that does not tear it: each vertex leaves on its
 /// own side, then all by the shortest way, then both slowly; at last it stays. `part`: by the first exit.
-template <typename Stored>
 __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, const StepMotion& motion,
                                                 double share, ReplayStats& stats, PartEnd part) {
   constexpr double slow_share = 0.125;
@@ -210,20 +208,19 @@ __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, cons
     const double own_speed = k == last ? 0 : k < ways ? speed : slow_share * speed;
     step.obstacles.way_out = {own_speed, k < last && k % ways == 1 ? direction : Triple{}};
     w.refactor = true;
-    part = solve_part<Stored>(w, step, motion, share, stats);
+    part = solve_part(w, step, motion, share, stats);
   }
   return part;
 }
 
 /// The part of a step from the share `begin` to `end` of it, as a whole. The state advances where it is
 /// solved or this is the `last_try`. Returns whether it is solved.
-template <typename Stored>
 __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, double begin, double end,
                          Point* positions, Point* velocities, ReplayStats& stats, bool last_try) {
   begin_damping(w, step);
   begin_obstacles(w, step, motion, begin, end);
-  PartEnd part = solve_part<Stored>(w, step, motion, end, stats);
-  if (part.end.start_depth > 0) part = leave_obstacles<Stored>(w, step, motion, end, stats, part);
+  PartEnd part = solve_part(w, step, motion, end, stats);
+  if (part.end.start_depth > 0) part = leave_obstacles(w, step, motion, end, stats, part);
   const bool solved = part.solved;
   const StepEnd& judged = part.end;
   if (!solved) w.refactor = true;
@@ -248,7 +245,6 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
 
 /// One time step, in halves where it cannot be solved as a whole, so often as `halvings` says. Once a half
 /// has failed the other is not divided any more.
-template <typename Stored>
 __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion& motion, Point* positions,
                                     Point* velocities) {
   constexpr int most_halvings = 16;
@@ -264,7 +260,7 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion
     step.h = length * w.replay.time_step;
     const bool last_try = halvings[level] == 0;
     const bool solved =
-        try_step<Stored>(w, step, motion, begin, begin + length, positions, velocities, stats, last_try);
+        try_step(w, step, motion, begin, begin + length, positions, velocities, stats, last_try);
     if (!solved && !last_try) {
       halvings[level + 1] = halvings[level] - 1;
       ++level;

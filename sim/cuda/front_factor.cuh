@@ -19,8 +19,8 @@ __host__ __device__ inline int factor_memory(int shared_panel) {
 /// The factor of the matrix `blocks`, nine numbers a block of the pattern, column-major. `updates`: memory
 /// for FrontTables::update_size numbers; `chip`: factor_memory on chip. Returns, to some threads at least,
 /// whether all pivots were positive.
-template <typename Stored>
-__device__ bool factorize(const FrontTables& tables, const float* blocks, float* updates, Stored* factor,
+template <int parts>
+__device__ bool factorize(const FrontTables& tables, const float* blocks, float* updates, __half* factor,
                           float* chip) {
   bool positive = true;
   float* tile = chip + tables.shared_panel + warp() * tile_numbers;
@@ -53,11 +53,12 @@ __device__ bool factorize(const FrontTables& tables, const float* blocks, float*
       add_blocks(tables, front, blocks, panel);
       group.synchronize();
       positive = invert_own_block(panel) && positive;
-      Stored* to = factor + front.panel_at;
-      store_inverse(front, panel, to);
-      const int warps = group.size / 32, rows_stored = front.leading - front.below_at;
-      for (int strip = group.rank / 32; 32 * strip < rows_stored; strip += warps) {
-        if (32 * strip < below) make_strip(panel, strip);
+      const FactorColumns<parts> to = {
+          factor + static_cast<long>(front.first_tile) * parts * solve_tile_numbers, front.column_tiles};
+      store_inverse(panel, to);
+      const int warps = group.size / 32;
+      for (int strip = group.rank / 32; 32 * strip < below; strip += warps) {
+        make_strip(panel, strip);
         store_strip(front, panel, strip, to);
       }
       group.synchronize();

@@ -6,11 +6,13 @@ namespace flash::sim::cuda {
 /// A FrontPlan in the memory of a device.
 struct FrontTables {
   int size, level_count, shared_panel, vector_size;
-  int solve_depth;  ///< chunks of a warp on chip, 1 or 2: while it works on one, the next is on its way
-  long factor_size, update_size;
+  int solve_depth;  ///< chunks of a warp on chip, 1, 2 or 4: while it works on one, the others are on their
+                    ///< way
+  int factor_tiles;
+  long update_size;
   const FrontLayout* fronts;
   const FrontLevel* levels;
-  const int *panel_rows, *entries;
+  const int* panel_rows;
   const BlockPlace* blocks;
   const SolveChunk* chunks;
   const int* chunk_starts;

@@ -1,6 +1,6 @@
 #pragma once
 #include "sim/cuda/front_panel.cuh"
-#include "sim/cuda/stored.cuh"
+#include "sim/cuda/solve_tile.cuh"
 #include "sim/cuda/tensor_core.cuh"
 
 namespace flash::sim::cuda {
@@ -64,14 +64,13 @@ __device__ inline void make_strip(const Panel& panel, int strip) {
   }
 }
 
-/// A strip of -L21 X to the factor, its padding with zeros.
-template <typename Stored>
-__device__ void store_strip(const FrontLayout& front, const Panel& panel, int strip, Stored* factor) {
+/// A strip of -L21 X to the factor.
+template <int parts>
+__device__ void store_strip(const FrontLayout& front, const Panel& panel, int strip,
+                            const FactorColumns<parts>& factor) {
   const int g = lane() / 4, t = lane() % 4, row = clamped_rows(panel, 32 * strip);
   const int first_row = 32 * strip + 4 * g, step = 4 * panel.leading;
-  // A strip of padding alone has nothing to read, least of all what another warp is at.
-  const int depth = 32 * strip < panel.below ? panel.own : 0;
-  Stored* to = kept_whole(factor + front.below_at + first_row);
+  __half* to = kept_whole(factor.row(front.below_at + first_row));
   for (int first = 0; first < panel.columns; first += strip_columns) {
     TileProduct products[strip_blocks];
     const float* across[strip_blocks];  // a row of X^T
@@ -80,7 +79,7 @@ __device__ void store_strip(const FrontLayout& front, const Panel& panel, int st
 #pragma unroll
     for (int d = 0; d < strip_blocks; ++d) {
       const int k = first + 8 * d;
-      if (k >= depth) break;
+      if (k >= panel.own) break;
       const LeftTile left = left_tile(panel, row, k);
 #pragma unroll
       for (int b = 0; b <= d; ++b) {
@@ -89,7 +88,7 @@ __device__ void store_strip(const FrontLayout& front, const Panel& panel, int st
       }
     }
 #pragma unroll 1
-    for (int k = first + strip_columns; k < depth; k += 8) {
+    for (int k = first + strip_columns; k < panel.own; k += 8) {
       const LeftTile left = left_tile(panel, row, k);
 #pragma unroll
       for (int b = 0; b < strip_blocks; ++b) {
@@ -97,34 +96,36 @@ __device__ void store_strip(const FrontLayout& front, const Panel& panel, int st
         products[b].add(left, from[0], from[step]);
       }
     }
-    if (front.below_at + first_row >= front.leading) continue;
 #pragma unroll
-    for (int b = 0; b < strip_blocks; ++b)
+    for (int b = 0; b < strip_blocks; ++b) {
+      const int column = first + 8 * b + 2 * t;
+      if (column >= panel.columns) continue;
+      const bool both = column + 1 < panel.columns;
+      const float4 near = products[b].rows(0), far = products[b].rows(1);
+      const float numbers[4][2] = {{near.x, far.x}, {near.y, far.y}, {near.z, far.z}, {near.w, far.w}};
+      __half* at = to + FactorColumns<parts>::column(first + 8 * b) + 2 * t;
 #pragma unroll
-      for (int j = 0; j < 2; ++j) {
-        const int column = first + 8 * b + 2 * t + j;
-        const float4 sum = products[b].rows(j);
-        const float4 result = {first_row < panel.below ? -sum.x : 0, first_row + 1 < panel.below ? -sum.y : 0,
-                               first_row + 2 < panel.below ? -sum.z : 0,
-                               first_row + 3 < panel.below ? -sum.w : 0};
-        if (column < panel.columns) store_four(result, to + column * front.leading);
-      }
+      for (int i = 0; i < 4; ++i)
+        if (first_row + i < panel.below)
+          store_two<parts>(-numbers[i][0], both ? -numbers[i][1] : 0.0f, at + i * solve_tile_row);
+    }
   }
 }
 
-/// X to the factor, zeros above its diagonal.
-template <typename Stored>
-__device__ void store_inverse(const FrontLayout& front, const Panel& panel, Stored* factor) {
-  const int warps = panel.group.size / 32;
-  for (int row = 4 * (panel.group.rank / 32); row < front.below_at; row += 4 * warps)
-    for (int column = lane(); column < panel.columns; column += 32) {
-      float numbers[4];
-#pragma unroll
-      for (int i = 0; i < 4; ++i)
-        numbers[i] = row + i < panel.columns && row + i >= column ? panel.at(column, row + i) : 0.0f;
-      store_four(float4{numbers[0], numbers[1], numbers[2], numbers[3]},
-                 factor + column * front.leading + row);
-    }
+/// X to the factor, squares of eight on and below its diagonal. Above them stands nothing but zeros.
+template <int parts>
+__device__ void store_inverse(const Panel& panel, const FactorColumns<parts>& factor) {
+  const int g = lane() / 4, t = lane() % 4, warps = panel.group.size / 32;
+  int row = 0, column = panel.group.rank / 32;
+  while (true) {
+    for (; column > row; ++row) column -= row + 1;
+    if (8 * row >= panel.columns) return;
+    const int r = 8 * row + g, c = 8 * column + 2 * t;
+    if (r < panel.columns)
+      store_two<parts>(r >= c ? panel.at(c, r) : 0.0f, r > c ? panel.at(c + 1, r) : 0.0f,
+                       factor.row(r) + FactorColumns<parts>::column(c));
+    column += warps;
+  }
 }
 
 /// What the children pass up to a tile, on chip; a row each lane, so that what lies together is read

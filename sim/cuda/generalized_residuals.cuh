@@ -38,14 +38,13 @@ __device__ inline void solve_small(double* small, int count) {
 
 /// The generalized minimal residual method for L A x = P b, as gmres of the CPU: `direction` = x over the
 /// free directions, `change` = A x. Returns the number of solves with the factor, to all threads.
-template <typename Stored>
+template <int parts>
 __device__ __noinline__ int generalized_residuals(const FrontTables& fronts, const SheetTables& sheet,
-                                                  const LinearProblem<Stored>& problem,
-                                                  const LinearVectors& v, const CoupledMemory& memory,
-                                                  float* direction, float* change, float* partial,
-                                                  char* chip) {
+                                                  const LinearProblem& problem, const LinearVectors& v,
+                                                  const CoupledMemory& memory, float* direction,
+                                                  float* change, float* partial, char* chip) {
   const int size = 3 * sheet.size, first = static_cast<int>(threadIdx.x);
-  float *search = reinterpret_cast<float*>(v.search), *preconditioned = v.solve.forward + size;
+  float *search = reinterpret_cast<float*>(v.search), *preconditioned = v.solved + size;
   const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
   const Restrictions& restrictions = problem.restrictions;
   const auto apply_left = [&](float* x) {
@@ -100,7 +99,7 @@ __device__ __noinline__ int generalized_residuals(const FrontTables& fronts, con
     __syncthreads();
     for (int i = first; i < size; i += team_threads) preconditioned[i] = last[i];
     __syncthreads();
-    solve(fronts, problem.factor, v.solve, chip);
+    solve<parts>(fronts, problem.factor, v, chip);
     restrict_to_free(restrictions, preconditioned);
     __syncthreads();
     for (int i = first; i < size; i += team_threads) own_direction[i] = search[slot(i)] = preconditioned[i];

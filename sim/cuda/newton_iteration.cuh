@@ -19,12 +19,8 @@ struct Work {
   ContactSet linear;  ///< of the linear problem, to which the direction is the solution
 };
 
-/// Counts the time since the last call to a phase.
 __device__ inline void count_phase(const TeamMemory& memory, ReplayPhase phase) {
-  if (threadIdx.x != 0) return;
-  const long long now = clock64();
-  memory.clocks[static_cast<int>(phase)] += now - memory.clocks[replay_phases];
-  memory.clocks[replay_phases] = now;
+  PhaseClock{memory.clocks}.count(phase);
 }
 
 __device__ inline void evaluate(const Work& w, const StepProblem& step, const ContactSet* line, Iterate& at) {
@@ -72,7 +68,6 @@ __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& s
 }
 
 /// Factorizes the positive Hessian at the iterate. Returns false where it is not positive definite after all.
-template <typename Stored>
 __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
   float* chip = shared_memory<float>();
   restrict_by(w, w.now.contacts, false, step);
@@ -80,8 +75,8 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
   assemble_blocks(w.replay.sheet, step.numbers, step.restrictions, hinges_of(w), w.memory.shares,
                   w.memory.blocks, chip);
   count_phase(w.memory, ReplayPhase::preconditioner);
-  const bool positive = factorize(w.replay.fronts, w.memory.blocks, w.memory.updates,
-                                  static_cast<Stored*>(w.memory.factor), chip);
+  const bool positive =
+      factorize<half_parts>(w.replay.fronts, w.memory.blocks, w.memory.updates, w.memory.factor, chip);
   const float failures = sum_over_team(positive ? 0.0f : 1.0f, chip);
   __syncthreads();
   count_phase(w.memory, ReplayPhase::factorization);
@@ -93,42 +88,43 @@ inline constexpr int linear_partial_bytes = 64;
 static_assert(linear_partial_bytes >= team_warps * static_cast<int>(sizeof(float)));
 
 /// Solves the linear problem. Returns the number of solves with the factor.
-template <typename Stored>
 __device__ __noinline__ int find_direction(const Work& w, const StepProblem& step, bool coupled) {
   constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
-  const LinearProblem<Stored> problem = {
+  const LinearProblem problem = {
       m.block_rows,
       static_cast<float>(step.numbers.effective_rigidity()),
       hinges_of(w),
-      static_cast<const Stored*>(m.factor),
+      m.factor,
       m.gradient,
       step.restrictions,
-      static_cast<float>(linear_tolerance * w.replay.tolerance * step.material->force_scale)};
+      static_cast<float>(linear_tolerance *
+                         fmin(w.replay.tolerance * step.material->force_scale, w.now.residual))};
   char* chip = shared_memory<char>();
   const auto on_chip = [&](int at, auto* otherwise) {
     return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
   };
-  const LinearVectors vectors = {
-      m.residual,
-      m.image,
-      m.search,
-      on_chip(w.replay.search_at, m.search),
-      {on_chip(w.replay.forward_at, m.forward), on_chip(w.replay.passed_at, m.passed)}};
+  const LinearVectors vectors = {m.residual,
+                                 m.image,
+                                 m.search,
+                                 on_chip(w.replay.search_at, m.search),
+                                 on_chip(w.replay.solved_at, m.solved),
+                                 w.replay.solved_at >= 0,
+                                 {m.clocks}};
   float* partial = reinterpret_cast<float*>(chip);
   char* rest = chip + linear_partial_bytes;
-  const int solves = coupled ? generalized_residuals(w.replay.fronts, tables, problem, vectors, m.coupled,
-                                                     m.direction, m.change, partial, rest)
-                             : conjugate_gradients(w.replay.fronts, tables, problem, vectors, m.direction,
-                                                   m.change, partial, rest);
+  const int solves = coupled
+                         ? generalized_residuals<half_parts>(w.replay.fronts, tables, problem, vectors,
+                                                             m.coupled, m.direction, m.change, partial, rest)
+                         : conjugate_gradients<half_parts>(w.replay.fronts, tables, problem, vectors,
+                                                           m.direction, m.change, partial, rest);
   count_phase(m, ReplayPhase::directions);
   return solves;
 }
 
 /// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
 /// its contacts in turn. `stuck`: with the positive Hessian, whose direction leads down.
-template <typename Stored>
 __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled, ReplayStats& stats) {
   constexpr int linear_problems = 6;
   const SheetTables& tables = w.replay.sheet;
@@ -143,7 +139,7 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   for (int solved = 1;; ++solved) {
     restrict_by(w, w.linear, coupled, step);
     count_phase(m, ReplayPhase::contact);
-    const int solves = find_direction<Stored>(w, step, coupled);
+    const int solves = find_direction(w, step, coupled);
     stats.solves += solves;
     w.refactor = w.refactor || solves > w.replay.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.
@@ -230,16 +226,18 @@ __device__ inline void lengthen(Work& w, const StepProblem& step, double slope, 
 }
 
 /// From w.now to balance or until it cannot go on. Counts its work in `stats`.
-template <typename Stored>
 __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stats) {
   constexpr int most_forced_moves = 6, coupled_after = 20;
+  constexpr double start_tolerance_share = 1e-3;  // as on the CPU
   bool stuck = false;
   int forced_moves = 0;
-  for (int iterations = 0; iterations < w.replay.max_iterations && !balanced(step, w.now, w.replay.tolerance);
+  double tolerance = start_tolerance_share * w.replay.tolerance;
+  for (int iterations = 0; iterations < w.replay.max_iterations && !balanced(step, w.now, tolerance);
        ++iterations) {
+    tolerance = w.replay.tolerance;
     ++stats.iterations;
     if (w.refactor) {
-      if (!factorize<Stored>(w, step)) return;
+      if (!factorize(w, step)) return;
       ++stats.factorizations;
     }
     assemble_matrix(w, step, stuck);
@@ -247,11 +245,12 @@ __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stat
     // goes round in circles at times. Then both are solved at once, guided by the residual.
     const bool coupled =
         !stuck && step.obstacles.count > 0 && step.h < w.replay.time_step && iterations + 1 > coupled_after;
-    linear_step<Stored>(w, step, stuck, coupled, stats);
+    linear_step(w, step, stuck, coupled, stats);
 
     const double slope = slope_at(w, w.now);
     const double length = line_search(w, step, coupled, slope);
     if (!acceptable(w, coupled, slope, length)) {
+      if (balanced(step, w.now, tolerance)) return;
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
         stuck = w.refactor = true;

@@ -21,7 +21,6 @@ __device__ void keep(const ReplayNumbers& replay, const Point* positions, double
 }
 
 /// Takes an environment from its step `first` up to `end`.
-template <typename Stored>
 __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, int e, int first, int end) {
   const int size = replay.sheet.size;
   Point *positions = replay.positions + static_cast<long>(size) * e,
@@ -35,7 +34,7 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
     at.contacts = memory.contacts[k];
     return at;
   };
-  if (threadIdx.x == 0) memory.clocks[replay_phases] = clock64();
+  PhaseClock{memory.clocks}.start();
   Work w = {replay, memory, true, iterate(0), iterate(1), iterate(2), memory.contacts[3]};
   StepProblem step = {&material,
                       replay.time_step,
@@ -69,7 +68,7 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
         material.several,
         replay.poses + row * replay.frames};
     step.restrictions.count = step.held_count = motion.held_count;
-    const ReplayStats stats = advance_step<Stored>(w, step, motion, positions, velocities);
+    const ReplayStats stats = advance_step(w, step, motion, positions, velocities);
     const long place = at - replay.stats_begin;
     if (threadIdx.x == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
     const int kept = replay.kept_index[place];
@@ -81,7 +80,6 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
 /// A block is a team. It takes an environment through some steps, until the solver forgets what it holds,
 /// and then takes the one that is furthest behind. So none waits for another, and all end at nearly the same
 /// time.
-template <typename Stored>
 __global__ void __launch_bounds__(team_threads, resident_teams_each)
     replay_kernel(const __grid_constant__ ReplayNumbers replay) {
   const TeamMemory& memory = replay.teams[blockIdx.x];
@@ -92,60 +90,52 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
     if (e < 0) return;
     const int interval = replay.restart_interval,
               end = min(replay.end_step, (first / interval + 1) * interval);
-    advance<Stored>(replay, memory, e, first, end);
+    advance(replay, memory, e, first, end);
     count_phase(memory, ReplayPhase::rest);
     __syncthreads();
     if (threadIdx.x == 0 && end < replay.end_step) add(replay.waiting, e, end);
   }
 }
 
-using Kernel = void (*)(ReplayNumbers);
-
-Kernel kernel_of(FactorPrecision precision) {
-  return precision == FactorPrecision::half ? replay_kernel<__half> : replay_kernel<float>;
-}
-
-int linear_bytes_of(FactorPrecision precision, const FrontTables& fronts) {
-  return linear_partial_bytes + (precision == FactorPrecision::half
-                                     ? solve_memory<__half>(fronts.solve_depth)
-                                     : solve_memory<float>(fronts.solve_depth));
-}
+int linear_bytes_of(int solve_depth) { return linear_partial_bytes + solve_memory<half_parts>(solve_depth); }
 
 /// What a team needs in any case, and as much as leaves room for as many teams as there are registers for.
-int bytes_of(FactorPrecision precision, const FrontTables& fronts) {
+int bytes_of(const FrontTables& fronts) {
   constexpr int number = sizeof(float), reserved = 1024;  // by the device, for each team
   return std::max({gradient_memory(fronts.size, false), hessian_memory * number,
-                   number * factor_memory(fronts.shared_panel), linear_bytes_of(precision, fronts),
+                   number * factor_memory(fronts.shared_panel), linear_bytes_of(fronts.solve_depth),
                    most_memory() / resident_teams_each - reserved});
 }
 
 }  // namespace
 
-void place_on_chip(FactorPrecision precision, ReplayNumbers& numbers) {
-  const FrontTables& fronts = numbers.fronts;
-  const int room = bytes_of(precision, fronts);
+void place_on_chip(ReplayNumbers& numbers) {
+  FrontTables& fronts = numbers.fronts;
+  const int room = bytes_of(fronts);
+  constexpr long number = sizeof(float);
+  const long vector = number * fronts.vector_size + 16;
+  for (const int depth : {1, 2, chunks_ahead})
+    if (linear_bytes_of(depth) + vector <= room) fronts.solve_depth = depth;
   numbers.places_on_chip = gradient_memory(fronts.size, true) <= room;
-  int used = linear_bytes_of(precision, fronts);
+  int used = linear_bytes_of(fronts.solve_depth);
   const auto place = [&](long bytes) {
     if (used + bytes > room) return -1;
     const int at = used;
     used += rounded_up(static_cast<int>(bytes), 16);
     return at;
   };
-  constexpr long number = sizeof(float);
-  numbers.forward_at = place(6 * number * fronts.size);
-  numbers.passed_at = place(number * fronts.vector_size);
+  numbers.solved_at = place(number * fronts.vector_size);
   // Where a solve has its chunks.
-  const bool fits = 4 * number * fronts.size <= linear_bytes_of(precision, fronts) - linear_partial_bytes;
+  const bool fits = 4 * number * fronts.size <= linear_bytes_of(fronts.solve_depth) - linear_partial_bytes;
   numbers.search_at = fits ? linear_partial_bytes : -1;
 }
 
-int resident_replay_teams(FactorPrecision precision, const FrontTables& fronts) {
-  return resident_teams(kernel_of(precision), bytes_of(precision, fronts));
+int resident_replay_teams(const FrontTables& fronts) {
+  return resident_teams(replay_kernel, bytes_of(fronts));
 }
 
-void run_replay(FactorPrecision precision, const ReplayNumbers& numbers, int teams, cudaStream_t stream) {
-  launch(kernel_of(precision), teams, bytes_of(precision, numbers.fronts), stream, numbers);
+void run_replay(const ReplayNumbers& numbers, int teams, cudaStream_t stream) {
+  launch(replay_kernel, teams, bytes_of(numbers.fronts), stream, numbers);
 }
 
 }  // namespace flash::sim::cuda

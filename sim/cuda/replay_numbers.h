@@ -1,8 +1,11 @@
 #pragma once
+#include <cuda_fp16.h>
+
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/four.h"
 #include "sim/cuda/front_tables.h"
 #include "sim/cuda/most_obstacles.h"
+#include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/law/vertex_contact.h"
 
@@ -59,10 +62,6 @@ struct ReplayStats {
   int converged;
 };
 
-/// Where the time of a step goes.
-enum class ReplayPhase { evaluation, matrix, preconditioner, factorization, directions, contact, rest };
-inline constexpr int replay_phases = 7;
-
 /// Directions that the generalized minimal residual method keeps, all of them.
 inline constexpr int most_directions = 40;
 
@@ -90,10 +89,11 @@ struct TeamMemory {
   int* held_axes;         ///< by place: bits 1, 2 and 4 for x, y and z
   CoupledMemory coupled;  ///< null without obstacles
   float *gradient, *direction, *change;
-  float *residual, *image, *forward, *passed;
+  float *residual, *image;
+  float* solved;  ///< FrontTables::vector_size
   Four<float>* search;
   float *shares, *updates, *block_rows, *blocks;
-  void* factor;
+  __half* factor;  ///< zeros where nothing is stored
   double *triangle_gradients, *hinge_gradients;
   float *hinge_matrix, *hinge_products;
   double *start_metrics, *start_angles;  ///< null where nothing is damped
@@ -117,8 +117,8 @@ struct ReplayNumbers {
   SheetTables sheet;
   const TeamMemory* teams;
   WaitingEnvironments waiting;
-  int places_on_chip;                    ///< whether there is room
-  int forward_at, passed_at, search_at;  ///< these vectors of the linear problem on chip, -1 without room
+  int places_on_chip;        ///< whether there is room
+  int solved_at, search_at;  ///< these vectors of the linear problem on chip, -1 without room
 
   // Settings.
   double time_step, tolerance;

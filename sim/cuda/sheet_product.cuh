@@ -21,16 +21,19 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
     const int wanted = first + lane() / 4, group = min(wanted, tables.group_count - 1);
     const int end = tables.group_starts[group + 1];
     Number sums[4][3] = {};
-#pragma unroll 4
-    for (int k = tables.group_starts[group] + part; k < end; k += 4) {
-      const auto vertex = x(tables.group_columns[k]);
-      const Four<Number> value = reinterpret_cast<const Four<Number>*>(values)[k];
-      const Number rows[4] = {value.x, value.y, value.z, value.w};
+    for (int first_column = tables.group_starts[group] + part; first_column < end;
+         first_column += group_padding) {
 #pragma unroll
-      for (int row = 0; row < 4; ++row) {
-        sums[row][0] += rows[row] * vertex.x;
-        sums[row][1] += rows[row] * vertex.y;
-        sums[row][2] += rows[row] * vertex.z;
+      for (int k = first_column; k < first_column + group_padding; k += 4) {
+        const auto vertex = x(tables.group_columns[k]);
+        const Four<Number> value = reinterpret_cast<const Four<Number>*>(values)[k];
+        const Number rows[4] = {value.x, value.y, value.z, value.w};
+#pragma unroll
+        for (int row = 0; row < 4; ++row) {
+          sums[row][0] += rows[row] * vertex.x;
+          sums[row][1] += rows[row] * vertex.y;
+          sums[row][2] += rows[row] * vertex.z;
+        }
       }
     }
     Number own[3] = {};

@@ -112,7 +112,8 @@ void time_replay(const Towel& towel, int environments, int steps, int stale_fact
               100 * converged / count, 1e6 * each, 1e6 * floor.seconds, each / floor.seconds,
               floor.bytes / each / bandwidth, floor.flops / each / single_rate);
   std::printf(
-      "         share of evaluation, matrix, preconditioner, factorization, directions, contact, rest:");
+      "         share of evaluation, matrix, preconditioner, factorization, solves, products, directions, "
+      "contact, rest:");
   for (const double share : replay.phases()) std::printf(" %.3f", share);
   std::printf("\n");
   std::fflush(stdout);

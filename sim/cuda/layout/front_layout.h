@@ -16,11 +16,11 @@ inline constexpr int resident_teams_each = 1;
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;
 
-/// Rows of a front are padded to so many.
-inline constexpr int row_padding = 16;
+/// Rows and columns of a tile of the factor: what a tensor core multiplies by at once.
+inline constexpr int solve_tile_width = 16, solve_tile_numbers = solve_tile_width * solve_tile_width;
 
 /// Vertices eliminated together and those below them, as a dense matrix of three rows and columns a vertex:
-/// its own rows, up to `below_at` with zeros, then those below, up to `leading` with zeros.
+/// its own rows, up to `below_at` with zeros, then those below, up to whole tiles with zeros.
 struct FrontLayout {
   int first_column, column_count;  ///< own vertices, by elimination
   int first_row, row_count;        ///< vertices below: in FrontPlan::rows
@@ -28,10 +28,11 @@ struct FrontLayout {
   int first_block, block_count;    ///< in FrontPlan::blocks
   int first_entry;                 ///< in FrontPlan::entries
   int first_panel_row;             ///< in FrontPlan::panel_rows, with children
-  int below_at, leading;           ///< rows; multiples of 4 and of 16
+  int below_at;                    ///< row, a multiple of 4
+  int row_tiles, column_tiles;     ///< of its columns in the factor, row of tiles after row of tiles
   int vector_at;                   ///< of what it passes up in a forward solve, three numbers a vertex below
   int children[2];                 ///< -1 for none
-  long panel_at;                   ///< of its columns in the factor
+  int first_tile;                  ///< of its columns in the factor
   long update_at;  ///< of its update matrix: columns of `update_leading` numbers, behind zeros
   int update_leading;
 };

@@ -19,10 +19,14 @@ struct Node {
 };
 
 int below_at(const Node& node) { return rounded_up(3 * node.column_count, 4); }
-int leading(const Node& node) {
-  return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), row_padding);
+int row_tiles(const Node& node) {
+  return rounded_up(below_at(node) + 3 * static_cast<int>(node.rows.size()), solve_tile_width) /
+         solve_tile_width;
 }
-int factor_size(const Node& node) { return 3 * node.column_count * leading(node); }
+int column_tiles(const Node& node) {
+  return rounded_up(3 * node.column_count, solve_tile_width) / solve_tile_width;
+}
+int factor_tiles(const Node& node) { return row_tiles(node) * column_tiles(node); }
 int below(const Node& node) { return 3 * static_cast<int>(node.rows.size()); }
 int panel_size(const Node& node) {
   return panel_numbers(3 * node.column_count, below(node), node.children[0] >= 0 || node.children[1] >= 0);
@@ -93,7 +97,7 @@ std::vector<Node> by_height(std::vector<Node> nodes) {
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
     if (nodes[a].height != nodes[b].height) return nodes[a].height < nodes[b].height;
-    return factor_size(nodes[a]) > factor_size(nodes[b]);
+    return factor_tiles(nodes[a]) > factor_tiles(nodes[b]);
   });
   for (std::size_t n = 0; n < order.size(); ++n) place[order[n]] = static_cast<int>(n);
   std::vector<Node> sorted;
@@ -129,20 +133,21 @@ class Places {
   long total_ = 0;
 };
 
-/// The columns of the factor one after the other. What a front passes up lives until its parent is done.
+/// The fronts' tiles one after the other. What a front passes up lives until its parent is done.
 void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
   Places updates, vectors;
   // Zeros, for the columns that a child lacks.
   int longest = 0;
   for (const Node& node : nodes) longest = std::max(longest, below(node));
   updates.take(rounded_up(longest, 8));
+  vectors.take(plan.nothing_passed() + 1);
   std::size_t front = 0;
   for (const FrontLevel& level : plan.levels) {
     const std::size_t end = level.first_front + level.front_count;
     for (std::size_t f = front; f < end; ++f) {
       FrontLayout& layout = plan.fronts[f];
-      layout.panel_at = plan.factor_size;
-      plan.factor_size += 3L * layout.column_count * layout.leading;
+      layout.first_tile = plan.factor_tiles;
+      plan.factor_tiles += layout.row_tiles * layout.column_tiles;
       layout.update_leading = rounded_up(3 * layout.row_count, 8);
       layout.update_at = updates.take(3L * layout.row_count * layout.update_leading);
       layout.vector_at = static_cast<int>(vectors.take(3L * layout.row_count));
@@ -156,7 +161,8 @@ void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
       }
   }
   plan.update_size = updates.total();
-  plan.vector_size = static_cast<int>(vectors.total());
+  // Chunks read beyond the last number.
+  plan.vector_size = static_cast<int>(vectors.total()) + 2 * solve_tile_width;
 }
 
 void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, FrontPlan& plan) {
@@ -186,7 +192,8 @@ void add_layouts(const std::vector<Node>& nodes, FrontPlan& plan) {
     layout.first_row = static_cast<int>(plan.rows.size());
     layout.row_count = static_cast<int>(node.rows.size());
     layout.below_at = below_at(node);
-    layout.leading = leading(node);
+    layout.row_tiles = row_tiles(node);
+    layout.column_tiles = column_tiles(node);
     layout.children[0] = node.children[0];
     layout.children[1] = node.children[1];
     plan.rows.insert(plan.rows.end(), node.rows.begin(), node.rows.end());
@@ -208,7 +215,7 @@ void add_layouts(const std::vector<Node>& nodes, FrontPlan& plan) {
     }
 
     layout.first_entry = static_cast<int>(plan.entries.size());
-    for (int row = 0; row < layout.leading; ++row) {
+    for (int row = 0; row < solve_tile_width * layout.row_tiles; ++row) {
       const int below = row - layout.below_at;
       int entry = 0;
       if (row < 3 * node.column_count)

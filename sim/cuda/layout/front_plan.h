@@ -22,16 +22,19 @@ struct FrontPlan {
   std::vector<int> panel_rows;
   std::vector<int> entries;  ///< of each row of a front: number of its entry in a vector, 0 in padding
   std::vector<BlockPlace> blocks;
-  long factor_size = 0;     ///< numbers stored of an environment's factor
+
+  /// Where the vector of a solve holds a zero.
+  int nothing_passed() const { return 6 * size; }
+  int factor_tiles = 0;     ///< stored of an environment's factor
   long update_size = 0;     ///< for update matrices
-  int vector_size = 0;      ///< for what fronts pass up in a forward solve
+  int vector_size = 0;      ///< numbers that a solve works on (solve_chunk.h)
   int shared_panel = 0;     ///< numbers of on-chip memory for the panels of a level
   long factor_entries = 0;  ///< that are not zero by structure
   double factor_flops = 0;  ///< additions and multiplications of a factorization with its inverses
 };
 
 struct FrontSettings {
-  int leaf_size = 8;             ///< vertices, at most, of a front without children
+  int leaf_size = 10;            ///< vertices, at most, of a front without children
   int panel_capacity = 40000;    ///< numbers of on-chip memory that a team has for panels
   int most_groups = team_warps;  ///< of a team in a factorization
 };

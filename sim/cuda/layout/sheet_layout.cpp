@@ -93,9 +93,18 @@ void add_scalar_rows(const BendingOperator& bending, const std::vector<int>& pos
   const RowGroups& stiffness = bending.stiffness;
   for (const auto& group : stiffness.rows)
     for (const int row : group) layout.group_rows.push_back(row < 0 ? -1 : position[row]);
-  layout.group_starts = stiffness.starts;
-  for (const int column : stiffness.columns) layout.group_columns.push_back(position[column]);
-  layout.group_values = stiffness.values;
+  layout.group_starts = {0};
+  for (std::size_t group = 0; group < stiffness.rows.size(); ++group) {
+    for (int k = stiffness.starts[group]; k < stiffness.starts[group + 1]; ++k) {
+      layout.group_columns.push_back(position[stiffness.columns[k]]);
+      layout.group_values.insert(layout.group_values.end(), stiffness.values.begin() + 4L * k,
+                                 stiffness.values.begin() + 4L * (k + 1));
+    }
+    // Zeros times any vertex.
+    while (layout.group_columns.size() % group_padding != 0) layout.group_columns.push_back(0);
+    layout.group_values.resize(4 * layout.group_columns.size(), 0.0);
+    layout.group_starts.push_back(static_cast<int>(layout.group_columns.size()));
+  }
   layout.stand_in = bending.stand_in;
 }
 

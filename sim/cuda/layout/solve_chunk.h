@@ -3,36 +3,44 @@
 
 namespace flash::sim::cuda {
 
-// Plain numbers, laid out on the host and read by kernels as they are.
+// Plain numbers, laid out on the host and read by kernels as they are. A solve works on one vector: y of the
+// forward solve, three numbers a vertex; right-hand side and solution, as many; then what fronts pass up.
 
-/// Rows and columns of the factor in a chunk at most, and so its numbers on chip: column after column.
-inline constexpr int chunk_rows = 64, chunk_columns = 24, chunk_numbers = chunk_rows * chunk_columns;
+/// Inputs and results of a chunk at most: two tiles of the factor each.
+inline constexpr int chunk_width = 2 * solve_tile_width;
+static_assert(chunk_width == 32);  // one each lane of a warp
 
-/// A piece of a front's columns that a warp works on, with all that it needs to know of it.
+/// A piece of a front's columns W that a warp multiplies by, with all that it needs to know of it: forward
+/// its columns are the inputs and its rows the results, backward the other way round.
 struct alignas(16) SolveChunk {
-  enum { backward = 1, begins = 2, ends = 4, ends_level = 8 };
+  enum { ends = 1, ends_level = 2 };
 
+  // To have it sent to the chip.
+  int first_tile = 0;  ///< of the factor
+  int next_row = 0;    ///< from there to the tile below it; 0: none is read
+  int columns =
+      0;  ///< twice SolvePlan::gathers' place of the first result, or -2; one more: two tiles side by side
+  int input_table = 0;  ///< place of the first input in SolvePlan::gathers
+  // To multiply by it.
   int flags = 0;
-  int columns = 0, rows = 0;      ///< 0: nothing to do
-  int right_at = 0;               ///< of the right-hand sides of its columns; backward of its results
-  int panel_at = 0, leading = 0;  ///< of its first number in the factor; from one column to the next
-  int table_at = 0;      ///< forward in `gathers`, of its first column; backward in FrontPlan::entries
-  int row_table_at = 0;  ///< forward in `gathers`, of its first row below
-  int first_row = 0, own_columns = 0, below_at = 0, below_count = 0;  ///< of the front, forward
-  int y_at = 0, passed_at = 0;                                        ///< where results go, forward
-  int unused[2] = {};
+  int inputs = 0;    ///< 0: nothing to do
+  int right_at = 0;  ///< forward, of the first input: its right-hand side
+  // At the end of a task.
+  int own_at = 0, own_count = 0;  ///< results that stay in the front: where the first goes, and how many
+  int passed_at = 0;              ///< where the first result would be in what the front passes up
+  int passed_begin = 0, passed_end = 0;  ///< results that it does pass up
 };
-static_assert(sizeof(SolveChunk) == 64);
+static_assert(sizeof(SolveChunk) == 48);
 
-/// Chunks without numbers behind the last of a warp, which looks so far ahead.
-inline constexpr int chunks_ahead = 2;
+/// SolveChunk::columns of tiles, and of a table of results, -1 for none.
+constexpr int chunk_columns(bool two, int result_table) { return 2 * result_table + (two ? 1 : 0); }
 
-/// Where what two children pass up for a vertex begins, -1 for none.
+/// Chunks of a warp on chip at most; as many without numbers stand behind its last.
+inline constexpr int chunks_ahead = 4;
+
+/// Two numbers of the vector that are added up; FrontPlan::nothing_passed for none.
 struct alignas(8) Gather {
-  int first = -1, second = -1;
+  int first, second;
 };
-
-/// Those of a chunk: of its columns, then of its rows below.
-inline constexpr int column_gathers = chunk_columns / 3, row_gathers = (chunk_rows + 4) / 3;
 
 }  // namespace flash::sim::cuda

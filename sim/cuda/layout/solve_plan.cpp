@@ -2,142 +2,145 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
-#include <stdexcept>
 
 namespace flash::sim::cuda {
 namespace {
 
-using Task = std::vector<SolveChunk>;  ///< chunks that add up to one result
+using Task = std::vector<SolveChunk>;  ///< chunks that add up to one set of results
 
-int number(long value) {
-  if (value > std::numeric_limits<int>::max()) throw std::length_error("the sheet's factor is too large");
-  return static_cast<int>(value);
+/// The tiles of a front from `row` and `column` on, as many as `rows` and `columns` lie in.
+void take_tiles(const FrontLayout& front, int row, int rows, int column, int columns, int result_table,
+                SolveChunk& chunk) {
+  const int r = row / solve_tile_width, c = column / solve_tile_width;
+  chunk.first_tile = front.first_tile + r * front.column_tiles + c;
+  chunk.next_row = rows > solve_tile_width && r + 1 < front.row_tiles ? front.column_tiles : 0;
+  chunk.columns = chunk_columns(columns > solve_tile_width && c + 1 < front.column_tiles, result_table);
 }
 
-/// Chunks of a front side by side, `rows` each.
-Task forward_task(const FrontPlan& plan, const FrontLayout& front, int first_gather, int row, int rows) {
-  const int columns = 3 * front.column_count;
+/// What becomes of `rows` rows of a front, from `row` on.
+Task forward_task(const FrontPlan& plan, const FrontLayout& front, int row, int rows) {
+  const int columns = 3 * front.column_count, below = 3 * front.row_count;
   // Above the diagonal there are zeros.
   const int end = row + rows > front.below_at ? columns : std::min(columns, row + rows);
+  const auto in_chunk = [&](int at) { return std::clamp(at - row, 0, rows); };
   SolveChunk chunk;
-  chunk.leading = front.leading;
-  chunk.rows = std::min(rows, front.leading - row);
-  chunk.row_table_at = first_gather + front.column_count + std::max(0, row - front.below_at) / 3;
-  chunk.first_row = row;
-  chunk.own_columns = columns;
-  chunk.below_at = front.below_at;
-  chunk.below_count = 3 * front.row_count;
-  chunk.y_at = 3 * front.first_column;
-  chunk.passed_at = front.vector_at;
+  chunk.own_at = 3 * front.first_column + row;
+  chunk.own_count = in_chunk(columns);
+  chunk.passed_at = front.vector_at - front.below_at + row;
+  chunk.passed_begin = in_chunk(front.below_at);
+  chunk.passed_end = in_chunk(front.below_at + below);
   Task task;
-  for (int column = 0; column < end; column += chunk_columns) {
-    chunk.flags =
-        (column == 0 ? SolveChunk::begins : 0) | (column + chunk_columns >= end ? SolveChunk::ends : 0);
-    chunk.columns = std::min(chunk_columns, end - column);
-    chunk.panel_at = number(front.panel_at + static_cast<long>(column) * front.leading + row);
+  for (int column = 0; column < end; column += chunk_width) {
+    const bool last = column + chunk_width >= end;
+    chunk.flags = last ? SolveChunk::ends : 0;
+    chunk.inputs = std::min(chunk_width, end - column);
+    chunk.input_table = front.first_entry + column;
     chunk.right_at = 3 * (plan.size + front.first_column) + column;
-    chunk.table_at = first_gather + column / 3;
+    take_tiles(front, row, rows, column, chunk.inputs, last ? front.first_entry + row : -1, chunk);
     task.push_back(chunk);
   }
   return task;
 }
 
-/// Chunks of a front one below the other, `columns` each.
-Task backward_task(const FrontPlan& plan, const FrontLayout& front, int column, int columns) {
+/// The solution of `columns` columns of a front, from `column` on. `entries`: SolvePlan::entries.
+Task backward_task(const FrontPlan& plan, int entries, const FrontLayout& front, int column, int columns) {
+  const int end = front.below_at + 3 * front.row_count;
   SolveChunk chunk;
-  chunk.leading = front.leading;
-  chunk.columns = std::min(columns, 3 * front.column_count - column);
-  chunk.right_at = 3 * (plan.size + front.first_column) + column;
+  chunk.own_at = 3 * (plan.size + front.first_column) + column;
+  chunk.own_count = std::min(columns, 3 * front.column_count - column);
   Task task;
   // Above the diagonal there are zeros.
-  for (int row = column; row < front.leading; row += chunk_rows) {
-    chunk.flags = SolveChunk::backward | (row == column ? SolveChunk::begins : 0) |
-                  (row + chunk_rows >= front.leading ? SolveChunk::ends : 0);
-    chunk.rows = std::min(chunk_rows, front.leading - row);
-    chunk.panel_at = number(front.panel_at + static_cast<long>(column) * front.leading + row);
-    chunk.table_at = front.first_entry + row;
+  for (int row = column; row < end; row += chunk_width) {
+    chunk.flags = row + chunk_width >= end ? SolveChunk::ends : 0;
+    chunk.inputs = std::min(chunk_width, end - row);
+    chunk.input_table = entries + front.first_entry + row;
+    take_tiles(front, row, chunk.inputs, column, columns, -1, chunk);
     task.push_back(chunk);
   }
   return task;
 }
 
-/// Tasks as large as leaves some for each warp.
-template <typename Cut>
-std::vector<Task> enough_tasks(const std::array<int, 3>& sizes, const Cut& cut) {
-  std::vector<Task> tasks;
-  for (const int size : sizes) {
-    tasks = cut(size);
-    if (tasks.size() >= 2 * team_warps) break;
-  }
-  return tasks;
-}
+using Shares = std::array<std::vector<SolveChunk>, team_warps>;
 
-using Warps = std::array<std::vector<SolveChunk>, team_warps>;
-
-/// Gives the tasks of a level to the warps, the longest first and each to the one with the least to do.
-void share_out(std::vector<Task> tasks, int flags, Warps& warps) {
+/// A level's tasks for each warp: the longest first, each to the warp with the least to do.
+Shares share_out(std::vector<Task> tasks) {
   std::stable_sort(tasks.begin(), tasks.end(),
                    [](const Task& a, const Task& b) { return a.size() > b.size(); });
-  std::array<std::size_t, team_warps> before{};
-  for (int w = 0; w < team_warps; ++w) before[w] = warps[w].size();
-  const auto busy = [&](int w) { return warps[w].size() - before[w]; };
+  Shares shares;
   for (const Task& task : tasks) {
-    int least = 0;
-    for (int w = 1; w < team_warps; ++w)
-      if (busy(w) < busy(least)) least = w;
-    warps[least].insert(warps[least].end(), task.begin(), task.end());
+    const auto least = std::min_element(shares.begin(), shares.end(),
+                                        [](const auto& a, const auto& b) { return a.size() < b.size(); });
+    least->insert(least->end(), task.begin(), task.end());
   }
-  for (int w = 0; w < team_warps; ++w) {
-    if (busy(w) == 0) {
-      warps[w].emplace_back();
-      warps[w].back().flags = flags;
+  return shares;
+}
+
+std::size_t longest(const Shares& shares) {
+  std::size_t most = 0;
+  for (const auto& share : shares) most = std::max(most, share.size());
+  return most;
+}
+
+/// Adds a level in tasks of whichever width has the warps wait least for each other.
+template <typename Cut>
+void add_level(const Cut& cut, Shares& warps) {
+  Shares shares = share_out(cut(chunk_width)), narrow = share_out(cut(solve_tile_width));
+  if (longest(narrow) < longest(shares)) shares = std::move(narrow);
+  for (std::size_t w = 0; w < warps.size(); ++w) {
+    if (shares[w].empty()) shares[w].emplace_back();
+    shares[w].back().flags |= SolveChunk::ends_level;
+    warps[w].insert(warps[w].end(), shares[w].begin(), shares[w].end());
+  }
+}
+
+std::vector<Gather> gathers_of(const FrontPlan& plan) {
+  const int none = plan.nothing_passed(), rows = static_cast<int>(plan.entries.size());
+  // Copies go by whole chunks, beyond the last row.
+  std::vector<Gather> gathers(2 * plan.entries.size() + chunk_width, {none, none});
+  for (int row = 0; row < rows; ++row) gathers[rows + row].first = plan.entries[row];
+  for (const FrontLayout& front : plan.fronts) {
+    const int vertices = front.column_count + front.row_count, columns = 3 * front.column_count;
+    for (int entry = 0; entry < 3 * vertices; ++entry) {
+      const auto from = [&](int k) {
+        if (front.children[k] < 0) return none;
+        const int place = plan.child_rows[front.first_map + k * vertices + entry / 3];
+        return place < 0 ? none : plan.fronts[front.children[k]].vector_at + 3 * place + entry % 3;
+      };
+      const int row = entry < columns ? entry : front.below_at + entry - columns;
+      gathers[front.first_entry + row] = {from(0), from(1)};
     }
-    warps[w].back().flags |= SolveChunk::ends_level;
   }
+  return gathers;
 }
 
 }  // namespace
 
 SolvePlan plan_solve(const FrontPlan& plan) {
   SolvePlan solve;
-  std::vector<int> first_gather;
-  for (const FrontLayout& front : plan.fronts) {
-    first_gather.push_back(static_cast<int>(solve.gathers.size()));
-    const int vertices = front.column_count + front.row_count;
-    for (int vertex = 0; vertex < vertices; ++vertex) {
-      const auto from = [&](int k) {
-        if (front.children[k] < 0) return -1;
-        const int place = plan.child_rows[front.first_map + k * vertices + vertex];
-        return place < 0 ? -1 : plan.fronts[front.children[k]].vector_at + 3 * place;
-      };
-      solve.gathers.push_back({from(0), from(1)});
-    }
-  }
-  // Copies go by whole chunks, beyond the last one.
-  solve.gathers.resize(solve.gathers.size() + column_gathers + row_gathers);
-  Warps warps;
-  for (const FrontLevel& level : plan.levels) {
-    const std::vector<Task> tasks = enough_tasks({chunk_rows, chunk_rows / 2, chunk_rows / 4}, [&](int rows) {
-      std::vector<Task> cut;
-      for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
-        for (int row = 0; row < plan.fronts[f].leading; row += rows)
-          cut.push_back(forward_task(plan, plan.fronts[f], first_gather[f], row, rows));
-      return cut;
-    });
-    share_out(tasks, 0, warps);
-  }
+  solve.gathers = gathers_of(plan);
+  solve.entries = static_cast<int>(plan.entries.size());
+  Shares warps;
+  for (const FrontLevel& level : plan.levels)
+    add_level(
+        [&](int rows) {
+          std::vector<Task> tasks;
+          for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
+            for (int row = 0; row < plan.fronts[f].below_at + 3 * plan.fronts[f].row_count; row += rows)
+              tasks.push_back(forward_task(plan, plan.fronts[f], row, rows));
+          return tasks;
+        },
+        warps);
   for (std::size_t l = plan.levels.size(); l-- > 0;) {
     const FrontLevel& level = plan.levels[l];
-    const std::vector<Task> tasks =
-        enough_tasks({chunk_columns, 2 * chunk_columns / 3, chunk_columns / 3}, [&](int columns) {
-          std::vector<Task> cut;
+    add_level(
+        [&](int columns) {
+          std::vector<Task> tasks;
           for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
             for (int column = 0; column < 3 * plan.fronts[f].column_count; column += columns)
-              cut.push_back(backward_task(plan, plan.fronts[f], column, columns));
-          return cut;
-        });
-    share_out(tasks, SolveChunk::backward, warps);
+              tasks.push_back(backward_task(plan, solve.entries, plan.fronts[f], column, columns));
+          return tasks;
+        },
+        warps);
   }
   for (const auto& chunks : warps) {
     solve.starts.push_back(static_cast<int>(solve.chunks.size()));

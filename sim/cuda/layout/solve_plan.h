@@ -12,7 +12,10 @@ namespace flash::sim::cuda {
 struct SolvePlan {
   std::vector<SolveChunk> chunks;  ///< of one warp after the other
   std::vector<int> starts;         ///< of each warp, and the end
-  std::vector<Gather> gathers;     ///< of each vertex of each front
+  /// By rows of fronts as FrontPlan::entries: what children pass up to it, then, from `entries` on, its
+  /// entry.
+  std::vector<Gather> gathers;
+  int entries = 0;
 };
 
 SolvePlan plan_solve(const FrontPlan& fronts);

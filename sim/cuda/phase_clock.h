@@ -1,0 +1,37 @@
+#pragma once
+
+namespace flash::sim::cuda {
+
+/// Where the time of a step goes.
+enum class ReplayPhase {
+  evaluation,
+  matrix,
+  preconditioner,
+  factorization,
+  solves,
+  products,
+  directions,  ///< but for solves and products
+  contact,
+  rest
+};
+inline constexpr int replay_phases = 9;
+
+#ifdef __CUDACC__
+/// Ticks of a team's processor spent in each phase, and behind them when the present one began.
+struct PhaseClock {
+  long long* ticks = nullptr;  ///< null: not counted
+
+  __device__ void start() const {
+    if (threadIdx.x == 0) ticks[replay_phases] = clock64();
+  }
+  /// Counts the time since the last call to a phase. All threads have just been synchronized.
+  __device__ void count(ReplayPhase phase) const {
+    if (threadIdx.x != 0 || ticks == nullptr) return;
+    const long long now = clock64();
+    ticks[static_cast<int>(phase)] += now - ticks[replay_phases];
+    ticks[replay_phases] = now;
+  }
+};
+#endif
+
+}  // namespace flash::sim::cuda
