@@ -287,6 +287,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         held.see(report.held_penetration, b, time);
         summary.residual_max = data::worst(summary.residual_max, report.residual);
         summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
+        summary.complementarity_max = data::worst(summary.complementarity_max, report.complementarity);
         summary.iterations += report.iterations;
       }
       summary.unconverged_steps += !converged;

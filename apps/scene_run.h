@@ -12,6 +12,7 @@ struct SceneSummary {
   int steps = 0;                     ///< done
   int unconverged_steps = 0;         ///< with an object whose residual stayed above the tolerance
   double residual_max = 0;           ///< worst |r| / |M g|
+  double complementarity_max = 0;    ///< [m]
   int halved_steps = 0;              ///< that could not be solved as one, and were in parts
   double penetration_max = 0;        ///< [m]
   double held_penetration_max = 0;   ///< of vertices that supports or end effectors hold [m]

@@ -156,7 +156,9 @@ int run(const RunOptions& options) {
   if (summary.unconverged_steps > 0)
     std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps
               << " steps did not converge; worst residual " << data::format_short(summary.residual_max)
-              << " (accepted: 1 in 100, and 1; see " << (fs::path(options.out) / "log.csv").string() << ")\n";
+              << ", worst complementarity " << data::format_short(summary.complementarity_max)
+              << " m; where both are small, energy came from nothing (accepted: 1 in 100, and 1; see "
+              << (fs::path(options.out) / "log.csv").string() << ")\n";
   if (options.json) {
     print_json(summary, options.out, exit_code);
   } else if (!options.quiet) {

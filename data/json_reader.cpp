@@ -247,8 +247,8 @@ double JsonObject::not_negative(const char* key) const {
 
 Eigen::Vector3d JsonObject::direction(const char* key, const Eigen::Vector3d& fallback) const {
   const Eigen::Vector3d value = vector3(key, fallback);
-  if (!(value.norm() > 1e-9)) throw error(key, "a direction that is not zero");
-  return value.normalized();
+  if (!(value.stableNorm() > 1e-9)) throw error(key, "a direction that is not zero");
+  return value.stableNormalized();
 }
 
 JsonObject JsonObject::object(const char* key) const {

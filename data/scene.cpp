@@ -156,6 +156,10 @@ void read_obstacles(const JsonObject& file, Scene& scene) {
 std::vector<int> read_vertices(const JsonObject& object) {
   std::vector<int> vertices = object.indices("vertices");
   if (vertices.empty()) throw object.error("vertices", "at least one index");
+  std::vector<int> sorted = vertices;
+  std::sort(sorted.begin(), sorted.end());
+  const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
+  if (twice != sorted.end()) throw object.error("vertices", "each vertex once");
   return vertices;
 }
 

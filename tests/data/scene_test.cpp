@@ -128,6 +128,15 @@ TEST_F(SceneFiles, FrictionBelongsToThePairThenToTheBody) {
   EXPECT_EQ(friction_between(scene, "cloth", "rail"), std::nullopt);
 }
 
+TEST_F(SceneFiles, DirectionsMayBeOfAnyLength) {
+  for (const double length : {1e-8, 1.0, 1e155, 1e300}) {
+    json file = json::parse(kPublished);
+    file["planecollisions"] = {{"point", {0, 0, 0}}, {"normal", {0, 0, length}}, {"friction", 0.25}};
+    const Scene scene = load(file.dump());
+    EXPECT_EQ(std::get<ScenePlane>(scene.obstacles[0].shape).normal, Eigen::Vector3d::UnitZ());
+  }
+}
+
 TEST_F(SceneFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed(kPublished, "/gravitiy", 1), "gravitiy: unknown field (did you mean \"gravity\"?)");
   EXPECT_EQ(changed(kPublished, "/timestep", 0), "timestep: found 0, expected a number above 0");
@@ -153,6 +162,8 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
             "objects.cloth.fixed[0].axes: found \"w\", expected letters of xyz, such as \"z\" for a roller");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/vertices", {1, -2}),
             "objects.cloth.fixed[0].vertices: found [1,-2], expected indices, whole numbers from 0");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/vertices", {3, 1, 3}),
+            "objects.cloth.fixed[0].vertices: found [3,1,3], expected each vertex once");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/0/hung_mass", 1),
             "objects.cloth.loads[0].force: found [1,2,3], expected either force [N] on each vertex, or "
             "hung_mass [kg] shared by them");
