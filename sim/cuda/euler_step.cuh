@@ -196,7 +196,6 @@ __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const Ste
 /// own side, then all by the shortest way, then both slowly; at last it stays. `part`: by the first exit.
 __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, const StepMotion& motion,
                                                 double share, ReplayStats& stats, PartEnd part) {
-  constexpr double slow_share = 0.125;
   const SheetTables& tables = w.replay.sheet;
   const double speed = w.replay.exit_speed;
   const Triple direction = shortest_way_out(tables, step, shared_memory<double>());
@@ -205,7 +204,7 @@ __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, cons
     if (part.solved && exits_gently(tables, step, w.now.positions, speed)) break;
     // A slower exit does not help an unsolved step, which costs the most: only staying is tried.
     if (!part.solved && k > 1) k = last;
-    const double own_speed = k == last ? 0 : k < ways ? speed : slow_share * speed;
+    const double own_speed = k == last ? 0 : k < ways ? speed : slow_exit_share * speed;
     step.obstacles.way_out = {own_speed, k < last && k % ways == 1 ? direction : Triple{}};
     w.refactor = true;
     part = solve_part(w, step, motion, share, stats);

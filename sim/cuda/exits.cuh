@@ -1,5 +1,6 @@
 #pragma once
 #include "sim/cuda/contact.cuh"
+#include "sim/law/exit_direction.h"
 
 namespace flash::sim::cuda {
 
@@ -9,20 +10,6 @@ namespace flash::sim::cuda {
 __device__ inline bool starts_inside(const StepProblem& step, int i, int obstacle) {
   return step.held_axes[i] == 0 &&
          distance_at_start(step.obstacles.obstacles[obstacle], triple(step.start[i])) < -inside_depth;
-}
-
-/// The k-th of the directions that lead out of a plane, out of the faces of a box, across the axis of a
-/// cylinder.
-__device__ inline int exit_directions(const MovingObstacle<double>& obstacle) {
-  return obstacle.shape == ObstacleShape::plane ? 1 : obstacle.shape == ObstacleShape::box ? 6 : 16;
-}
-__device__ inline Triple exit_direction(const MovingObstacle<double>& obstacle, int k) {
-  const Frame<double>& frame = obstacle.start;
-  if (obstacle.shape == ObstacleShape::plane) return frame.z;
-  if (obstacle.shape == ObstacleShape::box) return (k % 2 == 0 ? 1.0 : -1.0) * frame.axis(k / 2);
-  double sine, cosine;
-  sincospi(k / 8.0, &sine, &cosine);
-  return cosine * frame.x + sine * frame.y;
 }
 
 /// The unit direction in which the sheet leaves all obstacles that it starts in by the shortest way; zero

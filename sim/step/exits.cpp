@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+
+#include "sim/law/exit_direction.h"
 
 namespace flash::sim {
 
@@ -10,31 +11,13 @@ using data::Points;
 
 namespace {
 
-constexpr double slow_share = 0.125;  ///< of the exit speed, where the sheet cannot leave at all of it
-
-/// Appends the directions that lead out of the faces of a box, across the axis of a cylinder, out of a plane.
-void add_directions(const MovingObstacle<double>& obstacle, std::vector<Vector3<double>>& directions) {
-  const Frame<double>& frame = obstacle.start;
-  if (obstacle.shape == ObstacleShape::plane) {
-    directions.push_back(frame.z);
-  } else if (obstacle.shape == ObstacleShape::cylinder) {
-    constexpr int count = 16;
-    for (int k = 0; k < count; ++k) {
-      const double angle = 2 * std::numbers::pi * k / count;
-      directions.push_back(std::cos(angle) * frame.x + std::sin(angle) * frame.y);
-    }
-  } else {
-    for (int axis = 0; axis < 3; ++axis)
-      for (const double sign : {1.0, -1.0}) directions.push_back(sign * frame.axis(axis));
-  }
-}
-
 /// The unit direction in which a sheet leaves all obstacles that it starts in by the shortest way; zero where
 /// there is none. All vertices take the same way, so the sheet is not torn.
 Vector3<double> shortest_way_out(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
   std::vector<Vector3<double>> directions;
   for (std::size_t k = 0; k < step.obstacles.size(); ++k)
-    if (!inside[k].empty()) add_directions(step.obstacles[k], directions);
+    for (int n = 0; n < exit_directions(step.obstacles[k]) && !inside[k].empty(); ++n)
+      directions.push_back(exit_direction(step.obstacles[k], n));
   Vector3<double> best{};
   double shortest = no_such_side;
   for (const Vector3<double>& direction : directions) {
@@ -56,7 +39,7 @@ Vector3<double> shortest_way_out(const ContactStep& step, const std::vector<std:
 std::vector<WayOut<double>> exits_of(const ContactStep& step, const std::vector<std::vector<int>>& inside) {
   const Vector3<double> direction = shortest_way_out(step, inside);
   std::vector<WayOut<double>> exits;
-  for (const double share : {1.0, slow_share}) {
+  for (const double share : {1.0, slow_exit_share}) {
     exits.push_back({.speed = share * step.way_out.speed});
     if (!is_zero(direction)) exits.push_back({share * step.way_out.speed, direction});
   }
