@@ -30,6 +30,7 @@ struct FitOptions {
   double repeatability = 0;  ///< [m]; 0: not given
   bool no_solver_check = false;
   bool no_horizon = false;
+  bool resume = false;
   std::string rollouts;
   std::string out;
 };
@@ -96,8 +97,24 @@ std::string mesh_of(const sysid::Summary& found) {
   return mesh == found.settings.end() ? "" : mesh->second.substr(0, mesh->second.rfind(" ("));
 }
 
+// The folder is free, or --resume goes on with what it holds.
+void check_out(const FitOptions& options) {
+  if (options.resume && options.common.force)
+    throw data::InputError(
+        "--resume: found --force beside it, which removes the results, expected one of the two");
+  if (options.resume) return;
+  try {
+    data::check_folder_free(options.out, options.common.force);
+  } catch (const data::InputError& error) {
+    if (!fs::exists(fs::path(options.out) / "grid.json")) throw;
+    throw data::InputError(options.out +
+                           ": holds results already; go on with --resume, or name another folder");
+  }
+}
+
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   stop_on_signals();
+  check_out(options);
   const auto begin = std::chrono::steady_clock::now();
   const sim::Device device = choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
@@ -131,10 +148,12 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
       sysid::steps_in(2.0 * each.steps * options.replay.time_step, options.replay.time_step);
   sysid::check_job(replays, sysid::count_candidates(grid.axes),
                    sysid::estimate_memory(replays, grid, asked.solver_check));
-  data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
-  {
-    asked.ranges = grid.axes;
+  asked.ranges = grid.axes;
+  const std::string grid_file = (fs::path(options.out) / "grid.json").string();
+  if (options.resume && fs::exists(grid_file)) {
+    grid.axes = sysid::load_grid_file(grid_file).axes;  // the fingerprint holds the rest to it
+  } else {
     AnswerLine line(options.common, sysid::most_design_work(grid, replays.size()));
     grid.axes = sysid::design_about(
         replays, grid, start.values, start.around, asked,
@@ -142,7 +161,9 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   }
   end_after_signal();
   sysid::ResultsStore store(options.out, grid.axes, names, sysid::fingerprint(replays, grid),
-                            options.common.force ? sysid::Existing::replace : sysid::Existing::refuse);
+                            options.resume         ? sysid::Existing::resume
+                            : options.common.force ? sysid::Existing::replace
+                                                   : sysid::Existing::refuse);
   Search search{asset, std::move(replays), grid, asked, {}, device, options.out, begin};
   return run_search(search, store, options.common);
 }
@@ -167,6 +188,7 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions; without it, that of the search it starts from");
+  verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
   add_replay_options(*verb, options->replay);
   add_device_option(*verb, options->common);

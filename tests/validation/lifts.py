@@ -61,7 +61,7 @@ def fit(runs, data, asset, clip):
         shapes[shape] = runs.grid(f"{clip}/{shape}", [data / "lift" / clip], "--asset", asset, *window(clip),
                                   *GRASPS[shape], *axes(CLIPS[clip]["axes"]), "--no-solver-check")
         shapes[shape]["grasp"] = shape
-    best = min(shapes.values(), key=lambda search: search["best"]["score"])
+    best = min(shapes.values(), key=lambda search: search["best"]["score_on_mesh"])
     parameters = best["best"]["parameters"]
     stiffness = parameters["bending"]
     material = runs.grid(

@@ -48,7 +48,7 @@ def clip_table(fits):
     for clip, fit in fits.items():
         material, given = fit["material"], lifts.CLIPS[clip]
         best = material["best"]
-        rows.append([clip, mm(best["score"]), given["independent"], str(given.get("floor", "-")), material["grasp"],
+        rows.append([clip, mm(best["score_on_mesh"]), given["independent"], str(given.get("floor", "-")), material["grasp"],
                      f"{best['parameters']['start_yaw']:.2f}", number(best["parameters"]["bending"]),
                      finding_text(material, "bending"), finding_text(material, "young"),
                      f"{material['unconverged']} of {material['candidates']}"])
@@ -65,7 +65,7 @@ def lift_tables(results):
         offset = " / ".join(mm(x, 0) for x in recording["offset"])
         offsets.append([clip, offset, f"{recording['yaw']:.3f}", f"{1000 * recording['time_offset']:.0f}",
                         "; ".join(w.split(": ", 1)[1] for w in material["warnings"] if "at its bound" in w) or "-"])
-        shapes.append([clip, *(mm(fit["shapes"][s]["best"]["score"]) if s in fit["shapes"] else "-"
+        shapes.append([clip, *(mm(fit["shapes"][s]["best"]["score_on_mesh"]) if s in fit["shapes"] else "-"
                                for s in lifts.GRASPS),
                        ", ".join(f"{value:+.2f}: {mm(score, 1)}" for value, score in
                                  lifts.profile(fit["shapes"][material["grasp"]]["rows"], "start_yaw"))])
@@ -73,7 +73,7 @@ def lift_tables(results):
     for pair, (first, second) in lifts.PAIRS.items():
         for source, target, found in ((first, second, pairs[pair]["there"]), (second, first, pairs[pair]["back"])):
             cross.append([source, target, mm(found["predicted"]["score"]),
-                          mm(fits[target]["material"]["best"]["score"]), mm(found["median"]["score"])])
+                          mm(fits[target]["material"]["best"]["score_on_mesh"]), mm(found["median"]["score"])])
     joint = [[pair, number(search["best"]["parameters"]["bending"]), finding_text(search, "bending"),
               " / ".join(mm(recording["score"]) for recording in search["recordings"])]
              for pair, search in ((pair, pairs[pair]["joint"]) for pair in lifts.PAIRS)]
@@ -98,7 +98,7 @@ def fold_table(fold):
 def limits_table(limits):
     rows = []
     for clip, found in limits.items():
-        best = found["search"]["best"]["score"]
+        best = found["search"]["best"]["score_on_mesh"]
         pierced = [frame for frame, count in found["piercings"].items() if count > 0]
         rows += [
             [clip, "as fitted", mm(best)],
@@ -129,7 +129,7 @@ def twin_table(fits):
         nominal, noise = twins.TWINS[twin]
         finding = search["parameters"]["bending"]
         rows.append([twin, model, pattern, number(finding["estimate"]), f"{finding['estimate'] / nominal:.2f}",
-                     finding_text(search, "bending"), mm(search["best"]["score"]), mm(twins.trimmed_noise(noise))])
+                     finding_text(search, "bending"), mm(search["best"]["score_on_mesh"]), mm(twins.trimmed_noise(noise))])
     return table(["recording", "bending model", "diagonals", "D N m", "D / nominal", "95 % of D", "residual mm",
                   "of noise alone mm"], rows)
 
