@@ -59,7 +59,8 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   for (const std::string& notice : recording.notices) say(options.common, notice);
   const std::string path = (fs::path(settings.out) / "recording.json").string();
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"recording", path},
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-import/1"},
+                                        {"recording", path},
                                         {"keyframes", recording.keyframes.size()},
                                         {"notices", recording.notices}}
                      .dump(2)
@@ -85,7 +86,8 @@ void add_import_verb(CLI::App& app, Action& action) {
           ->excludes(clouds);
   verb->add_option("--masks", settings.masks, "Folder of masks of the same names")->needs(depth);
   verb->add_option("--intrinsics", settings.intrinsics, "camera_info or OpenCV YAML")->needs(depth);
-  verb->add_option("--extrinsics", settings.extrinsics, "T_base_camera: flash-extrinsics/1, or a TUM file")
+  verb->add_option("--extrinsics", settings.extrinsics,
+                   "T_base_camera: the extrinsics of flash-calib, or a TUM file")
       ->needs(depth);
   verb->add_option("--depth-scale", settings.depth_scale, "Metres a count")
       ->check(positive_number())

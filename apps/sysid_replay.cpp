@@ -122,6 +122,7 @@ void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, 
 nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const sysid::ReplayResult& motion) {
   const sysid::RecordingScore& recording = result.recordings.front();
   nlohmann::ordered_json json;
+  json["schema"] = "flash-sysid-replay/1";
   json["score"] = result.score;
   json["converged"] = result.converged;
   json["unconverged_share"] = motion.unconverged_share;

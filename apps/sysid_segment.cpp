@@ -121,18 +121,15 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
   check_places(views, options.out);
   const sysid::SegmentedFolder segmented =
       sysid::segment_folder(views, times_of(options, views.front().files.size()), settings, options.out);
-  for (const std::string& warning : segmented.warnings) warn(warning);
+  for (const std::string& warning : segmented.warnings) warn(warning);  // those of the cameras too
 
   std::size_t points = 0;
   for (const sysid::Segmentation& frame : segmented.frames)
     points += static_cast<std::size_t>(frame.cloth.rows());
-  std::vector<std::string> warnings;
-  for (const sysid::RawView& view : views)
-    warnings.insert(warnings.end(), view.warnings.begin(), view.warnings.end());
-  for (const std::string& warning : warnings) warn(warning);
   const std::string picture = (fs::path(options.out) / segmented.picture).string();
   if (options.common.json) {
-    nlohmann::ordered_json json = {{"clouds", segmented.clouds},
+    nlohmann::ordered_json json = {{"schema", "flash-sysid-segment/1"},
+                                   {"clouds", segmented.clouds},
                                    {"picture", picture},
                                    {"points", points},
                                    {"table", nullptr},
@@ -183,7 +180,7 @@ void add_segment_verb(CLI::App& app, Action& action) {
       "--intrinsics", options->intrinsics,
       "camera_info or OpenCV YAML, one a view or one for all; without it camera_info.yaml there");
   verb->add_option("--extrinsics", options->extrinsics,
-                   "T_base_camera, one a view: flash-extrinsics/1, or a TUM file; without it "
+                   "T_base_camera, one a view: the extrinsics of flash-calib, or a TUM file; without it "
                    "extrinsics.json or .tum there");
   verb->add_option("--depth-scale", options->depth_scales,
                    "Metres a count, one a view or one for all; without it 0.001")

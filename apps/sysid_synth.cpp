@@ -132,7 +132,8 @@ int run_synth(SynthOptions options) {
   Eigen::Index points = 0;
   for (const data::Points& cloud : synthetic.clouds) points += cloud.rows();
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"recording", options.out},
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
+                                        {"recording", options.out},
                                         {"truth", truth},
                                         {"keyframes", synthetic.clouds.size()},
                                         {"points", points},
