@@ -24,7 +24,7 @@ help:  ## This list
 
 demo: configure  ## Packages, build, then the main job on a recording it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
-	$(sysid) synth --asset examples/towel.json --set bending=1.5e-4 --kind corner_lift --seed 1 --force -o $(DEMO)/recording
+	$(sysid) synth --asset examples/towel.json --hold bending=1.5e-4 --kind corner_lift --seed 1 --force -o $(DEMO)/recording
 	$(sysid) grid $(DEMO)/recording --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \

@@ -25,8 +25,7 @@ struct FitOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::string start;
-  std::vector<std::string> freeze;
-  FixedTexts fixed;
+  std::vector<std::string> holds;
   double repeatability = 0;  ///< [m]; 0: not given
   bool no_solver_check = false;
   bool no_horizon = false;
@@ -42,53 +41,66 @@ struct Start {
   sysid::Extent around;
 };
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-// A parameter that was not searched stays as it was in the search.
-void hold(const std::string& name, const sysid::Summary& found, std::vector<sysid::Axis>& fixed) {
-  const auto value = found.best.find(name);
+// "friction=0.3", or a name alone: where the search found the parameter, or held it.
+sysid::Hold hold_of(const std::string& text, const sysid::Summary& found) {
+  if (text.find('=') != std::string::npos) return sysid::parse_hold(text);
+  sysid::check_parameter("--hold " + text, text);
+  const auto value = found.best.find(text);
   if (value == found.best.end())
-    sysid::check_parameter("--freeze " + name, name);
-  else if (std::none_of(fixed.begin(), fixed.end(),
-                        [&](const sysid::Axis& axis) { return axis.name == name; }))
-    fixed.push_back({name, {value->second}, false});
+    throw data::InputError("--hold " + text + ": the search neither found nor held it, expected " + text +
+                           "=value");
+  const auto fixed = found.fixed.find(text);
+  return {{text, {value->second}, false}, fixed != found.fixed.end() && fixed->second.source == "measured"};
 }
 
-// Frozen parameters stay where the search found them.
+// What the search held stays held, unless it is said otherwise, and what it found is where the fit begins.
 Start start_of(const FitOptions& options, const sysid::SearchFolder& search) {
   const sysid::Summary& found = search.summary;
-  Start start;
-  start.grid.fixed = parse_fixed(options.fixed);
-  const auto is_fixed = [&](const std::string& name) {
-    return std::any_of(start.grid.fixed.begin(), start.grid.fixed.end(),
-                       [&](const sysid::Axis& axis) { return axis.name == name; });
+  std::vector<sysid::Hold> holds;
+  const auto is_held = [&](const std::string& name) {
+    return std::any_of(holds.begin(), holds.end(),
+                       [&](const sysid::Hold& hold) { return hold.axis.name == name; });
   };
+  for (const std::string& text : options.holds) {
+    sysid::Hold hold = hold_of(text, found);
+    if (is_held(hold.axis.name))
+      throw data::InputError("--hold " + hold.axis.name + ": given twice, expected one value");
+    holds.push_back(std::move(hold));
+  }
   for (const auto& [name, fixed] : found.fixed)
-    if (!is_fixed(name) && fixed.source == "measured")
-      start.grid.fixed.push_back({name, {fixed.value}, false});
-  std::vector<std::string> searched;
-  for (const sysid::ParameterFinding& finding : found.parameters) {
-    searched.push_back(finding.name);
-    if (is_fixed(finding.name)) continue;
-    const double value = finding.estimate.value_or(found.best.at(finding.name));
-    if (contains(options.freeze, finding.name)) {
-      start.grid.fixed.push_back({finding.name, {value}, false});
+    if (!is_held(name) && fixed.source == "measured") holds.push_back({{name, {fixed.value}, false}, true});
+  Start start;
+  for (const sysid::Axis& axis : search.results.axes) {
+    if (is_held(axis.name)) continue;
+    if (axis.values.size() == 1) {
+      holds.push_back({axis, false});
       continue;
     }
-    const auto axis = std::find_if(search.results.axes.begin(), search.results.axes.end(),
-                                   [&](const sysid::Axis& each) { return each.name == finding.name; });
-    start.grid.axes.push_back(*axis);
-    start.values.push_back(value);
+    const auto finding =
+        std::find_if(found.parameters.begin(), found.parameters.end(),
+                     [&](const sysid::ParameterFinding& each) { return each.name == axis.name; });
+    start.grid.axes.push_back(axis);
+    start.values.push_back(finding->estimate.value_or(found.best.at(axis.name)));
     start.around.push_back(
-        finding.interval95.value_or(std::array{finding.values.front(), finding.values.back()}));
+        finding->interval95.value_or(std::array{finding->values.front(), finding->values.back()}));
   }
-  for (const std::string& name : options.freeze)
-    if (!contains(searched, name)) hold(name, found, start.grid.fixed);
-  if (start.grid.axes.empty()) throw data::InputError("--freeze, --fix: no parameter is left to fit");
+  if (start.grid.axes.empty()) throw data::InputError("--hold: no parameter is left to fit");
+  add_holds(holds, start.grid);
+  for (std::size_t k = start.values.size(); k < start.grid.axes.size(); ++k) {
+    const double value = start.grid.axes[k].values.front();
+    start.values.push_back(value);
+    start.around.push_back({value, value});
+  }
   start.grid.score = score_settings(options.replay);
   return start;
+}
+
+// Axes of one value, and constants.
+std::vector<sysid::Axis> held_axes(const sysid::GridSettings& grid) {
+  std::vector<sysid::Axis> held = grid.fixed;
+  for (const sysid::Axis& axis : grid.axes)
+    if (axis.values.size() == 1) held.push_back(axis);
+  return held;
 }
 
 // "sheet:0.2x0.2:0.02 (121 vertices)".
@@ -135,7 +147,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     names.push_back(recording.name);
   }
   std::vector<std::string> notices;
-  grid.base = material_base(asset, replays.front().sheet().rest, notices, grid.fixed);
+  grid.base = material_base(asset, replays.front().sheet().rest, notices, held_axes(grid));
   // One store of motions for the search and what goes on from it.
   grid.rollouts =
       options.rollouts.empty() ? (fs::path(options.start) / "motions").string() : options.rollouts;
@@ -177,10 +189,10 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
   verb->add_option("--start", options->start, "Folder of the search to start from")->required();
   verb->add_option("--asset", options->asset, "The object; without one, that of the search");
-  verb->add_option("--freeze", options->freeze,
-                   "Parameters that stay where the search found them, or held them")
-      ->delimiter(',');
-  add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3");
+  add_hold_option(
+      *verb, options->holds,
+      "Hold a parameter, as friction=0.3 where that is assumed, friction=0.3:measured where it is "
+      "known, or poisson where the search found or held it");
   verb->add_option("--repeatability", options->repeatability, "Trial-to-trial distance of a keyframe [m]")
       ->check(positive_number());
   verb->add_flag("--no-solver-check", options->no_solver_check,
@@ -195,7 +207,7 @@ void add_fit_verb(CLI::App& app, Action& action) {
   add_common_options(*verb, options->common);
   verb->footer(
       "Exit code 3: the answer cannot be used, for the reason that is said.\n"
-      "Example:\n  flash-sysid fit lift --start run --freeze poisson -o fitted");
+      "Example:\n  flash-sysid fit lift --start run --hold poisson -o fitted");
   verb->callback([verb, options, &action] { action = [verb, options] { return run_fit(*verb, *options); }; });
 }
 

@@ -110,10 +110,10 @@ void check(const SynthSettings& settings) {
   within("--rest", settings.rest, 0, kLongest, " s");
   within("--rate", settings.keyframe_rate, 1e-6, kMostKeyframes / (settings.duration + settings.rest),
          " keyframes a second");
-  within("--time-offset", settings.time_offset, -kFarthest, kFarthest, " s");
+  within("--time-offset-error", settings.time_offset, -kFarthest, kFarthest, " s");
   within("--noise", settings.depth_noise, 0, kFarthest, " m");
   for (int k = 0; k < 3; ++k) {
-    within("--offset", settings.cloud_offset[k], -kFarthest, kFarthest, " m");
+    within("--offset-error", settings.cloud_offset[k], -kFarthest, kFarthest, " m");
     if (settings.displacement)
       within("--displacement", (*settings.displacement)[k], -kFarthest, kFarthest, " m");
     for (const SynthCamera& camera : settings.cameras)

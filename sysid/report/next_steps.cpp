@@ -20,7 +20,8 @@ const std::map<std::string, std::string>& telling_experiments() {
       {"friction",
        "Drag the sheet over the table, or tilt the table until it slides: both tell friction directly."},
       {"areal_density",
-       "Weigh the sheet and pass --fix areal_density=...: motion tells stiffness over weight only."},
+       "Weigh the sheet and pass --hold areal_density=...:measured: motion determines stiffness over weight "
+       "only."},
       {"air_drag", "Record a hanging sheet that swings to rest: it tells air drag."},
       {"stiffness_damping", "Record a hanging sheet that swings to rest: it tells damping."}};
   return experiments;

@@ -38,7 +38,7 @@ std::map<std::string, double> parameters_of(const data::SheetMaterial& material,
           {"stiffness_damping", material.stiffness_damping}};
 }
 
-// What was held, and on whose word: `--fix` is a measurement, the asset an assumption.
+// What was held, and on whose word: a measurement, or an assumption of the command line or the asset.
 std::map<std::string, FixedParameter> fixed_of(const Summary& summary, const GridSettings& settings) {
   std::map<std::string, FixedParameter> fixed;
   for (const Axis& axis : settings.fixed) fixed[axis.name] = {axis.values.front(), "measured"};

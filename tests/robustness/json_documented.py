@@ -90,7 +90,7 @@ def outputs(options, folder):
             ([options.sysid, "report", folder / "run"], (0,)),
             ([options.sysid, "export", folder / "run", "-o", folder / "tuned.json"], (0, 3)),
             ([options.sysid, "import", recording / "frames", "--trajectory", recording / "gripper.tum", "--times", "rate:10",
-              "--sheet", "0.2x0.2", "--within", "0.03", "-o", folder / "imported"], (0,)),
+              "--mesh", "sheet:0.2x0.2:0.01", "--grasp-within", "0.03", "-o", folder / "imported"], (0,)),
             ([options.sim, "run", folder / "scene.json", "-o", folder / "out"], (0,)),
             ([options.sim, "bench", "--vertices", "20", "--envs", "1", "--steps", "2"], (0,)),
             ([options.calib, "validate", folder / "stands.samples", "--extrinsics", folder / "camera.json"], (0,)),

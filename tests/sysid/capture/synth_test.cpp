@@ -144,7 +144,7 @@ TEST(Answer, FindsTheTruthOfASyntheticLift) {
   GridSettings grid;
   grid.base.material = stiff_towel();
   grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log")};
-  grid.fixed = {parse_fixed("friction=0.3")};
+  grid.fixed = {parse_hold("friction=0.3").axis};
   grid.rollouts = folder / "motions";
   ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), Existing::refuse);
   ASSERT_TRUE(grid_search(replays, grid, store));
