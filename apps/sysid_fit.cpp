@@ -109,6 +109,23 @@ std::string mesh_of(const sysid::Summary& found) {
   return mesh == found.settings.end() ? "" : mesh->second.substr(0, mesh->second.rfind(" ("));
 }
 
+// What differs from the search, whose grasps, times and tolerances are not taken over by themselves.
+std::vector<std::string> other_settings(const std::string& start, const sysid::Fingerprint& print) {
+  const sysid::GridFile search = sysid::load_grid_file((fs::path(start) / "grid.json").string());
+  std::vector<std::string> lines;
+  for (const auto& [name, value] : search.fingerprint.value_or(sysid::Fingerprint())) {
+    const auto here = print.find(name);
+    if (here == print.end() || here->second == value || name.starts_with("ax") || name.starts_with("fixed"))
+      continue;
+    // Data stand there as hashes.
+    lines.push_back(
+        name.starts_with("recording")
+            ? name + ": not those of the search (--grasp-shape, --from and the like are not taken over)"
+            : name + ": found " + here->second + ", the search had " + value);
+  }
+  return lines;
+}
+
 // The folder is free, or --resume goes on with what it holds.
 void check_out(const FitOptions& options) {
   if (options.resume && options.common.force)
@@ -172,7 +189,9 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
         [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
   }
   end_after_signal();
-  sysid::ResultsStore store(options.out, grid.axes, names, sysid::fingerprint(replays, grid),
+  const sysid::Fingerprint print = sysid::fingerprint(replays, grid);
+  for (const std::string& line : other_settings(options.start, print)) warn(line);
+  sysid::ResultsStore store(options.out, grid.axes, names, print,
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace
                                                    : sysid::Existing::refuse);

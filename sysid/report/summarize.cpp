@@ -252,6 +252,9 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     summary.warnings.push_back(warning);
   summary.warnings.insert(summary.warnings.end(), answer.warnings.begin(), answer.warnings.end());
   summary.solver_check = answer.checks;
+  if (!asked.solver_check)
+    summary.warnings.emplace_back(
+        "no finer solution was asked for: how far mesh, step and iterations move the answer is not known");
   summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
   if (const std::string reason = reason_unusable(summary, estimate); !reason.empty()) {

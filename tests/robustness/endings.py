@@ -320,6 +320,10 @@ def check_fit(options, folder):
     for verb, more in (("report", ["-o", folder / "fitted.html"]), ("export", ["--asset", asset, "-o", folder / "fitted.json"])):
         done = program.call(options.sysid, verb, folder / "fitted", *more, "--quiet")
         yield done.returncode == fit["exit_code"] * (verb == "export"), f"{verb} of a fit: {done.returncode}: {done.stderr}"
+    yield "not those of the search" not in done.stderr and "the search had" not in done.stderr, f"fit: {done.stderr}"
+    done = program.call(*line, "--from", "0.2", "--time-step", "0.02", "-o", folder / "later")
+    yield ("recording recording keyframes: not those of the search" in done.stderr and
+           "time_step_s: found 0.02, the search had 0.01" in done.stderr, f"fit --from: {done.stderr}")
     done = program.call(*line, "--hold", "poison", "-o", folder / "other")
     yield done.returncode == REFUSED and 'did you mean "poisson"' in done.stderr, f"fit --hold poison: {done.stderr}"
 
