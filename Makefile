@@ -22,10 +22,14 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
-demo: configure  ## Packages, build, then the main job on a recording it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
+demo: configure  ## Packages, build, then the main job on depth frames it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
-	$(sysid) synth --asset examples/towel.json --hold bending=1.5e-4 --kind corner_lift --seed 1 --force -o $(DEMO)/recording
-	$(sysid) grid $(DEMO)/recording --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
+	$(sysid) synth --asset examples/towel.json --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
+	$(sysid) segment $(DEMO)/recording/camera1 --trajectory $(DEMO)/recording/gripper.tum --times rate:10 --force -o $(DEMO)/segmented
+	$(sysid) import $(DEMO)/segmented/frames --trajectory $(DEMO)/recording/gripper.tum --times rate:10 \
+	  --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 --table-z 0 --crop-z 0.008: \
+	  --offset-bound 0.005 --force -o $(DEMO)/lift
+	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
 	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \

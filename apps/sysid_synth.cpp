@@ -117,9 +117,12 @@ int run_synth(SynthOptions options) {
   options.solver.stop = &stop_on_signals();
   sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
   end_after_signal();
-  if (options.common.force)  // what makes a folder a recording goes first
+  if (options.common.force) {  // what makes a folder a recording goes first
     for (const char* old : {"recording.json", "truth.json", "camera_info.yaml", "frames"})
       fs::remove_all(fs::path(options.out) / old);
+    const auto camera = [&](int c) { return fs::path(options.out) / ("camera" + std::to_string(c)); };
+    for (int c = 1; fs::exists(camera(c) / "depth"); ++c) fs::remove_all(camera(c));
+  }
   sysid::save_synthetic(synthetic, options.out);
   const std::string truth =
       options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
@@ -196,6 +199,8 @@ void add_synth_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_flag("--clamp-slopes", synth.clamp_slopes,
                  "The grasped patch does not bend: it holds the sheet's slope as well as its place");
+  verb->add_flag("--raw", synth.raw,
+                 "Write what the cameras see, table and gripper included, to cameraN/depth, as for segment");
   verb->add_flag("--forces", synth.forces, "Record the gripper's force too");
   verb->add_flag("--no-gripper", options->no_gripper, "The gripper hides no cloth from the cameras");
   verb->add_option("--time-step", options->solver.time_step, "Time step of the simulation [s]")

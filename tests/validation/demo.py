@@ -14,7 +14,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 def commands(sysid, out):
     target = re.search(r"^demo:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE).group(1)
-    lines = [line for line in target.splitlines() if "$(sysid)" in line]
+    lines = [line for line in target.replace("\\\n", " ").splitlines() if "$(sysid)" in line]
     return [shlex.split(line.strip().replace("$(sysid)", sysid).replace("$(DEMO)", str(out))) for line in lines]
 
 
