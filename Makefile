@@ -54,11 +54,11 @@ bench: packages-build packages-test packages-bench  ## Packages, build, then the
 configure-test: packages-build packages-test
 	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=ON $(CMAKE_ARGS)
 
-validate: reference configure-test  ## Calibrate and fit what is in $(DATA), renew docs/validation.md; ONLY=handeye, lift_navy, ...
+validate: reference configure-test  ## Calibrate and fit what is in $(DATA), renew docs/validation/; ONLY=handeye, lift_navy, ...
 	cmake --build $(BUILD) -j $(JOBS) --target hand_eye_study
 	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --calib $(BUILD)/bin/flash-calib --sim $(BUILD)/bin/flash-sim \
 	  --hand-eye-study $(BUILD)/tests/hand_eye_study --data $(DATA) --scenes $(REFERENCE)/scenes \
-	  --results $(BUILD)/reference --out $(BUILD)/validation --document docs/validation.md $(if $(ONLY),--only $(ONLY)) $(if $(TWINS),--twins $(TWINS))
+	  --results $(BUILD)/reference --out $(BUILD)/validation --documents docs/validation $(if $(ONLY),--only $(ONLY)) $(if $(TWINS),--twins $(TWINS))
 
 routes: configure-test  ## Say whether every route to an answer gives the same one, on a strip of known truth
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid

@@ -1,4 +1,5 @@
 """Results as Markdown tables, and their place in the document."""
+import csv
 import math
 import re
 
@@ -6,15 +7,28 @@ import lifts
 import twins
 
 
-def replace_tables(document, tables):
-    """Puts each table between its `<!-- name -->` and the next `<!-- end -->`."""
-    text = document.read_text()
+def replace_tables(folder, tables):
+    """Puts each table between its `<!-- name -->` and the next `<!-- end -->` of a chapter, or into name.csv where that is there."""
+    chapters = {path: path.read_text() for path in sorted(folder.glob("*.md"))}
     for name, table in tables.items():
-        text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda m: m[1] + table + m[2], text,
-                              flags=re.DOTALL)
-        if count != 1:
-            raise SystemExit(f"validate: {document}: {count} places for the table {name}, expected one")
-    document.write_text(text)
+        if (folder / f"{name}.csv").exists():
+            write_csv(folder / f"{name}.csv", table)
+            continue
+        places = 0
+        for path, text in chapters.items():
+            chapters[path], count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda m: m[1] + table + m[2], text,
+                                            flags=re.DOTALL)
+            places += count
+        if places != 1:
+            raise SystemExit(f"validate: {folder}: {places} places for the table {name}, expected one")
+    for path, text in chapters.items():
+        path.write_text(text)
+
+
+def write_csv(path, table):
+    with path.open("w", newline="") as file:
+        header, _, *rows = [line[2:-2].split(" | ") for line in table.splitlines()]
+        csv.writer(file, lineterminator="\n").writerows([header, *rows])
 
 
 def table(header, rows):
