@@ -22,10 +22,14 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
 
-demo: configure  ## Packages, build, then the main job on a recording it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
+demo: configure  ## Packages, build, then the main job on depth frames it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
-	$(sysid) synth --asset examples/towel.json --set bending=1.5e-4 --kind corner_lift --seed 1 --force -o $(DEMO)/recording
-	$(sysid) grid $(DEMO)/recording --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
+	$(sysid) synth --asset examples/towel.json --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
+	$(sysid) segment $(DEMO)/recording/camera1 --trajectory $(DEMO)/recording/gripper.tum --times rate:10 --force -o $(DEMO)/segmented
+	$(sysid) import $(DEMO)/segmented/frames --trajectory $(DEMO)/recording/gripper.tum --times rate:10 \
+	  --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 --table-z 0 --crop-z 0.008: \
+	  --offset-bound 0.005 --force -o $(DEMO)/lift
+	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
 	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \
@@ -50,11 +54,11 @@ bench: packages-build packages-test packages-bench  ## Packages, build, then the
 configure-test: packages-build packages-test
 	cmake -G Ninja -S . -B $(BUILD) -DCMAKE_BUILD_TYPE=Release -DFLASH_TESTS=ON $(CMAKE_ARGS)
 
-validate: reference configure-test  ## Calibrate and fit what is in $(DATA), renew docs/validation.md; ONLY=handeye, lift_navy, ...
+validate: reference configure-test  ## Calibrate and fit what is in $(DATA), renew docs/validation/; ONLY=handeye, lift_navy, ...
 	cmake --build $(BUILD) -j $(JOBS) --target hand_eye_study
 	$(PYTHON) tests/validation/validate.py --sysid $(sysid) --calib $(BUILD)/bin/flash-calib --sim $(BUILD)/bin/flash-sim \
 	  --hand-eye-study $(BUILD)/tests/hand_eye_study --data $(DATA) --scenes $(REFERENCE)/scenes \
-	  --results $(BUILD)/reference --out $(BUILD)/validation --document docs/validation.md $(if $(ONLY),--only $(ONLY)) $(if $(TWINS),--twins $(TWINS))
+	  --results $(BUILD)/reference --out $(BUILD)/validation --documents docs/validation $(if $(ONLY),--only $(ONLY)) $(if $(TWINS),--twins $(TWINS))
 
 routes: configure-test  ## Say whether every route to an answer gives the same one, on a strip of known truth
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid

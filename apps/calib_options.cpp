@@ -20,7 +20,7 @@ void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options, const
   group.add_flag("--verbose", options.verbose, "Print every notice, and the time of each part")
       ->excludes(quiet);
   group.add_flag("--force", options.force, force);
-  group.add_option("--threads", options.threads, "0: one a processor")
+  group.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
       ->check(thread_number())
       ->capture_default_str();
 }
@@ -46,7 +46,7 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   group.add_option("--tip-link", choice.tip_link, "Link of the URDF that is the gripper")->needs(robot);
   group.add_option("--camera", choice.camera,
                    "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain, JSON, npz");
-  group.add_option("--depth-scale", choice.depth_scale, "Metres a count of the depth pictures")
+  group.add_option("--depth-scale", choice.depth_scale, "Metres per count of the depth pictures")
       ->check(positive_number())
       ->capture_default_str();
   group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");

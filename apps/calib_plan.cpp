@@ -94,31 +94,29 @@ void add_plan_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<PlanOptions>();
   CLI::App* verb = app.add_subcommand("plan", "The next robot poses that would help the calibration most");
   add_dataset_options(*verb, options->dataset);
-  verb->add_option("--setup", options->setup, "Where the dataset does not say")
+  verb->add_option("--setup", options->setup, "eye-in-hand or eye-to-hand, where the dataset does not say")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
-  verb->add_option("--poses", options->settings.poses, "How many")
+  verb->add_option("--count", options->settings.poses, "Number of poses to propose")
       ->check(whole_number(1, 100))
       ->capture_default_str();
-  verb->add_option("--lower", options->lower, "Least x y z of the gripper in the base [m]")
-      ->expected(3)
-      ->check(any_number());
-  verb->add_option("--upper", options->upper, "Greatest x y z of the gripper in the base [m]")
-      ->expected(3)
-      ->check(any_number());
-  verb->add_option("--reach", options->settings.reach, "Beyond the poses used, where the bounds allow [m]")
+  add_vector_option(*verb, "--lower", options->lower, "Least x,y,z of the gripper in the base [m]");
+  add_vector_option(*verb, "--upper", options->upper, "Greatest x,y,z of the gripper in the base [m]");
+  verb->add_option("--reach", options->settings.reach,
+                   "How far beyond the poses used, where the bounds allow [m]")
       ->check(number_from(0))
       ->capture_default_str();
   verb->add_option("--criterion", options->criterion,
                    "trace: sum of variances; determinant: volume of the region")
       ->check(CLI::IsMember({"trace", "determinant"}))
       ->capture_default_str();
-  verb->add_option("--seed", options->settings.seed, "Of the candidates")->capture_default_str();
+  verb->add_option("--seed", options->settings.seed, "Random seed of the candidate poses")
+      ->capture_default_str();
   verb->add_flag("--no-depth", options->dataset.no_depth, "Leave depth pictures out");
   verb->add_option("-o,--out", options->out, "File for the plan, JSON");
   add_calib_common_options(*verb, options->common);
   verb->footer(
       "Example:\n"
-      "  flash-calib plan wrist --target chessboard:9x6:0.025 --lower 0.2 -0.4 0.1 --upper 0.7 0.4 0.6 -o "
+      "  flash-calib plan wrist --target chessboard:9x6:0.025 --lower 0.2,-0.4,0.1 --upper 0.7,0.4,0.6 -o "
       "next.json");
   verb->callback([options, &action] { action = [options] { return run_plan(*options); }; });
 }

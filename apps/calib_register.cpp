@@ -213,17 +213,17 @@ void add_register_verb(CLI::App& app, Action& action) {
   verb->add_option("calibrations", options->calibrations,
                    "Extrinsics of two or more arms, eye-to-hand on one camera that stands still");
   verb->add_option("--cameras", options->cameras, "Datasets of one arm seen by several cameras");
-  verb->add_option("--target", options->target, "In place of what the datasets of --cameras say");
-  verb->add_option("--setup", options->setup, "Likewise")
+  verb->add_option("--target", options->target, "Target, in place of what the datasets of --cameras say");
+  verb->add_option("--setup", options->setup,
+                   "eye-in-hand or eye-to-hand, where the datasets of --cameras do not say")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
-  verb->add_option("--workspace", options->workspace,
-                   "Point in the first base where the uncertainty is stated [m]")
-      ->expected(3)
-      ->check(any_number());
+  add_vector_option(*verb, "--workspace", options->workspace,
+                    "Point in the first base where the uncertainty is stated [m]");
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
   add_lens_options(*verb, options->lens);
   add_target_size_options(*verb, options->target_size_sd);
-  verb->add_option("--depth-scale", options->depth_scale, "Metres a count of the depth pictures of --cameras")
+  verb->add_option("--depth-scale", options->depth_scale,
+                   "Metres per count of the depth pictures of --cameras")
       ->check(positive_number())
       ->capture_default_str();
   verb->add_flag("--no-depth", options->no_depth, "Leave depth pictures out");
@@ -232,7 +232,7 @@ void add_register_verb(CLI::App& app, Action& action) {
   add_calib_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
       "Examples:\n"
-      "  flash-calib register left.json right.json --workspace 0.4 0 0.1 -o cell.json\n"
+      "  flash-calib register left.json right.json --workspace 0.4,0,0.1 -o cell.json\n"
       "  flash-calib register --cameras camera1 camera2 camera3 -o cell.json");
   verb->callback([options, &action] { action = [options] { return run_register(*options); }; });
 }

@@ -99,7 +99,7 @@ nlohmann::ordered_json cloud_json(const calib::CloudCheck& clouds) {
 
 nlohmann::ordered_json result_json(const ValidateOptions& options, const std::vector<std::string>& warnings,
                                    const calib::ProjectionCheck& check, bool pixels,
-                                   const std::optional<calib::CloudCheck>& clouds) {
+                                   const std::optional<calib::CloudCheck>& clouds, int exit_code) {
   nlohmann::ordered_json json;
   json["schema"] = "flash-validation/1";
   json["extrinsics"] = options.extrinsics;
@@ -118,7 +118,8 @@ nlohmann::ordered_json result_json(const ValidateOptions& options, const std::ve
                              {"mm", view.mm},
                              {"deg", view.deg}});
   if (clouds) json["clouds"] = cloud_json(*clouds);
-  json["warnings"] = warnings;  // of the calibration
+  json["warnings"] = warnings;
+  json["exit_code"] = exit_code;
   return json;
 }
 
@@ -163,14 +164,21 @@ int run_validate(const ValidateOptions& options) {
   if (options.refit_target) poses.Z = refitted;
   const calib::ProjectionCheck check = check_with(poses.Z);
   // Ten times better at another place: it is the target that has moved, not the camera.
-  if (!options.refit_target && check.mm_rms > 5 && 10 * check_with(refitted).mm_rms < check.mm_rms)
-    warn_calib(
-        "the target is not where it was at the calibration; --refit-target takes its place from these views");
+  const bool moved =
+      !options.refit_target && check.mm_rms > 5 && 10 * check_with(refitted).mm_rms < check.mm_rms;
+  std::vector<std::string> warnings = extrinsics.warnings;
+  if (moved) {
+    warnings.insert(warnings.begin(),
+                    "the target is not where it was at the calibration: this proves nothing; --refit-target "
+                    "takes its place from these views");
+    warn_calib(warnings.front());
+  }
+  const int exit_code = moved || !extrinsics.usable ? exit_unusable : exit_done;
 
   const std::optional<calib::CloudCheck> clouds =
       pairs ? std::nullopt : check_clouds(dataset, extrinsics, views, check);
   const std::string text =
-      data::format_json(result_json(options, extrinsics.warnings, check, !pairs, clouds)) + '\n';
+      data::format_json(result_json(options, warnings, check, !pairs, clouds, exit_code)) + '\n';
   if (!options.out.empty()) {
     data::write_atomically((fs::path(options.out) / "validation.json").string(), text);
     draw_views(views, check, options.out);
@@ -183,7 +191,7 @@ int run_validate(const ValidateOptions& options) {
     std::cout << text;
   else
     print_table(check, clouds);
-  return exit_done;
+  return exit_code;
 }
 
 }  // namespace
@@ -200,6 +208,7 @@ void add_validate_verb(CLI::App& app, Action& action) {
   verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");
   add_calib_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
+      "Exit code 3: the target has moved since the calibration, or the calibration cannot be used.\n"
       "Example:\n"
       "  flash-calib validate another_recording --target chessboard:9x6:0.025 --extrinsics camera.json -o "
       "checked");

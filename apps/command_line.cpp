@@ -13,6 +13,7 @@
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <map>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -160,17 +161,49 @@ data::InputError wrong_config(const CLI::App& app, const CLI::ConfigError& error
   return data::InputError(file + ": " + text + ": unknown option or section (see --help)");
 }
 
+/// What an option was called in earlier versions, or is called by other tools: the first name that the verb
+/// has is what is meant.
+std::string present_name(const std::string& word, const std::vector<std::string>& known) {
+  static const std::map<std::string, std::vector<std::string>> kNames = {
+      {"--fix", {"--hold"}},
+      {"--set", {"--hold"}},
+      {"--freeze", {"--hold"}},
+      {"--within", {"--grasp-within"}},
+      {"--shape", {"--grasp-shape"}},
+      {"--offset", {"--offset-bound", "--offset-error"}},
+      {"--yaw", {"--yaw-bound"}},
+      {"--clock", {"--time-offset-bound", "--time-offset-error", "--time-offset"}},
+      {"--time-offset", {"--time-offset-bound", "--time-offset-error"}},
+      {"--start-yaw", {"--start-yaw-bound"}},
+      {"--table-error", {"--table-height-bound"}},
+      {"--table-height", {"--table-z"}},
+      {"--sheet", {"--mesh"}},
+      {"--cell", {"--mesh"}},
+      {"--rate", {"--times"}},
+      {"--crop-min", {"--crop-x"}},
+      {"--crop-max", {"--crop-x"}}};
+  const auto found = kNames.find(word);
+  if (found == kNames.end()) return "";
+  for (const std::string& name : found->second)
+    if (std::find(known.begin(), known.end(), name) != known.end()) return name;
+  return "";
+}
+
 /// What CLI11 found wrong with the command line; for a long option that the verb does not have, the nearest.
 std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
   std::vector<std::string> known;
   for (const CLI::App* verb : app.get_subcommands()) collect_options(*verb, known);
-  for (int i = 2; i < argc && dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr; ++i) {
+  // What was misspelt may be what is missing.
+  const bool of_names = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr ||
+                        dynamic_cast<const CLI::RequiredError*>(&error) != nullptr;
+  for (int i = 2; i < argc && of_names; ++i) {
     const std::string word(argv[i], std::strcspn(argv[i], "="));
     if (!word.starts_with("--") || std::find(known.begin(), known.end(), word) != known.end()) continue;
     if (word == "--config" && app.get_config_ptr() != nullptr)
       return "--config: found after the verb, expected before it, as " + app.get_name() + " --config FILE " +
              argv[1];
-    const std::string nearest = data::nearest_name(word, known);
+    const std::string present = present_name(word, known);
+    const std::string nearest = present.empty() ? data::nearest_name(word, known) : present;
     return word + ": unknown option" +
            (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)");
   }

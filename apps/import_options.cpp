@@ -45,27 +45,27 @@ void parse_range(const std::string& range, const char* option, int axis, data::C
   if (!(crop.min[axis] < crop.max[axis])) throw option_error(option, range, "a low end below the high one");
 }
 
-std::string mesh_spec(const ImportOptions& options) {
-  if (options.sheet.empty() == options.mesh.empty())
-    throw data::InputError("import: expected either --sheet or --mesh");
-  return options.mesh.empty() ? "sheet:" + options.sheet + ":" + data::format_number(options.cell)
-                              : options.mesh;
+data::TriangleMesh load_mesh(const std::string& spec) {
+  const data::TriangleMesh mesh = data::is_mesh_spec(spec) ? data::parse_mesh_spec(spec, "import", "--mesh")
+                                                           : data::load_triangle_mesh(spec);
+  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff();
+  if (size.norm() > kLargestSheet) throw option_error("mesh", spec, "metres (millimetres read as metres?)");
+  return mesh;
 }
 
-data::TriangleMesh load_mesh(const ImportOptions& options, const std::string& spec) {
-  const bool sheet = options.mesh.empty();
-  data::TriangleMesh mesh = data::is_mesh_spec(spec)
-                                ? data::parse_mesh_spec(spec, "import", sheet ? "--sheet" : "--mesh")
-                                : data::load_triangle_mesh(spec);
-  const Eigen::RowVector3d size = mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff();
-  if (size.norm() > kLargestSheet)
-    throw option_error(sheet ? "sheet" : "mesh", sheet ? options.sheet : options.mesh,
-                       "metres (millimetres read as metres?)");
-  const double shorter = size.head<2>().minCoeff();
-  if (sheet && options.cell > shorter)
-    throw option_error("cell", data::format_number(options.cell),
-                       "at most the shorter side of the sheet, " + data::format_short(shorter) + " m");
-  return mesh;
+/// Of a sheet that is made on the spot; of others what clouds usually ask for [m]
+double cell_of(const std::string& spec, const data::TriangleMesh& mesh) {
+  constexpr double kUsual = 0.01;
+  const std::vector<std::string_view> parts = data::split(spec, ":");
+  if (!data::is_mesh_spec(spec) || parts.size() < 3) return kUsual;
+  const double cell = data::parse_number(parts[2]).value_or(kUsual);
+  const double shorter =
+      (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).head<2>().minCoeff();
+  if (cell > shorter)
+    throw option_error(
+        "mesh", spec,
+        "cells of at most the shorter side of the sheet, " + data::format_short(shorter) + " m");
+  return cell;
 }
 
 data::Trajectory load_gripper(const std::string& path) {
@@ -100,20 +100,21 @@ data::GraspSelection parse_grasp(const std::string& text) {
   return grasp;
 }
 
-data::CropBox parse_crop(const ImportOptions& options) {
+data::CropBox parse_crop(const std::array<std::string, 3>& ranges) {
   data::CropBox crop;
-  parse_range(options.crop_x, "crop-x", 0, crop);
-  parse_range(options.crop_y, "crop-y", 1, crop);
-  parse_range(options.crop_z, "crop-z", 2, crop);
+  parse_range(ranges[0], "crop-x", 0, crop);
+  parse_range(ranges[1], "crop-y", 1, crop);
+  parse_range(ranges[2], "crop-z", 2, crop);
   return crop;
 }
 
 void read_options(const ImportOptions& options, sysid::ImportSettings& settings) {
-  settings.mesh_spec = mesh_spec(options);
-  settings.mesh = load_mesh(options, settings.mesh_spec);
+  if (options.mesh.empty()) throw data::InputError("import: expected --mesh, as sheet:0.3x0.24:0.01");
+  settings.mesh_spec = options.mesh;
+  settings.mesh = load_mesh(options.mesh);
   settings.grasp = parse_grasp(options.grasp);
-  settings.grasp.within = options.within.value_or(1.2 * options.cell);
-  settings.crop = parse_crop(options);
+  settings.grasp.within = options.within.value_or(1.2 * cell_of(options.mesh, settings.mesh));
+  settings.crop = parse_crop(options.crop);
   settings.trajectory = load_gripper(options.trajectory);
   settings.trajectory_path = options.trajectory;
   if (options.clouds.empty() == options.depth.empty())

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <optional>
 #include <string>
 
@@ -8,24 +9,22 @@ namespace flash {
 
 /// Options of `import` whose texts become values, as on the command line; empty where they are not given.
 struct ImportOptions {
-  std::string clouds;                  ///< folder of .ply or .pcd, taken in order of name, 2 before 10; or
-  std::string depth;                   ///< folder of .png
-  std::string trajectory;              ///< T_base_gripper, TUM or CSV
-  std::string times;                   ///< as frame_times reads them
-  std::string sheet;                   ///< "WIDTHxHEIGHT" [m]; or
-  std::string mesh;                    ///< mesh spec or file
-  double cell = 0.01;                  ///< of the sheet [m]
-  std::string grasp = "corner";        ///< as parse_grasp reads it
-  std::optional<double> within;        ///< of the grasp [m]; empty: 1.2 cells
-  std::string crop_x, crop_y, crop_z;  ///< "LOW:HIGH" [m], either side may be empty
+  std::string clouds;               ///< folder of .ply or .pcd, taken in order of name, 2 before 10; or
+  std::string depth;                ///< folder of .png
+  std::string trajectory;           ///< T_base_gripper, TUM or CSV
+  std::string times;                ///< as frame_times reads them
+  std::string mesh;                 ///< mesh spec or file
+  std::string grasp = "corner";     ///< as parse_grasp reads it
+  std::optional<double> within;     ///< of the grasp [m]; empty: 1.2 cells of a sheet
+  std::array<std::string, 3> crop;  ///< along x, y and z "LOW:HIGH" [m], either side may be empty
 };
 
 /// "corner", "corner:I,J", "vertices:A,B,..." or "position": what is near the gripper. Throws
 /// data::InputError that names --grasp.
 data::GraspSelection parse_grasp(const std::string& text);
 
-/// The box of the three ranges. Throws data::InputError that names the option.
-data::CropBox parse_crop(const ImportOptions& options);
+/// The box of the three ranges "LOW:HIGH". Throws data::InputError that names --crop-x, --crop-y or --crop-z.
+data::CropBox parse_crop(const std::array<std::string, 3>& ranges);
 
 /// Puts sheet, grasp, crop, trajectory, frames and their times into `settings`. Throws data::InputError that
 /// names the option, also where a folder holds no frames or where `settings` has no camera for depth images.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "data/error.h"
 #include "data/scene.h"
 #include "data/text.h"
 
@@ -63,6 +64,23 @@ CLI::Validator time_step() {
   const std::string most = data::format_short(data::max_time_step);
   return number_check("above 0, to " + most, "a number above 0, at most " + most,
                       [](double value) { return value > 0 && value <= data::max_time_step; });
+}
+
+CLI::Option* add_vector_option(CLI::App& verb, const std::string& name, std::vector<double>& value,
+                               const std::string& meaning) {
+  return verb
+      .add_option_function<std::string>(
+          name,
+          [name, &value](const std::string& text) {
+            value.clear();
+            for (const std::string_view word : data::split(text, ","))
+              if (const auto number = data::parse_number(word); number && std::isfinite(*number))
+                value.push_back(*number);
+            if (value.size() != 3 || data::split(text, ",").size() != 3)
+              throw data::InputError(name + ": found \"" + text + "\", expected x,y,z, as 0.2,-0.4,0.1");
+          },
+          meaning)
+      ->type_name("X,Y,Z");
 }
 
 CLI::Validator thread_number() { return whole_number(0, 1024); }

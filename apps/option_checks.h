@@ -1,5 +1,7 @@
 #pragma once
 #include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
 
 namespace flash {
 
@@ -13,6 +15,10 @@ CLI::Validator number_between(double low, double high);
 
 /// Of --time-step: above 0, at most data::max_time_step [s].
 CLI::Validator time_step();
+
+/// A point or a vector "x,y,z": the one way to write three numbers.
+CLI::Option* add_vector_option(CLI::App& verb, const std::string& name, std::vector<double>& value,
+                               const std::string& meaning);
 
 /// Of --threads: 0 means one a processor.
 CLI::Validator thread_number();

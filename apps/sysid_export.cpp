@@ -45,7 +45,12 @@ int run_export(const ExportOptions& options) {
   for (const std::string& notice : notices) warn(notice);
   if (summary.exit_code != 0) warn("the search behind this asset ended with: " + summary.warnings.front());
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"asset", options.out}, {"not_expressed", notices}}.dump(2) << '\n';
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-export/1"},
+                                        {"asset", options.out},
+                                        {"not_expressed", notices},
+                                        {"exit_code", summary.exit_code}}
+                     .dump(2)
+              << '\n';
   } else {
     std::printf("%s\n", options.out.c_str());
   }

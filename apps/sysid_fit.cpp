@@ -25,11 +25,11 @@ struct FitOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::string start;
-  std::vector<std::string> freeze;
-  FixedTexts fixed;
+  std::vector<std::string> holds;
   double repeatability = 0;  ///< [m]; 0: not given
   bool no_solver_check = false;
   bool no_horizon = false;
+  bool resume = false;
   std::string rollouts;
   std::string out;
 };
@@ -41,53 +41,66 @@ struct Start {
   sysid::Extent around;
 };
 
-bool contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-// A parameter that was not searched stays as it was in the search.
-void hold(const std::string& name, const sysid::Summary& found, std::vector<sysid::Axis>& fixed) {
-  const auto value = found.best.find(name);
+// "friction=0.3", or a name alone: where the search found the parameter, or held it.
+sysid::Hold hold_of(const std::string& text, const sysid::Summary& found) {
+  if (text.find('=') != std::string::npos) return sysid::parse_hold(text);
+  sysid::check_parameter("--hold " + text, text);
+  const auto value = found.best.find(text);
   if (value == found.best.end())
-    sysid::check_parameter("--freeze " + name, name);
-  else if (std::none_of(fixed.begin(), fixed.end(),
-                        [&](const sysid::Axis& axis) { return axis.name == name; }))
-    fixed.push_back({name, {value->second}, false});
+    throw data::InputError("--hold " + text + ": the search neither found nor held it, expected " + text +
+                           "=value");
+  const auto fixed = found.fixed.find(text);
+  return {{text, {value->second}, false}, fixed != found.fixed.end() && fixed->second.source == "measured"};
 }
 
-// Frozen parameters stay where the search found them.
+// What the search held stays held, unless it is said otherwise, and what it found is where the fit begins.
 Start start_of(const FitOptions& options, const sysid::SearchFolder& search) {
   const sysid::Summary& found = search.summary;
-  Start start;
-  start.grid.fixed = parse_fixed(options.fixed);
-  const auto is_fixed = [&](const std::string& name) {
-    return std::any_of(start.grid.fixed.begin(), start.grid.fixed.end(),
-                       [&](const sysid::Axis& axis) { return axis.name == name; });
+  std::vector<sysid::Hold> holds;
+  const auto is_held = [&](const std::string& name) {
+    return std::any_of(holds.begin(), holds.end(),
+                       [&](const sysid::Hold& hold) { return hold.axis.name == name; });
   };
+  for (const std::string& text : options.holds) {
+    sysid::Hold hold = hold_of(text, found);
+    if (is_held(hold.axis.name))
+      throw data::InputError("--hold " + hold.axis.name + ": given twice, expected one value");
+    holds.push_back(std::move(hold));
+  }
   for (const auto& [name, fixed] : found.fixed)
-    if (!is_fixed(name) && fixed.source == "measured")
-      start.grid.fixed.push_back({name, {fixed.value}, false});
-  std::vector<std::string> searched;
-  for (const sysid::ParameterFinding& finding : found.parameters) {
-    searched.push_back(finding.name);
-    if (is_fixed(finding.name)) continue;
-    const double value = finding.estimate.value_or(found.best.at(finding.name));
-    if (contains(options.freeze, finding.name)) {
-      start.grid.fixed.push_back({finding.name, {value}, false});
+    if (!is_held(name) && fixed.source == "measured") holds.push_back({{name, {fixed.value}, false}, true});
+  Start start;
+  for (const sysid::Axis& axis : search.results.axes) {
+    if (is_held(axis.name)) continue;
+    if (axis.values.size() == 1) {
+      holds.push_back({axis, false});
       continue;
     }
-    const auto axis = std::find_if(search.results.axes.begin(), search.results.axes.end(),
-                                   [&](const sysid::Axis& each) { return each.name == finding.name; });
-    start.grid.axes.push_back(*axis);
-    start.values.push_back(value);
+    const auto finding =
+        std::find_if(found.parameters.begin(), found.parameters.end(),
+                     [&](const sysid::ParameterFinding& each) { return each.name == axis.name; });
+    start.grid.axes.push_back(axis);
+    start.values.push_back(finding->estimate.value_or(found.best.at(axis.name)));
     start.around.push_back(
-        finding.interval95.value_or(std::array{finding.values.front(), finding.values.back()}));
+        finding->interval95.value_or(std::array{finding->values.front(), finding->values.back()}));
   }
-  for (const std::string& name : options.freeze)
-    if (!contains(searched, name)) hold(name, found, start.grid.fixed);
-  if (start.grid.axes.empty()) throw data::InputError("--freeze, --fix: no parameter is left to fit");
+  if (start.grid.axes.empty()) throw data::InputError("--hold: no parameter is left to fit");
+  add_holds(holds, start.grid);
+  for (std::size_t k = start.values.size(); k < start.grid.axes.size(); ++k) {
+    const double value = start.grid.axes[k].values.front();
+    start.values.push_back(value);
+    start.around.push_back({value, value});
+  }
   start.grid.score = score_settings(options.replay);
   return start;
+}
+
+// Axes of one value, and constants.
+std::vector<sysid::Axis> held_axes(const sysid::GridSettings& grid) {
+  std::vector<sysid::Axis> held = grid.fixed;
+  for (const sysid::Axis& axis : grid.axes)
+    if (axis.values.size() == 1) held.push_back(axis);
+  return held;
 }
 
 // "sheet:0.2x0.2:0.02 (121 vertices)".
@@ -96,8 +109,41 @@ std::string mesh_of(const sysid::Summary& found) {
   return mesh == found.settings.end() ? "" : mesh->second.substr(0, mesh->second.rfind(" ("));
 }
 
+// What differs from the search, whose grasps, times and tolerances are not taken over by themselves.
+std::vector<std::string> other_settings(const std::string& start, const sysid::Fingerprint& print) {
+  const sysid::GridFile search = sysid::load_grid_file((fs::path(start) / "grid.json").string());
+  std::vector<std::string> lines;
+  for (const auto& [name, value] : search.fingerprint.value_or(sysid::Fingerprint())) {
+    const auto here = print.find(name);
+    if (here == print.end() || here->second == value || name.starts_with("ax") || name.starts_with("fixed"))
+      continue;
+    // Data stand there as hashes.
+    lines.push_back(
+        name.starts_with("recording")
+            ? name + ": not those of the search (--grasp-shape, --from and the like are not taken over)"
+            : name + ": found " + here->second + ", the search had " + value);
+  }
+  return lines;
+}
+
+// The folder is free, or --resume goes on with what it holds.
+void check_out(const FitOptions& options) {
+  if (options.resume && options.common.force)
+    throw data::InputError(
+        "--resume: found --force beside it, which removes the results, expected one of the two");
+  if (options.resume) return;
+  try {
+    data::check_folder_free(options.out, options.common.force);
+  } catch (const data::InputError& error) {
+    if (!fs::exists(fs::path(options.out) / "grid.json")) throw;
+    throw data::InputError(options.out +
+                           ": holds results already; go on with --resume, or name another folder");
+  }
+}
+
 int run_fit(const CLI::App& verb, const FitOptions& options) {
   stop_on_signals();
+  check_out(options);
   const auto begin = std::chrono::steady_clock::now();
   const sim::Device device = choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
@@ -118,7 +164,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     names.push_back(recording.name);
   }
   std::vector<std::string> notices;
-  grid.base = material_base(asset, replays.front().sheet().rest, notices, grid.fixed);
+  grid.base = material_base(asset, replays.front().sheet().rest, notices, held_axes(grid));
   // One store of motions for the search and what goes on from it.
   grid.rollouts =
       options.rollouts.empty() ? (fs::path(options.start) / "motions").string() : options.rollouts;
@@ -131,18 +177,24 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
       sysid::steps_in(2.0 * each.steps * options.replay.time_step, options.replay.time_step);
   sysid::check_job(replays, sysid::count_candidates(grid.axes),
                    sysid::estimate_memory(replays, grid, asked.solver_check));
-  data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
-  {
-    asked.ranges = grid.axes;
+  asked.ranges = grid.axes;
+  const std::string grid_file = (fs::path(options.out) / "grid.json").string();
+  if (options.resume && fs::exists(grid_file)) {
+    grid.axes = sysid::load_grid_file(grid_file).axes;  // the fingerprint holds the rest to it
+  } else {
     AnswerLine line(options.common, sysid::most_design_work(grid, replays.size()));
     grid.axes = sysid::design_about(
         replays, grid, start.values, start.around, asked,
         [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
   }
   end_after_signal();
-  sysid::ResultsStore store(options.out, grid.axes, names, sysid::fingerprint(replays, grid),
-                            options.common.force ? sysid::Existing::replace : sysid::Existing::refuse);
+  const sysid::Fingerprint print = sysid::fingerprint(replays, grid);
+  for (const std::string& line : other_settings(options.start, print)) warn(line);
+  sysid::ResultsStore store(options.out, grid.axes, names, print,
+                            options.resume         ? sysid::Existing::resume
+                            : options.common.force ? sysid::Existing::replace
+                                                   : sysid::Existing::refuse);
   Search search{asset, std::move(replays), grid, asked, {}, device, options.out, begin};
   return run_search(search, store, options.common);
 }
@@ -156,10 +208,10 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
   verb->add_option("--start", options->start, "Folder of the search to start from")->required();
   verb->add_option("--asset", options->asset, "The object; without one, that of the search");
-  verb->add_option("--freeze", options->freeze,
-                   "Parameters that stay where the search found them, or held them")
-      ->delimiter(',');
-  add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3");
+  add_hold_option(
+      *verb, options->holds,
+      "Hold a parameter, as friction=0.3 where that is assumed, friction=0.3:measured where it is "
+      "known, or poisson where the search found or held it");
   verb->add_option("--repeatability", options->repeatability, "Trial-to-trial distance of a keyframe [m]")
       ->check(positive_number());
   verb->add_flag("--no-solver-check", options->no_solver_check,
@@ -167,13 +219,14 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions; without it, that of the search it starts from");
+  verb->add_flag("--resume", options->resume, "Go on with the results in the folder");
   verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
   add_replay_options(*verb, options->replay);
   add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
       "Exit code 3: the answer cannot be used, for the reason that is said.\n"
-      "Example:\n  flash-sysid fit lift --start run --freeze poisson -o fitted");
+      "Example:\n  flash-sysid fit lift --start run --hold poisson -o fitted");
   verb->callback([verb, options, &action] { action = [verb, options] { return run_fit(*verb, *options); }; });
 }
 

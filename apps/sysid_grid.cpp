@@ -26,7 +26,7 @@ struct GridOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::vector<std::pair<std::string, std::string>> axes;
-  FixedTexts fixed;
+  std::vector<std::string> holds;
   int envs = 64;
   double repeatability = 0;  ///< [m]; 0: the residual stands for it
   bool no_solver_check = false;
@@ -51,10 +51,10 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   settings.threads = threads;
   settings.rollouts =
       options.rollouts.empty() ? (fs::path(options.out) / "motions").string() : options.rollouts;
-  for (const auto& [name, text] : options.axes) settings.axes.push_back(sysid::parse_axis(name, text));
+  for (const auto& [name, text] : options.axes) settings.axes.push_back(parse_searched(name, text));
   if (settings.axes.empty())
     throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
-  settings.fixed = parse_fixed(options.fixed);
+  add_holds(parse_holds(options.holds), settings);
   std::vector<sysid::Axis> all = settings.axes;
   all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
   sysid::check_axes(all, base.material.constitutive);
@@ -118,7 +118,8 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
 
   std::vector<std::string> notices;
   const sysid::GridSettings settings = grid_settings(
-      options, material_base(asset, replays.front().sheet().rest, notices, parse_fixed(options.fixed)),
+      options,
+      material_base(asset, replays.front().sheet().rest, notices, axes_of(parse_holds(options.holds))),
       threads);
   sysid::check_grasp_axes(settings.axes, replays);
   sysid::check_grasp_axes(settings.fixed, replays);
@@ -159,8 +160,10 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_option("recording", options->recordings, "Folders with recording.json")->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
   verb->add_option("-o,--out", options->out, "Folder for results.csv, summary.json, report.html")->required();
-  add_fixed_options(*verb, options->fixed, "A measured constant, as friction=0.3; carried into the asset");
-  verb->add_option("--envs", options->envs, "Candidates a batch")
+  add_hold_option(
+      *verb, options->holds,
+      "Hold a parameter, as friction=0.3 where that is assumed, friction=0.3:measured where it is known");
+  verb->add_option("--envs", options->envs, "Candidates that are simulated at a time")
       ->check(whole_number(1, 100000))
       ->capture_default_str();
   verb->add_option("--repeatability", options->repeatability, "Trial-to-trial distance of a keyframe [m]")
@@ -169,7 +172,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
       ->delimiter(',')
       ->expected(2);
   verb->add_flag("--no-solver-check", options->no_solver_check,
-                 "Do not solve the best candidate again under finer settings");
+                 "Do not solve the estimate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions, for several searches; without it, motions/ of the run");
@@ -181,7 +184,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->footer(
       "Example:\n"
       "  flash-sysid grid lift_a --asset towel.json --young 1e3:1e6:16:log --bending 1e-6:1e-3:8:log \\\n"
-      "    --fix friction=0.3 --envs 64 -o run");
+      "    --hold friction=0.3:measured --envs 64 -o run");
   verb->callback(
       [verb, options, &action] { action = [verb, options] { return run_grid(*verb, *options); }; });
 }

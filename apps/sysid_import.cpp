@@ -23,20 +23,21 @@ struct ImportVerbOptions {
   CommonOptions common;
   ImportOptions texts;
   sysid::ImportSettings settings;
-  std::vector<std::string> offset;
+  std::string offset;
   std::string shape = "clamp", tool_at = "corner";
   double within = 0, table_height = 0, heading_degrees = 0;
 };
 
 // One bound for all axes, or x,y,z.
-Eigen::Vector3d parse_bounds(const std::vector<std::string>& words) {
+Eigen::Vector3d parse_bounds(const std::string& text) {
+  const std::vector<std::string_view> words = data::split(text, ",");
   Eigen::Vector3d bounds;
   for (int k = 0; k < 3; ++k) {
     const std::size_t word = words.size() == 1 ? 0 : static_cast<std::size_t>(k);
     const auto number =
         words.size() == 1 || words.size() == 3 ? data::parse_number(words[word]) : std::nullopt;
     if (!number || !(*number >= 0) || !std::isfinite(*number))
-      throw data::InputError("--offset: found \"" + (words.empty() ? "" : words[word]) +
+      throw data::InputError("--offset-bound: found \"" + text +
                              "\", expected one bound or three, x,y,z, in metres, as 0.06");
     bounds[k] = *number;
   }
@@ -50,8 +51,8 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   settings.tool_at_patch = options.tool_at == "patch";
   if (options.shape == "point") settings.shape = data::GraspShape::point;
   if (options.shape == "pinch") settings.shape = data::GraspShape::pinch;
-  if (verb.count("--within") > 0) options.texts.within = options.within;
-  if (verb.count("--table-height") > 0) settings.table_height = options.table_height;
+  if (verb.count("--grasp-within") > 0) options.texts.within = options.within;
+  if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
   if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;
   read_options(options.texts, settings);
 
@@ -59,7 +60,8 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   for (const std::string& notice : recording.notices) say(options.common, notice);
   const std::string path = (fs::path(settings.out) / "recording.json").string();
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"recording", path},
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-import/1"},
+                                        {"recording", path},
                                         {"keyframes", recording.keyframes.size()},
                                         {"notices", recording.notices}}
                      .dump(2)
@@ -84,63 +86,70 @@ void add_import_verb(CLI::App& app, Action& action) {
       verb->add_option("--depth", texts.depth, "Folder of 16-bit depth PNG, in place of clouds")
           ->excludes(clouds);
   verb->add_option("--masks", settings.masks, "Folder of masks of the same names")->needs(depth);
-  verb->add_option("--intrinsics", settings.intrinsics, "camera_info or OpenCV YAML")->needs(depth);
-  verb->add_option("--extrinsics", settings.extrinsics, "T_base_camera: flash-extrinsics/1, or a TUM file")
+  verb->add_option("--intrinsics", settings.intrinsics, "Lens of the camera: camera_info or OpenCV YAML")
       ->needs(depth);
-  verb->add_option("--depth-scale", settings.depth_scale, "Metres a count")
+  verb->add_option("--extrinsics", settings.extrinsics,
+                   "T_base_camera: the extrinsics of flash-calib, or a TUM file")
+      ->needs(depth);
+  verb->add_option("--depth-scale", settings.depth_scale, "Metres per count of the depth images")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--trajectory", texts.trajectory, "T_base_gripper, TUM or CSV")->required();
-  verb->add_option("--times", texts.times,
-                   "rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
-  CLI::Option* sheet =
-      verb->add_option("--sheet", texts.sheet,
-                       "WIDTHxHEIGHT [m], as 0.3x0.24; from corner 0,0 or 1,1, seen from above, the "
-                       "width is on the right hand");
-  verb->add_option("--mesh", texts.mesh, "Mesh specification or file, in place of --sheet")->excludes(sheet);
-  verb->add_option("--cell", texts.cell, "Of the sheet's mesh [m]")
-      ->check(positive_number())
+  verb->add_option("--trajectory", texts.trajectory, "Poses of the gripper, T_base_gripper, TUM or CSV")
+      ->required();
+  verb->add_option(
+      "--times", texts.times,
+      "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
+  verb->add_option(
+          "--mesh", texts.mesh,
+          "Mesh of the sheet, sheet:WIDTHxHEIGHT:CELL [m] or a file; from corner 0,0 or 1,1, seen from "
+          "above, the width is on the right hand")
+      ->required();
+  verb->add_option("--grasp", texts.grasp,
+                   "What is grasped: corner, corner:I,J, vertices:A,B,... or position")
       ->capture_default_str();
-  verb->add_option("--grasp", texts.grasp, "corner, corner:I,J, vertices:A,B,... or position")
-      ->capture_default_str();
-  verb->add_option("--within", options->within, "Size of the grasped patch [m]; without it 1.2 cells")
+  verb->add_option("--grasp-within", options->within, "Size of the grasped patch [m]; without it 1.2 cells")
       ->check(positive_number());
   verb->add_option("--tool-at", options->tool_at, "What is under the tool centre point at the start")
       ->check(CLI::IsMember({"corner", "patch"}))
       ->capture_default_str();
-  verb->add_option("--shape", options->shape, "How the patch sits in the fingers")
+  verb->add_option("--grasp-shape", options->shape, "How the patch sits in the fingers")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}))
       ->capture_default_str();
-  verb->add_option("--crop-x", texts.crop_x, "LOW:HIGH [m], either may be empty");
-  verb->add_option("--crop-y", texts.crop_y, "LOW:HIGH [m], either may be empty");
-  verb->add_option("--crop-z", texts.crop_z, "LOW:HIGH [m], either may be empty, as 0.075:");
-  verb->add_option("--table-height", options->table_height,
-                   "[m]; without it from the gripper's start and the crop")
+  verb->add_option("--crop-x", texts.crop[0], "Keep points in LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-y", texts.crop[1], "Keep points in LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-z", texts.crop[2], "Keep points in LOW:HIGH [m], either may be empty, as 0.075:");
+  verb->add_option(
+          "--table-z", options->table_height,
+          "Height of the table in the base frame [m]; without it from the gripper's start and the crop")
       ->check(any_number());
   verb->add_option("--heading", options->heading_degrees,
-                   "Of the diagonal from the grasped corner, from x [deg]; without it towards the clouds")
+                   "Direction of the sheet's diagonal from the grasped corner, turned from x [deg]; without "
+                   "it towards the clouds")
       ->check(any_number());
-  verb->add_option("--offset", options->offset, "Bound on the camera's offset, one or x,y,z [m]")
-      ->delimiter(',')
+  verb->add_option("--offset-bound", options->offset, "Bound on the camera's offset, one or x,y,z [m]");
+  verb->add_option("--yaw-bound", settings.nuisance.yaw, "Bound on the camera's yaw [rad]")
       ->check(number_from(0));
-  verb->add_option("--yaw", settings.nuisance.yaw, "Bound on the camera's yaw [rad]")->check(number_from(0));
-  verb->add_option("--clock", settings.nuisance.time, "Bound on the camera's clock against the robot's [s]")
+  verb->add_option("--time-offset-bound", settings.nuisance.time,
+                   "Bound on the camera's clock against the robot's [s]")
       ->check(number_from(0));
-  verb->add_option("--start-yaw", settings.nuisance.start_yaw, "Bound on the sheet's turn on the table [rad]")
+  verb->add_option("--start-yaw-bound", settings.nuisance.start_yaw,
+                   "Bound on the sheet's turn on the table [rad]")
       ->check(number_from(0));
-  verb->add_option("--table-error", settings.nuisance.table_height, "Bound on the table's height [m]")
+  verb->add_option("--table-height-bound", settings.nuisance.table_height, "Bound on the table's height [m]")
       ->check(number_from(0));
-  verb->add_option("--asset", settings.asset, "The object");
-  verb->add_option("--kind", settings.kind, "corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free")
+  verb->add_option("--asset", settings.asset, "File of the object");
+  verb->add_option("--kind", settings.kind,
+                   "What was done: corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free")
       ->capture_default_str();
-  verb->add_option("--name", settings.name, "Without it the folder's");
+  verb->add_option("--name", settings.name, "Name of the recording; without it that of the folder");
   verb->add_option("-o,--out", settings.out, "Folder of the recording")->required();
   add_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
       "Example:\n"
-      "  flash-sysid import clouds --trajectory tcp.tum --times rate:10 --sheet 0.278x0.278 --grasp corner "
+      "  flash-sysid import clouds --trajectory tcp.tum --times rate:10 --mesh sheet:0.278x0.278:0.01 "
+      "--grasp corner "
       "\\\n"
-      "    --crop-z 0.075: --offset 0.06 -o recording");
+      "    --crop-z 0.075: --offset-bound 0.06 -o recording");
   verb->callback(
       [verb, options, &action] { action = [verb, options] { return run_import(*verb, *options); }; });
 }

@@ -70,7 +70,7 @@ data::Asset with_fixed(data::Asset asset, const std::vector<sysid::Axis>& fixed)
       for (std::optional<double>* other : {&asset.density, &asset.mass, &asset.object_mass}) other->reset();
     }
     for (const char* name : {"young", "poisson", "bending", "areal_density"})
-      if (axis.name == name) asset.source += " --fix " + axis.name + "=" + data::format_short(value);
+      if (axis.name == name) asset.source += " --hold " + axis.name + "=" + data::format_short(value);
   }
   return asset;
 }
@@ -83,7 +83,7 @@ void add_common_options(CLI::App& verb, CommonOptions& options, const char* forc
   CLI::Option* quiet = group.add_flag("--quiet", options.quiet, "Print nothing but the result and errors");
   group.add_flag("--verbose", options.verbose, "Print every notice")->excludes(quiet);
   group.add_flag("--force", options.force, force);
-  group.add_option("--threads", options.threads, "0: one a processor")
+  group.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
       ->check(thread_number())
       ->capture_default_str();
 }
@@ -103,14 +103,20 @@ void add_device_option(CLI::App& verb, CommonOptions& options) {
 void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   CLI::App& group = *verb.add_option_group("Replay and score");
   group.add_option("--mesh", options.mesh, "Mesh in place of the recording's, as sheet:0.4x0.4:0.02");
-  group.add_option("--time-step", options.time_step, "[s]")->check(time_step())->capture_default_str();
-  group.add_option("--iterations", options.iterations, "Of the solver, a step at most")
+  group.add_option("--time-step", options.time_step, "Time step of the simulation [s]")
+      ->check(time_step())
+      ->capture_default_str();
+  group.add_option("--iterations", options.iterations, "Maximum Newton iterations per time step")
       ->check(whole_number(1, 10000))
       ->capture_default_str();
-  group.add_option("--tolerance", options.tolerance, "On the residual |r| / |M g|")
+  group
+      .add_option("--tolerance", options.tolerance,
+                  "Largest residual of a step that counts as converged, over the weight of the sheet")
       ->check(number_between(1e-12, 1))  // of numbers with 16 digits; at 1 nothing is solved
       ->capture_default_str();
-  group.add_option("--grasp-shape", options.grasp_shape, "In place of the recording's")
+  group
+      .add_option("--grasp-shape", options.grasp_shape,
+                  "How the patch sits in the fingers, in place of what the recording says")
       ->check(CLI::IsMember({"clamp", "point", "pinch"}));
   group
       .add_option("--grasp-within", options.grasp_within,
@@ -139,8 +145,8 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
   group.add_flag(
       "--two-sided", options.two_sided,
       "Simulated cloth inside the crop where none was seen counts too: for recordings that see all of it");
-  group.add_option("--share", options.shared, "Nuisance values that all recordings have in common")
-      ->check(CLI::IsMember({"offset", "yaw", "time"}))
+  group.add_option("--share", options.shared, "Errors of registration that all recordings have in common")
+      ->check(CLI::IsMember({"offset", "yaw", "time-offset"}))
       ->delimiter(',');
 }
 
@@ -174,50 +180,55 @@ sysid::ScoreSettings score_settings(const ReplayOptions& options) {
   const auto shares = [&](const char* name) {
     return std::find(options.shared.begin(), options.shared.end(), name) != options.shared.end();
   };
-  settings.shared = {shares("offset"), shares("yaw"), shares("time")};
+  settings.shared = {shares("offset"), shares("yaw"), shares("time-offset")};
   return settings;
 }
 
 void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values) {
-  CLI::App& group =
-      *verb.add_option_group("Searched parameters", "low:high:count[:log], a list a,b,c, or one value");
+  CLI::App& group = *verb.add_option_group("Searched parameters",
+                                           "low:high:count[:log] or a list a,b,c; --hold takes one value");
   for (const sysid::ParameterInfo& info : sysid::known_parameters()) {
     const std::string unit = info.unit.empty() ? "" : " [" + info.unit + "]";
-    const auto add = [&](CLI::App& to, const std::string& option) {
-      return to.add_option_function<std::string>(
-          option, [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
-          info.meaning + unit);
-    };
-    const std::string option = sysid::option_of(info.name);
-    add(group, option);
-    if (option != "--" + info.name) add(verb, "--" + info.name)->group("");  // as files call it
+    group.add_option_function<std::string>(
+        sysid::option_of(info.name),
+        [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
+        info.meaning + unit);
   }
 }
 
-void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& meaning) {
-  const auto add = [&](const std::string& name) {
-    return verb
-        .add_option_function<std::vector<std::string>>(
-            name,
-            [&fixed, name](const std::vector<std::string>& texts) {
-              for (const std::string& text : texts) fixed.emplace_back(name, text);
-            },
-            meaning)
-        ->allow_extra_args(false);
-  };
-  add("--fix");
-  add("--set")->group("");
+void add_hold_option(CLI::App& verb, std::vector<std::string>& holds, const std::string& meaning) {
+  verb.add_option("--hold", holds, meaning)->allow_extra_args(false);
 }
 
-std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed) {
-  std::vector<sysid::Axis> axes;
+std::vector<sysid::Hold> parse_holds(const std::vector<std::string>& texts) {
+  std::vector<sysid::Hold> holds;
   std::set<std::string> names;
-  for (const auto& [option, text] : fixed) {
-    axes.push_back(sysid::parse_fixed(text, option));
-    if (!names.insert(axes.back().name).second)
-      throw data::InputError(option + " " + axes.back().name + ": given twice, expected one value");
+  for (const std::string& text : texts) {
+    holds.push_back(sysid::parse_hold(text));
+    const std::string& name = holds.back().axis.name;
+    if (!names.insert(name).second)
+      throw data::InputError("--hold " + name + ": given twice, expected one value");
   }
+  return holds;
+}
+
+std::vector<sysid::Axis> axes_of(const std::vector<sysid::Hold>& holds) {
+  std::vector<sysid::Axis> axes;
+  for (const sysid::Hold& hold : holds) axes.push_back(hold.axis);
   return axes;
+}
+
+void add_holds(const std::vector<sysid::Hold>& holds, sysid::GridSettings& settings) {
+  for (const sysid::Hold& hold : holds) (hold.measured ? settings.fixed : settings.axes).push_back(hold.axis);
+}
+
+sysid::Axis parse_searched(const std::string& name, const std::string& specification) {
+  sysid::Axis axis = sysid::parse_axis(name, specification);
+  if (axis.values.size() < 2)
+    throw data::InputError(sysid::option_of(name) +
+                           ": found one value, expected a range, as low:high:count; hold it as --hold " +
+                           name + "=" + data::format_short(axis.values.front()));
+  return axis;
 }
 
 void say(const CommonOptions& options, const std::string& line) {

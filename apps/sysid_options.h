@@ -52,13 +52,16 @@ sysid::ScoreSettings score_settings(const ReplayOptions& options);
 /// Adds --young, --poisson, ...: one option a known parameter, its text kept by name.
 void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, std::string>>& values);
 
-/// Constants that were given, with the option that gave them.
-using FixedTexts = std::vector<std::pair<std::string, std::string>>;
-
-/// --fix NAME=VALUE; --set, which some verbs called it, is taken as well.
-void add_fixed_options(CLI::App& verb, FixedTexts& fixed, const std::string& meaning);
+/// --hold NAME=VALUE or NAME=VALUE:measured, as often as wanted.
+void add_hold_option(CLI::App& verb, std::vector<std::string>& holds, const std::string& meaning);
 /// Throws data::InputError where a name is given twice.
-std::vector<sysid::Axis> parse_fixed(const FixedTexts& fixed);
+std::vector<sysid::Hold> parse_holds(const std::vector<std::string>& texts);
+/// Of all, whatever they rest on.
+std::vector<sysid::Axis> axes_of(const std::vector<sysid::Hold>& holds);
+/// A value that was measured becomes a constant, another an axis of one value.
+void add_holds(const std::vector<sysid::Hold>& holds, sysid::GridSettings& settings);
+/// Of a range that is searched. Throws data::InputError where it is one value, which --hold holds.
+sysid::Axis parse_searched(const std::string& name, const std::string& specification);
 
 /// What a verb says to people, on stderr, unless --quiet.
 void say(const CommonOptions& options, const std::string& line);

@@ -37,7 +37,7 @@ struct PlanOptions {
 // The parameters asked about; without options the four of a cloth, stiffnesses about those of the asset.
 std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::MaterialBase& base) {
   std::vector<sysid::Axis> axes;
-  for (const auto& [name, text] : options.axes) axes.push_back(sysid::parse_axis(name, text));
+  for (const auto& [name, text] : options.axes) axes.push_back(parse_searched(name, text));
   return axes.empty() ? sysid::usual_ranges(base) : axes;
 }
 
@@ -142,7 +142,7 @@ void add_plan_verb(CLI::App& app, Action& action) {
   verb->add_option("--error", options->error, "Distance by which model and sheet differ in a keyframe [m]")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--keyframes", options->keyframes, "That count as independent")
+  verb->add_option("--keyframes", options->keyframes, "Number of independent keyframes assumed")
       ->check(positive_number())
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "plan.json")->required();

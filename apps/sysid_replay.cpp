@@ -29,7 +29,7 @@ struct ReplayVerbOptions {
   ReplayOptions replay;
   std::string recording;
   std::string asset;
-  FixedTexts fixed;
+  std::vector<std::string> holds;
   std::vector<int> frames;
   bool every_step = false;
   std::string out;
@@ -122,6 +122,7 @@ void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, 
 nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const sysid::ReplayResult& motion) {
   const sysid::RecordingScore& recording = result.recordings.front();
   nlohmann::ordered_json json;
+  json["schema"] = "flash-sysid-replay/1";
   json["score"] = result.score;
   json["converged"] = result.converged;
   json["unconverged_share"] = motion.unconverged_share;
@@ -149,7 +150,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;
-  const std::vector<sysid::Axis> axes = parse_fixed(options.fixed);
+  const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
   const sysid::MaterialBase base = material_base(asset, replay.sheet().rest, notices, axes);
   sysid::check_grasp_axes(axes, {replay});
   std::vector<double> values;
@@ -219,7 +220,7 @@ void add_replay_verb(CLI::App& app, Action& action) {
       "replay", "Replay one set of parameters: meshes, scores and pictures over the observation");
   verb->add_option("recording", options->recording, "Folder with recording.json")->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
-  add_fixed_options(*verb, options->fixed, "A parameter in place of the asset's, as bending=1e-4");
+  add_hold_option(*verb, options->holds, "A value in place of the asset's, as bending=1e-4");
   verb->add_option("--frames", options->frames,
                    "Keyframes to draw, counted from 0, each and together in sequence.png; without it six")
       ->delimiter(',');
@@ -233,7 +234,7 @@ void add_replay_verb(CLI::App& app, Action& action) {
       "Exit code 3: more than 1 % of the steps did not converge, or one has a residual above 1; all files "
       "are\n"
       "written.\n"
-      "Example:\n  flash-sysid replay lift_a --asset towel.json --fix bending=1e-4 --frames 12,16,20,24 -o "
+      "Example:\n  flash-sysid replay lift_a --asset towel.json --hold bending=1e-4 --frames 12,16,20,24 -o "
       "overlay");
   verb->callback(
       [verb, options, &action] { action = [verb, options] { return run_replay(*verb, *options); }; });

@@ -48,7 +48,7 @@ int run_report(const ReportOptions& options) {
   if (!options.out.empty()) data::check_file_free(out, options.common.force);
   sysid::write_report(summary, results, overlays, settings, out);
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"report", out}}.dump(2) << '\n';
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-report/1"}, {"report", out}}.dump(2) << '\n';
   } else {
     std::printf("%s\n", out.c_str());
   }

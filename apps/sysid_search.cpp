@@ -37,20 +37,45 @@ std::string value_text(const sysid::ParameterFinding& finding, const std::string
   return "not identifiable from the recordings";
 }
 
+// "; the best value is the lowest searched: search lower".
+std::string edge_of(const sysid::ParameterFinding& finding) {
+  const std::string edge = sysid::edge_text(finding.edge);
+  return edge.empty() ? "" : "; " + edge;
+}
+
+// "1.59 mm from the observed points, on cells of no size (extrapolated)".
+std::string score_text(const sysid::Summary& summary, double score) {
+  const auto setting = [&](const char* name) {
+    const auto found = summary.settings.find(name);
+    return found == summary.settings.end() ? std::string() : found->second;
+  };
+  char number[32];
+  std::snprintf(number, sizeof number, "%.2f mm", 1000 * score);
+  const std::string observed = setting("observed");
+  return number + (observed == "cloud" ? " from the observed points" : " over " + observed) + ", on " +
+         setting("score_of");
+}
+
+void print_solver_check(const sysid::Summary& summary) {
+  if (!summary.solver_check.empty()) std::printf("Other solutions of the estimate:\n");
+  for (const sysid::SolverCheck& check : summary.solver_check)
+    std::printf("  %-30s moves the surface by %.2f mm\n", sysid::solver_check_label(check.what).c_str(),
+                1000 * check.surface_change_m);
+}
+
 void print_answer(const sysid::Summary& summary, const std::string& out) {
   const bool has_thickness = summary.settings.count("thickness_m") > 0;
   for (const sysid::ParameterFinding& finding : summary.parameters) {
     const sysid::ParameterLabel label = sysid::parameter_label(finding.name, has_thickness);
-    std::printf("%-16s %s\n", finding.name.c_str(), value_text(finding, label.unit).c_str());
+    std::printf("%-16s %s%s\n", finding.name.c_str(), value_text(finding, label.unit).c_str(),
+                edge_of(finding).c_str());
   }
   for (const sysid::SummaryRecording& recording : summary.recordings)
-    std::printf("%-16s %.2f mm from the observed points, offset %.1f %.1f %.1f mm, clock %.0f ms\n",
-                data::message_line(recording.name).c_str(), 1000 * recording.score,
+    std::printf("%-16s %s; offset %.1f %.1f %.1f mm, clock %.0f ms\n",
+                data::message_line(recording.name).c_str(), score_text(summary, recording.score).c_str(),
                 1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
                 1000 * recording.time_offset);
-  for (const sysid::SolverCheck& check : summary.solver_check)
-    std::printf("%-24s moves the surface by %.2f mm, the score to %.2f mm\n", check.what.c_str(),
-                1000 * check.surface_change_m, 1000 * check.score);
+  print_solver_check(summary);
   std::printf("%s\n%s\n", (fs::path(out) / "summary.json").c_str(), (fs::path(out) / "report.html").c_str());
 }
 
@@ -65,14 +90,13 @@ void tell_what_was_shared(const std::vector<sysid::Replay>& replays, const Commo
 
 // The estimate over the observations, recording by recording; kept with the run.
 std::vector<sysid::Overlay> keep_estimate(const std::vector<std::string>& recordings,
-                                          const sysid::Answer& answer,
-                                          const std::vector<sysid::Replay>& replays, const std::string& out) {
+                                          const sysid::Answer& answer, const std::string& out) {
   std::vector<sysid::Overlay> overlays;
   if (answer.best < 0) return overlays;
   const std::vector<std::string> folders = sysid::file_names(recordings);
-  for (std::size_t r = 0; r < replays.size(); ++r) {
-    overlays.push_back(
-        sysid::make_overlay(replays[r], answer.motions[r].motion, answer.estimate.recordings[r]));
+  for (std::size_t r = 0; r < answer.fit.replays.size(); ++r) {
+    overlays.push_back(sysid::make_overlay(answer.fit.replays[r], answer.fit.motions[r].motion,
+                                           answer.fit.score.recordings[r]));
     sysid::save_overlay(overlays.back(), (fs::path(out) / "best" / folders[r]).string());
   }
   return overlays;
@@ -96,8 +120,7 @@ int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptio
   sysid::save_summary(summary, (fs::path(search.out) / "summary.json").string());
   sysid::ReportSettings report;
   for (std::size_t k = 0; k < search.map.size() && k < 2; ++k) report.map_axes[k] = search.map[k];
-  const std::vector<sysid::Overlay> overlays =
-      keep_estimate(results.recordings, answer, search.replays, search.out);
+  const std::vector<sysid::Overlay> overlays = keep_estimate(results.recordings, answer, search.out);
   sysid::write_report(summary, results, overlays, report, (fs::path(search.out) / "report.html").string());
 
   for (const std::string& warning : summary.warnings) warn(warning);

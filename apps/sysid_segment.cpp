@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -8,6 +9,7 @@
 
 #include "apps/command_line.h"
 #include "apps/frame_times.h"
+#include "apps/import_options.h"
 #include "apps/option_checks.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
@@ -30,8 +32,8 @@ struct SegmentOptions {
   std::vector<std::string> masks, intrinsics, extrinsics;  ///< none, or one a view; lenses also one for all
   std::vector<double> depth_scales;
   std::string trajectory, times;
-  double rate = 0, table_height = 0;
-  std::vector<double> low, high;
+  double table_height = 0;
+  std::array<std::string, 3> crop;
   bool no_table = false;
   sysid::SegmentFolderSettings settings;
   std::string out;
@@ -71,13 +73,11 @@ std::vector<sysid::RawView> open_views(const SegmentOptions& options) {
 
 /// One a frame. Without a gripper they do not count, and need not be known.
 std::vector<double> times_of(const SegmentOptions& options, std::size_t frames) {
-  std::string times = options.times;
-  if (options.rate > 0) times = "rate:" + data::format_number(options.rate);
-  if (times.empty() && !options.trajectory.empty())
+  if (options.times.empty() && !options.trajectory.empty())
     throw data::InputError(
         "--trajectory: the frames need times by its clock, expected --times FILE.csv or rate:HZ:START, or "
-        "--rate HZ where the first frame is at 0 s");
-  return frame_times(times.empty() ? "rate:1" : times, frames);
+        "rate:HZ where the first frame is at 0 s");
+  return frame_times(options.times.empty() ? "rate:1" : options.times, frames);
 }
 
 void check_lengths(const SegmentOptions& options) {
@@ -85,13 +85,6 @@ void check_lengths(const SegmentOptions& options) {
   if (segment.voxel > 0 && segment.voxel < kSmallestVoxel)
     throw data::InputError("--voxel: found " + data::format_short(segment.voxel) +
                            ", expected 0 or at least " + data::format_short(kSmallestVoxel) + " m");
-  for (int axis = 0; axis < 3; ++axis) {
-    const double low = segment.crop.min[axis], high = segment.crop.max[axis];
-    if (!(low < high))
-      throw data::InputError(std::string("--crop-min: found ") + "xyz"[axis] + " = " +
-                             data::format_short(low) + ", expected less than " + data::format_short(high) +
-                             " of --crop-max");
-  }
 }
 
 /// Files are never written over those that they are made from.
@@ -105,13 +98,11 @@ void check_places(const std::vector<sysid::RawView>& views, const std::string& o
 
 int run_segment(const CLI::App& verb, SegmentOptions options) {
   sysid::SegmentFolderSettings& settings = options.settings;
-  if (!options.low.empty()) settings.segment.crop.min = Eigen::Map<const Eigen::Vector3d>(options.low.data());
-  if (!options.high.empty())
-    settings.segment.crop.max = Eigen::Map<const Eigen::Vector3d>(options.high.data());
+  settings.segment.crop = parse_crop(options.crop);
   check_lengths(options);
   const std::vector<sysid::RawView> views = open_views(options);
   settings.find_table = !options.no_table;
-  if (verb.count("--table-height") > 0) settings.table_height = options.table_height;
+  if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
   if (!options.trajectory.empty()) {
     settings.gripper = data::load_trajectory(options.trajectory);
     settings.gripper_path = options.trajectory;
@@ -121,18 +112,15 @@ int run_segment(const CLI::App& verb, SegmentOptions options) {
   check_places(views, options.out);
   const sysid::SegmentedFolder segmented =
       sysid::segment_folder(views, times_of(options, views.front().files.size()), settings, options.out);
-  for (const std::string& warning : segmented.warnings) warn(warning);
+  for (const std::string& warning : segmented.warnings) warn(warning);  // those of the cameras too
 
   std::size_t points = 0;
   for (const sysid::Segmentation& frame : segmented.frames)
     points += static_cast<std::size_t>(frame.cloth.rows());
-  std::vector<std::string> warnings;
-  for (const sysid::RawView& view : views)
-    warnings.insert(warnings.end(), view.warnings.begin(), view.warnings.end());
-  for (const std::string& warning : warnings) warn(warning);
   const std::string picture = (fs::path(options.out) / segmented.picture).string();
   if (options.common.json) {
-    nlohmann::ordered_json json = {{"clouds", segmented.clouds},
+    nlohmann::ordered_json json = {{"schema", "flash-sysid-segment/1"},
+                                   {"clouds", segmented.clouds},
                                    {"picture", picture},
                                    {"points", points},
                                    {"table", nullptr},
@@ -173,30 +161,23 @@ void add_segment_verb(CLI::App& app, Action& action) {
       ->required();
   verb->add_option("--trajectory", options->trajectory,
                    "T_base_gripper, TUM or CSV: the arm above the gripper is cut away");
-  CLI::Option* times = verb->add_option(
-      "--times", options->times, "rate:HZ, rate:HZ:START, or a CSV with one time a frame, as for import");
-  verb->add_option("--rate", options->rate, "Frames a second from 0 s; short for --times rate:HZ")
-      ->check(positive_number())
-      ->excludes(times);
+  verb->add_option("--times", options->times,
+                   "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame");
   verb->add_option("--masks", options->masks, "Folder of masks of the depth images' names, one a view");
   verb->add_option(
       "--intrinsics", options->intrinsics,
       "camera_info or OpenCV YAML, one a view or one for all; without it camera_info.yaml there");
   verb->add_option("--extrinsics", options->extrinsics,
-                   "T_base_camera, one a view: flash-extrinsics/1, or a TUM file; without it "
+                   "T_base_camera, one a view: the extrinsics of flash-calib, or a TUM file; without it "
                    "extrinsics.json or .tum there");
   verb->add_option("--depth-scale", options->depth_scales,
-                   "Metres a count, one a view or one for all; without it 0.001")
+                   "Metres per count of the depth images, one a view or one for all; without it 0.001")
       ->check(number_between(1e-7, 1));
-  verb->add_option("--crop-min", options->low, "x,y,z of the box to keep [m]")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(any_number());
-  verb->add_option("--crop-max", options->high, "x,y,z of the box to keep [m]")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(any_number());
-  verb->add_option("--arm-radius", options->settings.arm_radius, "[m]")
+  verb->add_option("--crop-x", options->crop[0], "Keep points in LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-y", options->crop[1], "Keep points in LOW:HIGH [m], either may be empty");
+  verb->add_option("--crop-z", options->crop[2], "Keep points in LOW:HIGH [m], either may be empty");
+  verb->add_option("--arm-radius", options->settings.arm_radius,
+                   "Points this close to the line above the gripper are the arm [m]")
       ->check(number_between(0, 1))
       ->capture_default_str();
   verb->add_option("--clearance", segment.table_clearance,
@@ -210,13 +191,15 @@ void add_segment_verb(CLI::App& app, Action& action) {
       ->check(number_between(0, 0.1))
       ->capture_default_str();
   CLI::Option* height =
-      verb->add_option("--table-height", options->table_height,
-                       "Of a level table [m]; without it one is sought, beyond the crop too")
+      verb->add_option(
+              "--table-z", options->table_height,
+              "Height of a level table in the base frame [m]; without it one is sought, beyond the crop too")
           ->check(number_between(-20, 20));
   verb->add_flag("--no-table", options->no_table, "There is no table in view")->excludes(height);
   verb->add_option("-o,--out", options->out, "Folder for frames/ and segment.png")->required();
   add_common_options(*verb, options->common, force_covers_calibrations);
-  verb->footer("Example:\n  flash-sysid segment raw/camera --trajectory gripper.tum --rate 10 -o segmented");
+  verb->footer(
+      "Example:\n  flash-sysid segment raw/camera --trajectory gripper.tum --times rate:10 -o segmented");
   verb->callback(
       [verb, options, &action] { action = [verb, options] { return run_segment(*verb, *options); }; });
 }

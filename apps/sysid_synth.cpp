@@ -30,7 +30,7 @@ struct SynthOptions {
   sim::SolverSettings solver;
   std::string asset;
   std::string mesh;
-  FixedTexts fixed;
+  std::vector<std::string> holds;
   std::vector<std::string> cameras;
   std::string resolution = "160x120";
   double field_of_view = 60;
@@ -95,7 +95,7 @@ int run_synth(SynthOptions options) {
                                   : data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
                                                                   : data::load_triangle_mesh(mesh_spec);
   std::vector<std::string> notices;
-  const std::vector<sysid::Axis> axes = parse_fixed(options.fixed);
+  const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
   const sysid::MaterialBase base = material_base(asset, mesh, notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
@@ -117,9 +117,12 @@ int run_synth(SynthOptions options) {
   options.solver.stop = &stop_on_signals();
   sysid::SynthRecording synthetic = sysid::synthesize(mesh, mesh_spec, material, settings, options.solver);
   end_after_signal();
-  if (options.common.force)  // what makes a folder a recording goes first
+  if (options.common.force) {  // what makes a folder a recording goes first
     for (const char* old : {"recording.json", "truth.json", "camera_info.yaml", "frames"})
       fs::remove_all(fs::path(options.out) / old);
+    const auto camera = [&](int c) { return fs::path(options.out) / ("camera" + std::to_string(c)); };
+    for (int c = 1; fs::exists(camera(c) / "depth"); ++c) fs::remove_all(camera(c));
+  }
   sysid::save_synthetic(synthetic, options.out);
   const std::string truth =
       options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
@@ -132,7 +135,8 @@ int run_synth(SynthOptions options) {
   Eigen::Index points = 0;
   for (const data::Points& cloud : synthetic.clouds) points += cloud.rows();
   if (options.common.json) {
-    std::cout << nlohmann::ordered_json{{"recording", options.out},
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
+                                        {"recording", options.out},
                                         {"truth", truth},
                                         {"keyframes", synthetic.clouds.size()},
                                         {"points", points},
@@ -154,23 +158,21 @@ void add_synth_verb(CLI::App& app, Action& action) {
   CLI::App* verb = app.add_subcommand(
       "synth", "Make a recording from an asset: simulate it and look at it with depth cameras");
   sysid::SynthSettings& synth = options->synth;
-  verb->add_option("--asset", options->asset, "The object")->required();
+  verb->add_option("--asset", options->asset, "File of the object")->required();
   verb->add_option("--kind", synth.kind, "What is done to the sheet")
       ->check(CLI::IsMember({"corner_lift", "hang", "drag", "bar_pull", "bias_pull"}))
       ->capture_default_str();
   verb->add_option("--mesh", options->mesh, "Mesh in place of the asset's, as sheet:0.4x0.4:0.02");
-  add_fixed_options(*verb, options->fixed, "A parameter in place of the asset's, as bending=1e-4");
-  verb->add_option("--displacement", options->displacement, "Of the gripper x,y,z in place of the kind's [m]")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(any_number());
-  verb->add_option("--duration", synth.duration, "Of the motion [s]")
+  add_hold_option(*verb, options->holds, "A value in place of the asset's, as bending=1e-4");
+  add_vector_option(*verb, "--displacement", options->displacement,
+                    "Path of the gripper x,y,z, in place of that of the kind [m]");
+  verb->add_option("--duration", synth.duration, "Duration of the motion [s]")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--rest", synth.rest, "Recorded after it [s]")
+  verb->add_option("--rest", synth.rest, "Time that is recorded after the motion [s]")
       ->check(number_from(0))
       ->capture_default_str();
-  verb->add_option("--rate", synth.keyframe_rate, "Keyframes a second")
+  verb->add_option("--rate", synth.keyframe_rate, "Keyframes per second")
       ->check(positive_number())
       ->capture_default_str();
   verb->add_option("--grasp-within", synth.grasp_within, "Size of the grasped patch [m]")
@@ -179,32 +181,33 @@ void add_synth_verb(CLI::App& app, Action& action) {
   verb->add_option("--camera", options->cameras,
                    "Position x,y,z of a camera [m], aimed at the sheet; repeat for more")
       ->allow_extra_args(false);
-  verb->add_option("--resolution", options->resolution, "Of the cameras [px]")->capture_default_str();
+  verb->add_option("--resolution", options->resolution, "Width and height of the pictures [px]")
+      ->capture_default_str();
   verb->add_option("--fov", options->field_of_view, "Horizontal field of view [deg]")
       ->check(number_between(5, 150))
       ->capture_default_str();
-  verb->add_option("--noise", synth.depth_noise, "Standard deviation along the ray [m]")
+  verb->add_option("--noise", synth.depth_noise, "Standard deviation of depth along the ray [m]")
       ->check(number_from(0))
       ->capture_default_str();
   verb->add_option("--dropped", synth.dropped, "Share of keyframes lost")
       ->check(number_between(0, 1))
       ->capture_default_str();
-  verb->add_option("--offset", options->offset, "Error of the camera registration x,y,z [m]")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(any_number());
-  verb->add_option("--time-offset", synth.time_offset, "Error of the camera's clock [s]")
+  add_vector_option(*verb, "--offset-error", options->offset,
+                    "Error that is put on the camera's place, x,y,z [m]");
+  verb->add_option("--time-offset-error", synth.time_offset, "Error that is put on the camera's clock [s]")
       ->check(any_number())
       ->capture_default_str();
   verb->add_flag("--clamp-slopes", synth.clamp_slopes,
                  "The grasped patch does not bend: it holds the sheet's slope as well as its place");
+  verb->add_flag("--raw", synth.raw,
+                 "Write what the cameras see, table and gripper included, to cameraN/depth, as for segment");
   verb->add_flag("--forces", synth.forces, "Record the gripper's force too");
-  verb->add_flag("--no-gripper", options->no_gripper, "The gripper hides nothing");
-  verb->add_option("--time-step", options->solver.time_step, "[s]")
+  verb->add_flag("--no-gripper", options->no_gripper, "The gripper hides no cloth from the cameras");
+  verb->add_option("--time-step", options->solver.time_step, "Time step of the simulation [s]")
       ->check(time_step())
       ->capture_default_str();
   verb->add_option("--truth-out", options->truth,
-                   "Where the truth goes; without it truth.json in the recording");
+                   "File for the truth; without it, truth.json in the recording");
   verb->add_option("-o,--out", options->out, "Folder of the recording")->required();
   add_seed_option(*verb, options->common);
   add_device_option(*verb, options->common);

@@ -37,7 +37,10 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
                       "comparison",  "views",      "observability", "convention_findings",
                       "scale",       "splits",     "smooth_errors", "joint_zeros",
                       "use",         "warnings",   "exit_code",     "provenance"});
-  if (file.string("schema", "") != "flash-extrinsics/1") throw file.error("schema", "\"flash-extrinsics/1\"");
+  // The second version has joint_zeros, use and the depth of comparisons; what is read here is in both.
+  const std::string schema = file.string("schema", "");
+  if (schema != "flash-extrinsics/1" && schema != "flash-extrinsics/2")
+    throw file.error("schema", "\"flash-extrinsics/2\" or \"flash-extrinsics/1\"");
   CameraPose pose;
   pose.transform = read_transform(file.object("transform"));
   pose.warnings = read_warnings(file);

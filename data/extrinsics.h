@@ -13,7 +13,7 @@ struct NamedTransform {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();  ///< maps points of the child into the parent
 };
 
-/// What every reader of "flash-extrinsics/1" needs: where the camera is, and what `flash-calib handeye` said
+/// What every reader of extrinsics needs: where the camera is, and what `flash-calib handeye` said
 /// of its own answer.
 struct CameraPose {
   NamedTransform transform;           ///< base or gripper <- camera

@@ -252,8 +252,8 @@ double add_systematic(Calibration& result, const SystematicUncertainty& systemat
   std::snprintf(
       text, sizeof text,
       "the robot's errors change smoothly with its pose, as those of a kinematic model or a lens do: "
-      "what is alike in all views cannot be seen, and was added to the stated standard deviations, "
-      "which it raised by %.1f",
+      "the part common to all views cannot be observed, so its estimated size was added to the stated "
+      "standard deviations, which it raised by a factor of %.1f",
       std::sqrt(grown));
   result.warnings.emplace_back(text);
   return grown;

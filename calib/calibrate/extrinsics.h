@@ -31,7 +31,7 @@ std::string resolved(const std::string& path, const std::string& calibration);
 /// written. covariance: of the right perturbation (dt, dtheta), along those of the child.
 Vector6d parent_deviations(const Eigen::Isometry3d& T, const Matrix6d& covariance);
 
-/// "flash-extrinsics/1", as far as other programs need it.
+/// What flash-calib handeye wrote, as far as other programs need it.
 struct Extrinsics {
   Setup setup = Setup::eye_in_hand;
   std::string method;

@@ -130,7 +130,7 @@ Json to_json(const TargetSize& size) {
 Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int exit_code) {
   const Extrinsics extrinsics = extrinsics_of(calibration, inputs);
   const Vector6d sd = calibration.covariance.diagonal().cwiseSqrt();
-  Json json = {{"schema", "flash-extrinsics/1"},
+  Json json = {{"schema", "flash-extrinsics/2"},
                {"setup", to_string(extrinsics.setup)},
                {"method", extrinsics.method},
                {"transform", to_json(extrinsics.transform)},

@@ -171,10 +171,10 @@ std::vector<std::string> next_steps(const Calibration& c) {
   std::vector<std::string> steps;
   if (c.size && c.size->far_off()) {
     const double larger = 100 * (c.size->wanted->estimate - 1);
-    steps.push_back(
-        sentence(larger > 0 ? "Measure the printed target: the data want it %.2f %% larger than stated."
-                            : "Measure the printed target: the data want it %.2f %% smaller than stated.",
-                 std::abs(larger)));
+    steps.push_back(sentence(
+        larger > 0 ? "Measure the printed target: its estimated size is %.2f %% larger than stated."
+                   : "Measure the printed target: its estimated size is %.2f %% smaller than stated.",
+        std::abs(larger)));
   }
   const double second = kDegrees * c.diversity.spread.y();
   if (second < kWideTurn)

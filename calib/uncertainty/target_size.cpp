@@ -91,9 +91,10 @@ std::string size_sentence(const TargetSize& size) {
   char text[320];
   std::snprintf(
       text, sizeof text,
-      "the data want a target %.4f +- %.4f (2 sd) times as large as stated, which is known to %g %%: "
-      "measure its squares, or the intrinsics or the robot's unit are wrong; the answer is for %.4f "
-      "times (--target-size solved takes what the data want)",
+      "the estimated size of the target is %.4f +- %.4f (2 sd) of the stated one, which is known to %g %%: "
+      "measure a square; if the print is right, check the focal length and the unit of the robot's poses; "
+      "the "
+      "answer is for %.4f (--target-size solved takes the estimate)",
       size.wanted->estimate, 2 * size.wanted->sd, 100 * size.prior_sd, size.estimate);
   return text;
 }

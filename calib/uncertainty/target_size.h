@@ -41,7 +41,8 @@ struct SizedRefinement {
 /// variances. refined: the solution where it does not; settings: those it was made with.
 SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings);
 
-/// "the data want a target 1.0400 +- 0.0080 (2 sd) times as large as stated ...", of a size that is far off.
+/// "the estimated size of the target is 1.0400 +- 0.0080 (2 sd) of the stated one ...", of a size that is far
+/// off.
 std::string size_sentence(const TargetSize& size);
 
 }  // namespace flash::calib

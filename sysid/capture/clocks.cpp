@@ -30,10 +30,9 @@ std::vector<std::string> compare_clocks(const std::vector<double>& times, const 
     notices.push_back(path + ": " + spans + ": " + of_all +
                       " are outside of it, and the gripper is taken to stand still there");
   else if (times.size() > 1 && times.back() - times.front() < 2.0 / 3 * (end - begin))
-    notices.push_back(
-        path + ": " + spans +
-        ", far longer: are the times of the frames right (--times, --rate)? A wrong rate takes the arm "
-        "for cloth");
+    notices.push_back(path + ": " + spans +
+                      ", far longer: are the times of the frames right (--times)? A wrong rate takes the arm "
+                      "for cloth");
   return notices;
 }
 

@@ -96,7 +96,7 @@ std::vector<std::string> compare_sides(const data::Recording& recording,
   if (points.size() < fewest && size.x() == size.y()) return {};
   if (points.size() < fewest)
     return {
-        "import: --sheet: no cloud shows the sheet before the gripper moves, so its sides cannot be "
+        "import: --mesh: no cloud shows the sheet before the gripper moves, so its sides cannot be "
         "checked: " +
         data::format_short(corner[0] == corner[1] ? size.x() : size.y()) +
         " m are on the right hand, from the grasped corner and seen from above"};
@@ -110,7 +110,7 @@ std::vector<std::string> compare_sides(const data::Recording& recording,
   const double as_swapped = distance_to(turned_to(swapped, points), points);
   constexpr double clear = 0.002;  // below it, noise decides [m]
   if (as_swapped < 0.5 * as_given && as_given - as_swapped > clear)
-    return {"import: warning: --sheet: with the sides changed over, " + data::format_short(size.y()) + "x" +
+    return {"import: warning: --mesh: with the sides changed over, " + data::format_short(size.y()) + "x" +
             data::format_short(size.x()) + ", the sheet is " + data::format_short(1000 * as_swapped) +
             " mm from what the first clouds show of it, as given " + data::format_short(1000 * as_given) +
             " mm: change the sides over, or name another corner with --grasp corner:I,J"};
@@ -266,10 +266,10 @@ data::Recording import_recording(const ImportSettings& settings) {
     table_height = *settings.table_height;
   else
     guesses.push_back("table height " + data::format_short(table_height) +
-                      " m, from the gripper's start and the crop (--table-height)");
+                      " m, from the gripper's start and the crop (--table-z)");
   constexpr double kKnown = 5e-3;  // what a table's height is known to [m]
   if (gripper.z() < table_height - kKnown)
-    notices.push_back("import: warning: --table-height: found " + data::format_short(table_height) +
+    notices.push_back("import: warning: --table-z: found " + data::format_short(table_height) +
                       " m, expected at most the height at which the gripper starts, " +
                       data::format_short(gripper.z()) + " m: does it grasp below the table?");
   recording.has_table = true;
@@ -291,7 +291,7 @@ data::Recording import_recording(const ImportSettings& settings) {
       guesses.push_back("the sheet's diagonal points to " +
                         data::format_short(heading * 180 / std::numbers::pi) +
                         " deg from x, where the clouds are; a few degrees off are usual: give --heading DEG, "
-                        "or --start-yaw 0.2 here and as an axis of grid");
+                        "or --start-yaw-bound 0.2 here and --start-yaw as an axis of grid");
     guesses.push_back("the sheet starts flat on the table, " +
                       std::string(settings.tool_at_patch ? "the middle of the grasped patch" : "its corner") +
                       " under the gripper (--tool-at)");
@@ -300,7 +300,7 @@ data::Recording import_recording(const ImportSettings& settings) {
   const std::string doubt =
       corner && !settings.table_height
           ? "; or the table's height, guessed as " + data::format_short(table_height) +
-                " m from the gripper's start and the crop, is wrong: give it as --table-height"
+                " m from the gripper's start and the crop, is wrong: give it as --table-z"
           : "";
   data::StagedFolder staged(settings.out);
   copy_files(staged.path(), recording);

@@ -14,6 +14,7 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
 #include "data/text.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/replay/memory_estimate.h"
@@ -110,10 +111,10 @@ void check(const SynthSettings& settings) {
   within("--rest", settings.rest, 0, kLongest, " s");
   within("--rate", settings.keyframe_rate, 1e-6, kMostKeyframes / (settings.duration + settings.rest),
          " keyframes a second");
-  within("--time-offset", settings.time_offset, -kFarthest, kFarthest, " s");
+  within("--time-offset-error", settings.time_offset, -kFarthest, kFarthest, " s");
   within("--noise", settings.depth_noise, 0, kFarthest, " m");
   for (int k = 0; k < 3; ++k) {
-    within("--offset", settings.cloud_offset[k], -kFarthest, kFarthest, " m");
+    within("--offset-error", settings.cloud_offset[k], -kFarthest, kFarthest, " m");
     if (settings.displacement)
       within("--displacement", (*settings.displacement)[k], -kFarthest, kFarthest, " m");
     for (const SynthCamera& camera : settings.cameras)
@@ -220,6 +221,50 @@ data::Points visible_border(const data::TriangleMesh& sheet, const DepthView& vi
   return visible;
 }
 
+/// A table far larger than what is on it, a little below the sheet's middle surface, of cells: what reaches
+/// behind a camera is not drawn.
+data::TriangleMesh table_mesh() {
+  constexpr double kBelow = 1e-4;  // [m]
+  data::TriangleMesh mesh = data::parse_mesh_spec("sheet:2x2:0.05", "table");
+  mesh.vertices.rowwise() += Eigen::RowVector3d(-0.85, -0.85, -kBelow);
+  return mesh;
+}
+
+/// Whole millimetres with noise, as depth cameras give them; 0 where nothing is seen.
+data::DepthImage depth_image(const DepthView& view, double noise, std::mt19937_64& random) {
+  std::normal_distribution<double> normal(0.0, 1.0);
+  data::DepthImage image;
+  image.width = static_cast<int>(view.depth.cols());
+  image.height = static_cast<int>(view.depth.rows());
+  for (Eigen::Index v = 0; v < view.depth.rows(); ++v)
+    for (Eigen::Index u = 0; u < view.depth.cols(); ++u) {
+      const double depth = 1e3 * (view.depth(v, u) + noise * normal(random));
+      image.pixels.push_back(depth > 0 && depth < 65535 ? static_cast<std::uint16_t>(std::lround(depth)) : 0);
+    }
+  return image;
+}
+
+void save_raw(const SynthCamera& camera, const std::vector<data::DepthImage>& images,
+              const std::string& folder) {
+  const std::filesystem::path base(folder);
+  std::filesystem::create_directories(base / "depth");
+  data::save_camera_info(camera.intrinsics, (base / "camera_info.yaml").string());
+  const Eigen::Vector3d p = camera.base_from_camera.translation();
+  const Eigen::Quaterniond q(camera.base_from_camera.linear());
+  const nlohmann::ordered_json json = {{"schema", "flash-extrinsics/2"},
+                                       {"transform",
+                                        {{"parent", "base"},
+                                         {"child", "camera"},
+                                         {"translation", {p.x(), p.y(), p.z()}},
+                                         {"rotation_xyzw", {q.x(), q.y(), q.z(), q.w()}}}}};
+  data::write_atomically((base / "extrinsics.json").string(), data::format_json(json));
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    char name[48];
+    std::snprintf(name, sizeof name, "%03zu.png", i);
+    data::save_depth_image(images[i], (base / "depth" / name).string());
+  }
+}
+
 std::string frame_path(const std::string& folder, std::size_t i, const char* suffix) {
   char name[48];
   std::snprintf(name, sizeof name, "%03zu%s.ply", i, suffix);
@@ -253,7 +298,11 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
     synthetic.unconverged_share = result.unconverged_share;
     motion = std::move(result.motion);
   });
-  std::mt19937_64 random(settings.seed + 1);
+  std::mt19937_64 random(settings.seed + 1), raw_random(settings.seed + 2);
+  if (settings.raw) {
+    synthetic.cameras = settings.cameras;
+    synthetic.raw.resize(settings.cameras.size());
+  }
   for (data::RecordedKeyframe& keyframe : synthetic.recording.keyframes) {
     const double t = keyframe.time + settings.time_offset;
     std::vector<data::TriangleMesh> surfaces = {mesh};
@@ -272,6 +321,11 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
       if (in_plane(settings.kind))
         append(contour, visible_border(surfaces[0], view, camera, settings.depth_noise, random));
     }
+    if (settings.raw) surfaces.push_back(table_mesh());
+    for (std::size_t c = 0; c < synthetic.raw.size(); ++c)
+      synthetic.raw[c].push_back(depth_image(
+          render_depth(settings.cameras[c].intrinsics, settings.cameras[c].base_from_camera, surfaces),
+          settings.depth_noise, raw_random));
     cloud.rowwise() += settings.cloud_offset.transpose();
     contour.rowwise() += settings.cloud_offset.transpose();
     synthetic.clouds.push_back(std::move(cloud));
@@ -300,6 +354,8 @@ void save_synthetic(SynthRecording& synthetic, const std::string& folder) {
     recording.keyframes[i].contour = frame_path(folder, i, "_contour");
     data::save_point_cloud(synthetic.contours[i], recording.keyframes[i].contour);
   }
+  for (std::size_t c = 0; c < synthetic.raw.size(); ++c)
+    save_raw(synthetic.cameras[c], synthetic.raw[c], (base / ("camera" + std::to_string(c + 1))).string());
   data::save_recording(recording, (base / "recording.json").string());
 }
 

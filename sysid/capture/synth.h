@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "data/camera.h"
+#include "data/depth_image.h"
 #include "data/material.h"
 #include "data/mesh.h"
 #include "data/recording.h"
@@ -35,16 +36,19 @@ struct SynthSettings {
   double time_offset = 0.0;   ///< true time of an observation labelled t is t + time_offset [s]
   bool clamp_slopes = false;  ///< the grasped patch does not bend
   bool forces = false;        ///< record the gripper's force on the sheet
+  bool raw = false;           ///< keep what the cameras see, table and gripper included
   unsigned seed = 1;
 };
 
 /// A recording made by simulation: what recording.json will say, and the clouds of its keyframes.
 struct SynthRecording {
-  data::Recording recording;           ///< keyframes without paths
-  std::vector<data::Points> clouds;    ///< one a keyframe, base frame [m]
-  std::vector<data::Points> contours;  ///< visible border of the sheet, one a keyframe [m]
-  double residual_max = 0;             ///< of the simulated steps, |r| / |M g|
-  double unconverged_share = 0;        ///< of the simulated steps
+  data::Recording recording;                       ///< keyframes without paths
+  std::vector<data::Points> clouds;                ///< one a keyframe, base frame [m]
+  std::vector<data::Points> contours;              ///< visible border of the sheet, one a keyframe [m]
+  std::vector<SynthCamera> cameras;                ///< of the raw images
+  std::vector<std::vector<data::DepthImage>> raw;  ///< of each camera, one a keyframe [mm]; empty: not kept
+  double residual_max = 0;                         ///< of the simulated steps, |r| / |M g|
+  double unconverged_share = 0;                    ///< of the simulated steps
 };
 
 /// Simulates a sheet that lies on a table (z = 0) while grippers move patches of it from rest to rest along
@@ -56,7 +60,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
                           const sim::SolverSettings& solver);
 
 /// Writes recording.json, the trajectories, frames/NNN.ply and, where the kind needs it,
-/// frames/NNN_contour.ply.
+/// frames/NNN_contour.ply; of raw images cameraN/depth/NNN.png with camera_info.yaml and extrinsics.json.
 void save_synthetic(SynthRecording& synthetic, const std::string& folder);
 
 /// The truth behind a synthetic recording as JSON, schema "flash-truth/1".

@@ -116,20 +116,24 @@ Axis parse_axis(const std::string& name, const std::string& specification) {
   return axis;
 }
 
-Axis parse_fixed(const std::string& assignment, const std::string& option) {
-  const std::size_t equals = assignment.find('=');
-  if (equals == std::string::npos) {
-    throw data::InputError(option + ": \"" + assignment + "\": expected name=value, as friction=0.3");
-  }
-  const std::string name = assignment.substr(0, equals);
-  const std::string where = option + " " + name;
+Hold parse_hold(const std::string& text) {
+  constexpr std::string_view kMeasured = ":measured";
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos)
+    throw data::InputError("--hold: \"" + text +
+                           "\": expected name=value or name=value:measured, as friction=0.3");
+  const std::string name = text.substr(0, equals);
+  const std::string where = "--hold " + name;
   const ParameterInfo& info = info_of(where, name);
-  const std::string_view word = std::string_view(assignment).substr(equals + 1);
+  std::string_view word = std::string_view(text).substr(equals + 1);
+  const bool measured = word.ends_with(kMeasured);
+  if (measured) word.remove_suffix(kMeasured.size());
   const std::optional<double> value = data::parse_number(word);
   if (!value || !std::isfinite(*value))
-    throw data::InputError(where + ": found \"" + std::string(word) + "\", expected a number");
+    throw data::InputError(where + ": found \"" + std::string(word) +
+                           "\", expected a number, or one with :measured");
   check_range(where, info, *value);
-  return {name, {*value}, false};
+  return {{name, {*value}, false}, measured};
 }
 
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes) {
@@ -184,7 +188,7 @@ void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) 
     throw data::InputError(
         "--young, --poisson: under TRI_ARAP the motion depends on them only through E / (1 + nu), so that no "
         "recording "
-        "can tell them apart; fix one (--fix poisson=0.3), or use TRI_COROTATED");
+        "can tell them apart; hold one (--hold poisson=0.3), or use TRI_COROTATED");
   }
 }
 

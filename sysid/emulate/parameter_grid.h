@@ -39,8 +39,14 @@ void check_parameter(const std::string& option, const std::string& name);
 /// range, a value given twice.
 Axis parse_axis(const std::string& name, const std::string& specification);
 
-/// "friction=0.3", an axis of one value. Throws data::InputError naming `option`, that which was used.
-Axis parse_fixed(const std::string& assignment, const std::string& option = "--fix");
+/// A parameter that is held at a value.
+struct Hold {
+  Axis axis;              ///< of one value
+  bool measured = false;  ///< it counts as known; else it is an assumption
+};
+
+/// "friction=0.3", or "friction=0.3:measured". Throws data::InputError naming --hold.
+Hold parse_hold(const std::string& text);
 
 /// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes);

@@ -360,6 +360,20 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
   return found;
 }
 
+/// The estimate as it moves on the mesh that the answer is of.
+Fit fit_of(const Task& task, const Found& found, const Answer& answer) {
+  Fit fit{task.replays, answer.motions, answer.estimate};
+  std::vector<ReplayResult> own;
+  auto motions =
+      found.emulator.share == kOwn ? std::nullopt : simulate_at(task, found.emulator, answer.values, own);
+  if (!motions) return fit;
+  fit.replays = replays_of(found.emulator);
+  fit.motions = std::move(*motions);
+  fit.score = score_motions(fit.replays, fit.motions, task.grid.score);
+  fit.score.values = answer.values;
+  return fit;
+}
+
 /// How far each error moves the surface, and the parameters if they had to explain it.
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   const std::vector<Replay> on_model = replays_of(found.emulator);
@@ -373,7 +387,7 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
     const std::vector<MotionTerm>& terms = found.estimate.errors[e].terms;
     const Motions &from = *terms[0].motions, &to = *terms[1].motions;
     checks.push_back(compare_solutions(found.estimate.names[e], sensitivity, from.replays, from.results,
-                                       to.replays, to.results, task.grid));
+                                       to.replays, to.results, grid.axes));
   }
   return checks;
 }
@@ -410,7 +424,7 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
   constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
-  std::size_t motions = kAtEstimate + 2 + kHeld + kRounds * (own + kAtEstimate + (solver_check ? finer : 0));
+  std::size_t motions = kAtEstimate + 3 + kHeld + kRounds * (own + kAtEstimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(grid.axes)).size();
   const int looks = 2 * (own > 0 ? 1 + kRounds : 1);
   return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
@@ -454,6 +468,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.estimate = results.candidates[static_cast<std::size_t>(answer.best)];
     for (const Replay& replay : replays)
       answer.motions.push_back(store.run(replay, candidate_at(best, grid)));
+    answer.fit = {replays, answer.motions, answer.estimate};
     answer.parameters = findings_without_posterior(results, best);
     answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
     return answer;
@@ -476,6 +491,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   }
   answer.estimate = score_motions(replays, answer.motions, grid.score);
   answer.estimate.values = answer.values;
+  answer.fit = fit_of(task, *found, answer);
   const std::vector<Axis> ranges =
       settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
   answer.parameters = findings_of(results, ranges, posterior);

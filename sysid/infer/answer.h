@@ -19,12 +19,20 @@ struct AnswerSettings {
   std::vector<Axis> ranges = {};        ///< searched before the grid at hand; empty: its own
 };
 
+/// The motions of the estimate, and how far they are from what was observed.
+struct Fit {
+  std::vector<Replay> replays;        ///< on the mesh of the motions, one a recording
+  std::vector<ReplayResult> motions;  ///< one a recording
+  CandidateResult score;
+};
+
 /// What a search says of its parameters, and how that was checked.
 struct Answer {
   int best = -1;                             ///< candidate of least score; -1: none was usable
   std::vector<double> values;                ///< the estimate, one an axis
-  CandidateResult estimate;                  ///< simulated there and scored
-  std::vector<ReplayResult> motions;         ///< of the estimate, one a recording
+  CandidateResult estimate;                  ///< simulated on the search's own mesh and scored
+  std::vector<ReplayResult> motions;         ///< of the estimate there, one a recording
+  Fit fit;                                   ///< on cells of no size where the answer is of these, else there
   std::vector<ParameterFinding> parameters;  ///< one an axis, in order
   Eigen::MatrixXd covariance_log;   ///< of log(parameter) in order of the axes; empty where one may be zero
   Eigen::MatrixXd samples;          ///< of the posterior, values of the axes, a draw a row

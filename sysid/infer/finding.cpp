@@ -20,4 +20,10 @@ std::string to_string(RangeEdge edge) {
   return edge == RangeEdge::low ? "low" : edge == RangeEdge::high ? "high" : "";
 }
 
+std::string edge_text(RangeEdge edge) {
+  return edge == RangeEdge::low    ? "the best value is the lowest searched: search lower"
+         : edge == RangeEdge::high ? "the best value is the highest searched: search higher"
+                                   : "";
+}
+
 }  // namespace flash::sysid

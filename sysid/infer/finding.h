@@ -28,5 +28,7 @@ struct ParameterFinding {
 
 std::string to_string(Identifiable identifiable);
 std::string to_string(RangeEdge edge);  ///< "low", "high", or "" for none
+std::string edge_text(
+    RangeEdge edge);  ///< "the best value is the lowest searched: search lower"; "" for none
 
 }  // namespace flash::sysid

@@ -53,7 +53,7 @@ Eigen::VectorXd ranges_of(const std::vector<Axis>& axes) {
 SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensitivity,
                               const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
                               const std::vector<Replay>& finer,
-                              const std::vector<ReplayResult>& finer_motions, const GridSettings& grid) {
+                              const std::vector<ReplayResult>& finer_motions, const std::vector<Axis>& axes) {
   SolverCheck found;
   found.what = what;
   double sum = 0;
@@ -64,14 +64,13 @@ SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensit
       sum += distance;
       ++count;
     }
-  found.score = score_motions(finer, finer_motions, grid.score).score;
   found.surface_change_m = count > 0 ? sum / static_cast<double>(count) : 0;
   const Eigen::VectorXd shift =
       explain(sensitivity,
               displacements(sensitivity, finer, finer_motions) - displacements(sensitivity, replays, motions),
-              ranges_of(grid.axes));
-  for (std::size_t k = 0; k < grid.axes.size(); ++k)
-    found.shift[grid.axes[k].name] = shift[static_cast<Eigen::Index>(k)];
+              ranges_of(axes));
+  for (std::size_t k = 0; k < axes.size(); ++k)
+    found.shift[axes[k].name] = shift[static_cast<Eigen::Index>(k)];
   return found;
 }
 

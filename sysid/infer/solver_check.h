@@ -11,7 +11,6 @@ namespace flash::sysid {
 /// The estimate under other settings of the solution.
 struct SolverCheck {
   std::string what;             ///< "estimate_itself", "half_step", "double_mesh", "four_times_iterations"
-  double score = 0;             ///< [m]
   double surface_change_m = 0;  ///< mean distance between the two surfaces [m]
   std::map<std::string, double> shift{};  ///< error that the search's own settings cause in each parameter:
                                           ///< of its logarithm where it was searched so, else in its unit
@@ -31,11 +30,11 @@ std::vector<FinerSolution> finer_solutions(const std::vector<Replay>& replays,
 
 /// How far `finer_motions` are from `motions`, and the change of the parameters that explains it.
 /// `surface_change_m`: mean over the weighing keyframes of the mean distance from the vertices of the finer
-/// run to the surface of the other, before any registration. `score`: of the finer, registered anew.
+/// run to the surface of the other, before any registration.
 SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensitivity,
                               const std::vector<Replay>& replays, const std::vector<ReplayResult>& motions,
                               const std::vector<Replay>& finer,
-                              const std::vector<ReplayResult>& finer_motions, const GridSettings& grid);
+                              const std::vector<ReplayResult>& finer_motions, const std::vector<Axis>& axes);
 
 /// Extent of each axis, in the units of Sensitivity.
 Eigen::VectorXd ranges_of(const std::vector<Axis>& axes);

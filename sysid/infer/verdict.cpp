@@ -50,6 +50,16 @@ ParameterFinding empty_finding(const GridResults& results, std::size_t k) {
   return finding;
 }
 
+/// Which end of a range a coordinate is at, up to rounding of a logarithm and back.
+RangeEdge edge_of(const Axis& range, double coordinate) {
+  const double low = coordinate_of(range, range.values.front()),
+               high = coordinate_of(range, range.values.back());
+  const double rounding = 1e-9 * (high - low);
+  return coordinate <= low + rounding    ? RangeEdge::low
+         : coordinate >= high - rounding ? RangeEdge::high
+                                         : RangeEdge::none;
+}
+
 std::string note_of(const ParameterFinding& finding, bool open_below, bool open_above) {
   std::string note;
   const auto add = [&](const std::string& sentence) { note += (note.empty() ? "" : "; ") + sentence; };
@@ -58,13 +68,12 @@ std::string note_of(const ParameterFinding& finding, bool open_below, bool open_
   if (finding.identifiable == Identifiable::no && open_below && open_above)
     add("every value from " + low + " to " + high + " is likely");
   if (finding.identifiable == Identifiable::no && !(open_below && open_above))
-    add("the recordings tell it no better than what is usual for cloth");
+    add("the recordings halve the range that is usual for cloth by less than once");
   if (finding.identifiable == Identifiable::lower_bound)
     add("only values below " + data::format_short((*finding.interval95)[0]) + " are excluded");
   if (finding.identifiable == Identifiable::upper_bound)
     add("only values above " + data::format_short((*finding.interval95)[1]) + " are excluded");
-  if (finding.edge == RangeEdge::low) add("the best value is the lowest searched: search lower");
-  if (finding.edge == RangeEdge::high) add("the best value is the highest searched: search higher");
+  if (finding.edge != RangeEdge::none) add(edge_text(finding.edge));
   return note;
 }
 
@@ -92,14 +101,12 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
       const std::array<double, 2> usual = usual_of(range);
       const double from = below ? std::min(usual[0], low) : low, to = above ? std::max(usual[1], high) : high;
       finding.bits = std::log2((usual[1] - usual[0]) / std::max(to - from, 1e-12));
-      finding.identifiable = below && above               ? Identifiable::no
-                             : below                      ? Identifiable::upper_bound
-                             : above                      ? Identifiable::lower_bound
-                             : *finding.bits < kLeastBits ? Identifiable::no
-                                                          : Identifiable::yes;
-      finding.edge = estimate <= range.values.front()  ? RangeEdge::low
-                     : estimate >= range.values.back() ? RangeEdge::high
-                                                       : RangeEdge::none;
+      finding.identifiable = (below && above) || *finding.bits < kLeastBits ? Identifiable::no
+                             : below                                        ? Identifiable::upper_bound
+                             : above                                        ? Identifiable::lower_bound
+                                                                            : Identifiable::yes;
+      // Where every value is likely, a wider range would tell no more.
+      if (!(below && above)) finding.edge = edge_of(range, mode);
       finding.note = note_of(finding, below, above);
     } else {
       finding.interval95 = {estimate, estimate};

@@ -15,7 +15,7 @@ namespace flash::sysid {
 /// posterior, or at the estimate where that lies beyond. On another side it ends with the range. `bits` is
 /// the information gained: log2 of the width of what is usual for the parameter over that of the interval,
 /// which an open side takes to the end of the usual. A wider range says the same. Below one bit a parameter
-/// is not told.
+/// is not told, nor bounded.
 std::vector<ParameterFinding> findings_of(const GridResults& results, const std::vector<Axis>& searched,
                                           const Posterior& posterior);
 

@@ -80,7 +80,7 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
                                      {"source", source_of(base, finding.name)}};
   json["covariance_log"] = covariance(summary);
   json["samples"] = samples(summary);
-  json["score_m"] = number(summary.best_score);
+  json["score_m"] = number(summary.score_on_mesh);
   json["horizon_s"] = horizon ? Json(*horizon) : Json(nullptr);
   json["solver"] = summary.settings;
   json["tool_version"] = summary.tool_version;

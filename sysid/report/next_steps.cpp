@@ -8,21 +8,23 @@
 namespace flash::sysid {
 namespace {
 
-// Which experiment tells which parameter; the second would do as well.
+// Which experiment determines which parameter; the second would do as well.
 const std::map<std::string, std::string>& telling_experiments() {
   static const std::map<std::string, std::string> experiments = {
       {"young",
-       "Record a bar pull of 5 to 15 % with contour or gripper force: it tells the membrane stiffness."},
+       "Record a bar pull of 5 to 15 % with contour or gripper force: it determines the membrane stiffness."},
       {"poisson",
-       "Record a bias pull of about 15 % with contour: it tells Poisson's ratio. Until then, leave it at its "
-       "prior."},
-      {"bending", "Record a corner lift or a hang of a larger piece: both tell the bending rigidity."},
+       "Record a bias pull of about 15 % with contour: it determines Poisson's ratio. Until then, the "
+       "asset keeps its value."},
+      {"bending", "Record a corner lift or a hang of a larger piece: both determine the bending rigidity."},
       {"friction",
-       "Drag the sheet over the table, or tilt the table until it slides: both tell friction directly."},
+       "Drag the sheet over the table, or tilt the table until it slides. A light sheet may need a lift: "
+       "flash-sysid plan ranks the experiments for yours."},
       {"areal_density",
-       "Weigh the sheet and pass --fix areal_density=...: motion tells stiffness over weight only."},
-      {"air_drag", "Record a hanging sheet that swings to rest: it tells air drag."},
-      {"stiffness_damping", "Record a hanging sheet that swings to rest: it tells damping."}};
+       "Weigh the sheet and pass --hold areal_density=...:measured: motion determines stiffness over weight "
+       "only."},
+      {"air_drag", "Record a hanging sheet that swings to rest: it determines air drag."},
+      {"stiffness_damping", "Record a hanging sheet that swings to rest: it determines damping."}};
   return experiments;
 }
 

@@ -28,4 +28,14 @@ ParameterLabel parameter_label(const std::string& name, bool has_thickness) {
   return {words, name, ""};
 }
 
+std::string solver_check_label(const std::string& what) {
+  static const std::map<std::string, std::string> labels = {
+      {"estimate_itself", "simulated, not interpolated"},
+      {"double_mesh", "cells of no size, not of half"},
+      {"half_step", "half the time step"},
+      {"four_times_iterations", "four times the iterations"}};
+  const auto found = labels.find(what);
+  return found == labels.end() ? what : found->second;
+}
+
 }  // namespace flash::sysid

@@ -14,4 +14,7 @@ struct ParameterLabel {
 /// beside a thickness, and E t [N/m] without.
 ParameterLabel parameter_label(const std::string& name, bool has_thickness);
 
+/// What a SolverCheck compares: "half the time step" for half_step.
+std::string solver_check_label(const std::string& what);
+
 }  // namespace flash::sysid

@@ -100,7 +100,8 @@ Json recordings_of(const Summary& summary) {
                     {"score", number(recording.score)},
                     {"noise_m", number(recording.misfit.noise)},
                     {"misfit_m", number(recording.misfit.size)},
-                    {"fits", !recording.misfit.found},
+                    {"explained_m", number(recording.misfit.explained)},
+                    {"fits", model_fits(recording.misfit)},
                     {"keyframes", recording.misfit.keyframes},
                     {"worth", number(recording.misfit.worth)},
                     {"horizon_s", optional(recording.horizon_s)},
@@ -199,6 +200,7 @@ std::string render_report(const Summary& summary, const GridResults& results,
   json["fixed"] = fixed_of(summary, has_thickness);
   json["recordings"] = recordings_of(summary);
   json["score"] = number(summary.best_score);
+  json["score_on_mesh"] = number(summary.score_on_mesh);
   json["candidates"] = summary.candidates;
   json["unconverged"] = summary.unconverged;
   json["exit_code"] = summary.exit_code;
@@ -209,7 +211,7 @@ std::string render_report(const Summary& summary, const GridResults& results,
   json["solver_check"] = Json::array();
   for (const SolverCheck& check : summary.solver_check)
     json["solver_check"].push_back({{"what", check.what},
-                                    {"score", number(check.score)},
+                                    {"label", solver_check_label(check.what)},
                                     {"surface_change_m", number(check.surface_change_m)},
                                     {"shift", check.shift}});
   json["settings"] = summary.settings;

@@ -1,6 +1,7 @@
 #include "sysid/report/summarize.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 
@@ -37,7 +38,7 @@ std::map<std::string, double> parameters_of(const data::SheetMaterial& material,
           {"stiffness_damping", material.stiffness_damping}};
 }
 
-// What was held, and on whose word: `--fix` is a measurement, the asset an assumption.
+// What was held, and on whose word: a measurement, or an assumption of the command line or the asset.
 std::map<std::string, FixedParameter> fixed_of(const Summary& summary, const GridSettings& settings) {
   std::map<std::string, FixedParameter> fixed;
   for (const Axis& axis : settings.fixed) fixed[axis.name] = {axis.values.front(), "measured"};
@@ -69,17 +70,15 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
 /// "lift: the model does not fit: ..."; empty where it fits.
 std::string warning_of_misfit(const SummaryRecording& recording) {
   const Misfit& misfit = recording.misfit;
-  if (!misfit.found) return "";
+  if (model_fits(misfit)) return "";
   const auto mm = [](double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; };
-  const double explained =
-      std::sqrt(2 / M_PI) * std::hypot(misfit.noise, misfit.explained);  // of a mean distance
   std::string worth;
   if (misfit.worth < misfit.keyframes)
     worth = "; " + std::to_string(misfit.keyframes) + " keyframes are worth " +
             data::format_short(std::round(10 * misfit.worth) / 10);
-  return recording.name + ": the model does not fit: it misses the observed points by " +
-         mm(recording.score) + " where noise" +
-         (misfit.explained > 0 ? " and repeatability explain " : " explains ") + mm(explained) + worth +
+  return recording.name + ": the model does not fit: apart from noise of " + mm(misfit.noise) +
+         " it misses the cloth by " + mm(misfit.size) +
+         (misfit.explained > 0 ? " where repeatability explains " + mm(misfit.explained) : "") + worth +
          ". The intervals allow for it, but are those of a model that does not fit";
 }
 
@@ -92,8 +91,7 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
     if (finding.identifiable == Identifiable::no)
       warnings.push_back(finding.name + " is not identifiable from " +
                          (summary.recordings.size() > 1 ? "these recordings" : "this recording"));
-    if (finding.edge != RangeEdge::none && finding.identifiable == Identifiable::yes)
-      warnings.push_back(finding.name + ": the best value is at the edge of the searched range");
+    if (finding.edge != RangeEdge::none) warnings.push_back(finding.name + ": " + edge_text(finding.edge));
   }
   const auto claims_bending = [](const ParameterFinding& finding) {
     return finding.name == "bending" && finding.identifiable != Identifiable::no;
@@ -150,6 +148,21 @@ std::string reason_unusable(const Summary& summary, const CandidateResult& best)
   return "";
 }
 
+/// What was observed, of which the score is a mean: "cloud, contour".
+std::string observed_terms(const std::vector<Replay>& replays, const Objective& objective) {
+  std::array<double, 5> weights = {};
+  for (const Replay& replay : replays)
+    for (const Observation& observation : replay.observations) {
+      const std::array<double, 5> of_frame = term_weights(observation, objective);
+      for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = std::max(weights[k], of_frame[k]);
+    }
+  constexpr std::array<const char*, 5> kNames = {"cloud", "contour", "markers", "force", "unseen cloth"};
+  std::string terms;
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    if (weights[k] > 0) terms += (terms.empty() ? "" : ", ") + std::string(kNames[k]);
+  return terms;
+}
+
 void add_settings(Summary& summary, const std::vector<Replay>& replays, const GridSettings& settings) {
   const Replay& replay = replays.front();
   auto& texts = summary.settings;
@@ -171,6 +184,7 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
           ? "mean without the largest " + data::format_short(100 * robust.trim_fraction) + " %"
       : robust.kind == RobustKind::huber ? "Huber, " + data::format_short(1000 * robust.huber_delta) + " mm"
                                          : "mean";
+  texts["observed"] = observed_terms(replays, settings.score.objective);
 }
 
 /// Every so many draws, of the parameters that were searched.
@@ -208,7 +222,11 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   const ReplayCandidate candidate = candidate_at(answer.values, settings);
   summary.best = parameters_of(candidate.material, settings.base.thickness);
   summary.membrane_stiffness = candidate.material.membrane_stiffness;
-  summary.best_score = estimate.score;
+  summary.best_score = answer.fit.score.score;
+  summary.score_on_mesh = estimate.score;
+  const bool on_mesh = answer.fit.replays.empty() || answer.fit.score.score == estimate.score;
+  summary.settings["score_of"] =
+      on_mesh ? replays.front().recording.mesh_spec : "cells of no size (extrapolated)";
   std::map<std::string, double> nuisance;
   for (const std::vector<Axis>* axes : {&settings.axes, &settings.fixed})
     for (std::size_t k = 0; k < axes->size(); ++k)
@@ -223,7 +241,8 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   summary.fixed = fixed_of(summary, settings);
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const Misfit misfit = r < answer.misfits.size() ? answer.misfits[r] : Misfit{};
-    summary.recordings.push_back(summarize_recording(replays[r], estimate.recordings[r], misfit, nuisance));
+    summary.recordings.push_back(
+        summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
     if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
   }
   for (const SummaryRecording& recording : summary.recordings)
@@ -233,6 +252,9 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     summary.warnings.push_back(warning);
   summary.warnings.insert(summary.warnings.end(), answer.warnings.begin(), answer.warnings.end());
   summary.solver_check = answer.checks;
+  if (!asked.solver_check)
+    summary.warnings.emplace_back(
+        "no finer solution was asked for: how far mesh, step and iterations move the answer is not known");
   summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
   if (const std::string reason = reason_unusable(summary, estimate); !reason.empty()) {

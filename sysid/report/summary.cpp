@@ -63,7 +63,7 @@ Json to_json(const SummaryRecording& recording) {
   json["misfit_reach_s"] = number(recording.misfit.reach_time);
   json["misfit_reach_m"] = number(recording.misfit.reach_sheet);
   json["misfit_gain"] = number(recording.misfit.gain);
-  json["model_fits"] = !recording.misfit.found;
+  json["model_fits"] = model_fits(recording.misfit);
   json["keyframes"] = recording.misfit.keyframes;
   json["keyframes_worth"] = number(recording.misfit.worth);
   json["horizon_s"] = optional(recording.horizon_s);
@@ -252,6 +252,7 @@ void check_best(const Summary& summary, const std::string& path) {
     if (!std::isfinite(value)) throw data::input_error(path, field, "found null, expected a number");
   };
   check("best.score", summary.best_score);
+  check("best.score_on_mesh", summary.score_on_mesh);
   check("best.membrane_stiffness", summary.membrane_stiffness);
   for (const SummaryRecording& recording : summary.recordings)
     check("recordings." + recording.name + ".score", recording.score);
@@ -262,6 +263,7 @@ void check_values(const Summary& summary, const std::string& path) {
   for (const auto& [name, value] : summary.best) check_value(path, "best.parameters", name, value);
   for (const auto& [name, fixed] : summary.fixed) check_value(path, "fixed", name, fixed.value);
   check_score(path, "best.score", summary.best_score);
+  check_score(path, "best.score_on_mesh", summary.score_on_mesh);
   check_score(path, "best.membrane_stiffness", summary.membrane_stiffness);
   for (const ParameterFinding& finding : summary.parameters) {
     const std::string field = "parameters." + finding.name;
@@ -297,13 +299,19 @@ void check_values(const Summary& summary, const std::string& path) {
 
 }  // namespace
 
+bool model_fits(const Misfit& misfit) {
+  constexpr double kTold = 1e-5;  // [m]
+  return !misfit.found || misfit.size < misfit.explained + kTold;
+}
+
 std::string summary_text(const Summary& summary) {
   Json json;
   json["schema"] = schema;
   json["tool_version"] = summary.tool_version;
   json["best"] = {{"parameters", summary.best},
                   {"membrane_stiffness", number(summary.membrane_stiffness)},
-                  {"score", number(summary.best_score)}};
+                  {"score", number(summary.best_score)},
+                  {"score_on_mesh", number(summary.score_on_mesh)}};
   json["axes"] = Json::array();
   json["parameters"] = Json::object();
   for (const ParameterFinding& finding : summary.parameters) {
@@ -320,10 +328,8 @@ std::string summary_text(const Summary& summary) {
     json["recordings"].push_back(to_json(recording));
   json["solver_check"] = Json::array();
   for (const SolverCheck& check : summary.solver_check)
-    json["solver_check"].push_back({{"what", check.what},
-                                    {"score", number(check.score)},
-                                    {"surface_change_m", number(check.surface_change_m)},
-                                    {"shift", check.shift}});
+    json["solver_check"].push_back(
+        {{"what", check.what}, {"surface_change_m", number(check.surface_change_m)}, {"shift", check.shift}});
   json["settings"] = summary.settings;
   json["asset"] = summary.asset;
   json["candidates"] = summary.candidates;
@@ -356,6 +362,8 @@ Summary load_summary(const std::string& path) {
   summary.best = typed<std::map<std::string, double>>(best, "parameters", "numbers by name");
   summary.membrane_stiffness = score_of(best, "membrane_stiffness");
   summary.best_score = score_of(best, "score");
+  // Earlier programs had one score.
+  summary.score_on_mesh = best.has("score_on_mesh") ? score_of(best, "score_on_mesh") : summary.best_score;
   const data::JsonObject parameters = json.object("parameters");
   for (const std::string& name : typed<std::vector<std::string>>(json, "axes", "a list of names"))
     summary.parameters.push_back(read_finding(name, parameters.object(name.c_str())));
@@ -367,7 +375,7 @@ Summary load_summary(const std::string& path) {
     summary.recordings.push_back(read_recording(recording));
   for (const data::JsonObject& check : json.objects("solver_check"))
     summary.solver_check.push_back(
-        {check.string("what"), score_of(check, "score"), score_of(check, "surface_change_m"),
+        {check.string("what"), score_of(check, "surface_change_m"),
          check.has("shift") ? typed<std::map<std::string, double>>(check, "shift", "numbers by name")
                             : std::map<std::string, double>{}});
   summary.settings = typed<std::map<std::string, std::string>>(json, "settings", "texts by name");

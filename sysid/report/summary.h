@@ -38,11 +38,15 @@ struct SummaryRecording {
   std::vector<SummaryFrame> frames;
 };
 
+/// Whether no misfit was found, or repeatability explains it, to 0.01 mm.
+bool model_fits(const Misfit& misfit);
+
 /// All that a search found: the file summary.json (schema "flash-sysid-summary/2").
 struct Summary {
-  std::map<std::string, double> best;        ///< every parameter of the estimate
-  double membrane_stiffness = 0;             ///< E t of the estimate [N/m]
-  double best_score = 0;                     ///< of the estimate, simulated [m]
+  std::map<std::string, double> best;  ///< every parameter of the estimate
+  double membrane_stiffness = 0;       ///< E t of the estimate [N/m]
+  double best_score = 0;     ///< of the estimate, on the mesh that the answer is of (settings "score_of") [m]
+  double score_on_mesh = 0;  ///< of the estimate on the mesh that was searched, as a replay gives it [m]
   std::vector<ParameterFinding> parameters;  ///< the searched ones, in the order of the axes
   std::map<std::string, FixedParameter> fixed;
   Eigen::MatrixXd covariance_log;  ///< of log(parameter) in the order of `parameters`; empty: not estimated

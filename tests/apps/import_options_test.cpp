@@ -27,19 +27,16 @@ TEST(ImportOptions, AGraspIsACornerVerticesOrAPosition) {
 }
 
 TEST(ImportOptions, EitherSideOfACropMayBeOpen) {
-  ImportOptions options;
-  options.crop_x = "-0.1:0.2";
-  options.crop_y = ":0.3";
-  options.crop_z = "0.075:";
-  const data::CropBox crop = parse_crop(options);
+  std::array<std::string, 3> ranges = {"-0.1:0.2", ":0.3", "0.075:"};
+  const data::CropBox crop = parse_crop(ranges);
   EXPECT_EQ(crop.min, Eigen::Vector3d(-0.1, -kOpen, 0.075));
   EXPECT_EQ(crop.max, Eigen::Vector3d(0.2, 0.3, kOpen));
-  options.crop_z = "0.5:0.1";
-  EXPECT_EQ(data::input_error_of([&] { parse_crop(options); }),
+  ranges[2] = "0.5:0.1";
+  EXPECT_EQ(data::input_error_of([&] { parse_crop(ranges); }),
             "--crop-z: found \"0.5:0.1\", expected a low end below the high one");
   for (const char* wrong : {"1", "1:2:3", "low:1"}) {
-    options.crop_x = wrong;
-    EXPECT_EQ(data::input_error_of([&] { parse_crop(options); }),
+    ranges[0] = wrong;
+    EXPECT_EQ(data::input_error_of([&] { parse_crop(ranges); }),
               "--crop-x: found \"" + std::string(wrong) +
                   "\", expected LOW:HIGH in metres, either side may be empty");
   }
@@ -53,8 +50,7 @@ class ImportOptionsOfAFolder : public testing::Test {
       folder_.write(name, "");
     options_.clouds = folder_ / "clouds";
     options_.trajectory = folder_.write("tcp.tum", "0 0.5 0.1 0.052 0 0 0 1\n1 0.5 0.1 0.1 0 0 0 1\n");
-    options_.sheet = "0.2x0.1";
-    options_.cell = 0.02;
+    options_.mesh = "sheet:0.2x0.1:0.02";
   }
 
   template <class Change>
@@ -88,15 +84,16 @@ TEST_F(ImportOptionsOfAFolder, BecomeValues) {
 }
 
 TEST_F(ImportOptionsOfAFolder, AreRefusedByTheirNames) {
-  EXPECT_EQ(message_of([](ImportOptions& o) { o.cell = 100; }),
-            "--cell: found \"100\", expected at most the shorter side of the sheet, 0.1 m");
-  EXPECT_EQ(message_of([](ImportOptions& o) { o.sheet = "200x200", o.cell = 10; }),
-            "--sheet: found \"200x200\", expected metres (millimetres read as metres?)");
+  EXPECT_EQ(
+      message_of([](ImportOptions& o) { o.mesh = "sheet:0.2x0.1:0.15"; }),
+      "--mesh: found \"sheet:0.2x0.1:0.15\", expected cells of at most the shorter side of the sheet, 0.1 m");
+  EXPECT_EQ(message_of([](ImportOptions& o) { o.mesh = "sheet:200x200:10"; }),
+            "--mesh: found \"sheet:200x200:10\", expected metres (millimetres read as metres?)");
   EXPECT_TRUE(message_of([](ImportOptions& o) {
-                o.sheet = "0.2";
-              }).starts_with("import: --sheet: found \"sheet:0.2:0.02\", expected sheet:WIDTHxHEIGHT"));
-  EXPECT_EQ(message_of([](ImportOptions& o) { o.mesh = "sheet:0.2x0.2:0.02"; }),
-            "import: expected either --sheet or --mesh");
+                o.mesh = "sheet:0.2:0.02";
+              }).starts_with("import: --mesh: found \"sheet:0.2:0.02\", expected sheet:WIDTHxHEIGHT"));
+  EXPECT_EQ(message_of([](ImportOptions& o) { o.mesh = ""; }),
+            "import: expected --mesh, as sheet:0.3x0.24:0.01");
   const std::string one = folder_.write("one.tum", "0 0.5 0.1 0.052 0 0 0 1\n");
   EXPECT_EQ(message_of([&](ImportOptions& o) { o.trajectory = one; }),
             "--trajectory: " + one + ": found one pose, expected two or more");

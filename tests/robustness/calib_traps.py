@@ -196,7 +196,7 @@ def traps():
                    "005.png: no pose with number 5", "it is left out", used=15)
         yield Trap(f"{other}: millimetres", sound, poses_changed(millimetres), 2, "millimetres")
         yield Trap(f"{other}: squares 8 % too small", sound, option("--target", "chessboard:9x6:0.02315"), 3,
-                   "the data want a target 1.0")
+                   "the estimated size of the target is 1.0")
         yield Trap(f"{other}: three views", sound, first_views(3), 2, "3 of 3 views", "at least 4")
         yield Trap(f"{other}: 30 % outliers", sound, poses_changed(some_jolted), 0, "5 of 16 views were not used",
                    used=11)

@@ -69,12 +69,12 @@ def refusals(sim, sysid, calib):
         ([*run, "too_many.json", "-o", "out"], ["steps", "found 4294967296", "0 to 1,000,000"]),
         ([*run, "two_lengths.json", "-o", "out"], ["two_lengths.json", "steps", "found duration beside it"]),
         ([sim, "run", "short.json", "--config", "c.toml", "-o", "out"], ["--config", "before", "flash-sim --config FILE run"]),
-        ([*grid, "--bending", "1e-4", "--config", "c.toml"], ["--config", "before", "flash-sysid --config FILE grid"]),
-        ([*grid, "--bending", "1e-4", "--rollouts", "short.json"], ["--rollouts: short.json", "expected a folder"]),
-        ([*grid, "--bending", "1e-4", "--rollouts", long], ["--rollouts: " + long, "too long", "expected a folder"]),
-        ([*grid, "--bending", "1e-4", "--map", "bending,bending"], ["--map", "found bending twice"]),
-        ([*grid, "--bending", "1e-4", "--map", "bending,young"], ["--map", "found young", "searched"]),
-        ([*grid, "--bending", "1e-4", "--resume", "--force"], ["--resume", "--force"]),
+        ([*grid, "--bending", "1e-4,2e-4", "--config", "c.toml"], ["--config", "before", "flash-sysid --config FILE grid"]),
+        ([*grid, "--bending", "1e-4,2e-4", "--rollouts", "short.json"], ["--rollouts: short.json", "expected a folder"]),
+        ([*grid, "--bending", "1e-4,2e-4", "--rollouts", long], ["--rollouts: " + long, "too long", "expected a folder"]),
+        ([*grid, "--bending", "1e-4,2e-4", "--map", "bending,bending"], ["--map", "found bending twice"]),
+        ([*grid, "--bending", "1e-4,2e-4", "--map", "bending,young"], ["--map", "found young", "searched"]),
+        ([*grid, "--bending", "1e-4,2e-4", "--resume", "--force"], ["--resume", "--force"]),
         ([*run, "too_long.json", "-o", "out"], ["duration", "at most 1,000,000 steps"]),
         ([*run, "twice.json", "-o", "out"], ["timestep", "given twice"]),
         ([*run, "short.json", "--steps", "4294967296", "-o", "out"], ["--steps", "from 0 to 1,000,000"]),
@@ -87,24 +87,41 @@ def refusals(sim, sysid, calib):
         ([*run, "short.json", "-o", "short.json/out"], ["short.json/out", "Not a directory"]),
         ([sim, "rum"], ["unknown verb", "run"]),
         ([*grid, "--bendin", "1e-4"], ["--bendin: unknown option", 'did you mean "--bending"']),
+        *[([*words, old, "1"], [f"{old}: unknown option", f'did you mean "{new}"']) for words, old, new in (
+            (grid, "--fix", "--hold"), (synth, "--set", "--hold"), ([sysid, "fit", "recording"], "--freeze", "--hold"),
+            (synth, "--offset", "--offset-error"),
+            (synth, "--time-offset", "--time-offset-error"),
+            *[([sysid, "import", "recording"], *names) for names in (
+                ("--within", "--grasp-within"), ("--shape", "--grasp-shape"), ("--offset", "--offset-bound"),
+                ("--yaw", "--yaw-bound"), ("--clock", "--time-offset-bound"), ("--start-yaw", "--start-yaw-bound"),
+                ("--table-error", "--table-height-bound"), ("--table-height", "--table-z"), ("--sheet", "--mesh"),
+                ("--cell", "--mesh"))],
+            *[([sysid, "segment", "raw"], *names) for names in (
+                ("--rate", "--times"), ("--crop-min", "--crop-x"), ("--table-height", "--table-z"))],
+            ([sim, "run", "short.json"], "--durations", "--duration"), (bench, "--vertice", "--vertices"))],
+        ([*grid, "--friction", "0.3"], ["--friction: found one value", "--hold friction=0.3"]),
+        ([*grid, "--bending", "1e-5,1e-4", "--hold", "friction=0.3:weighed"], ["--hold friction", "0.3:weighed", ":measured"]),
+        ([*synth, "--displacement", "0 0 0.1"], ["--displacement", "x,y,z"]),
         ([*grid, "--bending", "1e-4,1e-4"], ["--bending", "twice"]),
         ([*bench, "--vertices", "1e9"], ["--vertices", "from 4 to 1,000,000"]),
         ([*bench, "--vertices", "1000000", "--threads", "1000", "--envs", "1000"], ["--vertices", "MB of memory"]),
         ([*bench, "--time-step", "nan"], ["--time-step", "found \"nan\"", "above 0"]),
         ([*bench, "--young-min", "5", "--young-max", "3"], ["--young-max", "found 3", "at least the 5"]),
-        ([*synth, "--set", "foo=1"], ["--set foo", "unknown parameter"]),
-        ([*synth, "--fix", "friction=0.3", "--fix", "friction=0.4"], ["--fix friction", "given twice"]),
-        ([*synth, "--set", "friction=1e300"], ["--set friction", "0 to 10"]),
+        ([*synth, "--hold", "foo=1"], ["--hold foo", "unknown parameter"]),
+        ([*synth, "--hold", "friction=0.3", "--hold", "friction=0.4"], ["--hold friction", "given twice"]),
+        ([*synth, "--hold", "friction=1e300"], ["--hold friction", "0 to 10"]),
         ([*grid, "--envs", "-1"], ["--envs", "found \"-1\"", "from 1 to 100,000"]),
         ([*grid, "--bending", "1e-5:1e-3:3000000"], ["--bending", "3000000", "from 1 to 1,000,000"]),
         ([*grid, "--table-height", "9:10:2"], ["--table-height", "-0.5 to 0.5"]),
         ([*grid, "--start-yaw", "a"], ["--start-yaw", "\"a\" is not a number"]),
-        ([*grid, "--bending", "1e-4", "--fix", "foo=1"], ["--fix foo", "unknown parameter"]),
+        ([*grid, "--bending", "1e-4,2e-4", "--hold", "foo=1"], ["--hold foo", "unknown parameter"]),
         ([*grid, "--bending", "1e-5:1e-3:3", "--grasp-depth", "0.01:0.03:2"], ["--grasp-depth", "pinch"]),
         *([] if calib is None else [
             ([calib, "detect", ".", "--depth-scale", "nan", "--target", "chessboard:9x6:0.025"], ["--depth-scale"]),
             ([calib, "register", "left.json", "right.json", "--without-images"], ["right.json", "exit_code", "one axis"]),
             ([calib, "validate", ".", "--extrinsics", "right.json"], ["right.json", "exit_code", "one axis", "--force"]),
+            ([calib, "handeye", ".", "--setups", "eye-in-hand"], ["--setups: unknown option", 'did you mean "--setup"']),
+            ([calib, "register", "left.json", "--workspace", "0.5", "0", "0.3"], ["--workspace", 'found "0.5"', "x,y,z"]),
             ([calib, "detect", ".", "--target", ""], ["--target", "found \"\""])]),
         ([sysid, "segment", "raw", "-o", "out"], ["extrinsics.json", "exit_code", "one axis", "--force"])]
 
@@ -255,7 +272,7 @@ def check_file_limit(options, folder):
     """A file that may not grow is told as a full disk is: one line, and no signal."""
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (1024, 1024))
-    grid = ["--bending", "1e-4", "--no-solver-check", "--no-horizon"]
+    grid = ["--bending", "1e-4,2e-4", "--no-solver-check", "--no-horizon"]
     inputs = [folder / "recording", "--asset", folder / "asset.json"]
     for words in ([options.sim, "run", folder / "default.json", "--steps", "20"],
                   [options.sysid, "synth", "--asset", folder / "asset.json", "--duration", "0.2"],
@@ -268,12 +285,12 @@ def check_file_limit(options, folder):
 
 def check_fixed(options, folder):
     """What is said to be understood is what is simulated: a constant of the command line, not the asset's."""
-    words = ["--asset", folder / "asset.json", "--fix", "areal_density=0.25", "-o", folder / "fixed", "--force"]
-    for verb in (["replay"], ["grid", "--bending", "1e-4", "--no-solver-check", "--no-horizon"]):
+    words = ["--asset", folder / "asset.json", "--hold", "areal_density=0.25:measured", "-o", folder / "fixed", "--force"]
+    for verb in (["replay"], ["grid", "--bending", "1e-4,2e-4", "--no-solver-check", "--no-horizon"]):
         done = program.call(options.sysid, *verb, folder / "recording", *words)
         said = [line for line in done.stderr.splitlines() if "kg/m^2" in line]
-        yield (len(said) == 1 and said[0].endswith(", 0.25 kg/m^2") and "--fix areal_density=0.25" in said[0],
-               f"{verb[0]} --fix: {done.stderr}")
+        yield (len(said) == 1 and said[0].endswith(", 0.25 kg/m^2") and "--hold areal_density=0.25" in said[0],
+               f"{verb[0]} --hold: {done.stderr}")
 
 
 def check_killed_replay(options, folder):
@@ -296,15 +313,19 @@ def check_fit(options, folder):
     program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "5e-5,1e-4,2e-4", "--no-solver-check",
                  "--no-horizon", "--quiet", "-o", run)
     line = [options.sysid, "fit", recording, "--start", run, "--no-solver-check", "--no-horizon", "--quiet"]
-    done = program.call(*line, "--freeze", "poisson", "-o", folder / "fitted")
+    done = program.call(*line, "--hold", "poisson", "-o", folder / "fitted")
     yield done.returncode in (0, 3) and "bending" in done.stdout, f"fit: exit code {done.returncode}: {done.stderr}{done.stdout}"
     fit = json.loads((folder / "fitted" / "summary.json").read_text())
     yield fit["fixed"]["poisson"]["value"] == 0.3, f"fit: held at {fit['fixed']}"
     for verb, more in (("report", ["-o", folder / "fitted.html"]), ("export", ["--asset", asset, "-o", folder / "fitted.json"])):
         done = program.call(options.sysid, verb, folder / "fitted", *more, "--quiet")
         yield done.returncode == fit["exit_code"] * (verb == "export"), f"{verb} of a fit: {done.returncode}: {done.stderr}"
-    done = program.call(*line, "--freeze", "poison", "-o", folder / "other")
-    yield done.returncode == REFUSED and 'did you mean "poisson"' in done.stderr, f"fit --freeze poison: {done.stderr}"
+    yield "not those of the search" not in done.stderr and "the search had" not in done.stderr, f"fit: {done.stderr}"
+    done = program.call(*line, "--from", "0.2", "--time-step", "0.02", "-o", folder / "later")
+    yield ("recording recording keyframes: not those of the search" in done.stderr and
+           "time_step_s: found 0.02, the search had 0.01" in done.stderr, f"fit --from: {done.stderr}")
+    done = program.call(*line, "--hold", "poison", "-o", folder / "other")
+    yield done.returncode == REFUSED and 'did you mean "poisson"' in done.stderr, f"fit --hold poison: {done.stderr}"
 
 
 def main():

@@ -194,25 +194,23 @@ def verbs(sysid, sim):
             "resume": lambda f: [sysid, "grid", f / "recording", "--asset", f / "asset.json", "--bending",
                                  "5e-5,1e-4,2e-4", "--no-solver-check", "--no-horizon", "--resume", "-o", f / "run"],
             "import": lambda f: [sysid, "import", f / "recording" / "frames", "--trajectory",
-                                 f / "recording" / "gripper.tum", "--times", f / "times.csv", "--sheet", "0.2x0.2",
-                                 "--cell", "0.05", "-o", f / "out"],
+                                 f / "recording" / "gripper.tum", "--times", f / "times.csv", "--mesh", "sheet:0.2x0.2:0.05", "-o", f / "out"],
             **{" ".join(options): lambda f, options=options: [
-                sysid, "import", f / "recording" / "frames", "--trajectory", f / "recording" / "gripper.tum", "--sheet",
-                "0.2x0.2", "--cell", "0.05", "-o", f / "out", *options] for options in IMPORT_OPTIONS},
+                sysid, "import", f / "recording" / "frames", "--trajectory", f / "recording" / "gripper.tum", "--mesh", "sheet:0.2x0.2:0.05", "-o", f / "out", *options] for options in IMPORT_OPTIONS},
             **{" ".join(("segment", *options)): lambda f, options=options: [
                 sysid, "segment", f / "view", "-o", f / "out", *(str(word).replace("{}", str(f)) for word in options)]
                for options in SEGMENT_OPTIONS}}
 
 
 # What no user can mean, and what the message has to name.
-IMPORT_OPTIONS = {("--cell", "100"): "--cell", ("--offset", "nan"): "--offset", ("--heading", "inf"): "--heading",
+IMPORT_OPTIONS = {("--mesh", "sheet:0.2x0.2:100"): "--mesh", ("--offset-bound", "nan"): "--offset-bound", ("--heading", "inf"): "--heading",
                   ("--times", "rate:0"): "--times", ("--times", "rate:10:1764000000"): "--times",
                   ("--times", "/dev/zero"): "/dev/zero", ("--asset", "nowhere.json"): "--asset",
                   ("--crop-z", "1:0"): "--crop-z"}
 SEGMENT_OPTIONS = {("--voxel", "1e-12"): "--voxel", ("--voxel", "nan"): "--voxel", ("--cluster-gap", "50"): "--cluster-gap",
                    ("--arm-radius", "1e9"): "--arm-radius", ("--clearance", "-1"): "--clearance",
-                   ("--depth-scale", "1e9"): "--depth-scale", ("--crop-min", "1,0,0", "--crop-max", "0,1,1"): "--crop-min",
-                   ("--crop-min", "9,9,9"): "table", ("--trajectory", "{}/recording/gripper.tum"): "--times",
+                   ("--depth-scale", "1e9"): "--depth-scale", ("--crop-x", "1:0"): "--crop-x",
+                   ("--crop-x", "9:"): "table", ("--trajectory", "{}/recording/gripper.tum"): "--times",
                    ("--trajectory", "{}/recording/gripper.tum", "--times", "rate:10:1764000000"): "gripper.tum",
                    ("--times", "{}"): "is a folder", ("--masks", "{}/nowhere"): "nowhere",
                    ("--intrinsics", "{}/pipe"): "pipe", ("--extrinsics", "/dev/zero"): "/dev/zero"}

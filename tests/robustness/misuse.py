@@ -132,7 +132,7 @@ def check_values(options, folder):
     content = json.loads((heavy / "recording.json").read_text())
     (heavy / "recording.json").write_text(json.dumps(content | {"gravity": [0, 0, -1e6]}))
     imported = [options.sysid, "import", "--depth", "view/depth", "--extrinsics", "view/extrinsics.json", "--trajectory",
-                "gripper.tum", "--sheet", "0.2x0.2", "-o", "out"]
+                "gripper.tum", "--mesh", "sheet:0.2x0.2:0.01", "-o", "out"]
     for words, *expected in (
             ([*run, "heavy.json", "-o", "out"], "heavy.json: gravity", "-1000000.0", "at most 1000"),
             ([*run, "loose.json", "-o", "out"], "loose.json: solver.tolerance", "1e+300", "at most 1"),
@@ -168,7 +168,7 @@ def check_names(options, folder):
     for words in ([options.sim, "run", "long_name.json", "-o", "out"], [options.sim, "run", name, "-o", "out"],
                   [options.sim, name], [options.sim, "run", "short.json", "-o", "out", "--" + name], [options.sysid, "replay", "long",
                   "--asset", "asset.json", "-o", "out"], [options.sysid, "report", name], [options.sysid, "grid",
-                  "recording", "--asset", "asset.json", "--fix", name + "=1", "--bending", "1e-4", "-o", "out"]):
+                  "recording", "--asset", "asset.json", "--hold", name + "=1", "--bending", "1e-4,2e-4", "-o", "out"]):
         yield from refused(options, folder, words, "xxx")
     del content["name"]
     others = []
@@ -198,8 +198,7 @@ def check_places(options, folder):
         for words in (["fit", *search, "--start", "run"], ["replay", *search], ["plan", *search],
                       ["grid", *search, "--bending", "1e-4,2e-4"], ["synth", "--asset", "cloth.json"],
                       ["segment", "view"], ["export", "run"], ["report", "run"],
-                      ["import", "recording/frames", "--trajectory", "recording/gripper.tum", "--sheet", "0.2x0.2",
-                       "--cell", "0.05"]):
+                      ["import", "recording/frames", "--trajectory", "recording/gripper.tum", "--mesh", "sheet:0.2x0.2:0.05"]):
             yield from refused(options, folder, [options.sysid, *words, "-o", place], place, *expected)
         yield from refused(options, folder, [options.sim, "run", "slow.json", "-o", place], place, *expected)
         if options.calib:  # the dataset is none, which is found later
@@ -218,7 +217,7 @@ def check_places(options, folder):
 def check_calibration(options, folder):
     """--force takes a camera that cannot be used; what stands on it says so, to the report."""
     words = [options.sysid, "import", "--depth", "view/depth", "--intrinsics", "view/camera_info.yaml", "--trajectory",
-             "gripper.tum", "--times", "rate:2", "--sheet", "0.2x0.2", "--cell", "0.05", "--table-height", "0"]
+             "gripper.tum", "--times", "rate:2", "--mesh", "sheet:0.2x0.2:0.05", "--table-z", "0"]
     yield from refused(options, folder, [*words, "--extrinsics", "unusable.json", "-o", "lift"], "unusable.json",
                        "exit_code", "one axis only", "--force")
     expected = ["flash-calib handeye ended with exit code 3, an answer that cannot be used", "one axis only", "second"]
@@ -247,12 +246,11 @@ def check_calibration(options, folder):
 
 def check_guess(options, folder):
     """A table height that was guessed wrong lets the gripper miss the sheet; one that was given was not guessed."""
-    words = [options.sysid, "import", "recording/frames", "--trajectory", "high.tum", "--times", "rate:10", "--sheet",
-             "0.2x0.2", "--cell", "0.05", "--quiet", "-o", "out"]
+    words = [options.sysid, "import", "recording/frames", "--trajectory", "high.tum", "--times", "rate:10", "--mesh", "sheet:0.2x0.2:0.05", "--quiet", "-o", "out"]
     for guess, crop in (("0", "0:"), ("-0.1", "-0.1:")):
         yield from refused(options, folder, [*words, f"--crop-z={crop}"], "gripper", "should hold",
-                           f"guessed as {guess} m", "--table-height")
-    done = program.call(*words, "--crop-z=0:", "--table-height", "0", cwd=folder)
+                           f"guessed as {guess} m", "--table-z")
+    done = program.call(*words, "--crop-z=0:", "--table-z", "0", cwd=folder)
     yield done.returncode == REFUSED and "should hold" in done.stderr, f"import of a high gripper: {done.stderr}"
     yield "guessed" not in done.stderr, f"a table height that was given: {done.stderr}"
 

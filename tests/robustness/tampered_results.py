@@ -266,8 +266,8 @@ def main():
         work = pathlib.Path(temporary)
         sound = work / "sound"
         write_sound_files(options.sysid, options.sim, sound)
-        program.call(options.sysid, "grid", sound / "recording", "--asset", sound / "asset.json", *AXES, "--fix",
-                     "friction=0.5", "-o", sound / "other")
+        program.call(options.sysid, "grid", sound / "recording", "--asset", sound / "asset.json", *AXES, "--hold",
+                     "friction=0.5:measured", "-o", sound / "other")
         commands = verbs(options.sysid, options.sim) | {
             "fit": lambda f: [options.sysid, "fit", f / "recording", "--start", f / "run", "-o", f / "fitted"]}
         for case in cases("fit" in program.call(options.sysid, "--help").stdout):

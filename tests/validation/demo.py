@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The main job of `make demo`, whose commands this reads from the Makefile: the recorded truth lies inside the intervals that
-it ends with, and the tuned asset has the estimates."""
+"""The main job of `make demo`, whose commands this reads from the Makefile: README has the same, the recorded truth lies inside
+the intervals that it ends with, and the tuned asset has the estimates."""
 import argparse
 import json
 import pathlib
@@ -14,8 +14,15 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 def commands(sysid, out):
     target = re.search(r"^demo:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE).group(1)
-    lines = [line for line in target.splitlines() if "$(sysid)" in line]
+    lines = [line for line in target.replace("\\\n", " ").splitlines() if "$(sysid)" in line]
     return [shlex.split(line.strip().replace("$(sysid)", sysid).replace("$(DEMO)", str(out))) for line in lines]
+
+
+def missing_in_readme():
+    """Commands of the demo that README does not have, word for word but for --force and what follows."""
+    readme = " ".join((ROOT / "README.md").read_text().replace("\\\n", " ").split())
+    lines = [" ".join(word for word in command if word != "--force") for command in commands("flash-sysid", "demo")]
+    return [line for line in lines if line not in readme]
 
 
 def main():
@@ -23,6 +30,8 @@ def main():
     parser.add_argument("--sysid", required=True, help="the program flash-sysid")
     parser.add_argument("--out", required=True, type=pathlib.Path)
     options = parser.parse_args()
+    if missing := missing_in_readme():
+        sys.exit(f"README.md does not have: {missing}")
     for command in commands(options.sysid, options.out):
         subprocess.run(command, cwd=ROOT, check=True)
     truth = json.loads((options.out / "recording/truth.json").read_text())["parameters"]

@@ -9,7 +9,7 @@ ASSET = {"schema": "flash-asset/1", "mesh": MESH, "element_type": "TRIANGLE",
                               "bending_rigidity": MEDIAN_FABRIC, "friction": 0.4}}
 GRASPS = {"clamp": ["--grasp-shape", "clamp", "--grasp-within", "0.021"],
           "point": ["--grasp-shape", "point", "--grasp-within", "0.021"],
-          "pinch": ["--grasp-shape", "pinch", "--fix", "grasp_depth=0.021"]}
+          "pinch": ["--grasp-shape", "pinch", "--hold", "grasp_depth=0.021:measured"]}
 STIFF = {"bending": "2e-4,5e-4,1e-3,2e-3", "start-yaw": "0.1,0.2,0.28,0.35"}
 LIMP = {"bending": "3e-6,1e-5,3e-5,1e-4", "start-yaw": "-0.05,0.05,0.15,0.25"}
 # `floor`: how far the other trial of the same fabric is away, `independent`: what another converged solver
@@ -46,9 +46,9 @@ def axes(ranges):
 
 
 def grasp_of(search):
-    """Options of a replay (no axes, no fixed constants) and the parameters for --set of the best candidate."""
+    """Options of a replay (no axes, no fixed constants) and the parameters for --hold of the best candidate."""
     shape = search["grasp"]
-    options = [word for word in GRASPS[shape] if word != "--fix" and "=" not in word]
+    options = [word for word in GRASPS[shape] if word != "--hold" and "=" not in word]
     names = ("bending", "start_yaw", "young", "grasp_depth")
     return options, {name: search["best"]["parameters"][name] for name in names
                      if name in search["best"]["parameters"]}
@@ -61,12 +61,12 @@ def fit(runs, data, asset, clip):
         shapes[shape] = runs.grid(f"{clip}/{shape}", [data / "lift" / clip], "--asset", asset, *window(clip),
                                   *GRASPS[shape], *axes(CLIPS[clip]["axes"]), "--no-solver-check")
         shapes[shape]["grasp"] = shape
-    best = min(shapes.values(), key=lambda search: search["best"]["score"])
+    best = min(shapes.values(), key=lambda search: search["best"]["score_on_mesh"])
     parameters = best["best"]["parameters"]
     stiffness = parameters["bending"]
     material = runs.grid(
         f"{clip}/material", [data / "lift" / clip], "--asset", asset, *window(clip), *GRASPS[best["grasp"]],
-        "--start-yaw", repr(parameters["start_yaw"]), "--young", "30,100,300",
+        "--hold", f"start_yaw={parameters['start_yaw']!r}", "--young", "30,100,300",
         f"--bending={stiffness / 4!r}:{stiffness * 4!r}:5:log",
         *(["--repeatability", repr(CLIPS[clip]["floor"] / 1000)] if "floor" in CLIPS[clip] else []),
         *([] if clip in CHECKED else ["--no-solver-check"]))
@@ -99,7 +99,7 @@ def fit_pair(runs, data, asset, pair, search):
     joint = runs.grid(f"{pair}_joint", [data / "lift" / clip for clip in PAIRS[pair]], "--asset", asset,
                       *window(PAIRS[pair][0]), *GRASPS[search["grasp"]],
                       f"--bending={stiffness / 4!r}:{stiffness * 4!r}:5:log",
-                      "--start-yaw", repr(yaw), "--repeatability", "0.0028", "--no-solver-check")
+                      "--hold", f"start_yaw={yaw!r}", "--repeatability", "0.0028", "--no-solver-check")
     joint["grasp"] = search["grasp"]
     return joint
 
@@ -109,10 +109,9 @@ def fold(runs, data, asset, joint):
     recording's start pose points away from its clouds, so it is made anew from clouds and path."""
     clip = data / "lift" / "fold_paper"
     recording = runs.import_clouds(
-        "fold_recording", clip / "frames", "--trajectory", str(clip / "tcp.tum"), "--times", "rate:10", "--sheet",
-        "0.278x0.278", "--cell", "0.02", "--grasp", "corner", "--within", "0.021", "--crop-z", "0.085:0.45",
-        "--crop-y", ":0.35", "--table-height", "0.07", "--offset", "0.08,0.12,0.06", "--yaw", "0.4", "--clock", "0.2",
-        "--start-yaw", "0.35", "--kind", "free", "--name", "fold_paper")
+        "fold_recording", clip / "frames", "--trajectory", str(clip / "tcp.tum"), "--times", "rate:10", "--mesh", "sheet:0.278x0.278:0.02", "--grasp", "corner", "--grasp-within", "0.021", "--crop-z", "0.085:0.45",
+        "--crop-y", ":0.35", "--table-z", "0.07", "--offset-bound", "0.08,0.12,0.06", "--yaw-bound", "0.4", "--time-offset-bound", "0.2",
+        "--start-yaw-bound", "0.35", "--kind", "free", "--name", "fold_paper")
     from_lifts = joint["best"]["parameters"]["bending"]
     values = sorted({MEDIAN_FABRIC, 1e-4, 2.5e-4, from_lifts})
     search = runs.grid("fold_paper", [recording], "--asset", asset, *window("fold_paper"), *GRASPS[joint["grasp"]],

@@ -8,7 +8,7 @@ def measure(runs, data, asset, clip, search):
     options, parameters = lifts.grasp_of(search)
     material = ["--asset", asset, *lifts.window(clip), "--bending", repr(parameters["bending"]), "--young",
                 repr(parameters["young"]), "--no-solver-check"]
-    yaw = ["--start-yaw", repr(parameters["start_yaw"])]
+    yaw = ["--hold", f"start_yaw={parameters['start_yaw']!r}"]
     table = runs.grid(f"{clip}/table_and_friction", [recording], *material, *yaw, *lifts.GRASPS[search["grasp"]],
                       "--table-height=-0.015,0,0.015", "--friction", "0.2,0.6")
     pinch = runs.grid(f"{clip}/pinch_shape", [recording], *material, *yaw, "--grasp-shape", "pinch", "--grasp-depth",

@@ -55,10 +55,10 @@ def main():
         subprocess.run([options.sysid, "synth", "--asset", asset, *lift, "--seed", options.seed, "--quiet", "--force", "-o",
                         recordings[rate]], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
-    search = ("--asset", asset, "--bending", "1e-4:4e-4:5:log", "--fix", f"friction={FRICTION}")
+    search = ("--asset", asset, "--bending", "1e-4:4e-4:5:log", "--hold", f"friction={FRICTION}:measured")
     routes = {"grid": ("grid", *search), "grid, motions kept elsewhere": ("grid", *search, "--rollouts", out / "motions"),
-              "grid, a wide range": ("grid", "--asset", asset, "--bending", "1e-6:1e-3:8:log", "--fix", f"friction={FRICTION}"),
-              "fit": ("fit", "--start", out / "grid", "--fix", f"friction={FRICTION}")}
+              "grid, a wide range": ("grid", "--asset", asset, "--bending", "1e-6:1e-3:8:log", "--hold", f"friction={FRICTION}:measured"),
+              "fit": ("fit", "--start", out / "grid", "--hold", f"friction={FRICTION}:measured")}
     found = {}
     for name, (verb, *words) in routes.items():
         found[name], fits = finding(options.sysid, out / name.split(",")[0] if name in ("grid", "fit") else out / "other", verb,
@@ -69,7 +69,7 @@ def main():
         claim(f"{name}: D as of grid to 1 %", abs(found[name]["estimate"] / found["grid"]["estimate"] - 1) <= 0.01)
         claim(f"{name}: interval as of grid to 10 %", abs(half_width(found[name]) / half_width(found["grid"]) - 1) <= 0.1)
     widths = {}
-    for words, name in ((("--fix", f"friction={FRICTION}"), "friction measured"), (("--friction", "0.5"), "friction taken for 0.5")):
+    for words, name in ((("--hold", f"friction={FRICTION}:measured"), "friction measured"), (("--hold", "friction=0.5"), "friction taken for 0.5")):
         for rate in RATES:
             each, fits = finding(options.sysid, out / "rate", "grid", recordings[rate], "--asset", asset, "--bending",
                                  "1e-4:4e-4:5:log", *words)

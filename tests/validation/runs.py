@@ -32,7 +32,7 @@ class Runs:
     def replay(self, name, recording, parameters, *options, frames="20"):
         """Score, offsets and keyframes of one set of parameters; meshes, clouds and pictures in the folder."""
         folder = self.out / name
-        settings = [word for key, value in parameters.items() for word in ("--set", f"{key}={value!r}")]
+        settings = [word for key, value in parameters.items() for word in ("--hold", f"{key}={value!r}")]
         command = ["replay", str(recording), *settings, *options, "--json", "--quiet", "--frames", frames,
                    "-o", str(folder)]
         if not self._done(folder, command, "score.json"):

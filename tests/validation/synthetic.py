@@ -31,7 +31,7 @@ def write_asset(out, name="strip.json", **properties):
 
 
 def settings(parameters):
-    return [word for key, value in parameters.items() for word in ("--set", f"{key}={value!r}")]
+    return [word for key, value in parameters.items() for word in ("--hold", f"{key}={value!r}")]
 
 
 def axes(ranges):
@@ -104,7 +104,7 @@ def lift(runs, bending, seed, relabel=None):
     name = f"lift_{bending:g}"
     values, _, cell, truth = BENDING[bending]
     recording = runs.synth(f"{name}/recording_{seed:02d}", asset, "--mesh", f"{STRIP}{truth}:alternating_by_row", *LIFT, "--seed",
-                           str(seed), "--set", f"bending={bending!r}")
+                           str(seed), "--hold", f"bending={bending!r}")
     run = f"{name}/run_{seed:02d}"
     if relabel:
         text = (recording / "recording.json").read_text().replace('"kind": "corner_lift"', f'"kind": "{relabel}"')
@@ -112,14 +112,14 @@ def lift(runs, bending, seed, relabel=None):
         recording.write_text(text)
         run += f"_{relabel}"
     return runs.grid(run, [recording], "--asset", asset, "--mesh", STRIP + cell, "--clamp-slopes", "--bending", values,
-                     "--poisson", "0:0.45:3", "--fix", "friction=0.3", "--rollouts", str(runs.out / name / "rollouts"))
+                     "--poisson", "0:0.45:3", "--hold", "friction=0.3:measured", "--rollouts", str(runs.out / name / "rollouts"))
 
 
 def bar_pull(runs, seed):
     asset = write_asset(runs.out, "bar.json", young=BAR_MATERIAL["young"])
     recording = runs.synth(f"bar_pull/recording_{seed:02d}", asset, *BAR, "--seed", str(seed))
     return runs.grid(f"bar_pull/run_{seed:02d}", [recording], "--asset", asset, "--mesh", "sheet:0.3x0.3:0.025",
-                     "--young", "25:100:7:log", "--poisson", "0.1:0.45:6", "--fix", "friction=0.3", "--rollouts",
+                     "--young", "25:100:7:log", "--poisson", "0.1:0.45:6", "--hold", "friction=0.3:measured", "--rollouts",
                      str(runs.out / "bar_pull" / "rollouts"))
 
 

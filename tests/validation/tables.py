@@ -1,4 +1,5 @@
 """Results as Markdown tables, and their place in the document."""
+import csv
 import math
 import re
 
@@ -6,15 +7,28 @@ import lifts
 import twins
 
 
-def replace_tables(document, tables):
-    """Puts each table between its `<!-- name -->` and the next `<!-- end -->`."""
-    text = document.read_text()
+def replace_tables(folder, tables):
+    """Puts each table between its `<!-- name -->` and the next `<!-- end -->` of a chapter, or into name.csv where that is there."""
+    chapters = {path: path.read_text() for path in sorted(folder.glob("*.md"))}
     for name, table in tables.items():
-        text, count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda m: m[1] + table + m[2], text,
-                              flags=re.DOTALL)
-        if count != 1:
-            raise SystemExit(f"validate: {document}: {count} places for the table {name}, expected one")
-    document.write_text(text)
+        if (folder / f"{name}.csv").exists():
+            write_csv(folder / f"{name}.csv", table)
+            continue
+        places = 0
+        for path, text in chapters.items():
+            chapters[path], count = re.subn(rf"(<!-- {name} -->\n).*?(<!-- end -->)", lambda m: m[1] + table + m[2], text,
+                                            flags=re.DOTALL)
+            places += count
+        if places != 1:
+            raise SystemExit(f"validate: {folder}: {places} places for the table {name}, expected one")
+    for path, text in chapters.items():
+        path.write_text(text)
+
+
+def write_csv(path, table):
+    with path.open("w", newline="") as file:
+        header, _, *rows = [line[2:-2].split(" | ") for line in table.splitlines()]
+        csv.writer(file, lineterminator="\n").writerows([header, *rows])
 
 
 def table(header, rows):
@@ -48,7 +62,7 @@ def clip_table(fits):
     for clip, fit in fits.items():
         material, given = fit["material"], lifts.CLIPS[clip]
         best = material["best"]
-        rows.append([clip, mm(best["score"]), given["independent"], str(given.get("floor", "-")), material["grasp"],
+        rows.append([clip, mm(best["score_on_mesh"]), given["independent"], str(given.get("floor", "-")), material["grasp"],
                      f"{best['parameters']['start_yaw']:.2f}", number(best["parameters"]["bending"]),
                      finding_text(material, "bending"), finding_text(material, "young"),
                      f"{material['unconverged']} of {material['candidates']}"])
@@ -65,7 +79,7 @@ def lift_tables(results):
         offset = " / ".join(mm(x, 0) for x in recording["offset"])
         offsets.append([clip, offset, f"{recording['yaw']:.3f}", f"{1000 * recording['time_offset']:.0f}",
                         "; ".join(w.split(": ", 1)[1] for w in material["warnings"] if "at its bound" in w) or "-"])
-        shapes.append([clip, *(mm(fit["shapes"][s]["best"]["score"]) if s in fit["shapes"] else "-"
+        shapes.append([clip, *(mm(fit["shapes"][s]["best"]["score_on_mesh"]) if s in fit["shapes"] else "-"
                                for s in lifts.GRASPS),
                        ", ".join(f"{value:+.2f}: {mm(score, 1)}" for value, score in
                                  lifts.profile(fit["shapes"][material["grasp"]]["rows"], "start_yaw"))])
@@ -73,7 +87,7 @@ def lift_tables(results):
     for pair, (first, second) in lifts.PAIRS.items():
         for source, target, found in ((first, second, pairs[pair]["there"]), (second, first, pairs[pair]["back"])):
             cross.append([source, target, mm(found["predicted"]["score"]),
-                          mm(fits[target]["material"]["best"]["score"]), mm(found["median"]["score"])])
+                          mm(fits[target]["material"]["best"]["score_on_mesh"]), mm(found["median"]["score"])])
     joint = [[pair, number(search["best"]["parameters"]["bending"]), finding_text(search, "bending"),
               " / ".join(mm(recording["score"]) for recording in search["recordings"])]
              for pair, search in ((pair, pairs[pair]["joint"]) for pair in lifts.PAIRS)]
@@ -98,7 +112,7 @@ def fold_table(fold):
 def limits_table(limits):
     rows = []
     for clip, found in limits.items():
-        best = found["search"]["best"]["score"]
+        best = found["search"]["best"]["score_on_mesh"]
         pierced = [frame for frame, count in found["piercings"].items() if count > 0]
         rows += [
             [clip, "as fitted", mm(best)],
@@ -129,7 +143,7 @@ def twin_table(fits):
         nominal, noise = twins.TWINS[twin]
         finding = search["parameters"]["bending"]
         rows.append([twin, model, pattern, number(finding["estimate"]), f"{finding['estimate'] / nominal:.2f}",
-                     finding_text(search, "bending"), mm(search["best"]["score"]), mm(twins.trimmed_noise(noise))])
+                     finding_text(search, "bending"), mm(search["best"]["score_on_mesh"]), mm(twins.trimmed_noise(noise))])
     return table(["recording", "bending model", "diagonals", "D N m", "D / nominal", "95 % of D", "residual mm",
                   "of noise alone mm"], rows)
 

@@ -56,14 +56,14 @@ def fit(runs, data, assets, meshes, twin, model, pattern):
     values = ",".join(f"{factor * nominal:.4g}" for factor in FACTORS[model])
     name = f"twin_{twin}/{model}_{pattern.replace(',', '').replace(' ', '_')}"
     return runs.grid(name, [data / "twin" / twin], "--asset", assets[model], "--mesh", meshes[pattern], "--bending",
-                     values, "--no-solver-check", "--fix", "friction=0.3", "--fix", "areal_density=0.2")
+                     values, "--no-solver-check", "--hold", "friction=0.3:measured", "--hold", "areal_density=0.2:measured")
 
 
 def fit_both(runs, data, assets, meshes, twin):
     """E and D at once on the truth's diagonals. The recordings of lift_a show the same motion, simulated once."""
     return runs.grid(f"twin_{twin}/both", [data / "twin" / twin], "--asset", assets["isometric"], "--mesh",
                      meshes["alternating, other parity"], "--young", "1e4:9e4:5:log", "--bending", "5e-5:2e-4:5:log",
-                     "--no-solver-check", "--fix", "friction=0.3", "--fix", "areal_density=0.2", "--rollouts",
+                     "--no-solver-check", "--hold", "friction=0.3:measured", "--hold", "areal_density=0.2:measured", "--rollouts",
                      str(runs.out / "twin_lift_a" / "rollouts"))
 
 
@@ -78,9 +78,9 @@ def horizon(runs, assets, meshes, model, pattern):
     """When the lift of lift_b, made here and gone on with to 3 s, stops being predictable [s]; None: it does not."""
     name = f"twin_longer/{model}_{pattern.replace(',', '').replace(' ', '_')}"
     mesh = ("--asset", assets[model], "--mesh", meshes[pattern])
-    recording = runs.synth(f"{name}_recording", *mesh[1:], *LONGER, "--set", "bending=1e-5")
-    summary = runs.grid(name, [recording], *mesh, "--bending", "8e-6,1e-5,1.25e-5", "--no-solver-check", "--fix",
-                        "friction=0.3", "--fix", "areal_density=0.2", horizon=True)
+    recording = runs.synth(f"{name}_recording", *mesh[1:], *LONGER, "--hold", "bending=1e-5:measured")
+    summary = runs.grid(name, [recording], *mesh, "--bending", "8e-6,1e-5,1.25e-5", "--no-solver-check", "--hold",
+                        "friction=0.3:measured", "--hold", "areal_density=0.2:measured", horizon=True)
     return summary["recordings"][0]["horizon_s"]
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Runs flash-calib on recorded hand-eye sets, flash-sysid on recorded lifts and on recordings of an independent
-simulator, and writes what came out into docs/validation.md. Finished runs are kept: called again, it goes on where it was."""
+simulator, and writes what came out into docs/validation/. Finished runs are kept: called again, it goes on where it was."""
 import argparse
 import pathlib
 import shutil
@@ -23,7 +23,7 @@ def main():
     parser.add_argument("--hand-eye-study", help="the program hand_eye_study")
     parser.add_argument("--data", required=True, type=pathlib.Path, help="folder with handeye/, lift/ and twin/")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder of the runs")
-    parser.add_argument("--document", required=True, type=pathlib.Path, help="where the tables go")
+    parser.add_argument("--documents", required=True, type=pathlib.Path, help="folder of the chapters, where the tables go")
     parser.add_argument("--sim", help="the program flash-sim")
     parser.add_argument("--scenes", type=pathlib.Path, help="folder of the reference scenes")
     parser.add_argument("--results", type=pathlib.Path, help="what make reference wrote of them")
@@ -49,15 +49,15 @@ def main():
     if options.only in (None, "lifts"):
         results = run_lifts(runs, options.data)
         document |= tables.lift_tables(results)
-        copy_pictures(options.out, options.document.parent / "images")
+        copy_pictures(options.out, options.documents.parent / "images")
     if options.only in (None, "twins"):
         document |= tables.twin_tables(run_twins(runs, options.data), run_both(runs, options.data),
                                        run_horizons(runs))
     if options.only in (None, "synthetic"):
         found = synthetic.coverage(runs, synthetic.TWINS[:options.twins])
         document |= tables.synthetic_tables(synthetic.experiment_rows(runs), synthetic.coverage_rows(found))
-    tables.replace_tables(options.document, document)
-    print(options.document)
+    tables.replace_tables(options.documents, document)
+    print(options.documents)
 
 
 def copy_pictures(out, images):

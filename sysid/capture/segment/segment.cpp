@@ -88,7 +88,7 @@ std::vector<int> without_outliers(const data::Points& points, const std::vector<
 }
 
 constexpr const char* remedy =
-    ": widen the view, or give --table-height, or --no-table where nothing of it is in the clouds";
+    ": widen the view, or give --table-z, or --no-table where nothing of it is in the clouds";
 
 std::string degrees(double radians) {
   char text[32];

@@ -72,7 +72,7 @@ std::string tilt_warning(const FoundTable& table) {
       text, sizeof text,
       "table: the plane that was found is tilted by %.1f deg against z of the base frame (normal %.4f "
       "%.4f %.4f; seen in %d of %d frames): is the camera's pose right, and is this the table? "
-      "--table-height gives one that is level",
+      "--table-z gives one that is level",
       table.tilt * 180 / M_PI, n.x(), n.y(), n.z(), table.agreeing, table.frames);
   return text;
 }

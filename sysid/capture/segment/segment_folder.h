@@ -25,8 +25,7 @@ struct RawView {
 struct RawViewFiles {
   std::string masks;       ///< folder of masks with the names of the depth images
   std::string intrinsics;  ///< camera_info or OpenCV YAML
-  std::string
-      extrinsics;  ///< T_base_camera: "flash-extrinsics/1" JSON, or a TUM file whose first pose counts
+  std::string extrinsics;  ///< T_base_camera: extrinsics JSON, or a TUM file whose first pose counts
   std::optional<double> depth_scale;  ///< [m] a count
   bool accept_unusable = false;       ///< extrinsics that flash-calib ended with exit code 3
 };

@@ -98,11 +98,13 @@ TEST_P(TargetSizes, SizeFarOffIsNamedAndRefusedUnlessItIsStatedToBeRight) {
   const Calibration result = calibrated(scene);
   ASSERT_TRUE(result.size && result.size->far_off());
   EXPECT_FALSE(result.usable);
-  EXPECT_TRUE(result.warnings.front().starts_with("the data want a target 1.0")) << result.warnings.front();
+  EXPECT_TRUE(result.warnings.front().starts_with("the estimated size of the target is 1.0"))
+      << result.warnings.front();
   const Calibration stated = calibrated(scene, kStated);
   EXPECT_TRUE(stated.usable);
   EXPECT_EQ(stated.refined.bundle.scales.front(), 1);
-  EXPECT_TRUE(stated.warnings.front().starts_with("the data want a target 1.0")) << stated.warnings.front();
+  EXPECT_TRUE(stated.warnings.front().starts_with("the estimated size of the target is 1.0"))
+      << stated.warnings.front();
 }
 
 // The linearised prior against differences of its residual, (s - 1) / sd.

@@ -188,7 +188,8 @@ TEST_P(Traps, WrongSquareSizeIsMeasured) {
   ASSERT_TRUE(result.size && result.size->wanted);
   EXPECT_NEAR(result.size->wanted->estimate, 1.08, 4 * result.size->wanted->sd);
   EXPECT_LT(result.size->wanted->sd, 0.01);
-  EXPECT_TRUE(result.warnings.front().starts_with("the data want a target 1.0")) << result.warnings.front();
+  EXPECT_TRUE(result.warnings.front().starts_with("the estimated size of the target is 1.0"))
+      << result.warnings.front();
 }
 
 TEST_P(Traps, FortyPercentFlippedBoardsArePutRight) {

@@ -184,13 +184,13 @@ TEST_F(ImportFiles, WhichSideIsTheWidthIsComparedWithTheSheetThatStillLies) {
     set_sheet("sheet:" + sheet + ":0.02", settings_);
     settings_.grasp.corner = corner;
     for (const std::string& notice : import_recording(settings_).notices)
-      if (notice.find("--sheet") != std::string::npos) return notice;
+      if (notice.find("--mesh") != std::string::npos) return notice;
     return std::string();
   };
   EXPECT_EQ(told("0.2x0.3", {0, 0}), "");
   EXPECT_EQ(told("0.2x0.3", {1, 1}), "");
   EXPECT_EQ(told("0.3x0.2", {1, 0}), "");
-  EXPECT_NE(told("0.3x0.2", {0, 0}).find("--sheet: with the sides changed over, 0.2x0.3, the sheet is"),
+  EXPECT_NE(told("0.3x0.2", {0, 0}).find("--mesh: with the sides changed over, 0.2x0.3, the sheet is"),
             std::string::npos);
   EXPECT_NE(told("0.2x0.3", {0, 1}), "");
 }
@@ -211,7 +211,7 @@ TEST_F(ImportFiles, ATableAboveTheGripperIsDoubted) {
     settings_.out = folder_ / (table_height < 0.055 ? "known" : "doubted");
     const std::vector<std::string> notices = import_recording(settings_).notices;
     return std::count_if(notices.begin(), notices.end(), [](const std::string& notice) {
-      return notice.find("warning: --table-height: found") != std::string::npos;
+      return notice.find("warning: --table-z: found") != std::string::npos;
     });
   };
   EXPECT_EQ(doubts(0.05), 0);

@@ -28,7 +28,7 @@ TEST(ParameterGrid, ReadsRangesListsAndSingleValues) {
   EXPECT_FALSE(poisson.logarithmic);
   EXPECT_NEAR(poisson.values[1], 0.15, 1e-15);
   EXPECT_EQ(parse_axis("friction", "0.5,0.2,0.3").values, (std::vector<double>{0.2, 0.3, 0.5}));
-  EXPECT_EQ(parse_fixed("friction=0.3").values, std::vector<double>{0.3});
+  EXPECT_EQ(parse_hold("friction=0.3").axis.values, std::vector<double>{0.3});
 }
 
 TEST(ParameterGrid, NamesWhatIsWrong) {
@@ -46,7 +46,7 @@ TEST(ParameterGrid, NamesWhatIsWrong) {
             std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("poisson", "0.7"); }).find("expected -0.99 to 0.5"),
             std::string::npos);
-  EXPECT_NE(message_of([] { parse_fixed("friction"); }).find("name=value"), std::string::npos);
+  EXPECT_NE(message_of([] { parse_hold("friction"); }).find("name=value"), std::string::npos);
 }
 
 TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
@@ -56,14 +56,24 @@ TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
   EXPECT_EQ(message_of([] { parse_axis("bending", "1e-6:1e-3:3000000"); }),
             "--bending: found the count 3000000, expected a whole number from 1 to 1,000,000");
   EXPECT_EQ(message_of([] { parse_axis("bending", "1e-4,2e-4,1e-4"); }), "--bending: 0.0001 is given twice");
-  EXPECT_EQ(message_of([] { parse_fixed("yuong=1"); }),
-            "--fix yuong: unknown parameter (did you mean \"young\"?)");
-  EXPECT_NE(message_of([] { parse_fixed("colour=1"); }).find("expected one of young, poisson"),
+  EXPECT_EQ(message_of([] { parse_hold("yuong=1"); }),
+            "--hold yuong: unknown parameter (did you mean \"young\"?)");
+  EXPECT_NE(message_of([] { parse_hold("colour=1"); }).find("expected one of young, poisson"),
             std::string::npos);
-  EXPECT_EQ(message_of([] { parse_fixed("friction=1e300", "--set"); }),
-            "--set friction: found 1e+300, expected 0 to 10");
-  EXPECT_EQ(message_of([] { parse_fixed("friction=low", "--set"); }),
-            "--set friction: found \"low\", expected a number");
+  EXPECT_EQ(message_of([] { parse_hold("friction=1e300"); }),
+            "--hold friction: found 1e+300, expected 0 to 10");
+  EXPECT_EQ(message_of([] { parse_hold("friction=low"); }),
+            "--hold friction: found \"low\", expected a number, or one with :measured");
+}
+
+TEST(ParameterGrid, AHeldValueIsAssumedUnlessItWasMeasured) {
+  const Hold assumed = parse_hold("friction=0.3"), measured = parse_hold("friction=0.3:measured");
+  EXPECT_EQ(assumed.axis.values, std::vector<double>{0.3});
+  EXPECT_EQ(measured.axis.values, std::vector<double>{0.3});
+  EXPECT_FALSE(assumed.measured);
+  EXPECT_TRUE(measured.measured);
+  EXPECT_NE(message_of([] { parse_hold("friction=0.3:weighed"); }).find("found \"0.3:weighed\""),
+            std::string::npos);
 }
 
 TEST(ParameterGrid, ParametersOfAPinchNeedAPinch) {
@@ -84,7 +94,7 @@ TEST(ParameterGrid, RefusesYoungAndPoissonTogetherUnderArap) {
             std::string::npos);
   EXPECT_EQ(message_of([&] { check_axes(axes, data::Constitutive::tri_corotated); }), "");
   EXPECT_EQ(message_of([&] {
-              check_axes({axes[0], parse_fixed("poisson=0.3")}, data::Constitutive::tri_arap);
+              check_axes({axes[0], parse_hold("poisson=0.3").axis}, data::Constitutive::tri_arap);
             }),
             "");
   EXPECT_NE(message_of([&] {

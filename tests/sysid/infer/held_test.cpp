@@ -37,7 +37,7 @@ TEST(Held, FrictionIsUncertainUnlessItWasSearchedOrMeasured) {
   searched.axes.push_back(parse_axis("friction", "0.1:0.5:3"));
   EXPECT_TRUE(held_parameters(searched, replays).empty());
   GridSettings measured = grid;
-  measured.fixed = {parse_fixed("friction=0.3")};
+  measured.fixed = {parse_hold("friction=0.3").axis};
   EXPECT_TRUE(held_parameters(measured, replays).empty());
 }
 

@@ -37,7 +37,7 @@ TEST(SolverCheck, ExplainsAMotionByTheParameters) {
   const Sensitivity sensitivity = measure_sensitivity(replays, grid, {2e-4});
   const std::vector<ReplayResult> other = run(replays[0], {candidate_at({2e-4 * 1.05}, grid)});
   const SolverCheck found =
-      compare_solutions("", sensitivity, replays, sensitivity.motions, replays, other, grid);
+      compare_solutions("", sensitivity, replays, sensitivity.motions, replays, other, grid.axes);
   // What is not linear over 10 % is a few per cent of 5 %.
   EXPECT_NEAR(found.shift.at("bending"), std::log(1.05), 0.005);
 }

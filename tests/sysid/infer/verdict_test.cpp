@@ -54,9 +54,21 @@ TEST(Verdict, TheEndsOfARangeTellNothing) {
   EXPECT_EQ(narrow.identifiable, Identifiable::no);
   EXPECT_LE(*narrow.bits, 0);
   // The best value is the lowest searched: the side below is open, and the estimate is inside its interval.
-  const ParameterFinding edge = bending_found("1e-4:1e-2:5:log", 0.5e-4, 0.5);
+  const ParameterFinding edge = bending_found("2e-6:2e-4:5:log", 1e-6, 0.5);
   EXPECT_EQ(edge.identifiable, Identifiable::upper_bound);
+  EXPECT_EQ(edge.edge, RangeEdge::low);
+  EXPECT_NE(edge.note.find("search lower"), std::string::npos);
   EXPECT_NEAR((*edge.interval95)[0], *edge.estimate, 1e-9 * *edge.estimate);  // exp(log(x))
+}
+
+// Bending is usually 1.1e-6 to 1.1e-4 N m: that it is at most 2e-4 is known beforehand.
+TEST(Verdict, ABoundThatGainsLessThanOneBitIsNotTold) {
+  const ParameterFinding found = bending_found("1e-4:1e-2:5:log", 0.5e-4, 0.5);
+  EXPECT_LT(*found.bits, 1);
+  EXPECT_EQ(found.identifiable, Identifiable::no);
+  EXPECT_EQ(found.edge, RangeEdge::low);  // lower values are still worth a search
+  // Where every value is likely a wider range would tell no more.
+  EXPECT_EQ(bending_found("0.9e-4:1.1e-4:3:log", 1.1e-4, 1).edge, RangeEdge::none);
 }
 
 TEST(Verdict, AnEstimateBeyondTheQuantilesIsInsideItsInterval) {

@@ -2,8 +2,49 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
+#include "tests/sysid/short_lift.h"
+
 namespace flash::sysid {
 namespace {
+
+// What the vertices themselves are apart bounds what the surfaces are: the horizon is no earlier than the
+// first keyframe at which that reaches the limit, and there is none where it never does.
+TEST(Horizon, IsWhereTwoNearlyEqualMotionsPart) {
+  const data::TemporaryFolder folder;
+  const Replay replay = short_lift(folder);
+  ReplayCandidate candidate;
+  candidate.material = short_lift_material();
+  constexpr double kPerturbation = 0.2;
+  ReplayCandidate other = candidate;
+  other.material.bending_rigidity *= 1 + kPerturbation;
+  other.material.membrane_stiffness *= 1 + kPerturbation;
+  other.material.friction *= 1 + kPerturbation;
+  const std::vector<ReplayResult> both = run(replay, {candidate, other});
+  std::vector<double> apart;
+  for (const Observation& observation : replay.observations) {
+    data::Points a, b;
+    surface_at(both[0].motion, observation.t, a);
+    surface_at(both[1].motion, observation.t, b);
+    apart.push_back((a - b).rowwise().norm().mean());
+  }
+  const double most = *std::max_element(apart.begin(), apart.end());
+  ASSERT_GT(most, 1e-4);
+  EXPECT_FALSE(predictability_horizon(replay, candidate, 1.01 * most, kPerturbation));
+  EXPECT_EQ(predictability_horizon(replay, candidate, -1, kPerturbation), replay.observations.front().t);
+  // Both motions begin alike: a tenth of where they end is crossed on the way.
+  const double limit = 0.1 * most;
+  const auto found = predictability_horizon(replay, candidate, limit, kPerturbation);
+  ASSERT_TRUE(found);
+  for (std::size_t k = 0; k < apart.size(); ++k) {
+    if (replay.observations[k].t != *found) continue;
+    EXPECT_GT(apart[k], limit);
+  }
+  EXPECT_GT(*found, replay.observations.front().t);
+  // Equal motions never part.
+  EXPECT_FALSE(predictability_horizon(replay, candidate, 1e-12, 0));
+}
 
 TEST(Horizon, ARecordingIsNeverLeftWithoutKeyframes) {
   Replay replay;

@@ -21,7 +21,7 @@ TEST(Summarize, ABendingFoundWithoutGravityIsDoubted) {
   Answer answer;
   answer.best = 0;
   answer.values = best.values;
-  answer.estimate = best;
+  answer.estimate = answer.fit.score = best;
   ParameterFinding& bending = answer.parameters.emplace_back();
   bending.name = "bending";
   bending.values = grid.axes[0].values;
@@ -52,19 +52,48 @@ TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
   answer.estimate.score = 0.005;
   answer.estimate.status = CandidateStatus::ok;
   answer.estimate.recordings.resize(1);
-  answer.estimate.recordings[0].score = 0.0052;
+  answer.fit.score = answer.estimate;
   answer.misfits = {{0.001, 0.0052, 0.3, 0.1, 90, true, 0.0028, 80, 9}};
   const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
   const auto first = [&] { return summarize(results, answer, replays, grid).warnings; };
   ASSERT_FALSE(first().empty());
   EXPECT_EQ(
       first().front(),
-      // sqrt(2 / pi) of the root of 1 and 2.8 squared
-      "lift: the model does not fit: it misses the observed points by 5.2 mm where noise and repeatability "
-      "explain 2.37 mm; 80 keyframes are worth 9. The intervals allow for it, but are those of a model that "
-      "does not fit");
+      "lift: the model does not fit: apart from noise of 1 mm it misses the cloth by 5.2 mm where "
+      "repeatability explains 2.8 mm; 80 keyframes are worth 9. The intervals allow for it, but are those of "
+      "a model that does not fit");
+  // A misfit that repeatability explains is none.
+  answer.misfits[0].explained = answer.misfits[0].size - 1e-6;
+  EXPECT_TRUE(first().empty());
+  answer.misfits[0].explained = 0.0028;
   answer.misfits[0].found = false;
   EXPECT_TRUE(first().empty());
+}
+
+// Bending of cells of no size beside a score of coarse ones would say that a good fit is a bad one.
+TEST(Summarize, TheScoreIsThatOfTheMeshThatTheAnswerIsOf) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_lift(folder)};
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
+  Answer answer;
+  answer.best = 0;
+  answer.values = {2e-4};
+  answer.estimate.status = CandidateStatus::ok;
+  answer.estimate.score = 0.005;
+  answer.estimate.recordings.resize(1);
+  answer.fit = {replays, {}, answer.estimate};
+  const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
+  Summary summary = summarize(results, answer, replays, grid);
+  EXPECT_EQ(summary.settings.at("score_of"), replays[0].recording.mesh_spec);
+  EXPECT_EQ(summary.settings.at("observed"), "cloud");
+  answer.fit.score.score = answer.fit.score.recordings[0].score = 0.001;
+  summary = summarize(results, answer, replays, grid);
+  EXPECT_EQ(summary.best_score, 0.001);
+  EXPECT_EQ(summary.score_on_mesh, 0.005);
+  EXPECT_EQ(summary.recordings[0].score, 0.001);
+  EXPECT_EQ(summary.settings.at("score_of"), "cells of no size (extrapolated)");
 }
 
 }  // namespace

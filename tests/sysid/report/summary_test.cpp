@@ -36,6 +36,7 @@ TEST(Summary, HasTheFieldsOfItsSchema) {
   EXPECT_EQ(json["best"]["parameters"]["bending"], 1e-4);
   EXPECT_EQ(json["best"]["membrane_stiffness"], 30);
   EXPECT_EQ(json["best"]["score"], 0.004);
+  EXPECT_EQ(json["best"]["score_on_mesh"], 0.0045);
   EXPECT_EQ(json["parameters"]["bending"]["interval95"][1], 1.5e-4);
   EXPECT_EQ(json["parameters"]["poisson"]["identifiable"], "no");
   EXPECT_EQ(json["parameters"]["poisson"]["edge"], "low");
