@@ -241,7 +241,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
           },
           "What the answer is for. workspace: places seen by the camera, in the robot's frame; "
           "image: pictures predicted through this robot; two-arms: arms that one camera relates, "
-          "with lens and target as stated for all alike")
+          "with the lens as stated for all alike")
       ->check(CLI::IsMember({"workspace", "image", "two-arms"}))
       ->default_str("workspace");
   add_lens_options(*verb, options->lens);

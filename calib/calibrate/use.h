@@ -11,7 +11,7 @@ enum class Use {
   workspace,  ///< places seen by the camera, in the robot's frame: errors in variables, lens and print solved
               ///< for
   image,      ///< pictures predicted through this robot: the fewest pixels, where that predicts them better
-  two_arms    ///< arms that one camera relates: lens and print as stated, for all alike
+  two_arms    ///< arms that one camera relates: the lens as stated, for all alike
 };
 const char* to_string(Use use);  ///< "workspace", "image", "two-arms"
 
