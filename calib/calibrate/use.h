@@ -1,5 +1,6 @@
 #pragma once
 #include <optional>
+#include <string>
 
 #include "calib/solve/held_out.h"
 
@@ -14,6 +15,7 @@ enum class Use {
   two_arms    ///< arms that one camera relates: the lens as stated, for all alike
 };
 const char* to_string(Use use);  ///< "workspace", "image", "two-arms"
+std::optional<Use> use_named(const std::string& name);
 
 /// The error of an answer in what it is for.
 struct UseError {

@@ -88,13 +88,14 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
 }
 
 std::string size_sentence(const TargetSize& size) {
-  char text[320];
+  char known[40] = "was to be kept", text[320];
+  if (size.prior_sd > 0) std::snprintf(known, sizeof known, "is known to %.2g %%", 100 * size.prior_sd);
   std::snprintf(
       text, sizeof text,
-      "the data want a target %.4f +- %.4f (2 sd) times as large as stated, which is known to %g %%: "
+      "the data want a target %.4f +- %.4f (2 sd) times as large as stated, which %s: "
       "measure its squares, or the intrinsics or the robot's unit are wrong; the answer is for %.4f "
       "times (--target-size solved takes what the data want)",
-      size.wanted->estimate, 2 * size.wanted->sd, 100 * size.prior_sd, size.estimate);
+      size.wanted->estimate, 2 * size.wanted->sd, known, size.estimate);
   return text;
 }
 
