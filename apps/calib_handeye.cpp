@@ -188,7 +188,8 @@ int run_handeye(const HandEyeOptions& options) {
 
   const calib::ExtrinsicsInputs inputs = calib::relative_to(
       {dataset.source, options.dataset.target.empty() ? dataset.target : options.dataset.target,
-       dataset.poses_path, dataset.camera_path, solved.refiner, solved.depth, solved.time_offset},
+       dataset.poses_path, dataset.camera_path, solved.refiner, solved.depth, solved.time_offset,
+       options.dataset.robot, options.dataset.base_link, options.dataset.tip_link},
       options.out);
   calib::Extrinsics extrinsics = calib::extrinsics_of(solved.calibration, inputs);
   const int exit_code = solved.calibration.usable ? exit_done : exit_unusable;
@@ -234,14 +235,10 @@ void add_handeye_verb(CLI::App& app, Action& action) {
                    "Camera on the gripper, or beside the robot that holds the target")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
   verb->add_option_function<std::string>(
-          "--for",
-          [options](const std::string& name) {
-            for (const calib::Use use : {calib::Use::workspace, calib::Use::image, calib::Use::two_arms})
-              if (name == calib::to_string(use)) options->use = use;
-          },
+          "--for", [options](const std::string& name) { options->use = *calib::use_named(name); },
           "What the answer is for. workspace: places seen by the camera, in the robot's frame; "
           "image: pictures predicted through this robot; two-arms: arms that one camera relates, "
-          "with lens and target as stated for all alike")
+          "with the lens as stated for all alike")
       ->check(CLI::IsMember({"workspace", "image", "two-arms"}))
       ->default_str("workspace");
   add_lens_options(*verb, options->lens);

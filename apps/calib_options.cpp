@@ -25,6 +25,15 @@ void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options, const
       ->capture_default_str();
 }
 
+void add_robot_options(CLI::App& group, DatasetChoice& choice) {
+  CLI::Option* robot =
+      group.add_option("--robot", choice.robot,
+                       "URDF of the arm: the poses are then its joints, a CSV with a column of "
+                       "each by its name or q1 q2 ... [rad], and their zeros are solved for");
+  group.add_option("--base-link", choice.base_link, "Link of the URDF that stands still")->needs(robot);
+  group.add_option("--tip-link", choice.tip_link, "Link of the URDF that is the gripper")->needs(robot);
+}
+
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   CLI::App& group = *verb.add_option_group("Dataset");
   group.add_option("dataset", choice.path, "Folder of pictures and poses, or a file of pose pairs")
@@ -38,12 +47,7 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
       "--angles", choice.angles,
       "What three angles of a pose are: xyz and the like about fixed axes, XYZ about turning ones "
       "(KUKA: ZYX, Staubli: XYZ, Kawasaki: ZYZ), rotvec");
-  CLI::Option* robot =
-      group.add_option("--robot", choice.robot,
-                       "URDF of the arm: the poses are then its joints, a CSV with a column of "
-                       "each by its name or q1 q2 ... [rad], and their zeros are solved for");
-  group.add_option("--base-link", choice.base_link, "Link of the URDF that stands still")->needs(robot);
-  group.add_option("--tip-link", choice.tip_link, "Link of the URDF that is the gripper")->needs(robot);
+  add_robot_options(group, choice);
   group.add_option("--camera", choice.camera,
                    "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain, JSON, npz");
   group.add_option("--depth-scale", choice.depth_scale, "Metres per count of the depth pictures")

@@ -38,6 +38,8 @@ struct DatasetChoice {
   bool no_depth = false;
 };
 void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
+/// Those of a URDF alone, which the former have.
+void add_robot_options(CLI::App& group, DatasetChoice& choice);
 
 /// --target-size-sd, --target-size stated|solved
 void add_target_size_options(CLI::App& verb, double& sd);

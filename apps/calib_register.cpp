@@ -29,6 +29,7 @@ struct RegisterOptions {
   std::vector<std::string> cameras;
   std::string target, setup, cache;
   std::vector<double> workspace;
+  DatasetChoice robot;  ///< of the datasets of --cameras: its URDF alone
   double depth_scale = 0.001;
   bool without_images = false, no_depth = false;
   calib::LensKnowledge lens = calib::LensKnowledge::near;
@@ -93,7 +94,7 @@ calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const Reg
                            {.refine = {}, .target_size_sd = options.target_size_sd, .lens = options.lens});
 }
 
-calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
+calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
   std::vector<calib::Extrinsics> calibrations;
   std::vector<std::string> arms;
   for (const std::string& path : options.calibrations) {
@@ -107,6 +108,9 @@ calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
       doubts.unusable = doubts.unusable || !calibration.usable;
     return composed;
   }
+  const bool for_arms = std::any_of(calibrations.begin(), calibrations.end(),
+                                    [](const calib::Extrinsics& c) { return c.use == calib::Use::two_arms; });
+  if (for_arms && options.lens == calib::LensKnowledge::near) options.lens = calib::LensKnowledge::stated;
   std::vector<calib::CellMember> members;
   for (std::size_t i = 0; i < arms.size(); ++i) {
     const calib::ExtrinsicsInputs& inputs = calibrations[i].inputs;
@@ -123,6 +127,9 @@ calib::Cell cell_of_arms(const RegisterOptions& options, Doubts& doubts) {
     } catch (const data::InputError& error) {
       throw data::InputError(std::string(error.what()) + "; --without-images composes the transforms alone");
     }
+    if (!inputs.robot.empty()) choice.robot = calib::resolved(inputs.robot, file);
+    choice.base_link = inputs.base_link;
+    choice.tip_link = inputs.tip_link;
     choice.target = target_text(inputs.target, file);
     choice.cache = options.cache;
     choice.no_depth = options.no_depth || !inputs.depth;
@@ -141,6 +148,9 @@ calib::Cell cell_of_cameras(const RegisterOptions& options, Doubts& doubts) {
   for (const std::string& path : options.cameras) {
     DatasetChoice choice;
     choice.path = path;
+    choice.robot = options.robot.robot;
+    choice.base_link = options.robot.base_link;
+    choice.tip_link = options.robot.tip_link;
     choice.target = options.target;
     choice.cache = options.cache;
     choice.depth_scale = options.depth_scale;
@@ -217,6 +227,7 @@ void add_register_verb(CLI::App& app, Action& action) {
   verb->add_option("--setup", options->setup,
                    "eye-in-hand or eye-to-hand, where the datasets of --cameras do not say")
       ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+  add_robot_options(*verb, options->robot);
   add_vector_option(*verb, "--workspace", options->workspace,
                     "Point in the first base where the uncertainty is stated [m]");
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");

@@ -73,6 +73,22 @@ void place(const CellMember& member, std::size_t arm, std::size_t camera, Layout
   }
 }
 
+/// Zeros of joints, where all arms have their joints known: errors of an arm are those of its joints, or
+/// smooth.
+void add_joint_zeros(Bundle& bundle, std::vector<std::string>* notices) {
+  std::vector<Eigen::Index> joints(bundle.bases.size(), 0);
+  for (const RobotPose& pose : bundle.poses)
+    joints[static_cast<std::size_t>(pose.arm)] = pose.joint_motions.cols();
+  const auto known = std::count_if(joints.begin(), joints.end(), [](Eigen::Index n) { return n > 0; });
+  if (known == 0) return;
+  if (known == static_cast<std::ptrdiff_t>(joints.size())) {
+    for (const Eigen::Index count : joints) bundle.joint_zeros.emplace_back(Eigen::VectorXd::Zero(count));
+    return;
+  }
+  for (RobotPose& pose : bundle.poses) pose.joint_motions.resize(6, 0);
+  if (notices) notices->emplace_back("joints are not known of all arms: the zeros of none are solved for");
+}
+
 }  // namespace
 
 CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
@@ -138,6 +154,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
         RobotPose pose;
         pose.arm = static_cast<int>(arm);
         pose.T_base_gripper = observation.T_base_gripper;
+        pose.joint_motions = observation.joint_motions;
         bundle.poses.push_back(pose);
       }
       BundleView view = make_view(member.points, observation);
@@ -153,6 +170,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   bundle.scales.assign(bundle.targets.size(), 1.0);
   bundle.time_offsets.assign(bundle.bases.size(), 0.0);
   bundle.pivots.assign(bundle.bases.size(), Eigen::Vector3d::Zero());
+  add_joint_zeros(bundle, notices);
   return bundle;
 }
 
@@ -164,6 +182,7 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
   settings.bundle.unknowns.warps = true;
   settings.bundle.unknowns.intrinsics = given.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   Bundle start = cell_bundle(members, &cell.notices);
+  settings.bundle.unknowns.joint_zeros = !start.joint_zeros.empty();
   if (given.lens == LensKnowledge::unknown) start.priors.lenses.clear();
   if (target_size_sd > 0) start.priors.scale_sd = target_size_sd;
   const SizedRefinement sized = refine_sizes(refine(std::move(start), settings), settings);

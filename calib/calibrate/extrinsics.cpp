@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 ExtrinsicsInputs relative_to(ExtrinsicsInputs inputs, const std::string& out) {
   if (out.empty()) return inputs;
   const fs::path folder = fs::weakly_canonical(fs::absolute(out)).parent_path();
-  for (std::string* path : {&inputs.dataset, &inputs.target, &inputs.poses, &inputs.camera})
+  for (std::string* path : {&inputs.dataset, &inputs.target, &inputs.poses, &inputs.camera, &inputs.robot})
     if (!path->empty() && fs::exists(*path))  // a target may be words
       *path = fs::weakly_canonical(fs::absolute(*path)).lexically_relative(folder).string();
   return inputs;
@@ -127,6 +127,12 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
     if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");
     if (scale.has("warp_mm")) extrinsics.target.warp = 1e-3 * two_numbers(scale, "warp_mm");
   }
+  if (object.has("use")) {
+    const std::string use = object.object("use").string("for", "workspace");
+    const std::optional<Use> known = use_named(use);
+    if (!known) throw object.error("use", "workspace, image or two-arms, found " + use);
+    extrinsics.use = *known;
+  }
   if (object.has("lens")) {
     const data::JsonObject lens = object.object("lens");
     if (lens.has("size_px")) extrinsics.lens = read_lens(lens);
@@ -135,6 +141,9 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
     const data::JsonObject from = object.object("provenance");
     extrinsics.inputs = {from.string("dataset", ""), from.string("target", ""), from.string("poses", ""),
                          from.string("camera", ""), from.string("refiner", "")};
+    extrinsics.inputs.robot = from.string("robot", "");
+    extrinsics.inputs.base_link = from.string("base_link", "");
+    extrinsics.inputs.tip_link = from.string("tip_link", "");
     if (from.has("depth_scale")) {
       DepthUse& depth = extrinsics.inputs.depth.emplace();
       depth.used = true;

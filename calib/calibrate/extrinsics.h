@@ -17,6 +17,7 @@ struct ExtrinsicsInputs {
   std::string dataset, target, poses, camera, refiner;
   std::optional<DepthUse> depth = {};
   std::optional<TimeOffset> time_offset = {};
+  std::string robot = {}, base_link = {}, tip_link = {};  ///< URDF whose joints the poses are, as load_urdf
 };
 
 /// The same with paths as a reader of the file `out` needs them: relative to its folder, so that file and
@@ -41,7 +42,8 @@ struct Extrinsics {
   TargetShape target;                          ///< that transform and target_pose are for
   std::optional<data::CameraIntrinsics> lens;  ///< likewise; none of pose pairs
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
-  bool pixels = true;                 ///< false: of pose pairs, which have no corners
+  bool pixels = true;  ///< false: of pose pairs, which have no corners
+  Use use = Use::workspace;
   std::vector<std::string> warnings;  ///< of the calibration, worst first
   bool usable = true;                 ///< false: it ended with exit code 3
   ExtrinsicsInputs inputs;

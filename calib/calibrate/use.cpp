@@ -14,6 +14,12 @@ const char* to_string(Use use) {
   return "workspace";
 }
 
+std::optional<Use> use_named(const std::string& name) {
+  for (const Use use : {Use::workspace, Use::image, Use::two_arms})
+    if (name == to_string(use)) return use;
+  return std::nullopt;
+}
+
 UseError use_error(Use use, const HeldOut& held_out, const std::optional<Halves>& halves) {
   if (use == Use::image) return {use, "corners of views left out are predicted to", "px", held_out.px};
   if (use == Use::workspace)

@@ -1,5 +1,6 @@
 #pragma once
 #include <optional>
+#include <string>
 
 #include "calib/solve/held_out.h"
 
@@ -11,9 +12,10 @@ enum class Use {
   workspace,  ///< places seen by the camera, in the robot's frame: errors in variables, lens and print solved
               ///< for
   image,      ///< pictures predicted through this robot: the fewest pixels, where that predicts them better
-  two_arms    ///< arms that one camera relates: lens and print as stated, for all alike
+  two_arms    ///< arms that one camera relates: the lens as stated, for all alike
 };
 const char* to_string(Use use);  ///< "workspace", "image", "two-arms"
+std::optional<Use> use_named(const std::string& name);
 
 /// The error of an answer in what it is for.
 struct UseError {

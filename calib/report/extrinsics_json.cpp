@@ -226,6 +226,11 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   json["provenance"] = {{"tool", "flash-calib"},    {"version", FLASH_VERSION}, {"dataset", inputs.dataset},
                         {"target", inputs.target},  {"poses", inputs.poses},    {"camera", inputs.camera},
                         {"refiner", inputs.refiner}};
+  if (!inputs.robot.empty()) {
+    json["provenance"]["robot"] = inputs.robot;
+    json["provenance"]["base_link"] = inputs.base_link;
+    json["provenance"]["tip_link"] = inputs.tip_link;
+  }
   json["provenance"]["depth_scale"] =
       inputs.depth && inputs.depth->used ? Json(inputs.depth->scale) : Json(nullptr);
   return json;

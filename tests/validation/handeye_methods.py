@@ -3,8 +3,9 @@
 recorded set below a folder. Each use is asked for what it is for: image for pixels, workspace for mm and deg, each on
 views that took no part (ten interleaved parts); two-arms for how far ten splits into halves, taken for two arms on one
 camera, put the middle of the workspace from each other. Beside the answer stand the least of the others, whose it is, and
-by how many standard errors of the paired difference of squares, over parts or splits, the answer is worse (negative:
-better). What is worse by more than two is marked. Halves are of sets with 16 views or more.
+by how much the answer is worse (negative: better), with the standard error of the difference: that of the paired
+difference of squares over parts or splits, over the sum of both rms. What is worse by more than two of them is marked.
+Halves are of sets with 16 views or more.
 
     tests/validation/handeye_methods.py build/release/bin/flash-calib ../shared/data/handeye"""
 import argparse
@@ -58,13 +59,12 @@ class Set:
         return entry["heldout_folds"][column], entry[f"heldout_{measure}"]
 
     def row(self, measure):
-        """Answer, the best of the others, whose it is, by how many standard errors the answer is worse."""
+        """Answer, the best of the others, whose it is, by how much the answer is worse, the standard error of that."""
         each, answer = self.squares(measure, None)
         best = min(OTHERS, key=lambda name: self.squares(measure, name)[1])
         others, least = self.squares(measure, best)
-        difference = numpy.array(each) - numpy.array(others)
-        error = difference.std(ddof=1) / math.sqrt(len(difference))
-        return answer, least, best, difference.mean() / error if error > 0 else 0.0
+        difference = (numpy.array(each) - numpy.array(others)) / (answer + least)
+        return answer, least, best, difference.mean(), difference.std(ddof=1) / math.sqrt(len(difference))
 
 
 def main():
@@ -75,7 +75,7 @@ def main():
     options = parser.parse_args()
     worse = dict.fromkeys(MEASURES, 0)
     halves = {name: [] for name in (None, *OTHERS)}
-    print(f"{'set':28} " + " | ".join(f"{unit:>11} {'others':>7} {'whose':6} {'behind':>6}  " for unit in MEASURES))
+    print(f"{'set':28} " + " | ".join(f"{unit:>11} {'others':>7} {'whose':6} {'behind':>7}    {'s.e.':>5}  " for unit in MEASURES))
     with tempfile.TemporaryDirectory() as folder:
         for target in sorted(options.data.glob("**/target.json")):
             one = Set(options.program, target.parent, options.cache or folder, pathlib.Path(folder))
@@ -85,9 +85,10 @@ def main():
             for measure in MEASURES:
                 if measure == "two arms mm" and not (one.first_halves and len(one.first_halves[0]) >= 8):
                     continue
-                answer, least, best, behind = one.row(measure)
-                worse[measure] += behind > 2
-                cells.append(f"{answer:11.3f} {least:7.3f} {best:6} {behind:+6.1f}{' !' if behind > 2 else '  '}")
+                answer, least, best, behind, error = one.row(measure)
+                worse[measure] += behind > 2 * error
+                mark = " !" if behind > 2 * error else "  "
+                cells.append(f"{answer:11.3f} {least:7.3f} {best:6} {behind:+7.3f} +- {error:5.3f}{mark}")
                 for name, squares in halves.items() if measure == "two arms mm" else ():
                     squares.append(one.squares(measure, name)[0])
             print(f"{target.parent.relative_to(options.data)!s:28} " + " | ".join(cells), flush=True)

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 
 #include "calib/calibrate/calibrate.h"
+#include "calib/calibrate/cell.h"
 #include "calib/geometry/serial_chain.h"
 #include "tests/calib/arm_scene.h"
 
@@ -32,8 +33,9 @@ TEST(JointZeros, ChainsOfJointsAreTheArmInClosedForm) {
 
 /// A recording of an arm whose joints are farther than they say by `zeros`; it repeats to 0.005 deg and 0.03
 /// mm.
-HandEyeScene recorded(const Eigen::VectorXd& zeros, bool with_joints, unsigned seed) {
-  SceneSettings settings = protocol_settings(Setup::eye_in_hand);
+HandEyeScene recorded(const Eigen::VectorXd& zeros, bool with_joints, unsigned seed,
+                      Setup setup = Setup::eye_in_hand) {
+  SceneSettings settings = protocol_settings(setup);
   settings.views = 25;
   HandEyeScene scene = make_arm_scene(settings, {}, 0.4, board_points(), seed);
   const SerialChain chain = chain_of(nominal_arm());
@@ -82,6 +84,48 @@ TEST(JointZeros, AreFoundAndTakeTheirErrorOutOfTheAnswer) {
   EXPECT_GE(inside, 8);     // of ten at 95 %: fewer once in eighty
   EXPECT_GT(squared, 0.4);  // 60 squares of unit mean, six of a trial correlated: 0.26 a standard deviation
   EXPECT_LT(squared, 1.8);
+}
+
+CellMember member_of(const HandEyeScene& scene, const std::string& arm) {
+  CellMember member{
+      .arm = arm, .camera = "camera", .setup = scene.settings.setup, .intrinsics = scene.camera};
+  member.points = scene.points;
+  member.symmetries = grid_symmetries(scene.points);
+  member.observations = scene.observations;
+  for (std::size_t i = 0; i < scene.observations.size(); ++i) member.stamps.push_back(static_cast<double>(i));
+  member.poses = shah(loops_of(scene));
+  return member;
+}
+
+TEST(JointZeros, OfTwoArmsOnOneCameraAreSolvedForTogether) {
+  constexpr double kChiSquare999 = 22.458;  // 6 degrees of freedom
+  std::mt19937 random(950);
+  std::normal_distribution<double> normal(0, kUsualJointZero);
+  std::array<Eigen::VectorXd, 2> zeros = {Eigen::VectorXd(6), Eigen::VectorXd(6)};
+  for (Eigen::VectorXd& of_arm : zeros)
+    for (double& zero : of_arm) zero = normal(random);
+  std::array<double, 2> off{};
+  for (const bool known : {false, true}) {
+    const HandEyeScene left = recorded(zeros[0], known, 950, Setup::eye_to_hand),
+                       right = recorded(zeros[1], known, 951, Setup::eye_to_hand);
+    const Cell cell = solve_cell({member_of(left, "left"), member_of(right, "right")});
+    const Vector6d error = motion_between(cell.bases[0].transform.T, left.truth.X * right.truth.X.inverse());
+    off[known ? 1 : 0] = error.head<3>().norm();
+    if (!known) continue;
+    EXPECT_LT(error.dot(cell.bases[0].covariance.ldlt().solve(error)), kChiSquare999);
+  }
+  EXPECT_LT(off[1], off[0]);
+}
+
+TEST(JointZeros, OfOneArmOfTwoAreNotSolvedFor) {
+  const Eigen::VectorXd zeros = Eigen::VectorXd::Zero(6);
+  std::vector<std::string> notices;
+  const Bundle bundle = cell_bundle({member_of(recorded(zeros, true, 960, Setup::eye_to_hand), "left"),
+                                     member_of(recorded(zeros, false, 961, Setup::eye_to_hand), "right")},
+                                    &notices);
+  EXPECT_TRUE(bundle.joint_zeros.empty());
+  for (const RobotPose& pose : bundle.poses) EXPECT_EQ(pose.joint_motions.cols(), 0);
+  ASSERT_EQ(notices.size(), 1U);
 }
 
 }  // namespace

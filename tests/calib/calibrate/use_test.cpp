@@ -38,17 +38,44 @@ TEST(Use, ImageTakesWhatPredictsPicturesBest) {
   EXPECT_GT(fewest, 0);
 }
 
-TEST(Use, TwoArmsTakeLensAndPrintAsStated) {
+TEST(Use, TwoArmsTakeTheLensAsStatedAndSolveForThePrint) {
   const HandEyeScene scene = arm_scene(45);
   const Calibration result = solved(scene, Use::two_arms);
-  const Bundle& bundle = result.refined.bundle;
-  EXPECT_EQ(to_vector(bundle.intrinsics.front()), to_vector(scene.camera));
-  EXPECT_EQ(bundle.scales.front(), 1);
-  EXPECT_EQ(result.unknowns.warps, false);
+  EXPECT_EQ(to_vector(result.refined.bundle.intrinsics.front()), to_vector(scene.camera));
+  EXPECT_TRUE(result.unknowns.scales);
+  EXPECT_EQ(result.size->prior_sd, kPrintSd);
   ASSERT_TRUE(result.use.value);
   EXPECT_GT(*result.use.value, 0);
   for (const ComparedMethod& method : result.comparison)
     EXPECT_EQ(method.halves.has_value(), method.held_out.has_value());
+}
+
+TEST(Use, TwoArmsWithPrintsOfTheirOwnAreNearerThanWithPrintsAsStated) {
+  // Two standard deviations of a print, one either way, a metre away: 12 mm between the arms.
+  const Eigen::Matrix3Xd points = board_points(7, 5, 0.03);
+  std::vector<Eigen::Isometry3d> truth, with_prior, as_stated;
+  for (const double size : {1 + 2 * kPrintSd, 1 - 2 * kPrintSd}) {
+    SceneSettings settings = protocol_settings(Setup::eye_to_hand);
+    settings.robot_deg = 0.05;
+    settings.robot_mm = 0.5;
+    HandEyeScene scene = make_scene(settings, size * points, size > 1 ? 47 : 48);
+    scene.points = points;
+    for (Observation& o : scene.observations)
+      o.T_camera_target = {fitted_pose(scene.camera, points, o.pixels, o.T_camera_target.front())};
+    truth.push_back(scene.truth.X);
+    with_prior.push_back(solved(scene, Use::two_arms).poses.X);
+    CalibrateSettings stated;
+    stated.use = Use::two_arms;
+    stated.target_size_sd = 0;
+    as_stated.push_back(
+        calibrate(settings.setup, scene.camera, points, grid_symmetries(points), scene.observations, stated)
+            .poses.X);
+  }
+  const Eigen::Vector3d middle = truth[1] * Eigen::Vector3d(0, 0, 0.9);
+  const auto off = [&](const std::vector<Eigen::Isometry3d>& X) {
+    return (X[0] * (X[1].inverse() * middle) - truth[0] * (truth[1].inverse() * middle)).norm();
+  };
+  EXPECT_LT(off(with_prior), 0.5 * off(as_stated));
 }
 
 TEST(Use, HalvesAgreeWhereRobotAndCornersAreExact) {

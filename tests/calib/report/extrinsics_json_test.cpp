@@ -38,13 +38,18 @@ TEST(ExtrinsicsJson, OfPosePairsSaysSoAndHasNoPixels) {
   EXPECT_EQ(loaded.method, "pose_space");
 }
 
-TEST(ExtrinsicsJson, DepthAndTimeOffsetAreSavedAndLoaded) {
+TEST(ExtrinsicsJson, WhatItWasMadeFromIsSavedAndLoaded) {
   const HandEyeScene scene = make_scene(protocol_settings(Setup::eye_in_hand), board_points(), 1);
+  CalibrateSettings settings;
+  settings.use = Use::two_arms;
   const Calibration result = calibrate(Setup::eye_in_hand, scene.camera, scene.points,
-                                       grid_symmetries(scene.points), scene.observations);
+                                       grid_symmetries(scene.points), scene.observations, settings);
   ExtrinsicsInputs inputs{"recording", "chessboard:9x6:0.025", "poses.tum", "camera_info.yaml", "ours"};
   inputs.depth = DepthUse{.used = true, .views = 12, .scale = 0.00025, .sigma = 0.0004};
   inputs.time_offset = TimeOffset{0.03, 0.001};
+  inputs.robot = "arm.urdf";
+  inputs.base_link = "base";
+  inputs.tip_link = "tool";
   const nlohmann::ordered_json json = to_json(result, inputs, 0);
   EXPECT_EQ(json["depth"]["views"], 12);
   EXPECT_EQ(json["sigmas"]["depth_m"], 0.0004);
@@ -54,6 +59,10 @@ TEST(ExtrinsicsJson, DepthAndTimeOffsetAreSavedAndLoaded) {
   EXPECT_EQ(loaded.inputs.depth->scale, 0.00025);
   EXPECT_EQ(loaded.inputs.time_offset->estimate, 0.03);
   EXPECT_TRUE(loaded.pixels);
+  EXPECT_EQ(loaded.use, Use::two_arms);
+  EXPECT_EQ(loaded.inputs.robot, "arm.urdf");
+  EXPECT_EQ(loaded.inputs.base_link, "base");
+  EXPECT_EQ(loaded.inputs.tip_link, "tool");
 }
 
 }  // namespace
