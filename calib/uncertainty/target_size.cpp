@@ -92,7 +92,8 @@ std::string size_sentence(const TargetSize& size) {
   if (size.prior_sd > 0) std::snprintf(known, sizeof known, "is known to %.2g %%", 100 * size.prior_sd);
   std::snprintf(
       text, sizeof text,
-      "the estimated size of the target is %.4f +- %.4f (2 sd) of the stated one, which %s: measure a square; "
+      "the estimated size of the target is %.4f +- %.4f (2 sd) of the stated one, which %s: measure a "
+      "square; "
       "if the print is right, check the focal length and the unit of the robot's poses; the answer is for "
       "%.4f (--target-size solved takes the estimate)",
       size.wanted->estimate, 2 * size.wanted->sd, known, size.estimate);
