@@ -88,6 +88,7 @@ def searched(runs, asset, seed, wrong=None):
     summary = runs.grid(f"run_{seed}_{wrong or 'right'}", [recording], "--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes",
                         *synthetic.axes(RANGES), "--rollouts", str(runs.out / "motions"))
     return {"seed": seed, "wrong": wrong, "truth": truth_of(seed), "parameters": summary["parameters"],
+            "noise": summary["recordings"][0]["noise_m"],
             "told": any(not r["model_fits"] for r in summary["recordings"]), "recording": recording}
 
 
@@ -105,7 +106,7 @@ def meshes(runs, twin, name, parameters):
 
 def least_spread(runs, twin):
     """Standard deviation of the logarithm of each parameter by Cramer and Rao: all points, white noise along the normal, the
-    truth's own cells, registration and clock unknown."""
+    truth's own cells, registration and clock unknown, ranges known."""
     step, name = 0.02, f"bound_{twin['seed']}"
     middle, faces = meshes(runs, twin, name, twin["truth"])
     rates = []
@@ -134,7 +135,10 @@ def least_spread(runs, twin):
         n = normals[nearest]
         rows.append(numpy.column_stack([(rate[k][nearest] * n).sum(1) for rate in rates] + [n, (speeds[k][nearest] * n).sum(1)]))
     rows = numpy.concatenate(rows)
-    information = rows.T @ rows / truth["depth_noise_m"] ** 2
+    information = rows.T @ rows / twin["noise"] ** 2
+    widths = [math.log(high / low) for low, high, _ in RANGES.values()]
+    widths += [2 * bound for bound in (*BOUNDS["offset_m"], BOUNDS["time_s"])]
+    information += numpy.diag(12 / numpy.square(widths))  # what is known before: even over each range
     scale = 1 / numpy.sqrt(numpy.diag(information))
     spread = numpy.sqrt(numpy.diag(numpy.linalg.inv(information * numpy.outer(scale, scale)))) * scale
     return dict(zip(RANGES, spread))
@@ -190,6 +194,7 @@ def main():
     parser.add_argument("--out", required=True, type=pathlib.Path)
     parser.add_argument("--seed", type=int, default=9001, help="of the first twin; the others follow")
     parser.add_argument("--runs", type=int, default=20, help="twins of each half")
+    parser.add_argument("--bounds", type=int, help="twins whose Cramer-Rao widths are computed; without it, all")
     parser.add_argument("--workers", type=int, default=2)
     options = parser.parse_args()
     runs = kept.Runs(options.sysid, options.out)
@@ -201,7 +206,8 @@ def main():
     with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
         found += pool.map(lambda job: searched(runs, asset, *job), jobs[1:])
         right = [twin for twin in found if not twin["wrong"]]
-        bounds = dict(zip(seeds, pool.map(lambda twin: least_spread(runs, twin), right)))
+        bounded = right[:options.bounds]
+        bounds = {twin["seed"]: bound for twin, bound in zip(bounded, pool.map(lambda twin: least_spread(runs, twin), bounded))}
     print(f"\nseeds {seeds.start} to {seeds.stop - 1}")
     print_right(right, bounds)
     print_wrong([twin for twin in found if twin["wrong"]])
