@@ -183,27 +183,30 @@ std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emu
   return errors;
 }
 
-/// Motions simulated at values on the meshes of the emulator, put together as it does; empty where one
-/// diverged. `own`: on the search's own mesh.
+/// Motions simulated at values, as the emulator's mesh has them; empty where one diverged. `own`: on the
+/// search's own mesh. `finer`: on the finer mesh too; else the emulator's difference between both stays.
 std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emulator& emulator,
-                                                     const std::vector<double>& values,
+                                                     const std::vector<double>& values, bool finer,
                                                      std::vector<ReplayResult>& own) {
   const ReplayCandidate candidate = candidate_at(values, task.grid);
-  std::vector<ReplayResult> simulated = motions_at(emulator, values, kOwn);  // for their steps
+  std::vector<ReplayResult> simulated = motions_at(emulator, values, emulator.share);
+  const std::vector<ReplayResult> own_model = motions_at(emulator, values, kOwn),
+                                  finer_model = motions_at(emulator, values, kFiner);
   own.clear();
   for (std::size_t r = 0; r < task.replays.size(); ++r) {
     own.push_back(task.store.run(task.replays[r], candidate));
     task.tell_motion();
     if (!own.back().finite) return std::nullopt;
+    const double share = finer ? emulator.share : 0;
     Motion& motion = simulated[r].motion;
-    const Motion on_model = emulator.models[r].model.on_its_mesh(own.back().motion);
-    add(motion, -1, motion);
-    add(motion, 1 - emulator.share, on_model);
-    if (emulator.share == kOwn) continue;
-    const ReplayResult finer = task.store.run(emulator.models[r].replay, candidate);
+    add(motion, 1 - share, emulator.models[r].model.on_its_mesh(own.back().motion));
+    add(motion, share - 1, own_model[r].motion);
+    if (share == 0) continue;
+    const ReplayResult there = task.store.run(emulator.models[r].replay, candidate);
     task.tell_motion();
-    if (!finer.finite) return std::nullopt;
-    add(motion, emulator.share, finer.motion);
+    if (!there.finite) return std::nullopt;
+    add(motion, share, there.motion);
+    add(motion, -share, finer_model[r].motion);
   }
   return simulated;
 }
@@ -215,7 +218,7 @@ std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
   const ReplayCandidate candidate = candidate_at(values, task.grid);
   const std::vector<Replay> on_model = replays_of(emulator);
   const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share);
-  auto simulated = simulate_at(task, emulator, values, estimate.motions);
+  auto simulated = simulate_at(task, emulator, values, true, estimate.motions);
   if (!simulated) return std::nullopt;
   const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects,
                              double times = 1) {
@@ -335,7 +338,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   const std::vector<Replay> on_model = replays_of(found.emulator);
   const std::vector<double> mode = found.look.posterior.values();
   std::vector<ReplayResult> own;
-  auto simulated = simulate_at(task, found.emulator, mode, own);
+  auto simulated = simulate_at(task, found.emulator, mode, false, own);
   if (!simulated) return Settled::elsewhere;
   MotionLikelihood likelihood = likelihood_about(
       task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
@@ -354,9 +357,11 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   for (const Replay& replay : task.replays)
     of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)).motion);
   const double fall = std::max(0.0, of_mode - least);
-  if (on_own.deviance(motions_in(own)) - fall > on_own.deviance(of_best) + kMatters)
-    return Settled::elsewhere;
-  if (fall > kMatters) {
+  const bool best_is_likelier = on_own.deviance(motions_in(own)) - fall > on_own.deviance(of_best) + kMatters;
+  Extent at_best;
+  for (const double value : best) at_best.push_back({value, value});
+  if (best_is_likelier && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
+  if (best_is_likelier || fall > kMatters) {
     found.look.posterior = explore_at_points(found.axes, of_points);
     found.look.likelihood = std::move(likelihood);
     found.errors = errors_about(found, held);
