@@ -8,6 +8,7 @@ FUZZ_SECONDS ?= 600
 CMAKE_ARGS ?=
 SEED ?= 10001
 SCENES ?= 1000
+RUNS ?= 20
 
 PYTHON ?= /usr/bin/python3
 REFERENCE ?= tests/reference
@@ -16,7 +17,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
+.PHONY: help demo configure build test validate routes coverage size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -63,6 +64,10 @@ validate: reference configure-test  ## Calibrate and fit what is in $(DATA), ren
 routes: configure-test  ## Say whether every route to an answer gives the same one, on a strip of known truth
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/routes.py --sysid $(sysid) --out $(BUILD)/routes
+
+coverage: configure-test  ## Say whether intervals hold the truth of RUNS strips from SEED on, and of as many that the model is wrong of
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage --seed $(SEED) --runs $(RUNS)
 
 size-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly, over 200 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target size_study

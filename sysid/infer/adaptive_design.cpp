@@ -228,6 +228,16 @@ bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes) {
   return false;
 }
 
+bool reaches_beyond(const Extent& extent, const std::vector<Axis>& axes) {
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const double first = axes[k].values.front(), last = axes[k].values.back();
+    const double slack = kSame * std::abs(distance(axes[k], first, last));
+    if (distance(axes[k], first, extent[k][0]) < -slack || distance(axes[k], last, extent[k][1]) > slack)
+      return true;
+  }
+  return false;
+}
+
 Extent next_lattice(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& searched) {
   constexpr double kPart = 0.5 - kSame;
   const Extent looked = extent_of(posterior.axes);

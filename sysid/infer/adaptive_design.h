@@ -65,6 +65,9 @@ std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searche
 /// Whether a lattice has, in any direction, cells of no more than half those of `axes`.
 bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes);
 
+/// Whether an extent goes beyond the values of `axes`.
+bool reaches_beyond(const Extent& extent, const std::vector<Axis>& axes);
+
 /// Where to simulate next: `extent` itself where nothing likely is beyond it within the searched range, and
 /// the posterior takes half of it or more. Else an extent about the estimate, twice as far on a side that
 /// the posterior leaves.

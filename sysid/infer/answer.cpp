@@ -5,6 +5,7 @@
 
 #include "data/text.h"
 #include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/verdict.h"
 #include "sysid/observe/horizon.h"
@@ -12,25 +13,8 @@
 namespace flash::sysid {
 namespace {
 
-constexpr int kRounds = 3;               // of motions about the answer
-constexpr int kWalk = 8;                 // of them on the way from a start
-constexpr std::size_t kFew = 30;         // of them in a round
-constexpr int kDraws = 4;                // at which an emulator is tried
-constexpr int kAtEstimate = 3 + kDraws;  // motions at an estimate: itself, two finer, and those
-constexpr double kOwn = 0, kFiner = 1, kLimit = 4.0 / 3;  // shares of a TwoMeshMotions
-
-/// What all steps of an answer need.
-struct Task {
-  const std::vector<Replay>& replays;
-  const GridSettings& grid;  ///< axes: of which every candidate has a motion
-  const AnswerSettings& settings;
-  const MotionStore& store;
-  const TellWork& told;
-
-  void tell_motion() const {
-    if (told) told({1, 0}, {});
-  }
-};
+constexpr int kRounds = 8;        // of motions about an answer
+constexpr std::size_t kFew = 30;  // of them in a round
 
 int best_of(const GridResults& results) {
   int best = -1;
@@ -87,7 +71,7 @@ Extent cells_around(const std::vector<double>& candidate, const std::vector<Axis
 /// Empty where one diverged or there is no finer mesh.
 std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
                                       const std::vector<Axis>& finer, bool told_own) {
-  Emulator emulator{{}, finer.empty() ? kOwn : kLimit};
+  Emulator emulator{{}, finer.empty() ? own_mesh : no_cells};
   GridSettings grid = task.grid;
   grid.axes = axes;
   const std::function<void()> motion = [&] { task.tell_motion(); };
@@ -101,117 +85,6 @@ std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>&
     emulator.models.push_back(std::move(*model));
   }
   return emulator;
-}
-
-std::vector<Replay> replays_of(const Emulator& emulator) {
-  std::vector<Replay> replays;
-  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
-  return replays;
-}
-
-/// The estimate simulated, and what it says of errors of the solution.
-struct Estimate {
-  std::vector<ReplayResult> motions;  ///< on the search's own mesh
-  std::vector<KnownError> errors;
-  std::vector<std::string> names;  ///< of the errors of the solution, as of a SolverCheck; they come first
-};
-
-bool all_finite(const std::vector<ReplayResult>& results) {
-  return std::all_of(results.begin(), results.end(),
-                     [](const ReplayResult& result) { return result.finite; });
-}
-
-/// By what is held and not measured, about an estimate: how the motion changes with it, and how that bends.
-/// What diverges is left out.
-std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
-                                       const std::vector<ReplayResult>& here) {
-  std::vector<KnownError> errors;
-  const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
-  for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
-    std::array<std::vector<ReplayResult>, 2> ends;
-    for (const std::size_t side : {0, 1})
-      for (const Replay& replay : task.replays) {
-        ends[side].push_back(
-            task.store.run(replay, candidate_with(values, task.grid, held.name, held.values[side])));
-        task.tell_motion();
-      }
-    if (!all_finite(ends[0]) || !all_finite(ends[1])) continue;
-    const auto low = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[0])}),
-               high = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[1])});
-    errors.push_back({{{-0.5, low}, {0.5, high}}, held.shared});
-    errors.push_back({{{0.5, low}, {-1, middle}, {0.5, high}}, held.shared});
-  }
-  return errors;
-}
-
-/// What the emulator misses at some draws of a posterior: errors of which any mixture is as likely.
-std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,
-                                           const Posterior& posterior) {
-  std::vector<KnownError> errors;
-  const Eigen::MatrixXd samples = samples_of(posterior);
-  const std::vector<Replay> on_model = replays_of(emulator);
-  const double share = 1 / std::sqrt(static_cast<double>(kDraws));
-  for (int draw = 0; draw < kDraws; ++draw) {
-    const Eigen::VectorXd row = samples.row((2 * draw + 1) * samples.rows() / (2 * kDraws)).transpose();
-    const std::vector<double> values(row.begin(), row.end());
-    const ReplayCandidate candidate = candidate_at(values, task.grid);
-    Motions simulated{on_model, {}};
-    for (std::size_t r = 0; r < task.replays.size(); ++r) {
-      ReplayResult own = task.store.run(task.replays[r], candidate);
-      task.tell_motion();
-      simulated.results.push_back(own);
-      simulated.results.back().motion = emulator.models[r].model.on_its_mesh(own.motion);
-    }
-    if (!all_finite(simulated.results)) continue;
-    errors.push_back(
-        {{{-share, std::make_shared<const Motions>(Motions{on_model, motions_at(emulator, values, kOwn)})},
-          {share, std::make_shared<const Motions>(std::move(simulated))}}});
-  }
-  return errors;
-}
-
-/// Motions simulated at values, as the emulator's mesh has them; empty where one diverged. `own`: on the
-/// search's own mesh.
-std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emulator& emulator,
-                                                     const std::vector<double>& values,
-                                                     std::vector<ReplayResult>& own) {
-  std::vector<ReplayResult> simulated = motions_at(emulator, values, emulator.share);
-  const std::vector<ReplayResult> own_model = motions_at(emulator, values, kOwn);
-  own.clear();
-  for (std::size_t r = 0; r < task.replays.size(); ++r) {
-    own.push_back(task.store.run(task.replays[r], candidate_at(values, task.grid)));
-    task.tell_motion();
-    if (!own.back().finite) return std::nullopt;
-    add(simulated[r].motion, 1, emulator.models[r].model.on_its_mesh(own.back().motion));
-    add(simulated[r].motion, -1, own_model[r].motion);
-  }
-  return simulated;
-}
-
-/// Empty where a motion diverged.
-std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
-                                 const std::vector<double>& values) {
-  Estimate estimate;
-  const ReplayCandidate candidate = candidate_at(values, task.grid);
-  const std::vector<Replay> on_model = replays_of(emulator);
-  const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share);
-  auto simulated = simulate_at(task, emulator, values, estimate.motions);
-  if (!simulated) return std::nullopt;
-  const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects) {
-    const auto shared = [](Motions& motions) { return std::make_shared<const Motions>(std::move(motions)); };
-    estimate.errors.push_back({{{-1, shared(from)}, {1, shared(to)}}, true, corrects});
-    estimate.names.push_back(name);
-  };
-  add_error("estimate_itself", {on_model, model}, {on_model, std::move(*simulated)}, true);
-  if (!task.settings.solver_check) return estimate;
-  if (emulator.share != kOwn)
-    add_error("double_mesh", {on_model, motions_at(emulator, values, kFiner)}, {on_model, model}, false);
-  for (FinerSolution& finer : finer_solutions(task.replays, candidate, task.store)) {
-    for (std::size_t r = 0; r < task.replays.size(); ++r) task.tell_motion();
-    add_error(finer.what, {task.replays, estimate.motions},
-              {std::move(finer.replays), std::move(finer.motions)}, true);
-  }
-  return estimate;
 }
 
 /// An emulator, and the posterior by it.
@@ -264,13 +137,18 @@ std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes) 
 std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
                                 bool finer, const std::vector<KnownError>& errors,
                                 std::vector<KnownError>& held) {
-  const std::vector<Axis>& searched = task.grid.axes;
-  const std::vector<Axis> axes = lattice(extent, searched, 3, kFew);
+  const std::vector<Axis> axes = lattice(extent, task.ranges, 3, kFew);
   if (cartesian_product(axes).size() > kFew) return std::nullopt;
   std::optional<Emulator> emulator = emulator_over(
-      task, axes, finer ? thinned(lattice(extent, searched, 2, kFew / 3)) : std::vector<Axis>{}, true);
+      task, axes, finer ? thinned(lattice(extent, task.ranges, 2, kFew / 3)) : std::vector<Axis>{}, true);
   if (!emulator) return std::nullopt;
   return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
+}
+
+/// All errors that are known but those of the emulator, and `more`.
+std::vector<KnownError> errors_about(const Found& found, std::vector<KnownError> more) {
+  more.insert(more.end(), found.estimate.errors.begin() + 1, found.estimate.errors.end());
+  return more;
 }
 
 /// The likelihood of motions on the mesh of `replays`, with all errors that are known but those of the
@@ -278,12 +156,11 @@ std::optional<Found> look_about(const Task& task, const Extent& extent, const st
 MotionLikelihood likelihood_about(const Task& task, const Found& found, const std::vector<Replay>& replays,
                                   const std::vector<double>& values,
                                   const std::vector<ReplayResult>& reference, std::vector<KnownError> more) {
-  more.insert(more.end(), found.estimate.errors.begin() + 1, found.estimate.errors.end());
   return {replays,
           reference,
           task.grid.score,
           task.settings.repeatability,
-          more,
+          errors_about(found, std::move(more)),
           rates_at(found.emulator, values, extent_of(found.look.posterior.axes), found.axes)};
 }
 
@@ -298,27 +175,27 @@ std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
   return motions;
 }
 
+enum class Settled { yes, at_points, elsewhere };
+
 /// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
-/// emulator's grid. Whether the mode is as likely as any such point and as the `best` of the search: it is
-/// not where folds fall another way between two simulations.
-bool settle(const Task& task, Found& found, const std::vector<double>& best,
-            const std::vector<KnownError>& held) {
+/// emulator's grid. Where folds fall another way between two simulations such a point is likelier than the
+/// mode, and the posterior becomes that of the points (explore_at_points). Elsewhere: the `best` of the
+/// search, perhaps beyond the emulator's grid, is likelier than both.
+Settled settle(const Task& task, Found& found, const std::vector<double>& best,
+               const std::vector<KnownError>& held) {
   constexpr double kMatters = 1;  // of a deviance
   const std::vector<Replay> on_model = replays_of(found.emulator);
   const std::vector<double> mode = found.look.posterior.values();
   std::vector<ReplayResult> own;
-  auto simulated = simulate_at(task, found.emulator, mode, own);
-  if (!simulated) return false;
-  const MotionLikelihood likelihood = likelihood_about(
+  auto simulated = simulate_at(task, found.emulator, mode, false, own);
+  if (!simulated) return Settled::elsewhere;
+  MotionLikelihood likelihood = likelihood_about(
       task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
   const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
   Eigen::Index likeliest;
   const double least = of_points.minCoeff(&likeliest), of_mode = likelihood.deviance(motions_in(*simulated));
-  if (least < of_mode)
-    set_estimate(found.look.posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
-  if (of_mode > least + kMatters) return false;
 
-  // The best of the search may be beyond the emulator's grid: both are moved alike to cells of no size.
+  // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
   std::vector<KnownError> errors = held;
   errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, own})},
                      {1, std::make_shared<const Motions>(Motions{on_model, std::move(*simulated)})}},
@@ -328,32 +205,48 @@ bool settle(const Task& task, Found& found, const std::vector<double>& best,
   std::vector<Motion> of_best;
   for (const Replay& replay : task.replays)
     of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)).motion);
-  return on_own.deviance(motions_in(own)) <= on_own.deviance(of_best) + kMatters;
+  const double fall = std::max(0.0, of_mode - least);
+  const bool best_is_likelier = on_own.deviance(motions_in(own)) - fall > on_own.deviance(of_best) + kMatters;
+  Extent at_best;
+  for (const double value : best) at_best.push_back({value, value});
+  if (best_is_likelier && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
+  if (best_is_likelier || fall > kMatters) {
+    found.look.posterior = explore_at_points(found.axes, of_points);
+    found.look.likelihood = std::move(likelihood);
+    found.errors = errors_about(found, held);
+    return Settled::at_points;
+  }
+  if (fall > 0)
+    set_estimate(found.look.posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
+  return Settled::yes;
 }
 
 /// The posterior by what was simulated alone, on the search's own mesh (explore_at_points). No motion is
 /// corrected by what was seen at another.
 void keep_to_simulated(const Task& task, Found& found, const std::vector<double>& best,
                        const std::vector<KnownError>& held) {
-  found.emulator.share = kOwn;
+  found.emulator.share = own_mesh;
   for (KnownError& error : found.estimate.errors) error.corrects = false;
+  found.errors = errors_about(found, held);
   found.look.likelihood = likelihood_about(task, found, replays_of(found.emulator), best,
-                                           motions_at(found.emulator, best, kOwn), held);
+                                           motions_at(found.emulator, best, own_mesh), held);
   found.look.posterior = explore_at_points(
       found.axes, deviance_over(found.emulator, found.axes, found.look.likelihood, task.grid));
 }
 
-/// Motions simulated anew about the answer where few simulations do, and again where it leaves them.
+/// Motions simulated anew about the answer, again while it leaves them or takes too little of them, where few
+/// simulations do.
 Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held) {
-  const bool finer = found.emulator.share != kOwn;
-  Extent extent = extent_of(found.look.posterior.axes);
+  const bool finer = found.emulator.share != own_mesh;
+  Extent extent = next_lattice(extent_of(found.axes), found.look.posterior, task.ranges);
+  if (!reaches_beyond(extent, found.axes) && !is_finer(lattice(extent, task.ranges, 3, kFew), found.axes))
+    return found;
   for (int round = 0; round < kRounds; ++round) {
-    if (round == 0 && !is_finer(lattice(extent, task.grid.axes, 3, kFew), found.axes)) break;
     std::optional<Found> there =
         look_about(task, extent, found.look.posterior.values(), finer, found.errors, held);
     if (!there) break;
     found = std::move(*there);
-    const Extent next = next_lattice(extent, found.look.posterior, task.grid.axes);
+    const Extent next = next_lattice(extent, found.look.posterior, task.ranges);
     if (next == extent) break;
     extent = next;
   }
@@ -364,8 +257,9 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
 Fit fit_of(const Task& task, const Found& found, const Answer& answer) {
   Fit fit{task.replays, answer.motions, answer.estimate};
   std::vector<ReplayResult> own;
-  auto motions =
-      found.emulator.share == kOwn ? std::nullopt : simulate_at(task, found.emulator, answer.values, own);
+  auto motions = found.emulator.share == own_mesh
+                     ? std::nullopt
+                     : simulate_at(task, found.emulator, answer.values, true, own);
   if (!motions) return fit;
   fit.replays = replays_of(found.emulator);
   fit.motions = std::move(*motions);
@@ -383,10 +277,10 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
       measure_sensitivity(on_model, grid, found.look.posterior.values(), true,
                           motions_of(found.emulator.models, found.emulator.share));
   std::vector<SolverCheck> checks;
-  for (std::size_t e = 0; e < found.estimate.names.size(); ++e) {
+  for (std::size_t e = 0; e < found.estimate.errors.size(); ++e) {
     const std::vector<MotionTerm>& terms = found.estimate.errors[e].terms;
     const Motions &from = *terms[0].motions, &to = *terms[1].motions;
-    checks.push_back(compare_solutions(found.estimate.names[e], sensitivity, from.replays, from.results,
+    checks.push_back(compare_solutions(found.estimate.errors[e].name, sensitivity, from.replays, from.results,
                                        to.replays, to.results, grid.axes));
   }
   return checks;
@@ -396,19 +290,19 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
 
 AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
   constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
-  const std::size_t motions = kWalk * (2 * kFew + kAtEstimate) + kHeld;
-  return {static_cast<int>(recordings * motions), 2 * kWalk * most_scores(grid.axes)};
+  const std::size_t motions = kRounds * (2 * kFew + motions_at_estimate) + kHeld;
+  return {static_cast<int>(recordings * motions), 2 * kRounds * most_scores(grid.axes)};
 }
 
 std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSettings& grid,
                                const std::vector<double>& start, const Extent& around,
                                const AnswerSettings& settings, const TellWork& told) {
   const MotionStore store(grid.rollouts);
-  const Task task{replays, grid, settings, store, told};
+  const Task task{replays, grid, grid.axes, settings, store, told};
   Extent extent = around;
   std::vector<double> at = start;
   std::vector<KnownError> held;
-  for (int round = 0; round < kWalk; ++round) {
+  for (int round = 0; round < kRounds; ++round) {
     std::optional<Found> found;
     if (settings.solver_check) found = look_about(task, extent, at, true, {}, held);
     if (!found) found = look_about(task, extent, at, false, {}, held);
@@ -424,7 +318,8 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
   constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
-  std::size_t motions = kAtEstimate + 3 + kHeld + kRounds * (own + kAtEstimate + (solver_check ? finer : 0));
+  std::size_t motions =
+      motions_at_estimate + 4 + kHeld + kRounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(grid.axes)).size();
   const int looks = 2 * (own > 0 ? 1 + kRounds : 1);
   return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
@@ -453,7 +348,9 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back(
         "some candidates diverged: the answer leaves out the values of a parameter at which they did");
   const MotionStore store(grid.rollouts);
-  const Task task{replays, usable, settings, store, told};
+  const std::vector<Axis> ranges =
+      settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
+  const Task task{replays, usable, ranges, settings, store, told};
   std::optional<Emulator> emulator;
   if (settings.solver_check) emulator = emulator_over(task, usable.axes, thinned(usable.axes), false);
   if (!emulator) emulator = emulator_over(task, usable.axes, {}, false);
@@ -474,14 +371,17 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     return answer;
   }
   Found about = simulate_about(task, *found, held);
-  if (settle(task, about, best, held)) {
-    found = std::move(about);
-  } else {
+  const Settled settled = settle(task, about, best, held);
+  if (settled == Settled::elsewhere)
     keep_to_simulated(task, *found, best, held);
+  else
+    found = std::move(about);
+  if (settled != Settled::yes)
     answer.warnings.emplace_back(
         "the motion changes too abruptly between the values searched: the answer is by these alone; search "
         "more values");
-  }
+
+  warn_of_held(task, found->look.likelihood, found->errors, answer.warnings);
 
   const Posterior& posterior = found->look.posterior;
   answer.values = posterior.values();
@@ -492,8 +392,6 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.estimate = score_motions(replays, answer.motions, grid.score);
   answer.estimate.values = answer.values;
   answer.fit = fit_of(task, *found, answer);
-  const std::vector<Axis> ranges =
-      settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
   answer.parameters = findings_of(results, ranges, posterior);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);

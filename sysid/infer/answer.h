@@ -51,7 +51,7 @@ struct Answer {
 /// what was observed say under noise and a discrepancy of the model (MotionLikelihood). Where few simulations
 /// do, a small lattice about what is found is simulated on both meshes, and the answer comes from its
 /// motions. Errors of the solution are known shapes in the likelihood: what the interpolation misses at the
-/// estimate, at some draws of the posterior, the last third to the mesh of no cells, and what half the step
+/// estimate, at some draws of the posterior, twice the step to the mesh of no cells, and what half the step
 /// and four times the iterations change. The motions are corrected by all but the second. So are the errors
 /// of what the search holds without a measurement (held_parameters). `told`: of the work that most_work
 /// counts.

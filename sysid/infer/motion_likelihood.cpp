@@ -92,87 +92,128 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                                    const std::vector<ReplayResult>& reference, const ScoreSettings& settings,
                                    std::optional<double> repeatability, const std::vector<KnownError>& errors,
                                    const std::vector<MotionChange>& rates) {
+  constexpr int kPasses = 2;  // where the nuisance is linear: without known errors, then at those found
   const CandidateResult score = score_motions(replays, reference, settings);
+  const Robust& robust = settings.objective.robust;
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const Replay& replay = replays[r];
     const RecordingScore& fit = score.recordings[r];
-    const Registration registration{fit.offset, fit.yaw, fit.time_offset, replay.pivot, replay.up};
-    const LinearObservations places(replay, reference[r].motion, registration, settings.objective);
-    const Eigen::Index count = places.rows();
-    Eigen::VectorXd scale(count), residuals(count), of_rows(count);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const auto row = places.row(i);
-      scale[i] = scale_of(row, settings.objective);
-      residuals[i] = scale[i] * row.distance;
-      of_rows[i] = scale[i] / row.weight;  // from the rows of the other functions
-    }
-    ObservedRows rows = rows_of(replay, places, settings.objective.robust);
-    rows.known.resize(count, static_cast<Eigen::Index>(errors.size()));
-    const Eigen::Matrix<double, Eigen::Dynamic, 5> moves =
-        of_rows.asDiagonal() * places.registration_derivatives();
+    Recording recording;
+    recording.replay = replay;
+    recording.objective = settings.objective;
     const data::NuisanceBounds& bounds = replay.recording.nuisance;
-    Eigen::Matrix<double, 5, 1> widths, found;
-    widths << bounds.offset, bounds.yaw, bounds.time;
-    found << fit.offset, fit.yaw, fit.time_offset;
-    rows.free = moves * widths.asDiagonal();
-    const auto moved_by = [&](const MotionChange& change) {
-      Eigen::VectorXd moved = Eigen::VectorXd::Zero(count);
-      for (const MotionTerm& term : change)
-        moved += term.factor * of_rows.cwiseProduct(places.displacements(term.motions->replays[r],
-                                                                         term.motions->results[r].motion));
-      return moved;
-    };
-    rows.rates.resize(count, static_cast<Eigen::Index>(rates.size()));
-    for (std::size_t k = 0; k < rates.size(); ++k)
-      rows.rates.col(static_cast<Eigen::Index>(k)) = moved_by(rates[k]);
-    Eigen::VectorXd correction = Eigen::VectorXd::Zero(count);
-    for (std::size_t e = 0; e < errors.size(); ++e) {
-      const KnownError& error = errors[e];
-      const Eigen::VectorXd moved = moved_by(error.terms);
+    recording.bounds << bounds.offset, bounds.yaw, bounds.time;
+    recording.nuisance.registration << fit.offset, fit.yaw, fit.time_offset;
+    recording.nuisance.errors = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(errors.size()));
+    for (const KnownError& error : errors) {
+      SheetShifts shifts = shifts_of(error.terms, r, replay, fit.time_offset);
+      if (error.corrects) add(recording.correction, 1, shifts);
       // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
       const double size = error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1;
-      rows.known.col(static_cast<Eigen::Index>(e)) = size * moved;
-      if (error.corrects) correction += moved;
+      add(recording.errors.emplace_back(), size, shifts);
+      recording.bends.emplace_back();
+      if (!error.bend.empty())
+        add(recording.bends.back(), size * size, shifts_of(error.bend, r, replay, fit.time_offset));
     }
-    const Robust& robust = settings.objective.robust;
-    ResidualLikelihood likelihood(
-        std::move(rows), residuals + moves * found - correction, repeatability,
-        robust.kind == RobustKind::huber ? std::optional<double>(robust.huber_delta) : std::nullopt);
-    recordings_.push_back(
-        {replay, found, widths, settings.objective, scale, moves, correction, std::move(likelihood)});
+    std::vector<SheetShifts> by_parameter;
+    for (const MotionChange& rate : rates)
+      by_parameter.push_back(shifts_of(rate, r, replay, fit.time_offset));
+    for (int pass = 0; pass < kPasses; ++pass) {
+      linearize(recording, reference[r].motion, by_parameter, repeatability,
+                robust.kind == RobustKind::huber ? std::optional<double>(robust.huber_delta) : std::nullopt);
+      if (errors.empty()) break;
+      if (pass + 1 < kPasses) recording.nuisance = fit_nuisance(recording, reference[r].motion).first;
+    }
+    recordings_.push_back(std::move(recording));
   }
 }
 
-Eigen::VectorXd MotionLikelihood::residuals(const Recording& recording, const Motion& motion,
-                                            const Nuisance& registration) {
-  const Registration applied{registration.head<3>(), registration[3], registration[4], recording.replay.pivot,
-                             recording.replay.up};
-  const LinearObservations places(recording.replay, motion, applied, recording.objective);
-  Eigen::VectorXd residuals(places.rows());
-  for (Eigen::Index i = 0; i < residuals.size(); ++i)
-    residuals[i] = recording.scale[i] * places.row(i).distance;
-  return residuals + recording.registered * registration - recording.correction;
+void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
+                                 const std::vector<SheetShifts>& rates, std::optional<double> repeatability,
+                                 std::optional<double> limit) {
+  const Replay& replay = recording.replay;
+  const LinearObservations places = places_at(recording, motion, recording.nuisance);
+  const Eigen::Index count = places.rows();
+  recording.scale.resize(count);
+  Eigen::VectorXd residuals(count), of_rows(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto row = places.row(i);
+    recording.scale[i] = scale_of(row, recording.objective);
+    residuals[i] = recording.scale[i] * row.distance;
+    of_rows[i] = recording.scale[i] / row.weight;  // from the rows of the other functions
+  }
+  const auto columns_of = [&](const std::vector<SheetShifts>& all) {
+    Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(all.size()));
+    for (std::size_t e = 0; e < all.size(); ++e)
+      if (!all[e].empty())
+        columns.col(static_cast<Eigen::Index>(e)) = of_rows.cwiseProduct(places.moved_by(replay, all[e]));
+    return columns;
+  };
+  recording.registered = of_rows.asDiagonal() * places.registration_derivatives();
+  recording.slopes = columns_of(recording.errors);
+  recording.curves = columns_of(recording.bends);
+  ObservedRows rows = rows_of(replay, places, recording.objective.robust);
+  const Nuisance& at = recording.nuisance;
+  rows.known = known_at(recording, at.errors);
+  rows.free = recording.registered * recording.bounds.asDiagonal();
+  rows.rates = columns_of(rates);
+  const Eigen::VectorXd left = residuals + recording.registered * at.registration + rows.known * at.errors;
+  recording.likelihood.emplace(std::move(rows), left, repeatability, limit);
+}
+
+Eigen::MatrixXd MotionLikelihood::known_at(const Recording& recording, const Eigen::VectorXd& errors) {
+  return recording.slopes + 2 * recording.curves * errors.asDiagonal();
+}
+
+LinearObservations MotionLikelihood::places_at(const Recording& recording, const Motion& motion,
+                                               const Nuisance& nuisance) {
+  const Registered& found = nuisance.registration;
+  const Registration registration{found.head<3>(), found[3], found[4], recording.replay.pivot,
+                                  recording.replay.up};
+  SheetShifts shifts = recording.correction;
+  for (std::size_t e = 0; e < recording.errors.size(); ++e) {
+    const double size = nuisance.errors[static_cast<Eigen::Index>(e)];
+    add(shifts, size, recording.errors[e]);
+    if (!recording.bends[e].empty()) add(shifts, size * size, recording.bends[e]);
+  }
+  return {recording.replay, motion, registration, recording.objective, shifts};
+}
+
+std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(const Recording& recording,
+                                                                             const Motion& motion) {
+  constexpr int kSteps = 6;
+  constexpr double kSame = 0.03;  // of the noise: what a step moves rows by
+  Nuisance at = recording.nuisance;
+  ResidualLikelihood::Fit fit;
+  for (int step = 0; step < kSteps; ++step) {
+    const LinearObservations places = places_at(recording, motion, at);
+    Eigen::VectorXd residuals(places.rows());
+    for (Eigen::Index i = 0; i < residuals.size(); ++i)
+      residuals[i] = recording.scale[i] * places.row(i).distance;
+    const Eigen::MatrixXd known = known_at(recording, at.errors);
+    fit = recording.likelihood->fit(residuals + recording.registered * at.registration + known * at.errors,
+                                    known);
+    const Nuisance next{recording.bounds.cwiseProduct(fit.free), fit.known};
+    const Eigen::VectorXd moved =
+        recording.registered * (next.registration - at.registration) + known * (next.errors - at.errors);
+    at = next;
+    if (moved.norm() <
+        kSame * recording.likelihood->misfit().noise * std::sqrt(static_cast<double>(moved.size())))
+      break;
+  }
+  return {at, fit.deviance};
+}
+
+double MotionLikelihood::spread_of(std::size_t error) const {
+  double spread = 1;
+  for (const Recording& recording : recordings_)
+    spread = std::min(spread, recording.likelihood->known_spread()[static_cast<Eigen::Index>(error)]);
+  return spread;
 }
 
 double MotionLikelihood::deviance(const std::vector<Motion>& motions) const {
-  constexpr int kSteps = 3;
-  constexpr double kSame = 0.3;  // of the noise: what a registration moves rows by
   double sum = 0;
-  for (std::size_t r = 0; r < recordings_.size(); ++r) {
-    const Recording& recording = recordings_[r];
-    Nuisance registration = recording.registration;
-    ResidualLikelihood::Fit fit;
-    for (int step = 0; step < kSteps; ++step) {
-      fit = recording.likelihood.fit(residuals(recording, motions[r], registration));
-      const Nuisance next = recording.bounds.cwiseProduct(fit.free);
-      const Eigen::VectorXd moved = recording.registered * (next - registration);
-      registration = next;
-      if (moved.norm() <
-          kSame * recording.likelihood.misfit().noise * std::sqrt(static_cast<double>(moved.size())))
-        break;
-    }
-    sum += fit.deviance;
-  }
+  for (std::size_t r = 0; r < recordings_.size(); ++r) sum += fit_nuisance(recordings_[r], motions[r]).second;
   return sum;
 }
 

@@ -1,37 +1,18 @@
 #pragma once
-#include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/motion_change.h"
 #include "sysid/infer/residual_likelihood.h"
 #include "sysid/observe/linear_observations.h"
 
 namespace flash::sysid {
 
-/// A motion of each recording, kept once however many errors it is part of.
-struct Motions {
-  std::vector<Replay> replays;  ///< of the motions; other meshes and steps than those observed, or the same
-  std::vector<ReplayResult> results;
-};
-
-struct MotionTerm {
-  double factor = 1;
-  std::shared_ptr<const Motions> motions;
-};
-
-/// A sum of motions whose factors add up to zero.
-using MotionChange = std::vector<MotionTerm>;
-
-/// An error of known shape, one standard deviation of it.
-struct KnownError {
-  MotionChange terms;
-  bool shared = true;     ///< all recordings have the same error, not each its own
-  bool corrects = false;  ///< the likelihood is that of motions moved by it; its size stays uncertain
-};
-
 /// How likely motions of several recordings are. The registration of each is fitted within its bounds, all
-/// alike likely; how rows change with it and with errors of known shape is that at a reference motion.
+/// alike likely, and errors of known shape under their prior: the sheet is moved by them before distances are
+/// taken. How rows change with both is that at a reference motion.
 class MotionLikelihood {
  public:
   /// `reference`: a motion a replay, near those to be asked about. `rates`: how motions change there with
@@ -45,24 +26,41 @@ class MotionLikelihood {
   /// -2 log likelihood of motions, one a recording, up to a constant.
   double deviance(const std::vector<Motion>& motions) const;
 
-  const ResidualLikelihood& of_recording(std::size_t r) const { return recordings_[r].likelihood; }
+  /// How well the recording that tells most tells a known error beside the parameters, in its standard
+  /// deviations.
+  double spread_of(std::size_t error) const;
+
+  const ResidualLikelihood& of_recording(std::size_t r) const { return *recordings_[r].likelihood; }
 
  private:
-  using Nuisance = Eigen::Matrix<double, 5, 1>;  ///< offset [m], yaw [rad], time [s]
+  using Registered = Eigen::Matrix<double, 5, 1>;  ///< offset [m], yaw [rad], time [s]
+  /// What is fitted to each motion.
+  struct Nuisance {
+    Registered registration;
+    Eigen::VectorXd errors;  ///< how many standard deviations of each known error
+  };
   struct Recording {
     Replay replay;
-    Nuisance registration;  ///< of the reference
-    Nuisance bounds;
     Objective objective;
+    Registered bounds;
+    std::vector<SheetShifts> errors;  ///< one standard deviation of each known error
+    std::vector<SheetShifts> bends;   ///< of each, its square; empty where there is none
+    SheetShifts correction;
+    Nuisance nuisance;                                    ///< of the reference
     Eigen::VectorXd scale;                                ///< of each row: by its stated error
     Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by what the registration moves each row
-    Eigen::VectorXd correction;                           ///< [m]
-    ResidualLikelihood likelihood;
+    Eigen::MatrixXd slopes, curves;                       ///< by what each known error does, and its square
+    std::optional<ResidualLikelihood> likelihood;
   };
-  /// Signed distances of what was observed to a motion under a registration, as rows (ObservedRows), with
-  /// what the registration explains of them [m].
-  static Eigen::VectorXd residuals(const Recording& recording, const Motion& motion,
-                                   const Nuisance& registration);
+  /// Makes the likelihood that is linear about a motion at the recording's nuisance.
+  static void linearize(Recording& recording, const Motion& motion, const std::vector<SheetShifts>& rates,
+                        std::optional<double> repeatability, std::optional<double> limit);
+  /// By what each known error moves each row about its size.
+  static Eigen::MatrixXd known_at(const Recording& recording, const Eigen::VectorXd& errors);
+  static LinearObservations places_at(const Recording& recording, const Motion& motion,
+                                      const Nuisance& nuisance);
+  /// The likeliest nuisance of a motion, by Gauss and Newton, and its -2 log likelihood.
+  static std::pair<Nuisance, double> fit_nuisance(const Recording& recording, const Motion& motion);
 
   std::vector<Recording> recordings_;
 };

@@ -47,20 +47,23 @@ Eigen::VectorXd solve_within(const Eigen::MatrixXd& normal, const Eigen::VectorX
 
 }  // namespace
 
-ResidualLikelihood::Fit ResidualLikelihood::fit(const Eigen::VectorXd& residuals) const {
+ResidualLikelihood::Fit ResidualLikelihood::fit(const Eigen::VectorXd& residuals,
+                                                const Eigen::MatrixXd& known) const {
+  Eigen::MatrixXd columns = known_;
+  if (known.size() > 0) columns.rightCols(known.cols()) = known;
   const double precision = 1 / (spread_ * spread_);
-  Fit fit{0, {}, residuals, weights_};
-  Eigen::VectorXd errors = Eigen::VectorXd::Zero(known_.cols());
+  Fit fit{0, {}, {}, residuals, weights_};
+  Eigen::VectorXd errors = Eigen::VectorXd::Zero(columns.cols());
   double before = INFINITY;
   for (int round = 0; round < kFits; ++round) {
     // Where rho is a distance, its weight is that of a square of the same slope.
     fit.weights = weights_.cwiseProduct(
         fit.left.unaryExpr([&](double y) { return std::abs(y) <= limit_ ? 1 : limit_ / std::abs(y); }));
-    const Eigen::MatrixXd weighed = fit.weights.asDiagonal() * known_;
-    Eigen::MatrixXd normal = precision * known_.transpose() * weighed;
+    const Eigen::MatrixXd weighed = fit.weights.asDiagonal() * columns;
+    Eigen::MatrixXd normal = precision * columns.transpose() * weighed;
     normal.diagonal() += priors_;
     errors = solve_within(normal, precision * (weighed.transpose() * residuals), free_);
-    fit.left = residuals - known_ * errors;
+    fit.left = residuals - columns * errors;
     double sum = 0;
     for (Eigen::Index i = 0; i < fit.left.size(); ++i) {
       const double size = std::abs(fit.left[i]);
@@ -68,6 +71,7 @@ ResidualLikelihood::Fit ResidualLikelihood::fit(const Eigen::VectorXd& residuals
     }
     fit.deviance = precision * sum + errors.cwiseAbs2().dot(priors_);
     fit.free = errors.head(free_);
+    fit.known = errors.tail(errors.size() - free_);
     if (before - fit.deviance < kSameFit * (1 + fit.deviance)) break;
     before = fit.deviance;
   }
@@ -80,6 +84,17 @@ Eigen::MatrixXd ResidualLikelihood::weigh(const Eigen::MatrixXd& columns,
   Eigen::MatrixXd normal = known_.transpose() * known;
   normal.diagonal() += spread_ * spread_ * priors_;
   return (weighed - known * normal.llt().solve(known.transpose() * columns)) / (spread_ * spread_);
+}
+
+Eigen::VectorXd ResidualLikelihood::known_spread() const {
+  Eigen::MatrixXd all(known_.rows(), known_.cols() + rates_.cols());
+  all << known_, rates_;
+  Eigen::MatrixXd normal = all.transpose() * weights_.asDiagonal() * all / (spread_ * spread_);
+  normal.diagonal().head(priors_.size()) += priors_;
+  normal.diagonal().tail(rates_.cols()).array() += kFree;
+  const Eigen::VectorXd variances =
+      normal.llt().solve(Eigen::MatrixXd::Identity(all.cols(), all.cols())).diagonal();
+  return variances.segment(free_, known_.cols() - free_).cwiseSqrt();
 }
 
 ResidualLikelihood::ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd& residuals,
@@ -95,6 +110,7 @@ ResidualLikelihood::ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd&
   limit_ = limit.value_or(kEfficient * misfit_.noise);
   spread_ = misfit_.noise;
   const Eigen::MatrixXd& rates = model.rows().rates;
+  rates_ = rates;
   if (rates.cols() == 0) return;
   for (int round = 0; round < kRounds; ++round) {
     const Fit here = fit(residuals);

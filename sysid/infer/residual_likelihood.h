@@ -31,14 +31,19 @@ class ResidualLikelihood {
 
   struct Fit {
     double deviance = 0;           ///< -2 log likelihood, up to a constant
-    Eigen::VectorXd free;          ///< the free errors, between -1 and 1
+    Eigen::VectorXd free = {};     ///< the free errors, between -1 and 1
+    Eigen::VectorXd known = {};    ///< the known errors, in standard deviations
     Eigen::VectorXd left = {};     ///< residuals without errors of known shape [m]
     Eigen::VectorXd weights = {};  ///< psi(left) / left, times those of the rows
   };
-  Fit fit(const Eigen::VectorXd& residuals) const;
+  /// `known`: the errors of known shape, in place of those of the rows.
+  Fit fit(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& known = {}) const;
   double deviance(const Eigen::VectorXd& residuals) const { return fit(residuals).deviance; }
 
   double spread() const { return spread_; }  ///< s [m]
+
+  /// How well the residuals tell each known error beside the parameters, in its standard deviations.
+  Eigen::VectorXd known_spread() const;
 
   /// At the residuals given to the constructor.
   const Misfit& misfit() const { return misfit_; }
@@ -49,7 +54,7 @@ class ResidualLikelihood {
 
   Eigen::VectorXd weights_;
   Eigen::Index free_;  ///< of the columns of known_, how many are bounded and of no other prior
-  Eigen::MatrixXd known_;
+  Eigen::MatrixXd known_, rates_;
   Eigen::VectorXd priors_;  ///< precision of each column of known_
   double limit_ = 0, spread_ = 0;
   Misfit misfit_;

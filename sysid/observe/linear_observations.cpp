@@ -50,6 +50,8 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
       nearest = sheet.mark(replay.observations[place.observation].marks[place.mark], point);
     hint = nearest.triangle;
     const Eigen::Vector3i corners = replay.recording.mesh.triangles.row(nearest.triangle);
+    place.triangle = nearest.triangle;
+    place.barycentric = nearest.barycentric;
     place.position = nearest.position;
     place.velocity = at(velocities, corners, nearest.barycentric);
     place.rest = at(replay.recording.mesh.vertices, corners, nearest.barycentric);
@@ -69,7 +71,7 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
 
 LinearObservations::LinearObservations(const Replay& replay, const Motion& motion,
                                        const Registration& registration, const Objective& objective,
-                                       Eigen::Index points_per_term)
+                                       const SheetShifts& shifts, Eigen::Index points_per_term)
     : registration_(registration) {
   SheetDistance sheet(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
@@ -82,6 +84,7 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
     if (!observation.seen() || observation.weight <= 0) continue;
     const double t = observation.t + registration.time_offset;
     surface_at(motion, t, positions, &velocities);
+    if (!shifts.empty()) positions += shifts[k].positions;
     sheet.move(positions);
     const std::array<double, 5> weights = term_weights(observation, objective);
     const auto common = [&](Term term, double weight) {
@@ -101,6 +104,7 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
     if (!observation.force || !(weights[3] > 0)) continue;
     Place place = common(Term::force, weights[3]);
     place.position = force_at(motion, t);
+    if (!shifts.empty()) place.position += shifts[k].force;
     place.velocity.setZero();
     // A force in newtons times its weight is a length; squared, the weight counts twice.
     place.weight = weights[3] * std::sqrt(observation.weight / total);
@@ -161,6 +165,20 @@ Eigen::VectorXd LinearObservations::displacements(const Replay& replay, const Mo
     if (place.term == Term::mark) there = sheet.mark(observation.marks[place.mark], place.position).position;
     if (place.term == Term::force) there = force_at(motion, t);
     rows[i] = place.weight * place.direction.dot(there - place.position);
+  }
+  return rows;
+}
+
+Eigen::VectorXd LinearObservations::moved_by(const Replay& replay, const SheetShifts& shifts) const {
+  Eigen::VectorXd rows(this->rows());
+  for (Eigen::Index i = 0; i < rows.size(); ++i) {
+    const Place& place = places_[static_cast<std::size_t>(i)];
+    const SheetShift& shift = shifts[place.observation];
+    const Eigen::Vector3d moved =
+        place.term == Term::force
+            ? shift.force
+            : at(shift.positions, replay.recording.mesh.triangles.row(place.triangle), place.barycentric);
+    rows[i] = place.weight * place.direction.dot(moved);
   }
   return rows;
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sysid/observe/score.h"
+#include "sysid/observe/sheet_shift.h"
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {
@@ -16,9 +17,11 @@ namespace flash::sysid {
 /// the mean over terms of the mean square [m^2], a force counting cloud_sigma / force_sigma.
 class LinearObservations {
  public:
-  /// `replay`: of `motion`; its observations count. `points_per_term`: of a keyframe, evenly thinned.
+  /// `replay`: of `motion`; its observations count. `shifts`: of the motion, where there are any.
+  /// `points_per_term`: of a keyframe, evenly thinned.
   LinearObservations(const Replay& replay, const Motion& motion, const Registration& registration,
-                     const Objective& objective, Eigen::Index points_per_term = 200);
+                     const Objective& objective, const SheetShifts& shifts = {},
+                     Eigen::Index points_per_term = 200);
 
   Eigen::Index rows() const { return static_cast<Eigen::Index>(places_.size()); }
 
@@ -44,6 +47,9 @@ class LinearObservations {
   /// and may have another mesh. Before any registration anew.
   Eigen::VectorXd displacements(const Replay& replay, const Motion& motion) const;
 
+  /// How far shifts take each place along the direction, to first order [m].
+  Eigen::VectorXd moved_by(const Replay& replay, const SheetShifts& shifts) const;
+
   /// Derivatives of `displacements` by offset x, y, z [m], yaw [rad] and time [s].
   Eigen::Matrix<double, Eigen::Dynamic, 5> registration_derivatives() const;
 
@@ -55,6 +61,8 @@ class LinearObservations {
     double weight = 0;        // root of the row's share
     double residual = 0;      // [m]
     int axis = 0;
+    int triangle = -1;
+    Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();
     Eigen::Vector3d rest = Eigen::Vector3d::Zero();
     Eigen::Vector3d direction;  // unit, frame of the simulation
     Eigen::Vector3d position;   // [m]; of a force [N]

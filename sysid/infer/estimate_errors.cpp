@@ -1,0 +1,139 @@
+#include "sysid/infer/estimate_errors.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "sysid/infer/held.h"
+#include "sysid/infer/verdict.h"
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kUnsure =
+    2;  // over the last step to cells of no size: an error of first order ends at a share of 2
+
+bool all_finite(const std::vector<ReplayResult>& results) {
+  return std::all_of(results.begin(), results.end(),
+                     [](const ReplayResult& result) { return result.finite; });
+}
+
+}  // namespace
+
+std::vector<Replay> replays_of(const Emulator& emulator) {
+  std::vector<Replay> replays;
+  for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
+  return replays;
+}
+
+std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
+                                       const std::vector<ReplayResult>& here) {
+  std::vector<KnownError> errors;
+  const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
+  for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
+    std::array<std::vector<ReplayResult>, 2> ends;
+    for (const std::size_t side : {0, 1})
+      for (const Replay& replay : task.replays) {
+        ends[side].push_back(
+            task.store.run(replay, candidate_with(values, task.grid, held.name, held.values[side])));
+        task.tell_motion();
+      }
+    if (!all_finite(ends[0]) || !all_finite(ends[1])) continue;
+    const auto low = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[0])}),
+               high = std::make_shared<const Motions>(Motions{task.replays, std::move(ends[1])});
+    KnownError error{{{-0.5, low}, {0.5, high}}, held.shared};
+    error.bend = {{0.5, low}, {-1, middle}, {0.5, high}};
+    error.name = held.name;
+    errors.push_back(std::move(error));
+  }
+  return errors;
+}
+
+void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const std::vector<KnownError>& errors,
+                  std::vector<std::string>& warnings) {
+  constexpr double kFarBetter = 0.25;  // of the standard deviation assumed
+  for (std::size_t e = 0; e < errors.size(); ++e)
+    for (const HeldParameter& held : held_parameters(task.grid, task.replays))
+      if (errors[e].name == held.name && likelihood.spread_of(e) < kFarBetter)
+        warnings.push_back(held.name + " was not measured, and the recordings tell it: search it as well");
+}
+
+std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,
+                                           const Posterior& posterior) {
+  std::vector<KnownError> errors;
+  const Eigen::MatrixXd samples = samples_of(posterior);
+  const std::vector<Replay> on_model = replays_of(emulator);
+  const double share = 1 / std::sqrt(static_cast<double>(emulator_draws));
+  for (int draw = 0; draw < emulator_draws; ++draw) {
+    const Eigen::VectorXd row =
+        samples.row((2 * draw + 1) * samples.rows() / (2 * emulator_draws)).transpose();
+    const std::vector<double> values(row.begin(), row.end());
+    const ReplayCandidate candidate = candidate_at(values, task.grid);
+    Motions simulated{on_model, {}};
+    for (std::size_t r = 0; r < task.replays.size(); ++r) {
+      ReplayResult own = task.store.run(task.replays[r], candidate);
+      task.tell_motion();
+      simulated.results.push_back(own);
+      simulated.results.back().motion = emulator.models[r].model.on_its_mesh(own.motion);
+    }
+    if (!all_finite(simulated.results)) continue;
+    errors.push_back({{{-share, std::make_shared<const Motions>(
+                                    Motions{on_model, motions_at(emulator, values, own_mesh)})},
+                       {share, std::make_shared<const Motions>(std::move(simulated))}}});
+  }
+  return errors;
+}
+
+std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emulator& emulator,
+                                                     const std::vector<double>& values, bool finer,
+                                                     std::vector<ReplayResult>& own) {
+  const ReplayCandidate candidate = candidate_at(values, task.grid);
+  std::vector<ReplayResult> simulated = motions_at(emulator, values, emulator.share);
+  const std::vector<ReplayResult> own_model = motions_at(emulator, values, own_mesh),
+                                  finer_model = motions_at(emulator, values, finer_mesh);
+  own.clear();
+  for (std::size_t r = 0; r < task.replays.size(); ++r) {
+    own.push_back(task.store.run(task.replays[r], candidate));
+    task.tell_motion();
+    if (!own.back().finite) return std::nullopt;
+    const double share = finer ? emulator.share : 0;
+    Motion& motion = simulated[r].motion;
+    add(motion, 1 - share, emulator.models[r].model.on_its_mesh(own.back().motion));
+    add(motion, share - 1, own_model[r].motion);
+    if (share == 0) continue;
+    const ReplayResult there = task.store.run(emulator.models[r].replay, candidate);
+    task.tell_motion();
+    if (!there.finite) return std::nullopt;
+    add(motion, share, there.motion);
+    add(motion, -share, finer_model[r].motion);
+  }
+  return simulated;
+}
+
+std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
+                                 const std::vector<double>& values) {
+  Estimate estimate;
+  const ReplayCandidate candidate = candidate_at(values, task.grid);
+  const std::vector<Replay> on_model = replays_of(emulator);
+  const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share);
+  auto simulated = simulate_at(task, emulator, values, true, estimate.motions);
+  if (!simulated) return std::nullopt;
+  const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects,
+                             double times = 1) {
+    const auto shared = [](Motions& motions) { return std::make_shared<const Motions>(std::move(motions)); };
+    estimate.errors.push_back({{{-times, shared(from)}, {times, shared(to)}}, true, corrects, {}, name});
+  };
+  add_error("estimate_itself", {on_model, model}, {on_model, std::move(*simulated)}, true);
+  if (!task.settings.solver_check) return estimate;
+  if (emulator.share != own_mesh)
+    add_error("double_mesh", {on_model, motions_at(emulator, values, finer_mesh)}, {on_model, model}, false,
+              kUnsure);
+  for (FinerSolution& finer : finer_solutions(task.replays, candidate, task.store)) {
+    for (std::size_t r = 0; r < task.replays.size(); ++r) task.tell_motion();
+    add_error(finer.what, {task.replays, estimate.motions},
+              {std::move(finer.replays), std::move(finer.motions)}, true);
+  }
+  return estimate;
+}
+
+}  // namespace flash::sysid

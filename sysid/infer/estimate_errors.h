@@ -1,0 +1,66 @@
+#pragma once
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/answer.h"
+#include "sysid/infer/motion_likelihood.h"
+
+namespace flash::sysid {
+
+// Shares of a TwoMeshMotions: the search's own mesh, the finer one, and cells of no size.
+inline constexpr double own_mesh = 0, finer_mesh = 1, no_cells = 4.0 / 3;
+
+/// Draws at which an emulator is tried.
+inline constexpr int emulator_draws = 4;
+
+/// Motions simulated at an estimate, a recording: itself, three finer ones, and the draws.
+inline constexpr int motions_at_estimate = 4 + emulator_draws;
+
+/// What all steps of an answer need.
+struct Task {
+  const std::vector<Replay>& replays;
+  const GridSettings& grid;         ///< axes: of which every candidate has a motion
+  const std::vector<Axis>& ranges;  ///< in which the answer is sought, with the cells of the search
+  const AnswerSettings& settings;
+  const MotionStore& store;
+  const TellWork& told;
+
+  void tell_motion() const {
+    if (told) told({1, 0}, {});
+  }
+};
+
+/// The estimate simulated, and what it says of errors of the solution.
+struct Estimate {
+  std::vector<ReplayResult> motions;  ///< on the search's own mesh
+  std::vector<KnownError> errors;     ///< of the solution, named as a SolverCheck is
+};
+
+std::vector<Replay> replays_of(const Emulator& emulator);
+
+/// By what is held and not measured, about an estimate: how the motion changes with it, and how that bends.
+/// What diverges is left out.
+std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
+                                       const std::vector<ReplayResult>& here);
+
+/// Names what was held without a measurement and what the recordings tell far better than was assumed.
+void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const std::vector<KnownError>& errors,
+                  std::vector<std::string>& warnings);
+
+/// What the emulator misses at some draws of a posterior: errors of which any mixture is as likely.
+std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,
+                                           const Posterior& posterior);
+
+/// Motions simulated at values, as the emulator's mesh has them; empty where one diverged. `own`: on the
+/// search's own mesh. `finer`: on the finer mesh too; else the emulator's difference between both stays.
+std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emulator& emulator,
+                                                     const std::vector<double>& values, bool finer,
+                                                     std::vector<ReplayResult>& own);
+
+/// Simulates the estimate, on finer meshes and steps too. Empty where a motion diverged.
+std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
+                                 const std::vector<double>& values);
+
+}  // namespace flash::sysid

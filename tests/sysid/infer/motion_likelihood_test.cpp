@@ -1,0 +1,121 @@
+#include "sysid/infer/motion_likelihood.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sysid/emulate/two_mesh_motions.h"
+#include "tests/sysid/moving_sheet.h"
+
+namespace flash::sysid {
+namespace {
+
+/// A cloth seen without noise in ten keyframes; `bulge`: how far its middle stands out [m].
+struct Cloth {
+  Replay replay;
+  explicit Cloth(int cells) {
+    data::TriangleMesh& mesh = replay.recording.mesh;
+    mesh = flat_sheet(cells);
+    replay.queries = std::make_shared<const SheetDistance>(mesh.triangles, mesh.vertices);
+    for (int k = 0; k < 10; ++k) {
+      Observation observation;
+      observation.t = 0.1 * k;
+      observation.weight = 1;
+      replay.observations.push_back(observation);
+    }
+  }
+  /// Bulge that grows and wanders, far from straight in its size: it turns as it grows.
+  Motion bulged(double size) const {
+    Motion motion = moving_sheet_motion(replay.recording.mesh, 0.1, 10);
+    for (data::Points& positions : motion.positions)
+      for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+        const Eigen::RowVector3d rest = replay.recording.mesh.vertices.row(i);
+        const double there = std::exp(-20 * (rest.head<2>() - Eigen::RowVector2d(0.25, 0.2)).squaredNorm());
+        positions.row(i) += size * there * Eigen::RowVector3d(0.6, 0.2, 0.8);
+      }
+    return motion;
+  }
+  void see(const Motion& motion) {
+    for (Observation& observation : replay.observations) {
+      data::Points positions;
+      surface_at(motion, observation.t, positions);
+      const data::Triangles& triangles = replay.recording.mesh.triangles;
+      observation.points.resize(triangles.rows(), 3);
+      for (Eigen::Index i = 0; i < triangles.rows(); ++i)
+        observation.points.row(i) = (positions.row(triangles(i, 0)) + positions.row(triangles(i, 1)) +
+                                     positions.row(triangles(i, 2))) /
+                                    3;
+    }
+  }
+};
+
+std::vector<ReplayResult> result_of(Motion motion) {
+  ReplayResult result;
+  result.motion = std::move(motion);
+  result.finite = result.converged = true;
+  return {result};
+}
+
+MotionChange from_to(const Cloth& from, const Motion& a, const Cloth& to, const Motion& b) {
+  return {{-1, std::make_shared<const Motions>(Motions{{from.replay}, result_of(a)})},
+          {1, std::make_shared<const Motions>(Motions{{to.replay}, result_of(b)})}};
+}
+
+TEST(MotionChange, IsThatOfEachVertexWhateverTheMeshItWasSimulatedOn) {
+  const Cloth coarse(8), fine(16);
+  const SheetShifts own =
+                        shifts_of(from_to(fine, fine.bulged(0), fine, fine.bulged(0.01)), 0, fine.replay, 0),
+                    other = shifts_of(from_to(fine, fine.bulged(0), fine, fine.bulged(0.01)), 0,
+                                      coarse.replay, 0);
+  const Eigen::SparseMatrix<double> to_fine =
+      prolongation(coarse.replay.recording.mesh, fine.replay.recording.mesh);
+  ASSERT_EQ(other.size(), 10u);
+  // Linear interpolation of a bulge that bends by 40 / m^2 of its size over cells of 50 mm.
+  for (const std::size_t k : {0, 4, 9})
+    EXPECT_LT((to_fine * other[k].positions - own[k].positions).cwiseAbs().maxCoeff(),
+              0.05 * 0.05 / 8 * 80 * 0.01);
+}
+
+// To first order the sheet would have to be moved along the normals that it has without the error. A bulge of
+// centimetres turns them: what is left then would be taken for an error of the model.
+TEST(MotionLikelihood, AnErrorOfKnownShapeIsTakenOutHoweverLarge) {
+  Cloth cloth(12);
+  cloth.see(cloth.bulged(0.03));
+  const KnownError bulge{from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.02))};
+  ScoreSettings settings;
+  settings.objective.robust.kind = RobustKind::plain;
+  const MotionLikelihood likelihood({cloth.replay}, result_of(cloth.bulged(0)), settings, {}, {bulge}, {});
+  const Misfit misfit = likelihood.of_recording(0).misfit();
+  EXPECT_LT(misfit.noise, 1e-4);  // of a bulge that moves points by up to 30 mm
+  EXPECT_LT(misfit.size, 1e-4);
+  // One and a half standard deviations are to be paid for, and next to nothing of them is left open.
+  EXPECT_NEAR(likelihood.deviance({cloth.bulged(0)}), 1.5 * 1.5, 0.1);
+  EXPECT_LT(likelihood.spread_of(0), 0.01);
+}
+
+TEST(MotionLikelihood, AnErrorThatBendsIsFollowedAlongItsCurve) {
+  Cloth cloth(12);
+  cloth.see(cloth.bulged(0.03 + 0.02));
+  // 0.02 u + 0.01 u^2 is 0.05 at u = 1.449.
+  KnownError bulge{from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.02))};
+  bulge.bend = from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.01));
+  ScoreSettings settings;
+  settings.objective.robust.kind = RobustKind::plain;
+  const MotionLikelihood likelihood({cloth.replay}, result_of(cloth.bulged(0)), settings, {}, {bulge}, {});
+  EXPECT_NEAR(likelihood.deviance({cloth.bulged(0)}), 1.449 * 1.449, 0.1);
+}
+
+TEST(MotionLikelihood, WhatIsCorrectedIsTakenForGranted) {
+  Cloth cloth(12);
+  cloth.see(cloth.bulged(0.02));
+  KnownError bulge{from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.02))};
+  bulge.corrects = true;
+  ScoreSettings settings;
+  settings.objective.robust.kind = RobustKind::plain;
+  const MotionLikelihood likelihood({cloth.replay}, result_of(cloth.bulged(0)), settings, {}, {bulge}, {});
+  EXPECT_NEAR(likelihood.deviance({cloth.bulged(0)}), 0, 0.01);
+  EXPECT_NEAR(likelihood.deviance({cloth.bulged(0.02)}), 1, 0.1);  // moved twice
+}
+
+}  // namespace
+}  // namespace flash::sysid

@@ -1,0 +1,218 @@
+#!/usr/bin/env python3
+"""Whether the stated intervals hold the truth: a strip of cells of 6.25 mm searched for E t, D and friction in
+recordings of one of 1.6 mm, with unknown registration and clock. A second half has an error that the model does not know of."""
+import argparse
+import concurrent.futures
+import json
+import math
+import pathlib
+import random
+import sys
+
+import numpy
+
+import runs as kept
+import synthetic
+
+BOUNDS = {"offset_m": [0.01, 0.01, 0.01], "yaw_rad": 0.02, "time_s": 0.03}
+RANGES = {"young": (3, 30, 5), "bending": (5e-5, 2e-3, 7), "friction": (0.15, 0.6, 4)}  # lowest, highest, values
+WRONG = ("damping", "grasp", "weight", "depth", "clock", "diagonals")
+NORMAL = 1.96  # half width of 95 % over the standard deviation
+
+
+def truth_of(seed):
+    """Log-uniform over the searched range."""
+    draw = random.Random(seed)
+    return {name: low * (high / low) ** draw.random() for name, (low, high, _) in RANGES.items()}
+
+
+def rewrite_points(path, change):
+    """Changes the points of a binary cloud."""
+    head, body = path.read_bytes().split(b"end_header\n", 1)
+    points = numpy.frombuffer(body, dtype="<f4").reshape(-1, 3).astype(float)
+    path.write_bytes(head + b"end_header\n" + change(points).astype("<f4").tobytes())
+
+
+def spoil_depth(recording, seed):
+    """2 mm of error that is smooth over 5 cm and the same in all frames, along the view from above."""
+    draw = numpy.random.default_rng(seed)
+    phases = draw.uniform(0, 2 * math.pi, 2)
+    for cloud in sorted((recording / "frames").glob("*.ply")):
+        rewrite_points(cloud, lambda p: p + numpy.outer(
+            0.002 * math.sqrt(2) * numpy.sin(p[:, 0] / 0.05 + phases[0]) * numpy.sin(p[:, 1] / 0.05 + phases[1]), (0, 0, 1)))
+
+
+def spoil_clock(recording, seed):
+    """Each frame is 10 ms off, by chance."""
+    draw = random.Random(seed)
+    path = recording / "recording.json"
+    record = json.loads(path.read_text())
+    for frame in record["keyframes"][1:-1]:
+        frame["t"] += max(-0.02, min(0.02, draw.gauss(0, 0.01)))
+    path.write_text(json.dumps(record))
+
+
+def recorded(runs, asset, seed, wrong):
+    """A recording of a strip of the seed's material; `wrong`: what the model is not told of."""
+    draw = random.Random(-seed)
+    name = f"recording_{seed}_{wrong or 'right'}"
+    fresh = not (runs.out / name / "recording.json").exists()
+    words = list(synthetic.LIFT)
+    fixed = dict(truth_of(seed))
+    mesh = synthetic.TRUTH
+    if wrong == "damping":
+        fixed["air_drag"] = 2.0
+    if wrong == "grasp":
+        words[words.index("--grasp-within") + 1] = "0.0551"
+    if wrong == "weight":
+        fixed["areal_density"] = 0.22
+    if wrong == "diagonals":
+        mesh = synthetic.FIT + ":alternating_by_row"
+    offset = ",".join(f"{draw.gauss(0, 0.003):.5f}" for _ in range(3))
+    recording = runs.synth(name, asset, "--mesh", mesh, *words, "--seed", str(seed), f"--offset={offset}", "--time-offset",
+                           f"{draw.gauss(0, 0.01):.5f}", *synthetic.settings(fixed))
+    if fresh:
+        path = recording / "recording.json"
+        record = json.loads(path.read_text())
+        record["nuisance"] |= BOUNDS
+        path.write_text(json.dumps(record))
+    if fresh and wrong == "depth":
+        spoil_depth(recording, seed)
+    if fresh and wrong == "clock":
+        spoil_clock(recording, seed)
+    return recording
+
+
+def searched(runs, asset, seed, wrong=None):
+    recording = recorded(runs, asset, seed, wrong)
+    summary = runs.grid(f"run_{seed}_{wrong or 'right'}", [recording], "--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes",
+                        *synthetic.axes(RANGES), "--rollouts", str(runs.out / "motions"))
+    return {"seed": seed, "wrong": wrong, "truth": truth_of(seed), "parameters": summary["parameters"],
+            "noise": summary["recordings"][0]["noise_m"],
+            "told": any(not r["model_fits"] for r in summary["recordings"]), "recording": recording}
+
+
+def meshes(runs, twin, name, parameters):
+    runs.replay(name, twin["recording"], parameters, "--asset", str(runs.out / "strip.json"), "--clamp-slopes", frames="0")
+    folder = runs.out / name
+    vertices = []
+    for path in sorted(folder.glob("*_mesh.ply")):
+        head, body = path.read_bytes().split(b"end_header\n", 1)
+        count = int(head.split(b"element vertex ")[1].split()[0])
+        vertices.append(numpy.frombuffer(body, dtype="<f8", count=3 * count).reshape(-1, 3))
+        faces = numpy.frombuffer(body[24 * count:], dtype=[("n", "u1"), ("v", "<i4", 3)])["v"]
+    return numpy.array(vertices), faces
+
+
+def least_spread(runs, twin):
+    """Standard deviation of the logarithm of each parameter by Cramer and Rao: all points, white noise along the normal, the
+    truth's own cells, registration and clock unknown, ranges known."""
+    step, name = 0.02, f"bound_{twin['seed']}"
+    middle, faces = meshes(runs, twin, name, twin["truth"])
+    rates = []
+    for parameter in RANGES:
+        ends = []
+        for sign in (-1, 1):
+            moved = dict(twin["truth"])
+            moved[parameter] *= math.exp(sign * step)
+            ends.append(meshes(runs, twin, f"{name}_{parameter}_{sign}", moved)[0])
+        rates.append((ends[1] - ends[0]) / (2 * step))
+    record = json.loads((twin["recording"] / "recording.json").read_text())
+    times = [frame["t"] for frame in record["keyframes"]]
+    speeds = numpy.gradient(middle, numpy.array(times), axis=0)
+    truth = json.loads((twin["recording"] / "truth.json").read_text())
+    rows = []
+    for k, frame in enumerate(record["keyframes"]):
+        _, body = (twin["recording"] / frame["cloud"]).read_bytes().split(b"end_header\n", 1)
+        points = numpy.frombuffer(body, dtype="<f4").reshape(-1, 3) - numpy.array(truth["offset"])
+        x = middle[k]
+        normals = numpy.zeros_like(x)
+        across = numpy.cross(x[faces[:, 1]] - x[faces[:, 0]], x[faces[:, 2]] - x[faces[:, 0]])
+        for corner in range(3):
+            numpy.add.at(normals, faces[:, corner], across)
+        normals /= numpy.linalg.norm(normals, axis=1, keepdims=True)
+        nearest = ((points[:, None, :] - x[None]) ** 2).sum(-1).argmin(1)
+        n = normals[nearest]
+        rows.append(numpy.column_stack([(rate[k][nearest] * n).sum(1) for rate in rates] + [n, (speeds[k][nearest] * n).sum(1)]))
+    rows = numpy.concatenate(rows)
+    information = rows.T @ rows / twin["noise"] ** 2
+    widths = [math.log(high / low) for low, high, _ in RANGES.values()]
+    widths += [2 * bound for bound in (*BOUNDS["offset_m"], BOUNDS["time_s"])]
+    information += numpy.diag(12 / numpy.square(widths))  # what is known before: even over each range
+    scale = 1 / numpy.sqrt(numpy.diag(information))
+    spread = numpy.sqrt(numpy.diag(numpy.linalg.inv(information * numpy.outer(scale, scale)))) * scale
+    return dict(zip(RANGES, spread))
+
+
+def interval_score(finding, truth):
+    """Of the logarithm (Gneiting and Raftery 2007): the width, and 40 times what the truth lies outside."""
+    low, high = (math.log(end) for end in finding["interval95"])
+    x = math.log(truth)
+    return high - low + 40 * (max(0, low - x) + max(0, x - high))
+
+
+def median(values):
+    values = sorted(values)
+    return values[len(values) // 2] if values else math.nan
+
+
+def print_right(twins, bounds):
+    print("\nThe model is right\n")
+    print(f"{'':10} {'twins':>6} {'claims':>7} {'two-sided held':>15} {'one-sided held':>15} {'score':>7} {'width / bound':>14}")
+    for name in RANGES:
+        sides = {True: [], False: []}
+        for twin in twins:
+            finding = twin["parameters"][name]
+            held = synthetic.holds(finding, twin["truth"][name])
+            if held is not None:
+                sides[finding["identifiable"] == "yes"].append((held, twin, finding))
+        shares = [f"{sum(h for h, _, _ in sides[two])} of {len(sides[two])}" for two in (True, False)]
+        ratios = [math.log(f["interval95"][1] / f["interval95"][0]) / (2 * NORMAL * bounds[twin["seed"]][name])
+                  for _, twin, f in sides[True] if twin["seed"] in bounds]
+        score = numpy.mean([interval_score(twin["parameters"][name], twin["truth"][name]) for twin in twins])
+        print(f"{name:10} {len(twins):6} {len(sides[True]) + len(sides[False]):7} {shares[0]:>15} {shares[1]:>15} {score:7.2f} "
+              f"{median(ratios):14.2f}")
+
+
+def print_wrong(twins):
+    print("\nThe model is wrong: a claim holds, or the answer says that the model does not fit\n")
+    print(f"{'':12} {'twins':>6} {'told':>6} " + " ".join(f"{name + ' held or told':>24}" for name in RANGES))
+    for wrong in (*WRONG, None):
+        of_kind = [twin for twin in twins if wrong is None or twin["wrong"] == wrong]
+        cells = []
+        for name in RANGES:
+            held = [synthetic.holds(twin["parameters"][name], twin["truth"][name]) for twin in of_kind]
+            claimed = [h or twin["told"] for h, twin in zip(held, of_kind) if h is not None]
+            cells.append(f"{sum(claimed)} of {len(claimed)} claims")
+        print(f"{wrong or 'all':12} {len(of_kind):6} {sum(twin['told'] for twin in of_kind):6} " +
+              " ".join(f"{cell:>24}" for cell in cells))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sysid", required=True, help="the program flash-sysid")
+    parser.add_argument("--out", required=True, type=pathlib.Path)
+    parser.add_argument("--seed", type=int, default=9001, help="of the first twin; the others follow")
+    parser.add_argument("--runs", type=int, default=20, help="twins of each half")
+    parser.add_argument("--bounds", type=int, help="twins whose Cramer-Rao widths are computed; without it, all")
+    parser.add_argument("--workers", type=int, default=2)
+    options = parser.parse_args()
+    runs = kept.Runs(options.sysid, options.out)
+    asset = synthetic.write_asset(options.out)
+    seeds = range(options.seed, options.seed + options.runs)
+    jobs = [(seed, None) for seed in seeds] + [(seed, WRONG[i % len(WRONG)]) for i, seed in enumerate(seeds)]
+    jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair]
+    found = [searched(runs, asset, *jobs[0])]  # fills the store
+    with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
+        found += pool.map(lambda job: searched(runs, asset, *job), jobs[1:])
+        right = [twin for twin in found if not twin["wrong"]]
+        bounded = right[:options.bounds]
+        bounds = {twin["seed"]: bound for twin, bound in zip(bounded, pool.map(lambda twin: least_spread(runs, twin), bounded))}
+    print(f"\nseeds {seeds.start} to {seeds.stop - 1}")
+    print_right(right, bounds)
+    print_wrong([twin for twin in found if twin["wrong"]])
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
