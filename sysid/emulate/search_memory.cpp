@@ -9,8 +9,10 @@ namespace flash::sysid {
 namespace {
 
 constexpr double kLikelihood = 1e6;  // bytes a keyframe: fields of the likelihoods at hand
-constexpr double kAtEstimate = 14;   // motions about the estimate that are kept
-constexpr double kFiner = 4;         // vertices of the mesh of half the cell, over those of the search's
+constexpr double kAtEstimate = 14;   // motions about the estimate that are kept, of the search's own mesh
+constexpr double kOfErrors =
+    48;                       // and of the answer's mesh: what errors are of, and how each moves the sheet
+constexpr double kFiner = 4;  // vertices of the mesh of half the cell, over those of the search's
 
 double kept_steps(const Replay& replay) {
   const std::vector<bool> read = steps_read(replay, replay.start, replay.settings.solver.time_step,
@@ -44,7 +46,8 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
   // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer
   // one.
   const double own = candidates * kept, half_cell = finer * kFiner * kept;
-  estimate.kept = own + std::max(own, 2 * half_cell) + kAtEstimate * kept + kLikelihood * keyframes;
+  const double about_estimate = (kAtEstimate + kOfErrors * (solver_check ? kFiner : 1)) * kept;
+  estimate.kept = own + std::max(own, 2 * half_cell) + about_estimate + kLikelihood * keyframes;
   return estimate;
 }
 

@@ -6,8 +6,8 @@ import surface
 def measure(runs, data, asset, clip, search):
     recording = data / "lift" / clip
     options, parameters = lifts.grasp_of(search)
-    material = ["--asset", asset, *lifts.window(clip), "--bending", repr(parameters["bending"]), "--young",
-                repr(parameters["young"]), "--no-solver-check"]
+    material = ["--asset", asset, *lifts.window(clip), "--hold", f"bending={parameters['bending']!r}:measured", "--hold",
+                f"young={parameters['young']!r}:measured", "--no-solver-check"]
     yaw = ["--hold", f"start_yaw={parameters['start_yaw']!r}"]
     table = runs.grid(f"{clip}/table_and_friction", [recording], *material, *yaw, *lifts.GRASPS[search["grasp"]],
                       "--table-height=-0.015,0,0.015", "--friction", "0.2,0.6")

@@ -34,7 +34,7 @@ TEST(SearchMemory, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
                         static_cast<double>(replay.sheet().rest.vertices.size());
   // Three of the search's mesh while three of four times as many vertices are made splines of, held twice.
   EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).kept,
-                   (3 + 2 * 3 * 4 + 14) * motion + 1e6 * static_cast<double>(replay.observations.size()));
+                   (3 + 2 * 3 * 4 + 14 + 4 * 48) * motion + 1e6 * static_cast<double>(replay.observations.size()));
 }
 
 TEST(SearchMemory, GrowsWithWhatIsInWorkAtOnce) {
