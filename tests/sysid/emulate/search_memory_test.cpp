@@ -33,8 +33,9 @@ TEST(SearchMemory, KeptMotionsHoldTheStepsAboutTheirKeyframes) {
   const double motion = static_cast<double>(steps.size() * sizeof(double)) *
                         static_cast<double>(replay.sheet().rest.vertices.size());
   // Three of the search's mesh while three of four times as many vertices are made splines of, held twice.
-  EXPECT_DOUBLE_EQ(estimate_memory(replays, grid, true).kept,
-                   (3 + 2 * 3 * 4 + 14 + 4 * 48) * motion + 1e6 * static_cast<double>(replay.observations.size()));
+  EXPECT_DOUBLE_EQ(
+      estimate_memory(replays, grid, true).kept,
+      (3 + 2 * 3 * 4 + 14 + 4 * 48) * motion + 1e6 * static_cast<double>(replay.observations.size()));
 }
 
 TEST(SearchMemory, GrowsWithWhatIsInWorkAtOnce) {
