@@ -5,7 +5,7 @@
 #include <Eigen/Cholesky>
 
 #include "data/error.h"
-#include "tests/calib/hand_eye_scene.h"
+#include "tests/calib/cell_member.h"
 
 namespace flash::calib {
 namespace {
@@ -15,16 +15,6 @@ HandEyeScene arm_scene(unsigned seed) {
   settings.robot_deg = 0.05;
   settings.robot_mm = 0.5;
   return make_scene(settings, board_points(), seed);
-}
-
-CellMember member_of(const HandEyeScene& scene, const std::string& arm, const std::string& camera) {
-  CellMember member{.arm = arm, .camera = camera, .setup = scene.settings.setup, .intrinsics = scene.camera};
-  member.points = scene.points;
-  member.symmetries = grid_symmetries(scene.points);
-  member.observations = scene.observations;
-  for (std::size_t i = 0; i < scene.observations.size(); ++i) member.stamps.push_back(static_cast<double>(i));
-  member.poses = shah(loops_of(scene));
-  return member;
 }
 
 TEST(Register, TwoArmsOnOneCameraAreWhereTheyAre) {

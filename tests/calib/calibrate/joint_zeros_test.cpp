@@ -8,6 +8,7 @@
 #include "calib/calibrate/cell.h"
 #include "calib/geometry/serial_chain.h"
 #include "tests/calib/arm_scene.h"
+#include "tests/calib/cell_member.h"
 
 namespace flash::calib {
 namespace {
@@ -84,17 +85,6 @@ TEST(JointZeros, AreFoundAndTakeTheirErrorOutOfTheAnswer) {
   EXPECT_GE(inside, 8);     // of ten at 95 %: fewer once in eighty
   EXPECT_GT(squared, 0.4);  // 60 squares of unit mean, six of a trial correlated: 0.26 a standard deviation
   EXPECT_LT(squared, 1.8);
-}
-
-CellMember member_of(const HandEyeScene& scene, const std::string& arm) {
-  CellMember member{
-      .arm = arm, .camera = "camera", .setup = scene.settings.setup, .intrinsics = scene.camera};
-  member.points = scene.points;
-  member.symmetries = grid_symmetries(scene.points);
-  member.observations = scene.observations;
-  for (std::size_t i = 0; i < scene.observations.size(); ++i) member.stamps.push_back(static_cast<double>(i));
-  member.poses = shah(loops_of(scene));
-  return member;
 }
 
 TEST(JointZeros, OfTwoArmsOnOneCameraAreSolvedForTogether) {
