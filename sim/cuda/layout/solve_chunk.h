@@ -16,10 +16,9 @@ struct alignas(16) SolveChunk {
   enum { ends = 1, ends_level = 2 };
 
   // To have it sent to the chip.
-  int first_tile = 0;  ///< of the factor
-  int next_row = 0;    ///< from there to the tile below it; 0: none is read
-  int columns =
-      0;  ///< twice SolvePlan::gathers' place of the first result, or -2; one more: two tiles side by side
+  int first_tile = 0;   ///< of the factor
+  int next_row = 0;     ///< from there to the tile below it; 0: none is read
+  int columns = 0;      ///< chunk_columns: how many tiles side by side, and where results go
   int input_table = 0;  ///< place of the first input in SolvePlan::gathers
   // To multiply by it.
   int flags = 0;
@@ -32,7 +31,8 @@ struct alignas(16) SolveChunk {
 };
 static_assert(sizeof(SolveChunk) == 48);
 
-/// SolveChunk::columns of tiles, and of a table of results, -1 for none.
+/// Whether there are two tiles side by side, and the place of the first result in SolvePlan::gathers, -1 for
+/// none.
 constexpr int chunk_columns(bool two, int result_table) { return 2 * result_table + (two ? 1 : 0); }
 
 /// Chunks of a warp on chip at most; as many without numbers stand behind its last.
