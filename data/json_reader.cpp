@@ -247,8 +247,11 @@ double JsonObject::not_negative(const char* key) const {
 
 Eigen::Vector3d JsonObject::direction(const char* key, const Eigen::Vector3d& fallback) const {
   const Eigen::Vector3d value = vector3(key, fallback);
-  if (!(value.stableNorm() > 1e-9)) throw error(key, "a direction that is not zero");
-  return value.stableNormalized();
+  // The length itself may be too large for a number.
+  const double largest = value.cwiseAbs().maxCoeff();
+  if (!(largest > 0 && largest * (value / largest).norm() > 1e-9))
+    throw error(key, "a direction that is not zero");
+  return (value / largest).normalized();
 }
 
 JsonObject JsonObject::object(const char* key) const {

@@ -135,6 +135,12 @@ TEST_F(SceneFiles, DirectionsMayBeOfAnyLength) {
     const Scene scene = load(file.dump());
     EXPECT_EQ(std::get<ScenePlane>(scene.obstacles[0].shape).normal, Eigen::Vector3d::UnitZ());
   }
+  json file = json::parse(kPublished);
+  file["planecollisions"] = {{"point", {0, 0, 0}}, {"normal", {0, 1.3e308, 1.3e308}}, {"friction", 0.25}};
+  const Scene scene = load(file.dump());
+  EXPECT_LT(
+      (std::get<ScenePlane>(scene.obstacles[0].shape).normal - Eigen::Vector3d(0, 1, 1).normalized()).norm(),
+      1e-15);
 }
 
 TEST_F(SceneFiles, WrongFieldsAreNamed) {
