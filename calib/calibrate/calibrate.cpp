@@ -12,17 +12,12 @@
 #include "calib/solve/linearization.h"
 #include "calib/uncertainty/pixel_fit.h"
 #include "data/error.h"
+#include "data/median.h"
 
 namespace flash::calib {
 namespace {
 
 constexpr double kDegree = M_PI / 180;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<Eigen::Isometry3d> target_poses(const std::vector<Observation>& observations) {
   std::vector<Eigen::Isometry3d> poses;
@@ -45,7 +40,11 @@ void expect_convention(Setup setup, const std::vector<Observation>& observations
   const std::optional<Finding> finding =
       check_convention(setup, observations, symmetries, stated, settings.angles, settings.convention);
   if (finding) throw data::InputError(finding->sentence);
-  if (stated.found && stated.score < settings.hopeless) return;
+  const bool hopeless = !(stated.found && stated.score < settings.hopeless);
+  const std::optional<Finding> sized =
+      check_size(setup, observations, symmetries, stated, settings.convention);
+  if (sized && (hopeless || !measurable_size(sized->size))) throw data::InputError(sized->sentence);
+  if (!hopeless) return;
   char text[240];
   std::snprintf(
       text, sizeof text,
@@ -77,7 +76,7 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
   const auto worst = static_cast<std::size_t>(
       std::distance(squared.begin(), std::max_element(squared.begin(), squared.end())));
   constexpr double kMedianOfChiSquare6 = 5.348;
-  const double usual = std::max(median(squared) / kMedianOfChiSquare6, 1e-12);
+  const double usual = std::max(data::median(squared) / kMedianOfChiSquare6, 1e-12);
   // Corrections far inside the corner noise say nothing.
   if (squared[worst] < surprise * std::max(usual, 0.05)) return false;
   const Vector6d xi =
@@ -220,8 +219,10 @@ std::optional<std::string> cause_of(const Calibration& result, const std::vector
                                     const CalibrateSettings& settings) {
   ConventionSettings any = settings.convention;
   any.suspicious = 0;
-  const std::optional<Finding> finding =
-      check_convention(result.setup, all, symmetries, result.selection.robust_seed, settings.angles, any);
+  const RobustSeed& stated = result.selection.robust_seed;
+  std::optional<Finding> finding =
+      check_convention(result.setup, all, symmetries, stated, settings.angles, any);
+  if (!finding) finding = check_size(result.setup, all, symmetries, stated, any);
   if (!finding) return std::nullopt;
   return finding->sentence;
 }
@@ -295,7 +296,7 @@ bool finish(Calibration& result, const std::vector<Observation>& used) {
     distances.push_back(observation.T_camera_target.front().translation().norm());
   }
   result.diversity = rotation_diversity(robot);
-  result.weakest = weakest_direction(result.covariance, median(distances), "camera");
+  result.weakest = weakest_direction(result.covariance, data::median(distances), "camera");
   warn(result);
   const std::string implausible = implausibility(result, used);
   if (implausible.empty()) return true;

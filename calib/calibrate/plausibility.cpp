@@ -46,7 +46,10 @@ std::string implausible_noise(const NoiseLevels& levels, const std::vector<Obser
   }
   const Motion moved = motion_of(robot);
   const Motion noise{std::sqrt(3) * levels.translation.front(), std::sqrt(3) * levels.rotation.front()};
-  if (noise.over(distance) < settings.noise * moved.over(distance)) return {};
+  // Turns that are right do not make up for places that are not.
+  const bool places = noise.translation < settings.noise * moved.translation ||
+                      noise.translation < settings.deviation * distance;
+  if (places && noise.over(distance) < settings.noise * moved.over(distance)) return {};
   return formatted(
       "robot and camera do not tell of the same motion: the robot's poses would have to be wrong by %.1f mm "
       "and "

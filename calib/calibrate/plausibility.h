@@ -10,8 +10,8 @@ namespace flash::calib {
 /// distance to the target, in radians.
 struct PlausibilitySettings {
   double deviation = 0.1;  ///< of the camera's place, rms an axis over the distance; of its turn [rad]
-  double noise = 0.5;      ///< of the robot's poses over their motion
-  double held_out = 0.5;   ///< residual of views left out over that of taking the target to stand still
+  double noise = 0.5;  ///< of the robot's poses over their motion; of its places alone, from `deviation` on
+  double held_out = 0.5;  ///< residual of views left out over that of taking the target to stand still
 };
 
 /// Empty, or one sentence that says why robot and camera do not tell of the same motion. used: views in the

@@ -5,6 +5,7 @@
 
 #include "calib/geometry/pose.h"
 #include "data/error.h"
+#include "data/median.h"
 #include "data/text.h"
 #include "data/trajectory.h"
 
@@ -12,12 +13,6 @@ namespace flash::calib {
 namespace {
 
 constexpr double kReach = 10;  // [m]
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 }  // namespace
 
@@ -69,13 +64,13 @@ Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::
 }
 
 bool beyond_reach(std::vector<double> distances) {
-  return !distances.empty() && median(std::move(distances)) > kReach;
+  return !distances.empty() && data::median(std::move(distances)) > kReach;
 }
 
 void expect_metres(const std::vector<double>& distances, const std::string& path) {
   if (beyond_reach(distances))
     throw data::input_error(path, "translations",
-                            "half of them are beyond " + data::format_short(median(distances)) +
+                            "half of them are beyond " + data::format_short(data::median(distances)) +
                                 " m, expected metres (are these millimetres?)");
 }
 

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "data/error.h"
+#include "data/median.h"
 
 namespace flash::calib {
 namespace {
@@ -40,12 +41,6 @@ std::pair<double, double> span_of(const std::vector<cv::Point2f>& hull, int y) {
     last = std::max(last, x);
   }
   return {first, last};
-}
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// 1 / z = plane . ray. Gauss and Newton from `plane`, on the depths.
@@ -145,7 +140,7 @@ BoardDepth board_depth(const data::DepthImage& depth, double depth_scale,
   for (int round = 0; round < 4; ++round) {
     std::vector<double> off;
     for (const RayDepth& d : depths) off.push_back(std::abs(d.z - 1 / plane.dot(d.ray)));
-    const double limit = kTrim * 1.4826 * median_of(off) + 1e-9;
+    const double limit = kTrim * 1.4826 * data::median(off) + 1e-9;
     std::erase_if(depths, [&](const RayDepth& d) { return std::abs(d.z - 1 / plane.dot(d.ray)) > limit; });
     if (static_cast<int>(depths.size()) < kLeastPixels) return result;
     fit(depths, plane);

@@ -11,6 +11,7 @@
 #include "calib/detect/finder.h"
 #include "calib/detect/planar_pose.h"
 #include "data/error.h"
+#include "data/median.h"
 #include "data/text.h"
 
 namespace flash::calib {
@@ -91,15 +92,15 @@ void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detect
   for (const Detection& detection : detections)
     if (!detection.readings.empty()) rms.push_back(detection.readings.front().observation.pose_rms);
   if (rms.empty()) return;
-  std::nth_element(rms.begin(), rms.begin() + static_cast<std::ptrdiff_t>(rms.size() / 2), rms.end());
-  const double limit = std::max(kAlwaysGood, settings.largest_ratio * rms[rms.size() / 2]);
+  const double usual = data::median(rms);
+  const double limit = std::max(kAlwaysGood, settings.largest_ratio * usual);
   for (Detection& detection : detections) {
     if (detection.readings.empty()) continue;
     const double found = detection.readings.front().observation.pose_rms;
     if (found > limit) {
       detection.readings.clear();
       detection.reason = "the corners fit the target to " + data::format_short(found) +
-                         " px, the usual view to " + data::format_short(rms[rms.size() / 2]) + " px";
+                         " px, the usual view to " + data::format_short(usual) + " px";
     }
     std::erase_if(detection.readings,
                   [&](const CornerReading& reading) { return reading.observation.pose_rms > limit; });

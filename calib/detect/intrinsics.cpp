@@ -10,6 +10,7 @@
 #include "calib/detect/lens_fit.h"
 #include "calib/geometry/pose.h"
 #include "data/error.h"
+#include "data/median.h"
 #include "data/text.h"
 
 namespace flash::calib {
@@ -139,12 +140,6 @@ std::vector<std::string> warnings_of(const IntrinsicsEstimate& estimate, std::si
   return warnings;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 }  // namespace
 
 IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<Observation>& observations,
@@ -172,14 +167,14 @@ IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<
   expect_views();
   Solution solution = solve(points, views, width, height, settings.model);
   for (int round = 0; round < 3; ++round) {
-    const double limit = std::max(1.0, settings.largest_ratio * median(solution.rms));
+    const double limit = std::max(1.0, settings.largest_ratio * data::median(solution.rms));
     std::vector<const Observation*> kept;
     std::vector<std::size_t> kept_place;
     for (std::size_t v = 0; v < views.size(); ++v) {
       if (solution.rms[v] > limit) {
         estimate.views[place[v]].reason = "fits to " + data::format_short(solution.rms[v]) +
                                           " px, the usual view to " +
-                                          data::format_short(median(solution.rms)) + " px";
+                                          data::format_short(data::median(solution.rms)) + " px";
         continue;
       }
       kept.push_back(views[v]);

@@ -8,6 +8,7 @@
 
 #include "calib/dataset/pose_file.h"
 #include "calib/geometry/pose.h"
+#include "data/median.h"
 
 namespace flash::calib {
 namespace {
@@ -57,6 +58,10 @@ void add_pairings(const Reading& as_stated, std::vector<Reading>& readings) {
                        " its own";
     readings.push_back(std::move(reading));
   }
+  Reading backwards = as_stated;
+  std::reverse(backwards.T_base_gripper.begin(), backwards.T_base_gripper.end());
+  backwards.sentence = "the poses are in reverse order: the first image belongs to the last pose";
+  readings.push_back(std::move(backwards));
 }
 
 Poses with_angles(Poses poses, const std::vector<Eigen::Vector3d>& angles, const std::string& order,
@@ -141,6 +146,30 @@ std::string closing_text(const RobustSeed& robust_seed) {
   return text;
 }
 
+bool closes_better(const RobustSeed& stated, const RobustSeed& found, const ConventionSettings& settings) {
+  return found.found && found.score <= settings.plausible &&
+         (!stated.found || found.score * settings.better <= stated.score);
+}
+
+/// True over stated size of the target by the views on which most agree.
+double size_of_target(const Reading& reading, const std::vector<Observation>& observations,
+                      const std::vector<Symmetry>& symmetries, const RobustSeed& seed) {
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < observations.size(); ++i)
+    if (!observations[i].T_camera_target.empty()) errors.push_back(seed.errors[i].translation);
+  const double usual = data::median(errors);
+  std::vector<PoseLoop> loops;
+  for (std::size_t i = 0; i < observations.size(); ++i) {
+    const std::vector<Eigen::Isometry3d>& poses = observations[i].T_camera_target;
+    if (poses.empty() || seed.errors[i].translation > usual) continue;
+    const auto choice = static_cast<std::size_t>(seed.choice[i]);
+    loops.push_back(
+        pose_loop(reading.setup, reading.T_base_gripper[i],
+                  poses[choice % poses.size()] * symmetries[choice / poses.size()].turn.inverse()));
+  }
+  return translation_scale(loops, seed.poses);
+}
+
 }  // namespace
 
 std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
@@ -197,9 +226,8 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
                    [&](const RobustSeed& seed) { return seed.found && 0.7 * seed.score <= least; }) -
       seeds.begin());
   if (chosen == seeds.size()) return std::nullopt;
+  if (!closes_better(stated, seeds[chosen], settings)) return std::nullopt;
   const double score = seeds[chosen].score;
-  if (score > settings.plausible || (stated.found && score * settings.better > stated.score))
-    return std::nullopt;
   for (std::size_t i = 0; i < seeds.size(); ++i)
     if (seeds[i].found && seeds[i].score < settings.runner_up * score &&
         !same_poses(readings[i].T_base_gripper, readings[chosen].T_base_gripper))
@@ -209,6 +237,35 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
   best.sentence += ": so the chain closes to " + closing_text(best.found) + ", as stated to " +
                    (stated.found ? closing_text(stated) : std::string("nothing consistent"));
   return best;
+}
+
+std::optional<Finding> check_size(Setup setup, const std::vector<Observation>& observations,
+                                  const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                  const ConventionSettings& settings) {
+  if (!stated.found || stated.score < settings.suspicious) return std::nullopt;
+  Reading reading{.sentence = {}, .setup = setup, .T_base_gripper = {}, .known = {}};
+  for (const Observation& observation : observations)
+    reading.T_base_gripper.push_back(observation.T_base_gripper);
+  reading.known.assign(observations.size(), true);
+  // A robot in units of the target: views that are wrong have less of a say each time.
+  double size = 1;
+  RobustSeed found = stated;
+  for (int round = 0; round < 3; ++round) {
+    const double left = size_of_target(reading, observations, symmetries, found);
+    if (!(left > 1e-6 && left < 1e6)) return std::nullopt;
+    size *= left;
+    reading.T_base_gripper = scaled(std::move(reading.T_base_gripper), 1 / left);
+    found = robust_seed_of(reading, observations, symmetries, settings.robust_seed);
+    if (!found.found) return std::nullopt;
+  }
+  if (!closes_better(stated, found, settings)) return std::nullopt;
+  found.translation *= size;
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the target is %.4g times as large as stated, or the robot's translations are not in metres: "
+                "measure a square: so the chain closes to ",
+                size);
+  return Finding{text + closing_text(found) + ", as stated to " + closing_text(stated), stated, found, size};
 }
 
 }  // namespace flash::calib

@@ -18,9 +18,9 @@ struct Reading {
 };
 
 /// Readings of the same numbers under the conventions that people mix up: the other setup, inverted poses,
-/// both, millimetres and inches for metres, pairing off by one or two, quaternions w x y z for x y z w, and,
-/// where the file gave angles, all other readings of them (rotation_from_angles), degrees for radians and
-/// radians for degrees. angles: as the file gave them [rad], one a view, or none.
+/// both, millimetres and inches for metres, pairing off by one or two or in reverse, quaternions w x y z for
+/// x y z w, and, where the file gave angles, all other readings of them (rotation_from_angles), degrees for
+/// radians and radians for degrees. angles: as the file gave them [rad], one a view, or none.
 std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
                                           const std::vector<Eigen::Vector3d>& angles = {});
 
@@ -35,6 +35,7 @@ struct ConventionSettings {
 struct Finding {
   std::string sentence;
   RobustSeed stated, found;  ///< how the input closes as it is stated, and as the finding reads it
+  double size = 1;           ///< of the target, over the stated one
 };
 
 /// Tries the readings where the stated one closes badly. Empty where it closes well, where no other closes
@@ -43,5 +44,11 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
                                         const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
                                         const std::vector<Eigen::Vector3d>& angles = {},
                                         const ConventionSettings& settings = {});
+
+/// Whether the stated reading closes with a target of another size, which is estimated. Empty as that of
+/// check_convention.
+std::optional<Finding> check_size(Setup setup, const std::vector<Observation>& observations,
+                                  const std::vector<Symmetry>& symmetries, const RobustSeed& stated,
+                                  const ConventionSettings& settings = {});
 
 }  // namespace flash::calib

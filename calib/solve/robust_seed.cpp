@@ -7,18 +7,12 @@
 #include <random>
 
 #include "calib/geometry/pose.h"
+#include "data/median.h"
 
 namespace flash::calib {
 namespace {
 
 using Candidates = std::vector<std::vector<Eigen::Isometry3d>>;
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 class Search {
  public:
@@ -31,7 +25,7 @@ class Search {
       views_.push_back(i);
       distances.push_back(candidates[i].front().translation().norm());
     }
-    distance_ = std::max(median(distances), 1e-9);
+    distance_ = std::max(data::median(distances), 1e-9);
     majority_ = std::max<std::size_t>(
         3, static_cast<std::size_t>(std::ceil(settings.majority * static_cast<double>(views_.size()))));
   }

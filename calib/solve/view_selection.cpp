@@ -5,16 +5,10 @@
 #include <cstdio>
 
 #include "calib/geometry/pose.h"
+#include "data/median.h"
 
 namespace flash::calib {
 namespace {
-
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The same picture twice: noise alone would move some corner by more.
 bool same_pixels(const Observation& a, const Observation& b) {
@@ -41,6 +35,14 @@ void drop_unusable(const std::vector<Observation>& observations, std::vector<Vie
   }
 }
 
+// Without noise everything closes to rounding.
+constexpr double kExact = 1e-5;
+
+bool closes(const ClosingError& error, const ClosingError& usual, double factor) {
+  return error.rotation <= factor * usual.rotation + kExact &&
+         error.translation <= factor * usual.translation + kExact;
+}
+
 std::string closing_reason(const ClosingError& error, const ClosingError& usual) {
   char text[200];
   std::snprintf(
@@ -52,23 +54,28 @@ std::string closing_reason(const ClosingError& error, const ClosingError& usual)
   return text;
 }
 
-// Without noise everything closes to rounding.
-constexpr double kExact = 1e-5;
-
-void drop_outliers(const RobustSeed& robust_seed, double factor, std::vector<ViewVerdict>& views) {
+/// robot: G of PoseLoop; candidates: of find_robust_seed.
+void drop_outliers(const RobustSeed& robust_seed, const std::vector<Eigen::Isometry3d>& robot,
+                   const std::vector<std::vector<Eigen::Isometry3d>>& candidates, double factor,
+                   std::vector<ViewVerdict>& views) {
   std::vector<double> rotations, translations;
   for (std::size_t i = 0; i < views.size(); ++i) {
     if (!views[i].used) continue;
     rotations.push_back(robust_seed.errors[i].rotation);
     translations.push_back(robust_seed.errors[i].translation);
   }
-  const ClosingError usual{median(rotations), median(translations)};
+  const ClosingError usual{data::median(rotations), data::median(translations)};
   for (std::size_t i = 0; i < views.size(); ++i) {
     const ClosingError& error = robust_seed.errors[i];
     views[i].error = error;
-    if (views[i].used && (error.rotation > factor * usual.rotation + kExact ||
-                          error.translation > factor * usual.translation + kExact))
-      drop(views[i], closing_reason(error, usual));
+    if (!views[i].used || closes(error, usual, factor)) continue;
+    // As cameras turn pictures by what they take for upright.
+    const Eigen::Isometry3d half_turn(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()));
+    const bool turned =
+        std::any_of(candidates[i].begin(), candidates[i].end(), [&](const Eigen::Isometry3d& C) {
+          return closes(closing_error({robot[i], half_turn * C}, robust_seed.poses), usual, factor);
+        });
+    drop(views[i], turned ? "the picture is turned by 180 deg" : closing_reason(error, usual));
   }
 }
 
@@ -118,6 +125,7 @@ ViewSelection select_views(Setup setup, const std::vector<Observation>& observat
     selection.views[i].symmetry = static_cast<int>(choice / observations[i].T_camera_target.size());
   }
   // All views turned alike close as well: most keep the numbering of their detector.
+  const RobustSeed as_found = selection.robust_seed;
   const Symmetry& common = symmetries[most_common(selection.views, symmetries.size())];
   selection.robust_seed.poses.Z = selection.robust_seed.poses.Z * common.turn;
   for (std::size_t i = 0; i < observations.size(); ++i) {
@@ -130,7 +138,7 @@ ViewSelection select_views(Setup setup, const std::vector<Observation>& observat
     const auto choice = static_cast<std::size_t>(selection.robust_seed.choice[i]);
     selection.observations[i].T_camera_target = {candidates[i][choice] * common.turn};
   }
-  drop_outliers(selection.robust_seed, settings.outlier, selection.views);
+  drop_outliers(as_found, robot, candidates, settings.outlier, selection.views);
   selection.renumbered = static_cast<int>(
       std::count_if(selection.views.begin(), selection.views.end(),
                     [](const ViewVerdict& view) { return view.used && view.symmetry != 0; }));

@@ -37,9 +37,9 @@ std::optional<Refinement> without_prior(Refinement refined, RefineSettings setti
   // solved.
   if (!told(refined, settings.bundle, columns, 1)) return std::nullopt;
   Refinement scaled = refine(refined.bundle, settings);
-  const bool collapsed = std::any_of(scaled.bundle.scales.begin(), scaled.bundle.scales.end(),
-                                     [](double scale) { return !(scale > 0.5 && scale < 2); });
-  if (collapsed || !told(scaled, settings.bundle, columns, 100)) return std::nullopt;
+  const bool measured =
+      std::all_of(scaled.bundle.scales.begin(), scaled.bundle.scales.end(), measurable_size);
+  if (!measured || !told(scaled, settings.bundle, columns, 100)) return std::nullopt;
   return scaled;
 }
 

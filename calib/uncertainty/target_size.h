@@ -11,6 +11,9 @@ namespace flash::calib {
 /// rulers across a whole sheet.
 constexpr double kPrintSd = 0.003;
 
+/// Over the stated one, what a solution looks for: one that starts farther off tends to zero or infinity.
+constexpr bool measurable_size(double size) { return size > 0.5 && size < 2; }
+
 /// What pictures and robot tell of the size of a target, over the size stated. It moves the camera by as
 /// large a share of its distance.
 struct TargetSize {

@@ -88,6 +88,15 @@ def millimetres(poses):
     return [[p[0], *(1000 * x for x in p[1:4]), *p[4:]] for p in poses]
 
 
+def backwards(poses):
+    return [[pose[0], *place[1:]] for pose, place in zip(poses, reversed(poses))]
+
+
+def w_first(poses):
+    """Quaternions as w x y z, where x y z w is read."""
+    return [[*pose[:4], pose[7], *pose[4:7]] for pose in poses]
+
+
 def some_jolted(poses):
     rng = random.Random(7)
     return [jolted(pose, rng) if i % 3 == 1 and i < 15 else pose for i, pose in enumerate(poses)]
@@ -148,6 +157,11 @@ def cut_picture(folder):
     return []
 
 
+def without_intrinsics(folder):
+    (folder / "camera_info.yaml").unlink()
+    return []
+
+
 def all_pictures_cut(folder):
     for path in (folder / "images").iterdir():
         path.write_bytes(path.read_bytes()[:500])
@@ -182,6 +196,13 @@ def traps():
         yield Trap(f"{other}: swapped setup", sound, swapped_setup, 2, f"the setup is {other}")
         yield Trap(f"{other}: pairing off by one", sound, poses_changed(shifted), 2, "paired off by one")
         yield Trap(f"{other}: poses shuffled", sound, poses_changed(shuffled), 2, "do not tell of the same motion")
+        yield Trap(f"{other}: order reversed", sound, poses_changed(backwards), 2, "the poses are in reverse order")
+        yield Trap(f"{other}: quaternions w x y z", sound, poses_changed(w_first), 2, "quaternions are w x y z")
+        yield Trap(f"{other}: target ten times too large", sound, option("--target", "chessboard:9x6:0.25"), 2,
+                   "the target is 0.1")
+        yield Trap(f"{other}: board transposed", sound, option("--target", "chessboard:6x9:0.025"), 0, used=16)
+        yield Trap(f"{other}: outer corners", sound, option("--target", "chessboard:11x8:0.025"), 2,
+                   "shows one of 9x6 inner corners")
         yield Trap(f"{other}: angles as they should be", sound, as_angles("rx,ry,rz", 1), 0, used=16)
         yield Trap(f"{other}: degrees for radians", sound, as_angles("rx,ry,rz", math.degrees(1)), 2, "degrees?")
         yield Trap(f"{other}: radians for degrees", sound, as_angles("rx_deg,ry_deg,rz_deg", 1), 2,
@@ -203,6 +224,8 @@ def traps():
         yield Trap(f"{other}: copies", sound, copied, 0, "100.png: not used: a copy of 000.png",
                    "6 of 22 views were not used", used=16)
         yield Trap(f"{other}: a picture cut off", sound, cut_picture, 0, "004.png: not used", used=15)
+    yield Trap("no intrinsics", "in_hand", without_intrinsics, 2, "flash-calib intrinsics")
+    yield Trap("half a target", "in_hand", option("--target", "chessboard:9x6"), 2, "chessboard:COLUMNSxROWS:SQUARE")
     yield Trap("a knock half-way", "in_hand", poses_changed(knocked), 0, "the camera moved by", "before 008.png", used=8)
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")

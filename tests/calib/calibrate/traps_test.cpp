@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdio>
 #include <functional>
 
 #include "calib/calibrate/calibrate.h"
@@ -83,6 +84,51 @@ TEST_P(Traps, PairingOffByOneIsNamed) {
   for (std::size_t i = scene.observations.size() - 1; i > 0; --i)
     scene.observations[i].T_base_gripper = scene.observations[i - 1].T_base_gripper;
   EXPECT_TRUE(refusal(scene).starts_with("images and poses are paired off by one")) << refusal(scene);
+}
+
+TEST_P(Traps, ReverseOrderIsNamed) {
+  HandEyeScene scene = scene_of(GetParam(), 15);
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Observation& o : scene.observations) poses.push_back(o.T_base_gripper);
+  for (Observation& o : scene.observations) {
+    o.T_base_gripper = poses.back();
+    poses.pop_back();
+  }
+  EXPECT_TRUE(refusal(scene).starts_with("the poses are in reverse order")) << refusal(scene);
+}
+
+TEST_P(Traps, QuaternionsInAnotherOrderAreNamed) {
+  HandEyeScene scene = scene_of(GetParam(), 16);
+  for (Observation& o : scene.observations) {
+    const Eigen::Quaterniond q(o.T_base_gripper.linear());
+    // A file of w x y z, read as x y z w.
+    o.T_base_gripper.linear() = Eigen::Quaterniond(q.z(), q.w(), q.x(), q.y()).toRotationMatrix();
+  }
+  EXPECT_TRUE(refusal(scene).starts_with("quaternions are w x y z where x y z w was expected"))
+      << refusal(scene);
+}
+
+TEST_P(Traps, TargetOfTenTimesTheSizeIsNamedWithItsSize) {
+  for (const double factor : {10.0, 2.5, 0.1}) {
+    HandEyeScene scene = scene_of(GetParam(), 17);
+    scene.points *= factor;
+    for (Observation& o : scene.observations) o.T_camera_target.front().translation() *= factor;
+    const std::string said = refusal(scene);
+    double size = 0;
+    ASSERT_EQ(std::sscanf(said.c_str(), "the target is %lf times as large as stated", &size), 1)
+        << factor << ": " << said;
+    // The robot's noise over how far it moves, 0.5 mm of 0.1 m, and its turns at the length of its arm.
+    EXPECT_NEAR(size * factor, 1, 0.01);
+  }
+}
+
+TEST_P(Traps, PlacesInWrongColumnsAreNoAnswer) {
+  HandEyeScene scene = scene_of(GetParam(), 21);
+  for (Observation& o : scene.observations) {
+    Eigen::Isometry3d& pose = o.T_base_gripper;
+    pose.translation() = Eigen::Vector3d(pose.translation().reverse());
+  }
+  EXPECT_NE(refusal(scene).find("do not tell of the same motion"), std::string::npos) << refusal(scene);
 }
 
 TEST_P(Traps, MillimetresAreNamed) {
@@ -204,6 +250,22 @@ TEST_P(Traps, FortyPercentFlippedBoardsArePutRight) {
   EXPECT_EQ(result.used.size(), scene.observations.size());
 }
 
+TEST_P(Traps, PicturesTurnedByHalfATurnAreLeftOutByName) {
+  HandEyeScene scene = scene_of(GetParam(), 18);
+  for (const std::size_t i : {2U, 9U, 14U}) {
+    Observation& o = scene.observations[i];
+    const Eigen::Vector2d last(scene.camera.width - 1, scene.camera.height - 1);
+    o.pixels = (-o.pixels).colwise() + last;
+    o.T_camera_target = {
+        fitted_pose(scene.camera, scene.points, o.pixels,
+                    Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitZ()) * o.T_camera_target.front())};
+  }
+  const Calibration result = calibrated(scene);
+  expect_right(result, scene);
+  EXPECT_EQ(result.used.size(), scene.observations.size() - 3);
+  EXPECT_EQ(result.views[9].reason, "the picture is turned by 180 deg");
+}
+
 TEST_P(Traps, ThirtyPercentOutliersAreRejectedByName) {
   HandEyeScene scene = scene_of(GetParam(), 9);
   std::mt19937 random(9);
@@ -235,24 +297,50 @@ TEST_P(Traps, CopiesCountOnce) {
   EXPECT_LT((once.covariance - twice.covariance).norm(), 1e-2 * once.covariance.norm());
 }
 
-TEST_P(Traps, OneAxisIsRefusedWithItsName) {
-  HandEyeScene scene = scene_of(GetParam(), 11);
+/// The scene seen from these poses of its robot.
+void see_from(const std::vector<Eigen::Isometry3d>& poses, HandEyeScene& scene) {
   const Eigen::Isometry3d& X = scene.truth.X;
   const Eigen::Isometry3d& Z = scene.truth.Z;
-  const Eigen::Isometry3d start = scene.true_poses.front();
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    Observation& o = scene.observations[i];
+    o.T_base_gripper = poses[i];
+    o.T_camera_target = {X.inverse() * pose_loop(scene.settings.setup, poses[i], X).G.inverse() * Z};
+  }
+}
+
+TEST_P(Traps, OneAxisIsRefusedWithItsName) {
+  HandEyeScene scene = scene_of(GetParam(), 11);
+  std::vector<Eigen::Isometry3d> poses;
   for (std::size_t i = 0; i < scene.observations.size(); ++i) {
     Vector6d turn = Vector6d::Zero();
     turn[0] = 0.01 * static_cast<double>(i);
     turn[5] = 0.05 * static_cast<double>(i);
-    Observation& o = scene.observations[i];
-    o.T_base_gripper = moved(start, turn);
-    o.T_camera_target = {GetParam() == Setup::eye_in_hand ? X.inverse() * o.T_base_gripper.inverse() * Z
-                                                          : X.inverse() * o.T_base_gripper * Z};
+    poses.push_back(moved(scene.true_poses.front(), turn));
   }
+  see_from(poses, scene);
   EXPECT_EQ(
       refusal(scene),
       "rotations turn about one axis only (1.0000 of the spread): translation along that axis, (0.00, 0.00, "
       "1.00) of the gripper, cannot be determined; add views that tilt about another");
+}
+
+TEST_P(Traps, RobotThatDoesNotTurnIsRefused) {
+  HandEyeScene scene = scene_of(GetParam(), 19);
+  std::vector<Eigen::Isometry3d> poses(scene.observations.size(), scene.true_poses.front());
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    poses[i].translation() += Eigen::Vector3d(0.01, -0.005, 0.007) * static_cast<double>(i * i % 7);
+  see_from(poses, scene);
+  EXPECT_TRUE(refusal(scene).starts_with("the gripper turns by no more than")) << refusal(scene);
+  see_from(std::vector<Eigen::Isometry3d>(poses.size(), poses.front()), scene);
+  EXPECT_TRUE(refusal(scene).starts_with("the gripper turns by no more than 0.00 deg")) << refusal(scene);
+}
+
+TEST_P(Traps, FourViewsAreSolvedAndSaidToBeFew) {
+  const Calibration result = calibrated(scene_of(GetParam(), 20, 4));
+  ASSERT_FALSE(result.warnings.empty());
+  EXPECT_TRUE(std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
+    return warning.starts_with("4 views: noise levels and uncertainty are themselves uncertain");
+  })) << result.warnings.front();
 }
 
 TEST_P(Traps, ThreeViewsAreRefused) {

@@ -246,6 +246,15 @@ TEST(Layouts, IntrinsicsOfManyKinds) {
   EXPECT_EQ(load_intrinsics(folder.write("camera_info.yaml", kCamera)).width, 8);
 }
 
+TEST(Layouts, WithoutIntrinsicsTheVerbThatMakesThemIsNamed) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  std::filesystem::remove(folder / "camera_info.yaml");
+  folder.write("poses.tum", "9 0 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+  const std::string message = data::input_error_of([&] { load_dataset(folder / ""); });
+  EXPECT_NE(message.find("flash-calib intrinsics"), std::string::npos) << message;
+}
+
 TEST(Layouts, IntrinsicsThatAreNoneAreNamed) {
   const data::TemporaryFolder folder;
   EXPECT_NE(data::input_error_of([&] {

@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <fstream>
 
+#include "calib/detect/grey_image.h"
 #include "data/depth_image.h"
+#include "data/picture.h"
 #include "tests/calib/rendered_view.h"
 #include "tests/data/temporary_folder.h"
 
@@ -89,6 +91,47 @@ TEST(Detect, PicturesOfAnotherSizeNameTheFileOfTheirOwnSet) {
     const std::string message = data::input_error_of([&] { detect(dataset, target, settings); });
     EXPECT_NE(message.find("the picture is"), std::string::npos) << message;
     EXPECT_NE(message.find(dataset.camera_path + " says"), std::string::npos) << message;
+  }
+}
+
+TEST(Detect, PictureOfHalfTheSizeIsLeftOutWithBothSizes) {
+  const data::TemporaryFolder folder;
+  const Target target = parse_target("chessboard:7x5:0.03");
+  const Dataset dataset = write_set(folder, target, 3);
+  const GreyImage whole = load_grey_image(folder / "images/1.png");
+  data::Picture half(whole.width / 2, whole.height / 2, {0, 0, 0});
+  data::save_png(half, folder / "images/1.png");
+  const std::vector<Detection> detections = detect(dataset, target);
+  EXPECT_FALSE(detections[0].readings.empty());
+  EXPECT_TRUE(detections[1].readings.empty());
+  EXPECT_NE(detections[1].reason.find("the picture is " + std::to_string(whole.width / 2) + " x " +
+                                      std::to_string(whole.height / 2)),
+            std::string::npos)
+      << detections[1].reason;
+  EXPECT_NE(detections[1].reason.find("says " + std::to_string(whole.width) + " x "), std::string::npos);
+  EXPECT_FALSE(detections[2].readings.empty());
+}
+
+TEST(Detect, BoardsCountedOtherwiseAreNamedByTheirInnerCorners) {
+  const data::TemporaryFolder folder;
+  const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 2);
+  // Squares; corners with the outer ones; one less.
+  for (const char* counted : {"chessboard:8x6:0.03", "chessboard:9x7:0.03", "chessboard:6x5:0.03"}) {
+    const std::string message = data::input_error_of([&] { detect(dataset, parse_target(counted)); });
+    EXPECT_NE(message.find("shows one of 7x5 inner corners, where four squares meet: --target "
+                           "chessboard:7x5:0.03"),
+              std::string::npos)
+        << message;
+  }
+}
+
+TEST(Detect, TransposedBoardIsTheSameBoard) {
+  const data::TemporaryFolder folder;
+  const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 2);
+  for (const Detection& detection : detect(dataset, parse_target("chessboard:5x7:0.03"))) {
+    ASSERT_FALSE(detection.readings.empty()) << detection.reason;
+    EXPECT_EQ(detection.readings.front().observation.points.size(), 35U);
+    EXPECT_LT(detection.readings.front().observation.pose_rms, 0.05);  // as of 7 x 5
   }
 }
 
