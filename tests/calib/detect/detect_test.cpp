@@ -114,7 +114,7 @@ TEST(Detect, PictureOfHalfTheSizeIsLeftOutWithBothSizes) {
 
 TEST(Detect, BoardsCountedOtherwiseAreNamedByTheirInnerCorners) {
   const data::TemporaryFolder folder;
-  const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 2);
+  const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 1);
   // Squares; corners with the outer ones; one less.
   for (const char* counted : {"chessboard:8x6:0.03", "chessboard:9x7:0.03", "chessboard:6x5:0.03"}) {
     const std::string message = data::input_error_of([&] { detect(dataset, parse_target(counted)); });
