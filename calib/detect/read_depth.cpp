@@ -6,10 +6,15 @@
 
 #include "calib/detect/board_depth.h"
 #include "data/error.h"
-#include "data/median.h"
 
 namespace flash::calib {
 namespace {
+
+double median_of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
 
 template <class... Values>
 std::string formatted(const char* format, const Values&... values) {
@@ -55,7 +60,7 @@ std::optional<DepthViews> read_depth(const Dataset& dataset, const std::vector<D
   }
   use.used = true;
   use.pixel_noise = std::sqrt(squares / pixels);
-  use.over_corners = data::median(ratios);
+  use.over_corners = median_of(ratios);
   if (std::abs(use.over_corners - 1) > 0.1)
     throw data::InputError(formatted(
         "%s: depth puts the target at %.4g times the distance that its corners say: expected --depth-scale "
