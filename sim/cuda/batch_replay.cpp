@@ -188,7 +188,8 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   m.restriction_of = arena.take<int>(size);
   if (const std::size_t obstacles = number(sizes.most_obstacles); obstacles > 0) {
     const auto records = [&]<typename Record>(std::size_t layers) -> VertexRecords<Record> {
-      return {arena.take<double>(VertexRecords<Record>::numbers_each * size * layers), static_cast<int>(size)};
+      return {arena.take<double>(VertexRecords<Record>::numbers_each * size * layers),
+              static_cast<int>(size)};
     };
     for (ContactSet& contacts : m.contacts)
       contacts = {arena.take<int>(size), records.operator()<VertexContact>(1),

@@ -171,8 +171,7 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   ContactResponse response = {};
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
-    response.line_friction =
-        friction_potential_of(obstacles, start, point, read(line->contacts, i), touches);
+    response.line_friction = friction_potential_of(obstacles, start, point, read(line->contacts, i), touches);
   }
   const double clearance = clearance_of(obstacles, start, point);
   contacts.clearance[i] = clearance;
