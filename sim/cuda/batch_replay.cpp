@@ -187,9 +187,13 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   m.restrictions = arena.take<VertexRestriction>(sizes.most_obstacles > 0 ? size : held);
   m.restriction_of = arena.take<int>(size);
   if (const std::size_t obstacles = number(sizes.most_obstacles); obstacles > 0) {
+    const auto records = [&]<typename Record>(std::size_t layers) -> VertexRecords<Record> {
+      return {arena.take<double>(VertexRecords<Record>::numbers_each * size * layers),
+              static_cast<int>(size)};
+    };
     for (ContactSet& contacts : m.contacts)
-      contacts = {arena.take<int>(size), arena.take<VertexContact>(size),
-                  arena.take<VertexTouch>(size * obstacles), arena.take<double>(size)};
+      contacts = {arena.take<int>(size), records.operator()<VertexContact>(1),
+                  records.operator()<VertexTouch>(obstacles), arena.take<double>(size)};
     m.obstacles = arena.take<MovingObstacle<double>>(obstacles);
     m.own_blocks = arena.take<float>(9 * size);
     m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),

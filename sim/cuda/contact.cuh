@@ -15,24 +15,33 @@ __device__ inline Triple way_at(const float* direction, int i) {
   return {direction[3 * i], direction[3 * i + 1], direction[3 * i + 2]};
 }
 
-/// Moves a trial iterate out of the obstacles, held vertices onto their surface. `contacts`: of the linear
-/// problem, null where there is none yet.
-__device__ __noinline__ void project_to_feasible(const SheetTables& tables, const StepProblem& step,
-                                                 const ContactSet* contacts, Point* positions) {
-  if (step.obstacles.count == 0) return;
-  SurfaceRoom<most_obstacles> room;
+template <int most>
+__device__ __noinline__ void project_vertices(const SheetTables& tables, const StepProblem& step,
+                                              const ContactSet* contacts, Point* positions) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  SurfaceRoom<most> room;
+  VertexTouch touches[most];
   __syncthreads();
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     if (step.held_axes[i] != 0) continue;
     const Triple start = triple(step.start[i]), point = triple(positions[i]);
     Triple place = point;
-    if (contacts != nullptr && contacts->listed[i] != 0)
-      place = feasible_place(step.obstacles, start, contacts->contacts[i], step.touches_of(*contacts, i),
-                             point, room);
-    else if (!(clearance_of(step.obstacles, start, point) >= 0))
-      place = projected_out(step.obstacles, start, nullptr, point, room);
+    if (contacts != nullptr && contacts->listed[i] != 0) {
+      read_touches(*contacts, i, obstacles.count, touches);
+      place = feasible_place(obstacles, start, read(contacts->contacts, i), touches, point, room);
+    } else if (!(clearance_of(obstacles, start, point) >= 0)) {
+      place = projected_out(obstacles, start, nullptr, point, room);
+    }
     positions[i] = {place.x, place.y, place.z, 0};
   }
+}
+
+/// Moves a trial iterate out of the obstacles, held vertices onto their surface. `contacts`: of the linear
+/// problem, null where there is none yet.
+__device__ inline void project_to_feasible(const SheetTables& tables, const StepProblem& step,
+                                           const ContactSet* contacts, Point* positions) {
+  if (step.obstacles.count == 0) return;
+  for_obstacles_of(step, [&](auto most) { project_vertices<most>(tables, step, contacts, positions); });
 }
 
 /// Copies what holds the vertices at an iterate.
@@ -42,8 +51,8 @@ __device__ inline void copy_contacts(const SheetTables& tables, const StepProble
     const int listed = from.listed[i];
     to.listed[i] = listed;
     if (listed == 0) continue;
-    to.contacts[i] = from.contacts[i];
-    for (int k = 0; k < step.obstacles.count; ++k) step.touches_of(to, i)[k] = step.touches_of(from, i)[k];
+    write(read(from.contacts, i), to.contacts, i);
+    for (int k = 0; k < step.obstacles.count; ++k) write(read(from.touches, i, k), to.touches, i, k);
   }
 }
 
@@ -60,12 +69,12 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
   __syncthreads();
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     if (step.held_axes[i] != 0) continue;
-    const bool holds = contacts.listed[i] != 0 && contacts.contacts[i].freedom != Freedom::free;
-    if (!holds) {
+    VertexContact contact;
+    if (contacts.listed[i] != 0) contact = read(contacts.contacts, i);
+    if (contact.freedom == Freedom::free) {
       of_place[i] = -1;
       continue;
     }
-    const VertexContact& contact = contacts.contacts[i];
     VertexRestriction restriction = {i, {}, {}};
     for (int c = 0; c < 3; ++c) {
       for (int r = 0; r < 3; ++r) restriction.free[3 * c + r] = static_cast<float>(contact.free.at(r, c));
@@ -75,8 +84,10 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
     list[at] = restriction;
     of_place[i] = at;
     if (left == nullptr) continue;
+    VertexTouch touches[most_obstacles];
+    read_touches(contacts, i, step.obstacles.count, touches);
     for (int c = 0; c < 3; ++c) {
-      const Triple coupling = friction_coupling(step.obstacles, contact, step.touches_of(contacts, i), c);
+      const Triple coupling = friction_coupling(step.obstacles, contact, touches, c);
       for (int r = 0; r < 3; ++r)
         left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
     }
@@ -93,10 +104,10 @@ __device__ inline void write_own_blocks(const SheetTables& tables, const StepPro
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     Symmetric3 sum;
     if (step.held_axes[i] == 0 && contacts.listed[i] != 0) {
-      const VertexContact& contact = contacts.contacts[i];
+      const VertexContact contact = read(contacts.contacts, i);
       if (contact.freedom == Freedom::slip) sum = restricted(contact.slip_stiffness, contact.free);
       for (int k = 0; k < step.obstacles.count && curved; ++k) {
-        const VertexTouch& touch = step.touches_of(contacts, i)[k];
+        const VertexTouch touch = read(contacts.touches, i, k);
         if (touch.holds) sum = sum - touch.normal_force * square(touch.curvature_direction);
       }
     }
@@ -104,45 +115,56 @@ __device__ inline void write_own_blocks(const SheetTables& tables, const StepPro
   }
 }
 
-/// One exchange of the active set of the linear problem, as exchange_contacts of the CPU; `stuck`: as
-/// hold_touching. `change`: what the direction adds to the forces. Returns whether any vertex changed, to
-/// all.
-__device__ __noinline__ bool exchange_contacts(const SheetTables& tables, const StepProblem& step,
+template <int most>
+__device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const StepProblem& step,
                                                const Iterate& now, const float* direction,
                                                const float* change, bool stuck, const ContactSet& contacts,
                                                float* gradient) {
-  const ObstacleStep<double>& obstacles = step.obstacles;
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   const double reach = stuck ? touching_gap : no_such_side;
-  SurfaceRoom<most_obstacles> room;
+  SurfaceRoom<most> room;
+  VertexTouch touches[most];
   bool any = false;
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     if (step.held_axes[i] != 0) continue;
     const Triple way = way_at(direction, i);
-    VertexTouch* touches = step.touches_of(contacts, i);
+    VertexContact contact;
     if (contacts.listed[i] != 0) {
-      VertexContact contact = contacts.contacts[i];
+      contact = read(contacts.contacts, i);
+      read_touches(contacts, i, obstacles.count, touches);
       const Triple force = force_at(now.force, i);
       if (!stuck && contact.freedom != Freedom::free &&
           release(obstacles, force + way_at(change, i), contact, touches, room)) {
         const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
         for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
       } else if (contact.freedom == Freedom::stick || !hold(obstacles, way, reach, contact, touches)) {
+        // That the surface would have had to pull is noted of vertices that stay as they are, too.
+        write_touches(touches, contacts, i, obstacles.count);
         continue;
       }
-      contacts.contacts[i] = contact;
-      any = true;
-      continue;
+    } else {
+      const double clearance = now.contacts.clearance[i];
+      if (clearance > reach || clearance > norm(way)) continue;
+      find_touches(obstacles, triple(step.start[i]), triple(now.positions[i]), touches);
+      if (!hold(obstacles, way, reach, contact, touches)) continue;
+      contacts.listed[i] = 1;
     }
-    const double clearance = now.contacts.clearance[i];
-    if (clearance > reach || clearance > norm(way)) continue;
-    find_touches(obstacles, triple(step.start[i]), triple(now.positions[i]), touches);
-    VertexContact contact;
-    if (!hold(obstacles, way, reach, contact, touches)) continue;
-    contacts.contacts[i] = contact;
-    contacts.listed[i] = 1;
+    write(contact, contacts.contacts, i);
+    write_touches(touches, contacts, i, obstacles.count);
     any = true;
   }
   return __syncthreads_or(any) != 0;
+}
+
+/// One exchange of the active set of the linear problem, as exchange_contacts of the CPU; `stuck`: as
+/// hold_touching. `change`: what the direction adds to the forces. Returns whether any vertex changed, to
+/// all.
+__device__ inline bool exchange_contacts(const SheetTables& tables, const StepProblem& step,
+                                         const Iterate& now, const float* direction, const float* change,
+                                         bool stuck, const ContactSet& contacts, float* gradient) {
+  return for_obstacles_of(step, [&](auto most) {
+    return exchange_vertices<most>(tables, step, now, direction, change, stuck, contacts, gradient);
+  });
 }
 
 /// What a step says of its contacts.
@@ -153,10 +175,10 @@ struct ContactEnd {
   double work;             ///< of the obstacles on the sheet [J]
 };
 
-__device__ __noinline__ ContactEnd judge_contacts(const SheetTables& tables, const StepProblem& step,
+template <int most>
+__device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, const StepProblem& step,
                                                   const Iterate& end, double* partial) {
-  const ObstacleStep<double>& obstacles = step.obstacles;
-  if (obstacles.count == 0) return {};
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   double complementarity = 0, penetration = 0, start_depth = 0, work[1] = {};
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     const Triple start = triple(step.start[i]), point = triple(end.positions[i]);
@@ -175,7 +197,7 @@ __device__ __noinline__ ContactEnd judge_contacts(const SheetTables& tables, con
     }
     if (axes != 0 || end.contacts.listed[i] == 0) continue;
     for (int k = 0; k < obstacles.count; ++k) {
-      const VertexTouch& touch = step.touches_of(end.contacts, i)[k];
+      const VertexTouch touch = read(end.contacts.touches, i, k);
       if (!touch.holds) continue;
       complementarity = worse_of(complementarity, touch.gap);
       const Triple force = touch.normal_force * touch.normal + touch.friction;
@@ -189,6 +211,12 @@ __device__ __noinline__ ContactEnd judge_contacts(const SheetTables& tables, con
   start_depth = worst_over_team(start_depth, partial);
   __syncthreads();
   return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, work[0]};
+}
+
+__device__ inline ContactEnd judge_contacts(const SheetTables& tables, const StepProblem& step,
+                                            const Iterate& end, double* partial) {
+  if (step.obstacles.count == 0) return {};
+  return for_obstacles_of(step, [&](auto most) { return judge_vertices<most>(tables, step, end, partial); });
 }
 
 }  // namespace flash::sim::cuda

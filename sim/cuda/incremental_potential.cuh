@@ -1,7 +1,10 @@
 #pragma once
+#include <type_traits>
+
 #include "sim/cuda/elastic_gradient.cuh"
 #include "sim/cuda/replay_numbers.h"
 #include "sim/cuda/rigid_turn.cuh"
+#include "sim/cuda/vertex_records.cuh"
 
 namespace flash::sim::cuda {
 
@@ -35,9 +38,6 @@ struct StepProblem {
   __device__ Triple held_part(int i, const Triple& v) const {
     const int axes = held_axes[i];
     return {axes & 1 ? v.x : 0, axes & 2 ? v.y : 0, axes & 4 ? v.z : 0};
-  }
-  __device__ VertexTouch* touches_of(const ContactSet& contacts, int i) const {
-    return contacts.touches + static_cast<long>(i) * obstacles.count;
   }
 };
 
@@ -133,29 +133,59 @@ struct ContactResponse {
   double rounding;                 ///< of the reaction, by that of positions where friction turns [N]
 };
 
+/// The obstacles of a step that has at most so many of them; for one the compiler has no loops to make.
+template <int most>
+__device__ ObstacleStep<double> obstacles_of(const StepProblem& step) {
+  ObstacleStep<double> obstacles = step.obstacles;
+  if constexpr (most == 1) {
+    obstacles.count = 1;
+    obstacles.several = false;
+  }
+  return obstacles;
+}
+
+/// act(std::integral_constant<int, most>) for the fewest obstacles that code is made for: one, or any number.
+template <typename Act>
+__device__ auto for_obstacles_of(const StepProblem& step, const Act& act) {
+  if (step.obstacles.count == 1) return act(std::integral_constant<int, 1>{});
+  return act(std::integral_constant<int, most_obstacles>{});
+}
+
+__device__ inline void read_touches(const ContactSet& contacts, int i, int count, VertexTouch* touches) {
+  for (int k = 0; k < count; ++k) touches[k] = read(contacts.touches, i, k);
+}
+__device__ inline void write_touches(const VertexTouch* touches, const ContactSet& contacts, int i,
+                                     int count) {
+  for (int k = 0; k < count; ++k) write(touches[k], contacts.touches, i, k);
+}
+
 /// Decides what the obstacles do to vertex i, which needs `force`.
+template <int most>
 __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
                                                        const ContactSet* line, int i, const Triple& point,
                                                        const Triple& force) {
   constexpr double epsilon = 2.220446049250313e-16;
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   const Triple start = triple(step.start[i]);
+  VertexTouch touches[most];
   ContactResponse response = {};
-  if (line != nullptr && line->listed[i] != 0)
-    response.line_friction =
-        friction_potential_of(step.obstacles, start, point, line->contacts[i], step.touches_of(*line, i));
-  const double clearance = clearance_of(step.obstacles, start, point);
+  if (line != nullptr && line->listed[i] != 0) {
+    read_touches(*line, i, obstacles.count, touches);
+    response.line_friction = friction_potential_of(obstacles, start, point, read(line->contacts, i), touches);
+  }
+  const double clearance = clearance_of(obstacles, start, point);
   contacts.clearance[i] = clearance;
   contacts.listed[i] = 0;
   if (clearance > touching_gap) return response;
-  VertexTouch* touches = step.touches_of(contacts, i);
-  find_touches(step.obstacles, start, point, touches);
-  SurfaceRoom<most_obstacles> room;
-  const VertexContact contact = decide_contact(step.obstacles, start, point, force, touches, room);
+  find_touches(obstacles, start, point, touches);
+  SurfaceRoom<most> room;
+  const VertexContact contact = decide_contact(obstacles, start, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
-  contacts.contacts[i] = contact;
+  write(contact, contacts.contacts, i);
+  write_touches(touches, contacts, i, obstacles.count);
   contacts.listed[i] = 1;
   response.reaction = contact.reaction;
-  response.friction = friction_potential_of(step.obstacles, start, point, contact, touches);
+  response.friction = friction_potential_of(obstacles, start, point, contact, touches);
   response.rounding = epsilon * norm(point) * norm(contact.slip_stiffness);
   return response;
 }
@@ -190,7 +220,9 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
     Triple reaction = step.held_part(i, own);
     double rounding = 0;
     if (step.obstacles.count > 0 && step.held_axes[i] == 0) {
-      const ContactResponse contact = update_contact(step, at.contacts, line, i, triple(positions[i]), own);
+      const ContactResponse contact = for_obstacles_of(step, [&](auto most) {
+        return update_contact<most>(step, at.contacts, line, i, triple(positions[i]), own);
+      });
       reaction = contact.reaction;
       rounding = contact.rounding;
       sums[2] += contact.friction;

@@ -7,6 +7,7 @@
 #include "sim/cuda/most_obstacles.h"
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_tables.h"
+#include "sim/cuda/vertex_records.h"
 #include "sim/law/vertex_contact.h"
 
 namespace flash::sim::cuda {
@@ -40,10 +41,10 @@ struct FramePose {
 
 /// What obstacles do to the vertices at an iterate, by place.
 struct ContactSet {
-  int* listed;              ///< whether `contacts` and `touches` say anything of a vertex
-  VertexContact* contacts;  ///< only of those
-  VertexTouch* touches;     ///< only of those: one an obstacle of the environment
-  double* clearance;        ///< distance to the nearest obstacle [m]
+  int* listed;                            ///< whether `contacts` and `touches` say anything of a vertex
+  VertexRecords<VertexContact> contacts;  ///< only of those
+  VertexRecords<VertexTouch> touches;     ///< only of those: a layer for each obstacle
+  double* clearance;                      ///< distance to the nearest obstacle [m]
 };
 
 /// A vertex held in some axes at the end of a step.

@@ -69,8 +69,8 @@ def recorded(runs, asset, seed, wrong):
     if wrong == "diagonals":
         mesh = synthetic.FIT + ":alternating_by_row"
     offset = ",".join(f"{draw.gauss(0, 0.003):.5f}" for _ in range(3))
-    recording = runs.synth(name, asset, "--mesh", mesh, *words, "--seed", str(seed), f"--offset={offset}", "--time-offset",
-                           f"{draw.gauss(0, 0.01):.5f}", *synthetic.settings(fixed))
+    recording = runs.synth(name, asset, "--mesh", mesh, *words, "--seed", str(seed), f"--offset-error={offset}",
+                           f"--time-offset-error={draw.gauss(0, 0.01):.5f}", *synthetic.settings(fixed))
     if fresh:
         path = recording / "recording.json"
         record = json.loads(path.read_text())
@@ -195,7 +195,7 @@ def main():
     parser.add_argument("--seed", type=int, default=9001, help="of the first twin; the others follow")
     parser.add_argument("--runs", type=int, default=20, help="twins of each half")
     parser.add_argument("--bounds", type=int, help="twins whose Cramer-Rao widths are computed; without it, all")
-    parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--jobs", type=int, default=2, help="searches at a time; the same command again goes on where it stopped")
     options = parser.parse_args()
     runs = kept.Runs(options.sysid, options.out)
     asset = synthetic.write_asset(options.out)
@@ -203,7 +203,7 @@ def main():
     jobs = [(seed, None) for seed in seeds] + [(seed, WRONG[i % len(WRONG)]) for i, seed in enumerate(seeds)]
     jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair]
     found = [searched(runs, asset, *jobs[0])]  # fills the store
-    with concurrent.futures.ThreadPoolExecutor(options.workers) as pool:
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         found += pool.map(lambda job: searched(runs, asset, *job), jobs[1:])
         right = [twin for twin in found if not twin["wrong"]]
         bounded = right[:options.bounds]
