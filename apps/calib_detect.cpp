@@ -6,6 +6,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "calib/detect/plane_residual.h"
 #include "data/atomic_file.h"
 #include "data/json_reader.h"
 #include "data/writable.h"
@@ -19,19 +20,23 @@ struct DetectOptions {
   std::string out;
 };
 
-nlohmann::ordered_json reading_json(const calib::CornerReading& reading) {
+/// posed: there are intrinsics, and with them poses that corners can be held against. Without, a flat target
+/// is.
+nlohmann::ordered_json reading_json(const calib::CornerReading& reading,
+                                    const Eigen::Matrix3Xd& target_points, bool posed) {
   const calib::Observation& observation = reading.observation;
   nlohmann::ordered_json pixels = nlohmann::json::array();
   for (Eigen::Index i = 0; i < observation.pixels.cols(); ++i)
     pixels.push_back({observation.pixels(0, i), observation.pixels(1, i)});
   return {{"refiner", reading.refiner},
-          {"pose_rms_px", observation.pose_rms},
+          {posed ? "pose_rms_px" : "plane_rms_px",
+           posed ? observation.pose_rms : calib::plane_residual(target_points, observation)},
           {"points", observation.points},
           {"pixels", std::move(pixels)}};
 }
 
 nlohmann::ordered_json result_json(const std::vector<calib::Detection>& detections,
-                                   const Eigen::Matrix3Xd& target_points) {
+                                   const Eigen::Matrix3Xd& target_points, bool posed) {
   nlohmann::ordered_json json;
   json["schema"] = "flash-detections/1";
   json["target_points"] = nlohmann::json::array();
@@ -47,28 +52,32 @@ nlohmann::ordered_json result_json(const std::vector<calib::Detection>& detectio
     if (!detection.reason.empty()) view["reason"] = detection.reason;
     view["readings"] = nlohmann::json::array();
     for (const calib::CornerReading& reading : detection.readings)
-      view["readings"].push_back(reading_json(reading));
+      view["readings"].push_back(reading_json(reading, target_points, posed));
     json["views"].push_back(std::move(view));
   }
   return json;
 }
 
-/// posed: there are intrinsics, and with them poses that corners can be held against.
-void print_table(const std::vector<calib::Detection>& detections, bool posed) {
+void print_table(const std::vector<calib::Detection>& detections, const Eigen::Matrix3Xd& target_points,
+                 bool posed) {
   std::size_t found = 0;
   for (const calib::Detection& detection : detections) {
     found += detection.readings.empty() ? 0 : 1;
     std::printf("%-24s", detection.image.c_str());
     if (detection.readings.empty()) std::printf("  %s", detection.reason.c_str());
     for (const calib::CornerReading& reading : detection.readings) {
-      std::printf("  %s", reading.refiner.c_str());
-      if (posed) std::printf(" %.3f px", reading.observation.pose_rms);
-      std::printf(" (%zu)", reading.observation.points.size());
+      const calib::Observation& observation = reading.observation;
+      std::printf("  %s %.3f px (%zu)", reading.refiner.c_str(),
+                  posed ? observation.pose_rms : calib::plane_residual(target_points, observation),
+                  observation.points.size());
     }
     std::printf("\n");
   }
   std::printf("%zu of %zu pictures show the target\n", found, detections.size());
-  if (!posed) return;
+  if (!posed) {
+    std::printf("px: from a flat target through a lens that bends nothing; with intrinsics, from its pose\n");
+    return;
+  }
   for (const calib::RefinerScore& score : calib::rank_refiners(detections))
     std::printf("%-16s %.3f px rms a corner, %d views\n", score.refiner.c_str(), score.rms, score.views);
 }
@@ -81,12 +90,14 @@ int run_detect(const DetectOptions& options) {
   without_warnings.quiet = true;
   const std::vector<calib::Detection> detections =
       detect_all(dataset, target, options.dataset, without_warnings);
-  const std::string text = data::format_json(result_json(detections, calib::target_points(target))) + '\n';
+  const Eigen::Matrix3Xd points = calib::target_points(target);
+  const bool posed = dataset.camera.has_value();
+  const std::string text = data::format_json(result_json(detections, points, posed)) + '\n';
   if (!options.out.empty()) data::write_atomically(options.out, text);
   if (options.common.json)
     std::cout << text;
   else
-    print_table(detections, dataset.camera.has_value());
+    print_table(detections, points, posed);
   return exit_done;
 }
 

@@ -171,9 +171,10 @@ void fit(const GreyImage& image, const Rectifier& rectifier, Board& board) {
   }
 }
 
-Board find_board(const GreyImage& image, const Target& target) {
+Board find_board(const GreyImage& image, const Target& target, Search search) {
   Corners classic = find_classic(image, target), sectors = find_sectors(image, target);
-  if (classic.empty() && sectors.empty()) sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
+  if (search == Search::thorough && classic.empty() && sectors.empty())
+    sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
   Board board{.grids = {}, .by_sectors = !sectors.empty()};
   for (Corners* corners : {&classic, &sectors}) {
     if (corners->empty()) continue;
@@ -185,11 +186,11 @@ Board find_board(const GreyImage& image, const Target& target) {
 
 }  // namespace
 
-Finder chessboard_finder(const Target& target, const Rectifier& rectifier) {
-  return [target, &rectifier](const GreyImage& image) {
+Finder chessboard_finder(const Target& target, const Rectifier& rectifier, Search search) {
+  return [target, &rectifier, search](const GreyImage& image) {
     const auto count = static_cast<std::size_t>(target.columns * target.rows);
     Found found;
-    Board board = find_board(image, target);
+    Board board = find_board(image, target, search);
     if (board.grids.empty()) {
       found.reason = "no chessboard of " + std::to_string(target.columns) + " x " +
                      std::to_string(target.rows) + " inner corners";

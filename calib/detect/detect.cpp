@@ -1,10 +1,7 @@
 #include "calib/detect/detect.h"
 
 #include <algorithm>
-#include <atomic>
-#include <exception>
 #include <mutex>
-#include <thread>
 #include <tuple>
 
 #include "calib/detect/detection_cache.h"
@@ -12,12 +9,15 @@
 #include "calib/detect/planar_pose.h"
 #include "data/error.h"
 #include "data/median.h"
+#include "data/parallel.h"
 #include "data/text.h"
 
 namespace flash::calib {
 namespace {
 
 constexpr double kAlwaysGood = 2;  // small markers, seen aslant, vary by that much [px]
+constexpr std::size_t kFirstPictures =
+    4;  // where none of them shows the target, another one is tried before the rest
 
 Observation observe(const Frame& frame, const Sighting& sighting) {
   Observation observation;
@@ -136,7 +136,7 @@ std::string other_board(const Dataset& dataset, const Target& target, const Rect
     other.columns += columns;
     other.rows += rows;
     if (other.columns < 3 || other.rows < 3) continue;
-    const Finder finder = make_finder(other, rectifier);
+    const Finder finder = chessboard_finder(other, rectifier, Search::quick);
     for (std::size_t i = 0; i < std::min(kPictures, dataset.frames.size()); ++i) try {
         if (find_in(dataset.frames[i], dataset, rectifier, finder).sightings.empty()) continue;
         const std::string size = std::to_string(other.columns) + "x" + std::to_string(other.rows);
@@ -163,53 +163,57 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
                               const std::function<void(int, int)>& progress) {
   const Rectifier rectifier = make_rectifier(dataset);
   const Eigen::Matrix3Xd points = target_points(target);
-  const int count = static_cast<int>(dataset.frames.size());
-  std::vector<Detection> detections(dataset.frames.size());
+  const std::size_t count = dataset.frames.size();
+  std::vector<Detection> detections(count);
   const DetectionCache cache(settings.cache, dataset.camera, target);
 
-  std::atomic<int> next{0};
   std::mutex mutex;
+  std::vector<Finder> idle;  // a finder serves one thread at a time
   int done = 0;
-  std::exception_ptr failure;
-  const auto work = [&] {
-    try {
-      const Finder finder = make_finder(target, rectifier);
-      for (int k = next++; k < count; k = next++) {
-        const Frame& frame = dataset.frames[static_cast<std::size_t>(k)];
-        Detection& detection = detections[static_cast<std::size_t>(k)];
-        const Found found =
-            find_or_say(frame, cache, [&] { return find_in(frame, dataset, rectifier, finder); });
-        detection.image = frame.name;
-        detection.reason = found.reason;
-        for (const Sighting& sighting : found.sightings)
-          detection.readings.push_back({sighting.refiner, observe(frame, sighting)});
-        if (dataset.camera && detection.reason.empty())
-          add_poses(*dataset.camera, points, settings.largest_rms, detection);
-        const std::lock_guard lock(mutex);
-        if (progress) progress(++done, count);
-      }
-    } catch (...) {
-      const std::lock_guard lock(mutex);
-      failure = std::current_exception();
-      next = count;
-    }
+  const auto take_finder = [&] {
+    const std::lock_guard lock(mutex);
+    if (idle.empty()) return make_finder(target, rectifier);
+    Finder finder = std::move(idle.back());
+    idle.pop_back();
+    return finder;
   };
-  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const int threads = std::clamp(settings.threads > 0 ? settings.threads : processors, 1, std::max(1, count));
-  std::vector<std::thread> pool;
-  for (int i = 1; i < threads; ++i) pool.emplace_back(work);
-  work();
-  for (std::thread& thread : pool) thread.join();
-  if (failure) std::rethrow_exception(failure);
-
-  drop_misfits(settings, detections);
-  const bool none = std::all_of(detections.begin(), detections.end(),
-                                [](const Detection& detection) { return detection.readings.empty(); });
-  if (none)
+  const auto look_at = [&](std::size_t k) {
+    const Frame& frame = dataset.frames[k];
+    Finder finder = take_finder();
+    const Found found = find_or_say(frame, cache, [&] { return find_in(frame, dataset, rectifier, finder); });
+    Detection& detection = detections[k];
+    detection.image = frame.name;
+    detection.reason = found.reason;
+    for (const Sighting& sighting : found.sightings)
+      detection.readings.push_back({sighting.refiner, observe(frame, sighting)});
+    if (dataset.camera && detection.reason.empty())
+      add_poses(*dataset.camera, points, settings.largest_rms, detection);
+    const std::lock_guard lock(mutex);
+    idle.push_back(std::move(finder));
+    if (progress) progress(++done, static_cast<int>(count));
+  };
+  const auto look_at_range = [&](std::size_t first, std::size_t last) {
+    data::for_each_in_parallel(last - first, settings.threads, [&](std::size_t k) { look_at(first + k); });
+  };
+  const auto none_before = [&](std::size_t last) {
+    return std::all_of(detections.begin(), detections.begin() + static_cast<std::ptrdiff_t>(last),
+                       [](const Detection& detection) { return detection.readings.empty(); });
+  };
+  const auto refuse = [&](const std::string& pictures, const std::string& other) {
     throw data::InputError(
-        dataset.source + ": the target is seen in none of " + std::to_string(count) + " pictures; " +
-        (detections.empty() ? "" : detections.front().image + ": " + detections.front().reason) +
-        other_board(dataset, target, rectifier));
+        dataset.source + ": the target is seen in none of " + pictures + " pictures; " +
+        (detections.empty() ? "" : detections.front().image + ": " + detections.front().reason) + other);
+  };
+
+  const std::size_t first = std::min(count, kFirstPictures);
+  look_at_range(0, first);
+  if (first < count && none_before(first)) {
+    const std::string other = other_board(dataset, target, rectifier);
+    if (!other.empty()) refuse("the first " + std::to_string(first), other);
+  }
+  look_at_range(first, count);
+  drop_misfits(settings, detections);
+  if (none_before(count)) refuse(std::to_string(count), other_board(dataset, target, rectifier));
   return detections;
 }
 

@@ -33,8 +33,11 @@ inline const char* const kImageModel = "image_model";
 
 Finder make_finder(const Target& target, const Rectifier& rectifier);
 
+/// How long a board is looked for where it is not seen at once: thorough takes a second a picture.
+enum class Search { thorough, quick };
+
 /// The kinds behind make_finder.
-Finder chessboard_finder(const Target& target, const Rectifier& rectifier);
+Finder chessboard_finder(const Target& target, const Rectifier& rectifier, Search search = Search::thorough);
 Finder aruco_finder(const Target& target, const Rectifier& rectifier);  ///< aruco and aruco_grid
 Finder charuco_finder(const Target& target, const Rectifier& rectifier);
 Finder apriltag_finder(const Target& target, const Rectifier& rectifier);  ///< apriltag and aprilgrid

@@ -17,6 +17,7 @@ struct RenderSettings {
   double noise = 2;                ///< of a pixel, sigma
   int samples = 16;                ///< a side of a pixel that an edge crosses
   bool double_border = false;      ///< aprilgrid as Kalibr prints it
+  double dots = 0;  ///< a projector's dots, fixed to the camera: light on the dot over other light
 };
 
 /// Draws a target as a camera sees it. The print is described by its own words here, not by target_points:

@@ -228,6 +228,7 @@ def traps():
     yield Trap("half a target", "in_hand", option("--target", "chessboard:9x6"), 2, "chessboard:COLUMNSxROWS:SQUARE")
     yield Trap("a knock half-way", "in_hand", poses_changed(knocked), 0, "the camera moved by", "before 008.png", used=8)
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
+    yield Trap("a misspelt setup", "in_hand", option("--setup", "eye-in-hnad"), 2, "--setup", "eye-in-hand,eye-to-hand")
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")
     yield Trap("one axis", "one_axis", nothing, 2, "rotations turn about one axis only", "cannot be determined")
     yield Trap("flipped boards", "flipped", nothing, 0, "numbered from its other end", used=16)

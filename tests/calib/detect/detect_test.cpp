@@ -15,9 +15,10 @@ namespace flash::calib {
 namespace {
 
 /// Rendered pictures in a folder, with poses and intrinsics.
-Dataset write_set(const data::TemporaryFolder& folder, const Target& target, int views) {
+Dataset write_set(const data::TemporaryFolder& folder, const Target& target, int views,
+                  const RenderSettings& settings = {}) {
   const data::CameraIntrinsics camera = small_camera();
-  const Renderer renderer(target, camera);
+  const Renderer renderer(target, camera, settings);
   std::mt19937 random(5);
   std::string poses;
   for (int v = 0; v < views; ++v) {
