@@ -172,9 +172,11 @@ void fit(const GreyImage& image, const Rectifier& rectifier, Board& board) {
 }
 
 Board find_board(const GreyImage& image, const Target& target, Search search) {
-  Corners classic = find_classic(image, target), sectors = find_sectors(image, target);
-  if (search == Search::thorough && classic.empty() && sectors.empty())
-    sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
+  Corners classic, sectors = find_sectors(image, target);
+  if (search == Search::thorough) {
+    classic = find_classic(image, target);  // takes seconds where there is no such board
+    if (classic.empty() && sectors.empty()) sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
+  }
   Board board{.grids = {}, .by_sectors = !sectors.empty()};
   for (Corners* corners : {&classic, &sectors}) {
     if (corners->empty()) continue;

@@ -1,7 +1,9 @@
 #include "calib/detect/detect.h"
 
 #include <algorithm>
+#include <atomic>
 #include <mutex>
+#include <optional>
 #include <tuple>
 
 #include "calib/detect/detection_cache.h"
@@ -125,10 +127,29 @@ Rectifier make_rectifier(const Dataset& dataset) {
   return {width, height};
 }
 
-/// Where a board of a like number of corners is seen: people count squares, or outer corners. Else empty.
-std::string other_board(const Dataset& dataset, const Target& target, const Rectifier& rectifier) {
+/// Whether a quick search sees the chessboard in any of the first `count` pictures.
+bool is_seen(const Dataset& dataset, const Target& board, const Rectifier& rectifier, std::size_t count,
+             int threads) {
+  std::atomic<bool> seen = false;
+  data::for_each_in_parallel(std::min(count, dataset.frames.size()), threads, [&](std::size_t i) {
+    if (seen) return;
+    try {
+      const Finder finder = chessboard_finder(board, rectifier, Search::quick);
+      if (!find_in(dataset.frames[i], dataset, rectifier, finder).sightings.empty()) seen = true;
+    } catch (const data::InputError&) {
+      return;  // a picture that cannot be read shows nothing
+    }
+  });
+  return seen;
+}
+
+/// The board that is seen where the stated one is not: people count squares, or outer corners. This is asked
+/// before a thorough search, which takes seconds for every picture that does not show the target.
+std::optional<Target> miscounted_board(const Dataset& dataset, const Target& target,
+                                       const Rectifier& rectifier, int threads) {
   if (target.kind != TargetKind::chessboard) return {};
-  constexpr std::size_t kPictures = 3;
+  constexpr std::size_t kPictures = 4;
+  if (is_seen(dataset, target, rectifier, kPictures, threads)) return {};
   // Larger ones first: a smaller one may be a part of the board.
   constexpr std::pair<int, int> kOff[] = {{1, 1}, {1, 0}, {0, 1}, {0, -1}, {-1, 0}, {-1, -1}, {-2, -2}};
   for (const auto& [columns, rows] : kOff) {
@@ -136,16 +157,10 @@ std::string other_board(const Dataset& dataset, const Target& target, const Rect
     other.columns += columns;
     other.rows += rows;
     if (other.columns < 3 || other.rows < 3) continue;
-    const Finder finder = chessboard_finder(other, rectifier, Search::quick);
-    for (std::size_t i = 0; i < std::min(kPictures, dataset.frames.size()); ++i) try {
-        if (find_in(dataset.frames[i], dataset, rectifier, finder).sightings.empty()) continue;
-        const std::string size = std::to_string(other.columns) + "x" + std::to_string(other.rows);
-        return "; but it shows one of " + size +
-               " inner corners, where four squares meet: --target chessboard:" + size + ":" +
-               data::format_short(target.spacing);
-      } catch (const data::InputError&) {
-        continue;  // a picture that cannot be read shows nothing
-      }
+    if (!is_seen(dataset, other, rectifier, kPictures, threads)) continue;
+    // Boards that the pictures cut off look smaller: all of them have to.
+    if (is_seen(dataset, target, rectifier, dataset.frames.size(), threads)) return {};
+    return other;
   }
   return {};
 }
@@ -166,6 +181,13 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
   const std::size_t count = dataset.frames.size();
   std::vector<Detection> detections(count);
   const DetectionCache cache(settings.cache, dataset.camera, target);
+  if (const auto board = miscounted_board(dataset, target, rectifier, settings.threads)) {
+    const std::string size = std::to_string(board->columns) + "x" + std::to_string(board->rows);
+    throw data::InputError(dataset.source + ": the target is seen in none of " + std::to_string(count) +
+                           " pictures; but they show one of " + size +
+                           " inner corners, where four squares meet: --target chessboard:" + size + ":" +
+                           data::format_short(target.spacing));
+  }
 
   std::mutex mutex;
   std::vector<Finder> idle;  // a finder serves one thread at a time
@@ -192,28 +214,15 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
     idle.push_back(std::move(finder));
     if (progress) progress(++done, static_cast<int>(count));
   };
-  const auto look_at_range = [&](std::size_t first, std::size_t last) {
-    data::for_each_in_parallel(last - first, settings.threads, [&](std::size_t k) { look_at(first + k); });
-  };
-  const auto none_before = [&](std::size_t last) {
-    return std::all_of(detections.begin(), detections.begin() + static_cast<std::ptrdiff_t>(last),
-                       [](const Detection& detection) { return detection.readings.empty(); });
-  };
-  const auto refuse = [&](const std::string& pictures, const std::string& other) {
-    throw data::InputError(
-        dataset.source + ": the target is seen in none of " + pictures + " pictures; " +
-        (detections.empty() ? "" : detections.front().image + ": " + detections.front().reason) + other);
-  };
+  data::for_each_in_parallel(count, settings.threads, look_at);
 
-  const std::size_t first = std::min(count, kFirstPictures);
-  look_at_range(0, first);
-  if (first < count && none_before(first)) {
-    const std::string other = other_board(dataset, target, rectifier);
-    if (!other.empty()) refuse("the first " + std::to_string(first), other);
-  }
-  look_at_range(first, count);
   drop_misfits(settings, detections);
-  if (none_before(count)) refuse(std::to_string(count), other_board(dataset, target, rectifier));
+  const bool none = std::all_of(detections.begin(), detections.end(),
+                                [](const Detection& detection) { return detection.readings.empty(); });
+  if (none)
+    throw data::InputError(dataset.source + ": the target is seen in none of " + std::to_string(count) +
+                           " pictures" +
+                           (count == 0 ? "" : "; " + detections[0].image + ": " + detections[0].reason));
   return detections;
 }
 

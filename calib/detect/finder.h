@@ -33,7 +33,7 @@ inline const char* const kImageModel = "image_model";
 
 Finder make_finder(const Target& target, const Rectifier& rectifier);
 
-/// How long a board is looked for where it is not seen at once: thorough takes a second a picture.
+/// How long a board is looked for where it is not seen at once: thorough takes seconds a picture.
 enum class Search { thorough, quick };
 
 /// The kinds behind make_finder.

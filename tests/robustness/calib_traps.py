@@ -202,7 +202,7 @@ def traps():
                    "the target is 0.1")
         yield Trap(f"{other}: board transposed", sound, option("--target", "chessboard:6x9:0.025"), 0, used=16)
         yield Trap(f"{other}: outer corners", sound, option("--target", "chessboard:11x8:0.025"), 2,
-                   "shows one of 9x6 inner corners")
+                   "show one of 9x6 inner corners")
         yield Trap(f"{other}: angles as they should be", sound, as_angles("rx,ry,rz", 1), 0, used=16)
         yield Trap(f"{other}: degrees for radians", sound, as_angles("rx,ry,rz", math.degrees(1)), 2, "degrees?")
         yield Trap(f"{other}: radians for degrees", sound, as_angles("rx_deg,ry_deg,rz_deg", 1), 2,

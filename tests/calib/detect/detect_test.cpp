@@ -119,11 +119,24 @@ TEST(Detect, BoardsCountedOtherwiseAreNamedByTheirInnerCorners) {
   // Squares; corners with the outer ones; one less.
   for (const char* counted : {"chessboard:8x6:0.03", "chessboard:9x7:0.03", "chessboard:6x5:0.03"}) {
     const std::string message = data::input_error_of([&] { detect(dataset, parse_target(counted)); });
-    EXPECT_NE(message.find("shows one of 7x5 inner corners, where four squares meet: --target "
+    EXPECT_NE(message.find("show one of 7x5 inner corners, where four squares meet: --target "
                            "chessboard:7x5:0.03"),
               std::string::npos)
         << message;
   }
+}
+
+// A board that is cut off looks like one with a row less.
+TEST(Detect, BoardsThatTheFirstPicturesCutOffAreFoundInTheRest) {
+  const data::TemporaryFolder folder, cut;
+  const Target target = parse_target("chessboard:7x5:0.03");
+  const Dataset dataset = write_set(folder, target, 5);
+  write_set(cut, parse_target("chessboard:7x4:0.03"), 4);
+  for (const char* picture : {"images/0.png", "images/1.png", "images/2.png", "images/3.png"})
+    std::filesystem::rename(cut / picture, folder / picture);
+  const std::vector<Detection> detections = detect(dataset, target);
+  EXPECT_TRUE(detections[0].readings.empty());
+  EXPECT_FALSE(detections[4].readings.empty());
 }
 
 TEST(Detect, TransposedBoardIsTheSameBoard) {
