@@ -88,7 +88,7 @@ deep-starts: configure-test  ## Simulate SCENES random sheets that start across 
 reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py
 	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \
 	  --out $(BUILD)/reference
-	$(PYTHON) $(REFERENCE)/compare.py $(BUILD)/reference --all --except solids
+	$(PYTHON) $(REFERENCE)/compare.py $(BUILD)/reference --all
 
 fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s under address and undefined-behaviour sanitizers
 	cmake --preset fuzz

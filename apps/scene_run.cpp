@@ -21,6 +21,7 @@
 #include "sim/newton/solver.h"
 #include "sim/oracle/projective.h"
 #include "sim/scene/scene.h"
+#include "sim/scene/solid.h"
 
 namespace flash::sim {
 namespace {
@@ -31,6 +32,9 @@ using Eigen::Vector3d;
 using Stepper = std::function<StepReport(Environment&)>;
 
 Stepper make_stepper(const data::SceneSolver& solver, double time_step, const SceneBody& body) {
+  if (solver.integrator != "newton" && has_solids(body.sheet))
+    throw data::InputError("solver.type " + solver.integrator + ": " + body.name +
+                           " is a solid (element_type TETRAHEDRON), which type newton simulates alone");
   if (solver.integrator == "newton") {
     SolverSettings settings;
     settings.time_step = time_step;
@@ -61,7 +65,7 @@ data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
   Eigen::Index vertices = 0, triangles = 0;
   for (const SceneBody& body : bodies) {
     const data::Points& x = body.environment.state.positions;
-    const data::Triangles& t = body.sheet.rest.triangles;
+    const data::Triangles t = visible_triangles(body.sheet);
     mesh.vertices.conservativeResize(vertices + x.rows(), 3);
     mesh.triangles.conservativeResize(triangles + t.rows(), 3);
     mesh.vertices.bottomRows(x.rows()) = x;
@@ -109,13 +113,14 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
     sum.kinetic += r.kinetic;
     sum.membrane += r.membrane;
     sum.bending += r.bending;
+    sum.solid += r.solid;
     sum.gravitational += r.gravitational;
     converged = converged && r.converged;
   }
   std::string row = std::to_string(step) + "," + time_text(time);
   row += "," + data::format_number(largest.residual) + "," + std::to_string(sum.iterations);
   for (double value : {largest.penetration_max, largest.complementarity, sum.kinetic,
-                       sum.membrane + sum.bending, sum.gravitational})
+                       sum.membrane + sum.bending + sum.solid, sum.gravitational})
     row += "," + data::format_number(value);
   row += converged ? ",1" : ",0";
   return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "," +
@@ -169,6 +174,20 @@ struct Deepest {
            data::format_short(time) + " s";
   }
 };
+
+/// Of bodies whose mesh is stiffer than their material.
+std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) {
+  std::vector<std::string> warnings;
+  for (const SceneBody& body : bodies)
+    for (const auto& [number, solid] : body.environment.solids)
+      if (solid.poissons_ratio >= locking_poissons_ratio)
+        warnings.push_back(body.name +
+                           ": linear tetrahedra lock at nu = " + data::format_short(solid.poissons_ratio) +
+                           ", from " + data::format_short(locking_poissons_ratio) +
+                           " on: bent, they are stiffer than their E says, the more the coarser; compare "
+                           "with a mesh of half the edge (docs/theory.md)");
+  return warnings;
+}
 
 constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
 
@@ -309,6 +328,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     throw;
   }
   write_tables();
+  summary.warnings = locking_warnings(bodies);
   for (std::size_t b = 0; b < bodies.size() && !summary.interrupted && summary.steps > 0; ++b)
     for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
       summary.warnings.push_back(bodies[b].name + ": " + warning);

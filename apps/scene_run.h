@@ -24,8 +24,8 @@ struct SceneSummary {
   double last_motion = 0;  ///< quasistatic: of the vertex that moved farthest in the last step [m]
   bool at_rest = true;     ///< quasistatic: whether that is below the scene's bound
   std::vector<std::string> notices;
-  std::vector<std::string>
-      warnings;  ///< of holds, and of vertices held inside an obstacle or that start there
+  std::vector<std::string> warnings;  ///< of solids that lock, of holds, and of vertices held inside an
+                                      ///< obstacle or that start there
 };
 
 struct SceneRun {

@@ -22,7 +22,8 @@ constexpr std::array kConstitutiveNames = {std::pair{Constitutive::tri_arap, "TR
                                            std::pair{Constitutive::tri_neohookean, "TRI_NEOHOOKEAN"},
                                            std::pair{Constitutive::tet_arap, "TET_ARAP"},
                                            std::pair{Constitutive::tet_corotated, "TET_COROTATED"},
-                                           std::pair{Constitutive::tet_neohookean, "TET_NEOHOOKEAN"}};
+                                           std::pair{Constitutive::tet_neohookean, "TET_NEOHOOKEAN"},
+                                           std::pair{Constitutive::tet_neohookean_log, "TET_NEOHOOKEAN_LOG"}};
 
 constexpr std::array kBendingModelNames = {std::pair{BendingModel::plate, "plate"},
                                            std::pair{BendingModel::isometric, "isometric"},
@@ -48,7 +49,7 @@ auto value_in(const Names& names, const std::string& name, const std::string& so
 
 bool is_solid(Constitutive constitutive) {
   return constitutive == Constitutive::tet_arap || constitutive == Constitutive::tet_corotated ||
-         constitutive == Constitutive::tet_neohookean;
+         constitutive == Constitutive::tet_neohookean || constitutive == Constitutive::tet_neohookean_log;
 }
 
 double plate_rigidity(double youngs_modulus, double poissons_ratio, double thickness) {
@@ -254,13 +255,20 @@ ResolvedSolid resolve_solid(const Asset& asset, double rest_volume) {
   if (asset.element_type != ElementType::tetrahedron)
     throw input_error(asset.source, "element_type", "found TRIANGLE, expected TETRAHEDRON: a solid");
   ResolvedSolid solid;
-  solid.youngs_modulus = asset.young;
-  solid.poissons_ratio = asset.poisson;
-  solid.density = asset.density ? *asset.density
-                                : (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_volume;
-  solid.notices.push_back(asset.source + ": E = " + format_short(solid.youngs_modulus) + " Pa, nu = " +
-                          format_short(solid.poissons_ratio) + ", density = " + format_short(solid.density) +
-                          " kg/m^3, mass = " + format_short(solid.density * rest_volume) + " kg");
+  SolidMaterial& m = solid.material;
+  m.constitutive = asset.constitutive;
+  m.youngs_modulus = asset.young;
+  m.poissons_ratio = asset.poisson;
+  m.density = asset.density ? *asset.density
+                            : (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_volume;
+  m.friction = asset.friction;
+  m.air_drag = asset.air_drag;
+  m.stiffness_damping = asset.stiffness_damping;
+  solid.uniform_vertex_mass = asset.object_mass.has_value();
+  solid.notices.push_back(asset.source + ": E = " + format_short(m.youngs_modulus) + " Pa, nu = " +
+                          format_short(m.poissons_ratio) + ", density = " + format_short(m.density) +
+                          " kg/m^3, mass = " + format_short(m.density * rest_volume) + " kg" +
+                          (asset.object_mass ? " (obj_mass, the total, spread evenly over vertices)" : ""));
   return solid;
 }
 
@@ -322,22 +330,44 @@ Asset asset_from_sheet(const SheetMaterial& material, std::optional<double> thic
   return asset;
 }
 
-TriangleMesh load_rest_mesh(const Asset& asset) {
+namespace {
+
+void check_size(const Asset& asset, const Points& vertices) {
   constexpr double kLargestSize = 20.0;  // as of recordings: above it, lengths are taken for millimetres [m]
-  TriangleMesh mesh = is_mesh_spec(asset.mesh) ? parse_mesh_spec(asset.mesh, asset.source, "mesh")
-                                               : load_triangle_mesh(asset.mesh);
-  const double size = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).norm();
+  const double size = (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
   if (size > kLargestSize)
     throw input_error(
         asset.source, "mesh",
         "is " + format_short(size) + " m across, expected metres (millimetres read as metres?)");
+}
+
+void transform(const Asset& asset, Points& vertices) {
+  vertices *= rotation_from_degrees(asset.rotation_degrees).transpose();
+  vertices.rowwise() += asset.translation.transpose();
+}
+
+}  // namespace
+
+TriangleMesh load_rest_mesh(const Asset& asset) {
+  TriangleMesh mesh = is_mesh_spec(asset.mesh) ? parse_mesh_spec(asset.mesh, asset.source, "mesh")
+                                               : load_triangle_mesh(asset.mesh);
+  check_size(asset, mesh.vertices);
   return mesh;
 }
 
 TriangleMesh load_asset_mesh(const Asset& asset) {
   TriangleMesh mesh = load_rest_mesh(asset);
-  mesh.vertices *= rotation_from_degrees(asset.rotation_degrees).transpose();
-  mesh.vertices.rowwise() += asset.translation.transpose();
+  transform(asset, mesh.vertices);
+  return mesh;
+}
+
+TetMesh load_asset_tet_mesh(const Asset& asset) {
+  if (is_mesh_spec(asset.mesh))
+    throw input_error(asset.source, "mesh",
+                      "found \"" + asset.mesh + "\", expected a .vtk or .tet file of tetrahedra");
+  TetMesh mesh = load_tet_mesh(asset.mesh);
+  check_size(asset, mesh.vertices);
+  transform(asset, mesh.vertices);
   return mesh;
 }
 

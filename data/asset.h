@@ -69,13 +69,14 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area);
 Asset asset_from_sheet(const SheetMaterial& material, std::optional<double> thickness,
                        const std::string& mesh);
 
-/// Volume of a solid decides its mass; the material is E [Pa], nu, density.
+/// What was understood of a solid, and the sentences that say so.
 struct ResolvedSolid {
-  double youngs_modulus = 0.0;  ///< [Pa]
-  double poissons_ratio = 0.0;
-  double density = 0.0;  ///< [kg/m^3]
+  SolidMaterial material;
+  bool uniform_vertex_mass = false;  ///< obj_mass is spread evenly over vertices, not by volume
   std::vector<std::string> notices;
 };
+
+/// rest_volume: of the solid [m^3]. Throws InputError for triangles.
 ResolvedSolid resolve_solid(const Asset& asset, double rest_volume);
 
 /// The asset's triangle mesh. Throws InputError where it is so large that it must be in millimetres.
@@ -83,6 +84,9 @@ TriangleMesh load_rest_mesh(const Asset& asset);
 
 /// The asset's triangle mesh, moved by its transformation.
 TriangleMesh load_asset_mesh(const Asset& asset);
+
+/// The asset's tetrahedra, moved likewise. Throws InputError as load_rest_mesh does.
+TetMesh load_asset_tet_mesh(const Asset& asset);
 
 /// Rotation about fixed x, then y, then z [deg], then translation.
 Eigen::Matrix3d rotation_from_degrees(const Eigen::Vector3d& degrees);

@@ -9,7 +9,8 @@ enum class Constitutive {
   tri_neohookean,
   tet_arap,
   tet_corotated,
-  tet_neohookean
+  tet_neohookean,
+  tet_neohookean_log
 };
 
 /// How curvature is measured; `plate` (Morley) gives D and nu on any flat mesh, the others are for parity.
@@ -28,6 +29,19 @@ struct SheetMaterial {
   double stiffness_damping = 0.0;     ///< Rayleigh, stiffness-proportional [s]
 
   bool operator==(const SheetMaterial&) const = default;
+};
+
+/// A body of tetrahedra as the simulation sees it.
+struct SolidMaterial {
+  Constitutive constitutive = Constitutive::tet_neohookean;
+  double youngs_modulus = 1e5;     ///< E at small strains [Pa]
+  double poissons_ratio = 0.3;     ///< at small strains, in (-1, 1/2)
+  double density = 1000.0;         ///< [kg/m^3]
+  double friction = 0.3;           ///< Coulomb coefficient against the table
+  double air_drag = 0.0;           ///< mass-proportional damping [1/s]
+  double stiffness_damping = 0.0;  ///< Rayleigh, stiffness-proportional [s]
+
+  bool operator==(const SolidMaterial&) const = default;
 };
 
 }  // namespace flash::data

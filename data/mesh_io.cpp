@@ -13,6 +13,7 @@
 #include "data/pcd.h"
 #include "data/ply.h"
 #include "data/stl.h"
+#include "data/tet_faces.h"
 #include "data/text.h"
 #include "data/vtk.h"
 
@@ -45,6 +46,19 @@ double signed_volume(const Points& x, const Eigen::Vector4i& t) {
   const Eigen::Vector3d a = x.row(t[1]) - x.row(t[0]), b = x.row(t[2]) - x.row(t[0]),
                         c = x.row(t[3]) - x.row(t[0]);
   return a.cross(b).dot(c) / 6;
+}
+
+double longest_edge(const Points& x, const Eigen::Vector4i& t) {
+  double longest = 0;
+  for (int k = 1; k < 4; ++k)
+    for (int l = 0; l < k; ++l) longest = std::max(longest, (x.row(t[k]) - x.row(t[l])).norm());
+  return longest;
+}
+
+std::string list_of(const Eigen::VectorXi& vertices) {
+  std::string text;
+  for (const int vertex : vertices) text += (text.empty() ? "" : ", ") + std::to_string(vertex);
+  return text;
 }
 
 Geometry parse(const std::string& path) {
@@ -116,15 +130,42 @@ TriangleMesh load_triangle_mesh(const std::string& path) {
   return mesh;
 }
 
+void check_tet_mesh(const TetMesh& mesh, const std::string& source) {
+  check_points(mesh.vertices, source);
+  check_indices(mesh.tetrahedra, mesh.vertices.rows(), "tetrahedron", source);
+  if (mesh.tetrahedra.rows() == 0) throw InputError(source + ": found no tetrahedra");
+  std::vector<bool> used(static_cast<std::size_t>(mesh.vertices.rows()), false);
+  for (Eigen::Index i = 0; i < mesh.tetrahedra.rows(); ++i) {
+    const Eigen::Vector4i t = mesh.tetrahedra.row(i);
+    const double volume = signed_volume(mesh.vertices, t), longest = longest_edge(mesh.vertices, t);
+    // Six times the volume against the longest edge: below this the rest shape cannot be inverted in double.
+    if (6 * std::abs(volume) <= 1e-10 * longest * longest * longest)
+      throw input_error(source, "tetrahedron " + std::to_string(i),
+                        "is flat: vertices " + list_of(t) + " lie in a plane");
+    if (volume < 0)
+      throw input_error(source, "tetrahedron " + std::to_string(i),
+                        "is inverted: the volume of vertices " + list_of(t) + " is negative");
+    for (const int vertex : t) used[static_cast<std::size_t>(vertex)] = true;
+  }
+  if (const Overlap overlap = first_overlap(mesh.tetrahedra); overlap.second >= 0)
+    throw input_error(source, "tetrahedron " + std::to_string(overlap.second),
+                      "lies on the same side of the face of vertices " + list_of(overlap.face) +
+                          " as tetrahedron " + std::to_string(overlap.first) +
+                          ": one of them is inverted, or they are the same");
+  const auto lone = std::find(used.begin(), used.end(), false);
+  if (lone != used.end())
+    throw input_error(source, "vertex " + std::to_string(lone - used.begin()), "belongs to no tetrahedron");
+}
+
 TetMesh load_tet_mesh(const std::string& path) {
   Geometry geometry = load_geometry(path);
   if (geometry.tetrahedra.rows() == 0) throw InputError(path + ": found no tetrahedra");
-  for (Eigen::Index i = 0; i < geometry.tetrahedra.rows(); ++i) {
-    const double volume = signed_volume(geometry.points, geometry.tetrahedra.row(i));
-    if (volume < 0) std::swap(geometry.tetrahedra(i, 2), geometry.tetrahedra(i, 3));
-    if (volume == 0) throw input_error(path, "tetrahedron " + std::to_string(i), "is flat");
-  }
-  return {std::move(geometry.points), std::move(geometry.tetrahedra)};
+  for (Eigen::Index i = 0; i < geometry.tetrahedra.rows(); ++i)
+    if (signed_volume(geometry.points, geometry.tetrahedra.row(i)) < 0)
+      std::swap(geometry.tetrahedra(i, 2), geometry.tetrahedra(i, 3));
+  TetMesh mesh{std::move(geometry.points), std::move(geometry.tetrahedra)};
+  check_tet_mesh(mesh, path);
+  return mesh;
 }
 
 Points load_point_cloud(const std::string& path, std::size_t& left_out) {

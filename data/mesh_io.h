@@ -22,7 +22,7 @@ Geometry load_geometry(const std::string& path);
 /// ones.
 TriangleMesh load_triangle_mesh(const std::string& path);
 
-/// The tetrahedra of .vtk or .tet; negative ones are turned, flat ones are an error.
+/// The tetrahedra of .vtk or .tet; negative ones are turned. Also throws as check_tet_mesh does.
 TetMesh load_tet_mesh(const std::string& path);
 
 /// The points of .ply, .pcd, .obj or .vtk; faces do not count. May be empty. Points that are not finite, as
@@ -40,5 +40,9 @@ void save_point_cloud(const Points& points, const std::string& path);
 
 /// Throws InputError as the loaders do; `source` names the mesh in the message.
 void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source);
+
+/// Throws InputError naming the first tetrahedron that is flat, has a negative volume, or overlaps a
+/// neighbour, and vertices of none.
+void check_tet_mesh(const TetMesh& mesh, const std::string& source);
 
 }  // namespace flash::data

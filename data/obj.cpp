@@ -86,8 +86,8 @@ Geometry parse_tet(std::string_view text, const std::string& source) {
     } else if (words[0] == "t" && words.size() == 5) {
       for (std::size_t k = 1; k <= 4; ++k) {
         const std::optional<long> index = parse_integer(words[k]);
-        if (!index) throw line_error(source, lines, words[k], "a vertex index from 0");
-        tetrahedra.push_back(to_index(static_cast<double>(*index)));
+        if (!index || *index < 1) throw line_error(source, lines, words[k], "a vertex index from 1");
+        tetrahedra.push_back(to_index(static_cast<double>(*index - 1)));
       }
     } else {
       throw line_error(source, lines, line, "v x y z or t a b c d");
@@ -101,7 +101,7 @@ std::string format_tet(const TetMesh& mesh) {
   for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i) append_row(text, 'v', mesh.vertices.row(i).data());
   for (Eigen::Index i = 0; i < mesh.tetrahedra.rows(); ++i) {
     text += 't';
-    for (int k = 0; k < 4; ++k) text += ' ' + std::to_string(mesh.tetrahedra(i, k));
+    for (int k = 0; k < 4; ++k) text += ' ' + std::to_string(mesh.tetrahedra(i, k) + 1);
     text += '\n';
   }
   return text;

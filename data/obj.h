@@ -11,7 +11,7 @@ namespace flash::data {
 Geometry parse_obj(std::string_view text, const std::string& source);
 std::string format_obj(const TriangleMesh& mesh);
 
-/// Tetrahedra, read likewise: lines `v x y z` and `t a b c d`, indices from 0.
+/// Tetrahedra, read likewise: lines `v x y z` and `t a b c d`, indices from 1.
 Geometry parse_tet(std::string_view text, const std::string& source);
 std::string format_tet(const TetMesh& mesh);
 

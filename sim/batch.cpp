@@ -91,6 +91,12 @@ bool frames_exist(const Environment& environment) {
                      [&](const Obstacle& obstacle) { return exists(obstacle.frame); });
 }
 
+bool solids_match(const SheetPlan& plan, const Environment& environment) {
+  for (std::size_t b = 0; b < plan.bodies.size(); ++b)
+    if (plan.bodies[b].body.is_solid() != (environment.solids.count(static_cast<int>(b)) > 0)) return false;
+  return true;
+}
+
 void check(const SheetPlan& plan, const std::vector<Environment>& environments,
            const BatchSettings& settings) {
   const auto require = [](bool met, const char* what) {
@@ -109,6 +115,8 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
             "batch: every environment needs a position and a velocity for each vertex of the plan");
     require(environment.holds.size() == environments.front().holds.size(),
             "batch: all environments need the same number of holds");
+    require(solids_match(plan, environment),
+            "batch: every environment needs a solid material for each body of tetrahedra, and for no other");
     require(frames_exist(environment),
             "batch: a hold or an obstacle names a frame that the schedule does not have");
   }

@@ -46,7 +46,8 @@ inline constexpr int restart_interval = 50;
 class Batch {
  public:
   /// Throws std::invalid_argument where the environments do not have the plan's vertices and the same number
-  /// of holds, where a frame is not in the schedule, or the steps do not ascend from first_step to `steps`.
+  /// of holds, where the solids of both are not the same, where a frame is not in the schedule, or the steps
+  /// do not ascend from first_step to `steps`.
   Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> environments, BatchSettings settings);
   ~Batch();
   Batch(Batch&&) noexcept;

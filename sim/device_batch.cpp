@@ -16,12 +16,23 @@
 namespace flash::sim {
 
 std::string why_not_on_device(const Environment& environment) {
+  if (!environment.solids.empty()) return "solids (element_type TETRAHEDRON) are simulated on the CPU alone";
   if (environment.materials.size() > 1) return "several bodies in one environment";
   if (environment.obstacles.size() > most_obstacles)
     return "more than " + std::to_string(most_obstacles) + " obstacles: found " +
            std::to_string(environment.obstacles.size());
   return {};
 }
+
+namespace {
+
+void check_on_device(const std::vector<Environment>& environments) {
+  for (const Environment& environment : environments)
+    if (const std::string why = why_not_on_device(environment); !why.empty())
+      throw data::InputError("--device cuda: " + why);
+}
+
+}  // namespace
 
 #ifdef FLASH_HAVE_CUDA
 
@@ -135,9 +146,7 @@ void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& gro
 
 void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment>& environments,
                        const BatchSettings& settings, int first, int steps, const DeviceResults& results) {
-  for (const Environment& environment : environments)
-    if (const std::string why = why_not_on_device(environment); !why.empty())
-      throw data::InputError("--device cuda: " + why);
+  check_on_device(environments);
   std::vector<int> at(environments.size(), first);
   const int end = first + steps;
   for (auto groups = grouped(*plan, environments, at, end, settings.solver.time_step); !groups.empty();
@@ -153,8 +162,9 @@ void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector
 
 #else
 
-void advance_on_device(const std::shared_ptr<const SheetPlan>&, std::vector<Environment>&,
+void advance_on_device(const std::shared_ptr<const SheetPlan>&, std::vector<Environment>& environments,
                        const BatchSettings&, int, int, const DeviceResults&) {
+  check_on_device(environments);
   throw data::InputError("--device cuda: this program was built without CUDA");
 }
 

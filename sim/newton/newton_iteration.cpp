@@ -47,6 +47,7 @@ void assemble_matrix(const StepProblem& problem, bool positive, NewtonWorkspace&
   bool sparse = true;
   std::vector<ScaledBending> bending;
   for (const BodyLaw& law : problem.laws) {
+    if (law.solid != nullptr) continue;
     sparse = sparse && !law.bends_at_hinges();
     bending.push_back({law.bending, problem.potential.effective_rigidity(law)});
   }

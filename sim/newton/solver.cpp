@@ -21,8 +21,8 @@ constexpr double gap_tolerance = 1e-9;       ///< on gaps and complementarity [m
 ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWorkspace& w) {
   const Environment& environment = problem.contacts.environment;
   const Points& start = environment.state.positions;
-  if (w.now.materials == environment.materials && w.now.positions.rows() == start.rows() &&
-      w.now.positions == start)
+  if (w.now.materials == environment.materials && w.now.solids == environment.solids &&
+      w.now.positions.rows() == start.rows() && w.now.positions == start)
     return w.now.elastic;
   Points force = Points::Zero(start.rows(), 3);
   ElasticEnergy elastic;

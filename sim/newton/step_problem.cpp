@@ -26,6 +26,7 @@ double StepProblem::relative_residual(const Iterate& iterate) const {
 
 void StepProblem::evaluate(Iterate& iterate) const {
   iterate.materials = contacts.environment.materials;
+  iterate.solids = contacts.environment.solids;
   iterate.incremental_potential = potential.evaluate(iterate.positions, iterate.force, iterate.elastic);
   update_contacts(contacts, iterate.positions, iterate.force, iterate.contacts);
   iterate.residual = iterate.force;

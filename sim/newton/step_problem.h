@@ -1,4 +1,6 @@
 #pragma once
+#include <map>
+
 #include "sim/step/contact_set.h"
 #include "sim/step/incremental_potential.h"
 
@@ -11,6 +13,7 @@ struct Iterate {
   data::Points residual;   ///< what the constraints leave of it [N]
   ContactSet contacts;
   std::vector<data::SheetMaterial> materials;  ///< of `elastic`
+  std::map<int, data::SolidMaterial> solids;   ///< likewise
   ElasticEnergy elastic;
   double incremental_potential = 0;  ///< [J]
 };

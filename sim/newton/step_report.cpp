@@ -66,6 +66,7 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
   report.kinetic = kinetic_of(moved / h);
   report.membrane = end.elastic.membrane;
   report.bending = end.elastic.bending;
+  report.solid = end.elastic.solid;
   double falls = 0, unbalanced = 0;
   bool start_is_feasible = report.start_penetration.depth == 0;
   for (int i = 0; i < mass.size(); ++i) {
@@ -92,17 +93,19 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
   for (const MovingObstacle<double>& obstacle : problem.contacts.obstacles)
     start_is_feasible = start_is_feasible && !obstacle.moves;
 
-  const double stored_at_start = elastic_at_start.membrane + elastic_at_start.bending,
-               stored_at_end = report.membrane + report.bending;
+  const double stored_at_start = elastic_at_start.total(), stored_at_end = end.elastic.total();
   const double kinetic_at_start = kinetic_of(start.velocities);
   const double gain =
       report.kinetic - kinetic_at_start + stored_at_end - stored_at_start - falls - report.work;
   const double there = kinetic_at_start + stored_at_start + std::max(0.0, falls) + std::max(0.0, report.work);
   // The allowance covers the rounding of positions and the work of the weight over a nanometre.
   double rounding = 1e-9 * mass.sum() * problem.gravity;
-  for (const BodyLaw& law : problem.laws)
-    rounding += 1e-14 * law.material.membrane_stiffness * rows_of(law.place.body, mass).sum() /
-                law.material.areal_density;
+  for (const BodyLaw& law : problem.laws) {
+    const double body_mass = rows_of(law.place.body, mass).sum();
+    rounding += law.solid != nullptr
+                    ? 1e-14 * law.solid->youngs_modulus * body_mass / law.solid->density
+                    : 1e-14 * law.material.membrane_stiffness * body_mass / law.material.areal_density;
+  }
   if (!(gain <= energy_tolerance * there + unbalanced + rounding)) return false;
   if (!start_is_feasible) return true;
   return end.incremental_potential <=

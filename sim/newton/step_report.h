@@ -21,7 +21,7 @@ struct StepReport {
   Penetration held_penetration;   ///< the deepest that a hold carries below a surface
   Penetration start_penetration;  ///< the deepest other that started the step inside an obstacle
   double complementarity = 0;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
-  double kinetic = 0, membrane = 0, bending = 0, gravitational = 0;  ///< energies [J]
+  double kinetic = 0, membrane = 0, bending = 0, solid = 0, gravitational = 0;  ///< energies [J]
   double work = 0;  ///< work done on the sheet by holds and obstacles [J]
   // Forces of a step in parts are their means over time.
   std::vector<Eigen::Vector3d> hold_forces;      ///< hold on sheet, one a hold of the environment [N]

@@ -51,7 +51,7 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   auto bending = std::make_shared<BendingOperator>();
   bending->model = model;
   bending->kernels = plan.kernels;
-  if (model == data::BendingModel::hinge) return bending;
+  if (model == data::BendingModel::hinge || body.is_solid()) return bending;
   const Sheet alone = body_alone(plan.sheet, body);
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(alone);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
@@ -96,6 +96,7 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, Instruction
     own.group_count = static_cast<int>(plan->triangle_groups.size()) - own.first_group;
     plan->bodies.push_back(own);
   }
+  plan->solid_elements = solid_elements(sheet, [&](int row, int column) { return slot(row, column).block; });
   plan->edge_count = plan->pattern.pairs.size();
   for (const Hinge& hinge : plan->hinges) {
     const auto& v = hinge.vertices;

@@ -13,6 +13,7 @@
 #include "sim/cpu/symbolic_factor.h"
 #include "sim/cpu/triangle_group.h"
 #include "sim/plan/hinge_bending.h"
+#include "sim/plan/solid_plan.h"
 #include "sim/scene/sheet.h"
 
 namespace flash::sim {
@@ -58,6 +59,7 @@ struct SheetPlan {
   ProductPattern triangle_product, full_product;  ///< without and with the neighbours across a hinge
   std::vector<BodyPlan> bodies;
   std::vector<TriangleGroup> triangle_groups;  ///< each of triangles of one body
+  std::vector<SolidElement> solid_elements;    ///< tetrahedra, in the order of the sheet's
   std::vector<std::array<BlockSlot, 6>>
       hinge_slots;  ///< blocks (1,0), (2,0), (2,1), (3,0), (3,1), (3,2) of a hinge
   std::shared_ptr<BendingOperators> bending = std::make_shared<BendingOperators>();
@@ -67,7 +69,8 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet,
                                                  InstructionLevel level = highest_instruction_level());
 
 /// The bending operator of a model and a body, made once a Poisson's ratio and kept with the plan; threads
-/// may ask at once. Throws data::InputError where the model needs a flat rest shape and the body has none.
+/// may ask at once. That of a solid is empty. Throws data::InputError where the model needs a flat rest shape
+/// and the body has none.
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
                                         double poissons_ratio, int body = 0);
 

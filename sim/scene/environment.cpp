@@ -62,8 +62,14 @@ double friction_on(const Obstacle& obstacle, int body, double friction) {
   return told ? obstacle.friction[index] : friction;
 }
 
+double friction_of(const Environment& environment, int body) {
+  const auto solid = environment.solids.find(body);
+  return solid != environment.solids.end() ? solid->second.friction
+                                           : environment.materials[static_cast<std::size_t>(body)].friction;
+}
+
 double friction_between(const Environment& environment, const Obstacle& obstacle, int body) {
-  return friction_on(obstacle, body, environment.materials[static_cast<std::size_t>(body)].friction);
+  return friction_on(obstacle, body, friction_of(environment, body));
 }
 
 Isometry3d frame_pose(const Environment& environment, int frame, double time) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <map>
 #include <memory>
 #include <string>
 #include <variant>
@@ -55,7 +56,8 @@ struct State {
 
 /// One simulated world: its own materials, motion and state over a shared Sheet.
 struct Environment {
-  std::vector<data::SheetMaterial> materials = {{}};  ///< of each body of the sheet
+  std::vector<data::SheetMaterial> materials = {{}};  ///< of each body; those of solids are not read
+  std::map<int, data::SolidMaterial> solids = {};     ///< of each body that is a solid, by its number
   Eigen::Vector3d gravity{0, 0, -9.81};               ///< [m/s^2]
   std::vector<Obstacle> obstacles;
   std::vector<Hold> holds;
@@ -67,6 +69,9 @@ struct Environment {
 
 /// Coulomb coefficient of an obstacle on a body whose material has that `friction`.
 double friction_on(const Obstacle& obstacle, int body, double friction);
+
+/// Coulomb coefficient of the material of a body.
+double friction_of(const Environment& environment, int body);
 
 /// Coulomb coefficient between an obstacle and the vertices of a body.
 double friction_between(const Environment& environment, const Obstacle& obstacle, int body);

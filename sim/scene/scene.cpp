@@ -7,6 +7,7 @@
 #include "data/error.h"
 #include "data/mesh_io.h"
 #include "data/text.h"
+#include "sim/scene/solid.h"
 
 namespace flash::sim {
 namespace {
@@ -123,24 +124,44 @@ void add_end_effectors(const data::Scene& scene, const std::string& object, Time
 
 double total_area(const Sheet& sheet) { return sheet.vertex_area.sum(); }
 
+/// Mesh and material of an object of triangles.
+void make_sheet_body(const data::Scene& scene, const data::Asset& asset, SceneBody& body,
+                     std::vector<std::string>& notices) {
+  body.sheet = make_sheet(data::load_asset_mesh(asset));
+  const data::ResolvedSheet resolved = data::resolve_sheet(asset, total_area(body.sheet));
+  for (const std::string& notice : resolved.notices) notices.push_back(body.name + ": " + notice);
+  if (resolved.uniform_vertex_mass) body.sheet.vertex_area.setConstant(body.sheet.vertex_area.mean());
+  body.environment.materials[0] = resolved.material;
+  if (scene.bending_model) body.environment.materials[0].bending_model = *scene.bending_model;
+}
+
+/// Mesh and material of an object of tetrahedra.
+void make_solid_body(const data::Asset& asset, SceneBody& body, std::vector<std::string>& notices) {
+  body.sheet = make_solid(data::load_asset_tet_mesh(asset));
+  Eigen::VectorXd& volume = body.sheet.vertex_volume;
+  const data::ResolvedSolid resolved = data::resolve_solid(asset, volume.sum());
+  for (const std::string& notice : resolved.notices) notices.push_back(body.name + ": " + notice);
+  if (resolved.uniform_vertex_mass) volume.setConstant(volume.mean());
+  body.environment.solids[0] = resolved.material;
+}
+
 SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, Timeline& timeline,
                     std::vector<std::string>& notices) {
   const data::Asset asset = data::load_asset(object.asset);
-  if (asset.element_type != data::ElementType::triangle)
-    throw data::input_error(asset.source, "element_type",
-                            "TETRAHEDRON, but only sheets (TRIANGLE) can be simulated");
   SceneBody body;
   body.name = object.name;
-  body.sheet = make_sheet(data::load_asset_mesh(asset));
-  const data::ResolvedSheet resolved = data::resolve_sheet(asset, total_area(body.sheet));
-  for (const std::string& notice : resolved.notices) notices.push_back(object.name + ": " + notice);
-  if (resolved.uniform_vertex_mass) body.sheet.vertex_area.setConstant(body.sheet.vertex_area.mean());
+  if (asset.element_type == data::ElementType::tetrahedron)
+    make_solid_body(asset, body, notices);
+  else
+    make_sheet_body(scene, asset, body, notices);
 
   Environment& environment = body.environment;
-  environment.materials[0] = resolved.material;
-  if (scene.bending_model) environment.materials[0].bending_model = *scene.bending_model;
   environment.gravity = scene.gravity;
   environment.state.positions = start_positions(scene, object, body.sheet.rest.vertices);
+  if (const int inverted = first_inverted(body.sheet, environment.state.positions); inverted >= 0)
+    throw data::input_error(scene.source, "objects." + object.name + ".start",
+                            "turns tetrahedron " + std::to_string(inverted) + " of " + asset.mesh +
+                                " inside out or flat, expected a positive volume");
   environment.state.velocities =
       object.start_velocity.transpose().replicate(environment.state.positions.rows(), 1);
   for (const data::SceneObstacle& other : scene.obstacles) {

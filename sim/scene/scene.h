@@ -11,14 +11,14 @@ namespace flash::sim {
 /// One object of a scene, ready to step.
 struct SceneBody {
   std::string name;
-  Sheet sheet;  ///< vertex_area carries the mass: even where the asset spreads its mass evenly over the
-                ///< vertices
+  Sheet sheet;  ///< vertex_area, of a solid vertex_volume, carries the mass: even where the asset spreads its
+                ///< mass evenly over the vertices
   Environment environment;
 };
 
 /// The objects of a scene, on one schedule for `steps` steps. What was understood of units and what cannot be
-/// done goes to `notices`. Throws data::InputError: solids, start positions that do not fit the mesh,
-/// vertices out of range.
+/// done goes to `notices`. Throws data::InputError: start positions that do not fit the mesh or turn a
+/// tetrahedron inside out, vertices out of range.
 std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::vector<std::string>& notices);
 
 }  // namespace flash::sim

@@ -49,17 +49,32 @@ Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name) {
   return sheet;
 }
 
+bool has_solids(const Sheet& sheet) { return !sheet.tetrahedra.empty(); }
+
+data::Triangles visible_triangles(const Sheet& sheet) {
+  const Eigen::Index elements = sheet.rest.triangles.rows(), faces = sheet.solid_surface.rows();
+  data::Triangles all(elements + faces, 3);
+  all.topRows(elements) = sheet.rest.triangles;
+  all.bottomRows(faces) = sheet.solid_surface;
+  return all;
+}
+
 Sheet joined(std::span<const Sheet> sheets) {
   Sheet whole;
-  Eigen::Index vertices = 0, triangles = 0;
+  Eigen::Index vertices = 0, triangles = 0, faces = 0;
   for (const Sheet& sheet : sheets) {
     vertices += sheet.rest.vertices.rows();
     triangles += sheet.rest.triangles.rows();
+    faces += sheet.solid_surface.rows();
   }
+  whole.solid_surface.resize(faces, 3);
+  if (std::any_of(sheets.begin(), sheets.end(), has_solids))
+    whole.vertex_volume = Eigen::VectorXd::Zero(vertices);
   whole.rest.vertices.resize(vertices, 3);
   whole.rest.triangles.resize(triangles, 3);
   whole.vertex_area.resize(vertices);
-  int first_vertex = 0, first_triangle = 0;
+  int first_vertex = 0, first_triangle = 0, first_tetrahedron = 0;
+  Eigen::Index first_face = 0;
   for (const Sheet& sheet : sheets) {
     const Eigen::Index own_vertices = sheet.rest.vertices.rows(), own_triangles = sheet.rest.triangles.rows();
     whole.rest.vertices.middleRows(first_vertex, own_vertices) = sheet.rest.vertices;
@@ -70,11 +85,21 @@ Sheet joined(std::span<const Sheet> sheets) {
       triangle.vertices.array() += first_vertex;
       whole.triangles.push_back(triangle);
     }
+    if (has_solids(sheet)) whole.vertex_volume.segment(first_vertex, own_vertices) = sheet.vertex_volume;
+    const Eigen::Index own_faces = sheet.solid_surface.rows();
+    whole.solid_surface.middleRows(first_face, own_faces) = sheet.solid_surface.array() + first_vertex;
+    for (RestTetrahedron tetrahedron : sheet.tetrahedra) {
+      tetrahedron.vertices.array() += first_vertex;
+      whole.tetrahedra.push_back(tetrahedron);
+    }
     for (Body body : sheet.bodies) {
       body.first_vertex += first_vertex;
       body.first_triangle += first_triangle;
+      body.first_tetrahedron += first_tetrahedron;
       whole.bodies.push_back(body);
     }
+    first_tetrahedron += static_cast<int>(sheet.tetrahedra.size());
+    first_face += own_faces;
     first_vertex += static_cast<int>(own_vertices);
     first_triangle += static_cast<int>(own_triangles);
   }

@@ -16,26 +16,47 @@ struct RestTriangle {
   bool stiff = false;             ///< inside a clamp: does not bend (plate only)
 };
 
-/// A part of the mesh with a material of its own. Its vertices and its triangles stand side by side.
+/// A tetrahedron of the rest shape.
+struct RestTetrahedron {
+  Eigen::Vector4i vertices;
+  Eigen::Matrix3d inverse_edges;  ///< inverse of the matrix of rest edges (x1 - x0, x2 - x0, x3 - x0) [1/m]
+  double volume;                  ///< [m^3]
+};
+
+/// A part of the mesh with a material of its own: a sheet of triangles, or a solid of tetrahedra. Its
+/// vertices and its elements stand side by side.
 struct Body {
   std::string name = {};  ///< for messages
   int first_vertex = 0, vertex_count = 0;
   int first_triangle = 0, triangle_count = 0;
+  int first_tetrahedron = 0, tetrahedron_count = 0;
+
+  bool is_solid() const { return tetrahedron_count > 0; }
 };
 
 /// What all environments of one mesh share: the rest shape, never a material.
 struct Sheet {
-  data::TriangleMesh rest;
+  data::TriangleMesh rest;  ///< all vertices, and the triangles that are elements
   std::vector<RestTriangle> triangles;
   Eigen::VectorXd vertex_area;  ///< a third of the area of the adjacent triangles [m^2]
   std::vector<Body> bodies;     ///< one, or those that were joined, in the order of their vertices
+  // Of the solid bodies; empty where there are none.
+  std::vector<RestTetrahedron> tetrahedra = {};
+  data::Triangles solid_surface = {};  ///< outer faces, counter-clockwise seen from outside
+  Eigen::VectorXd vertex_volume = {};  ///< a quarter of the volume of the adjacent tetrahedra [m^3]
 };
 
 /// A sheet of one body. Throws data::InputError on degenerate or duplicate triangles and on vertices without
 /// a triangle.
 Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name = {});
 
-/// The bodies of all `sheets` in one mesh, vertices and triangles in the order of the list.
+/// Whether any body is a solid.
+bool has_solids(const Sheet& sheet);
+
+/// All triangles that can be seen: elements of the sheets, then outer faces of the solids.
+data::Triangles visible_triangles(const Sheet& sheet);
+
+/// The bodies of all `sheets` in one mesh, vertices and elements in the order of the list.
 Sheet joined(std::span<const Sheet> sheets);
 
 /// One body of a sheet as a sheet of its own.

@@ -7,17 +7,22 @@
 namespace flash::sim {
 
 /// What one body of an environment obeys: its place in the plan, its material, and the bending operator that
-/// goes with both.
+/// goes with both. Of a solid `material` is not read and `bending` is empty.
 struct BodyLaw {
   const BodyPlan& place;
   const data::SheetMaterial& material;
   const BendingOperator& bending;
+  const data::SolidMaterial* solid = nullptr;  ///< null: a sheet
 
-  bool bends_at_hinges() const { return bending.model == data::BendingModel::hinge; }
+  bool bends_at_hinges() const { return solid == nullptr && bending.model == data::BendingModel::hinge; }
+  double air_drag() const { return solid != nullptr ? solid->air_drag : material.air_drag; }
+  double stiffness_damping() const {
+    return solid != nullptr ? solid->stiffness_damping : material.stiffness_damping;
+  }
 };
 
 /// The laws of all bodies, in the order of the plan. Plan and environment have to outlive them. Throws as
-/// bending_operator does.
+/// bending_operator does, and std::invalid_argument where the solids of both are not the same.
 std::vector<BodyLaw> body_laws(const SheetPlan& plan, const Environment& environment);
 
 }  // namespace flash::sim

@@ -2,6 +2,7 @@
 
 #include "sim/cpu/kernels.h"
 #include "sim/step/hinge_energy.h"
+#include "sim/step/solid_energy.h"
 
 namespace flash::sim {
 
@@ -29,6 +30,10 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, co
                                    Points& gradient) {
   ElasticEnergy energy;
   const BodyPlan& place = law.place;
+  if (law.solid != nullptr) {
+    energy.solid = add_solid_gradient(plan, place.body, solid_of(*law.solid), positions, gradient);
+    return energy;
+  }
   const Membrane membrane = membrane_of(law.material);
   energy.membrane = plan.kernels->add_membrane_gradient(membrane.law, membrane.lame,
                                                         plan.triangle_groups.data() + place.first_group,
@@ -48,6 +53,8 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, co
 
 void add_elastic_hessian(const SheetPlan& plan, const BodyLaw& law, const Points& positions, double scale,
                          Curvature curvature, BlockValues<double>& values) {
+  if (law.solid != nullptr)
+    return add_solid_hessian(plan, law.place.body, solid_of(*law.solid), positions, scale, curvature, values);
   const Membrane membrane = membrane_of(law.material);
   plan.kernels->add_membrane_hessian(
       membrane.law, membrane.lame, plan.triangle_groups.data() + law.place.first_group, law.place.group_count,

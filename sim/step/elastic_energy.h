@@ -8,10 +8,13 @@ namespace flash::sim {
 struct ElasticEnergy {
   double membrane = 0.0;  ///< [J]
   double bending = 0.0;   ///< [J]
+  double solid = 0.0;     ///< of tetrahedra [J]
 
+  double total() const { return membrane + bending + solid; }
   ElasticEnergy& operator+=(const ElasticEnergy& other) {
     membrane += other.membrane;
     bending += other.bending;
+    solid += other.solid;
     return *this;
   }
 };
@@ -21,8 +24,8 @@ struct ElasticEnergy {
 ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, const data::Points& positions,
                                    data::Points& gradient);
 
-/// Adds `scale` times the Hessian of a body's membrane and the Gauss-Newton Hessian of its hinges.
-/// `positive`: the negative eigenvalues of each triangle are set to zero.
+/// Adds `scale` times the Hessian of a body's membrane and the Gauss-Newton Hessian of its hinges, or that of
+/// a solid. `positive`: the negative eigenvalues of each element are set to zero.
 void add_elastic_hessian(const SheetPlan& plan, const BodyLaw& law, const data::Points& positions,
                          double scale, Curvature curvature, BlockValues<double>& values);
 

@@ -52,7 +52,11 @@ bool exits_gently(const ContactStep& step, const SheetPlan& plan, const std::vec
   const Points& start = step.environment.state.positions;
   const Points& rest = plan.sheet.rest.vertices;
   const auto strain_limit = [&](int vertex) {
-    const data::SheetMaterial& material = step.environment.materials[body_of(step.sheet, vertex)];
+    const int body = body_of(step.sheet, vertex);
+    const auto solid = step.environment.solids.find(body);
+    if (solid != step.environment.solids.end())
+      return step.way_out.speed * std::sqrt(solid->second.density / solid->second.youngs_modulus);
+    const data::SheetMaterial& material = step.environment.materials[body];
     return step.way_out.speed * std::sqrt(material.areal_density / material.membrane_stiffness);
   };
   std::vector<bool> exiting(static_cast<size_t>(start.rows()), false);

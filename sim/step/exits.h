@@ -12,8 +12,8 @@ namespace flash::sim {
 std::vector<WayOut<double>> exits_of(const ContactStep& step, const std::vector<std::vector<int>>& inside);
 
 /// Whether leaving the obstacles has not torn the sheet, which ends the step at `end`. Edges at vertices that
-/// started inside must not be strained by more than v sqrt(rho / (E t)), or than they were at the start. A
-/// sheet that is released turns that strain into the step's exit speed v.
+/// started inside must not be strained by more than v sqrt(rho / (E t)), of a solid v sqrt(rho / E), or than
+/// they were at the start. A sheet that is released turns that strain into the step's exit speed v.
 bool exits_gently(const ContactStep& step, const SheetPlan& plan, const std::vector<std::vector<int>>& inside,
                   const data::Points& end);
 

@@ -6,6 +6,7 @@
 #include "sim/step/hinge_energy.h"
 #include "sim/step/membrane_damping.h"
 #include "sim/step/rigid_turn.h"
+#include "sim/step/solid_damping.h"
 
 namespace flash::sim {
 
@@ -16,14 +17,19 @@ IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const std::vec
                                            const Environment& environment, double time_step)
     : plan_(plan), laws_(laws), environment_(environment), h_(time_step), mass_(plan.sheet.vertex_area) {
   const State& start = environment.state;
-  for (const BodyLaw& law : laws) rows_of(law.place.body, mass_) *= law.material.areal_density;
+  for (const BodyLaw& law : laws)
+    if (law.solid != nullptr)
+      rows_of(law.place.body, mass_) = law.solid->density * rows_of(law.place.body, plan.sheet.vertex_volume);
+    else
+      rows_of(law.place.body, mass_) *= law.material.areal_density;
   target_ = start.positions + h_ * start.velocities;
   target_.rowwise() += h_ * h_ * environment.gravity.transpose();
   loads_ = Points::Zero(start.positions.rows(), 3);
   for (const Load& load : environment.loads) loads_.row(load.vertex) += load.force.transpose();
-  const auto damped = [](const BodyLaw& law) { return law.material.stiffness_damping > 0; };
+  const auto damped = [](const BodyLaw& law) { return law.stiffness_damping() > 0; };
   if (std::none_of(laws.begin(), laws.end(), damped)) return;
   start_metrics_ = triangle_metrics(plan, start.positions);
+  solid_start_metrics_ = solid_metrics(plan, start.positions);
   start_hinges_ = plan.hinges;
   for (Hinge& hinge : start_hinges_) {
     HingePositions x;
@@ -39,6 +45,11 @@ SheetLame IncrementalPotential::damping_lame(const BodyLaw& law) const {
   return lame;
 }
 
+SolidLame IncrementalPotential::solid_damping_lame(const BodyLaw& law) const {
+  const SolidLame lame = solid_of(*law.solid).lame;
+  return {damping_share(law) * lame.mu, damping_share(law) * lame.lambda};
+}
+
 double IncrementalPotential::evaluate(const Points& positions, Points& force, ElasticEnergy& elastic) const {
   const Points inertial = positions - target_, moved = positions - environment_.state.positions;
   force = mass_.asDiagonal() * (inertial / (h_ * h_)) - loads_;
@@ -47,29 +58,31 @@ double IncrementalPotential::evaluate(const Points& positions, Points& force, El
   elastic = {};
   for (const BodyLaw& law : laws_) {
     potential += add_drag(law, moved, force);
-    if (law.material.stiffness_damping > 0) potential += add_damping(law, positions, force);
+    if (law.stiffness_damping() > 0) potential += add_damping(law, positions, force);
     elastic += add_elastic_gradient(plan_, law, positions, force);
   }
-  return potential + elastic.membrane + elastic.bending;
+  return potential + elastic.membrane + elastic.bending + elastic.solid;
 }
 
 double IncrementalPotential::at_start(const ElasticEnergy& elastic) const {
   const Points inertial = environment_.state.positions - target_;
   return 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() + elastic.membrane +
-         elastic.bending;
+         elastic.bending + elastic.solid;
 }
 
 double IncrementalPotential::add_drag(const BodyLaw& law, const Points& moved, Points& force) const {
-  if (law.material.air_drag == 0) return 0;
+  if (law.air_drag() == 0) return 0;
   const auto own_moved = rows_of(law.place.body, moved);
-  const Points dragged =
-      law.material.air_drag / h_ * (rows_of(law.place.body, mass_).asDiagonal() * own_moved);
+  const Points dragged = law.air_drag() / h_ * (rows_of(law.place.body, mass_).asDiagonal() * own_moved);
   rows_of(law.place.body, force) += dragged;
   return 0.5 * dragged.cwiseProduct(own_moved).sum();
 }
 
 double IncrementalPotential::add_damping(const BodyLaw& law, const Points& positions, Points& force) const {
   const Body& body = law.place.body;
+  if (law.solid != nullptr)
+    return add_solid_damping_gradient(plan_, body, solid_start_metrics_, solid_damping_lame(law), positions,
+                                      force);
   const double rigidity = damping_share(law) * law.material.bending_rigidity;
   const double potential =
       add_membrane_damping_gradient(plan_, law.place, start_metrics_, damping_lame(law), positions, force);
@@ -96,14 +109,17 @@ void IncrementalPotential::assemble(const Points& positions, Curvature curvature
   values.assign(9 * (plan_.pattern.size + (sparse ? plan_.edge_count : plan_.pattern.pairs.size())), 0.0);
   for (const BodyLaw& law : laws_) {
     add_elastic_hessian(plan_, law, positions, 1.0, curvature, values);
-    if (law.material.stiffness_damping > 0) {
+    if (law.stiffness_damping() > 0 && law.solid != nullptr) {
+      add_solid_damping_hessian(plan_, law.place.body, solid_start_metrics_, solid_damping_lame(law),
+                                positions, curvature, values);
+    } else if (law.stiffness_damping() > 0) {
       add_membrane_damping_hessian(plan_, law.place, start_metrics_, damping_lame(law), positions, curvature,
                                    values);
       if (law.bends_at_hinges())
         add_hinge_hessian(plan_, law.place, start_hinges_, damping_share(law) * law.material.bending_rigidity,
                           positions, values);
     }
-    const double per_mass = 1 / (h_ * h_) + law.material.air_drag / h_;
+    const double per_mass = 1 / (h_ * h_) + law.air_drag() / h_;
     const Body& body = law.place.body;
     for (int i = body.first_vertex; i < body.first_vertex + body.vertex_count; ++i)
       for (int c = 0; c < 3; ++c) values[9L * i + 4 * c] += mass_[i] * per_mass;

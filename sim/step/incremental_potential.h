@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "sim/law/solid.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 #include "sim/step/elastic_energy.h"
@@ -43,10 +44,11 @@ class IncrementalPotential {
 
  private:
   /// b / h of a body.
-  double damping_share(const BodyLaw& law) const { return law.material.stiffness_damping / h_; }
+  double damping_share(const BodyLaw& law) const { return law.stiffness_damping() / h_; }
 
-  /// Moduli of a body's membrane times b / h.
+  /// Moduli of a body's membrane times b / h, and those of a solid.
   SheetLame damping_lame(const BodyLaw& law) const;
+  SolidLame solid_damping_lame(const BodyLaw& law) const;
 
   /// Adds the gradient of a body's a / (2 h) |x - x_0|^2_M to `force` and returns its value [J]; `moved`:
   /// x - x_0.
@@ -63,6 +65,7 @@ class IncrementalPotential {
   data::Points target_, loads_;
   // Strains and angles of all bodies at the start of the step; kept where any of them is damped.
   std::vector<Eigen::Matrix2d> start_metrics_;
+  std::vector<Eigen::Matrix3d> solid_start_metrics_;
   std::vector<Hinge> start_hinges_;
 };
 

@@ -78,7 +78,7 @@ std::vector<MovingObstacle<double>> moving_obstacles(const Environment& environm
                                                      double end) {
   std::vector<MovingObstacle<double>> all;
   for (const Obstacle& obstacle : environment.obstacles) {
-    auto [moving, place] = described(obstacle, environment.materials[0].friction);
+    auto [moving, place] = described(obstacle, friction_of(environment, 0));
     moving.start = frame_of(moving.moves ? frame_pose(environment, obstacle.frame, start) * place : place);
     moving.end = moving.moves ? frame_of(frame_pose(environment, obstacle.frame, end) * place) : moving.start;
     all.push_back(moving);

@@ -249,6 +249,41 @@ TEST(MeshIo, BrokenMeshesAreNamed) {
             ": ending \".fbx\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
 }
 
+TEST(MeshIo, BrokenTetrahedraAreNamed) {
+  const TemporaryFolder folder;
+  const auto message = [&](const std::string& name, const std::string& contents) {
+    const std::string path = folder.write(name, contents);
+    std::string text = input_error_of([&] { load_tet_mesh(path); });
+    return text.starts_with(path) ? text.substr(path.size()) : "no file in: " + text;
+  };
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 1 1\n";
+  EXPECT_EQ(message("a.tet", corners + "t 1 2 3 0\n"),
+            ": line 6: found \"0\", expected a vertex index from 1");
+  EXPECT_EQ(message("a.tet", corners + "t 1 2 3 6\n"),
+            ": tetrahedron 0: found vertex index 5, expected 0 to 4");
+  EXPECT_EQ(message("a.tet", corners), ": found no tetrahedra");
+  EXPECT_EQ(message("a.tet", corners + "t 1 2 3 4\n"), ": vertex 4: belongs to no tetrahedron");
+  EXPECT_EQ(message("a.tet", corners + "v 0.5 0.5 0\nt 1 2 3 4\nt 1 2 3 6\n"),
+            ": tetrahedron 1: is flat: vertices 0, 1, 2, 5 lie in a plane");
+  // The second one was pushed through the face that it shares with the first.
+  EXPECT_EQ(message("a.tet", corners + "v 0.1 0.1 0.1\nt 1 2 3 4\nt 2 3 4 6\nt 2 3 4 5\n"),
+            ": tetrahedron 1: lies on the same side of the face of vertices 1, 2, 3 as tetrahedron 0: one of "
+            "them is inverted, or they are the same");
+}
+
+TEST(MeshIo, TetrahedraCountFromOneInTetFiles) {
+  const TemporaryFolder folder;
+  const std::string path = folder.write("a.tet", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nt 1 2 3 4\n");
+  EXPECT_EQ(load_tet_mesh(path).tetrahedra.row(0), Eigen::RowVector4i(0, 1, 2, 3));
+}
+
+TEST(MeshIo, TetrahedraThatAreInsideOutAreNamedUnlessAFileHasThem) {
+  TetMesh mesh = tet_box({0.3, 0.2, 0.1}, {3, 2, 1});
+  std::swap(mesh.tetrahedra(7, 0), mesh.tetrahedra(7, 1));
+  EXPECT_NE(input_error_of([&] { check_tet_mesh(mesh, "mesh"); }).find("tetrahedron 7: is inverted"),
+            std::string::npos);
+}
+
 // Found by the fuzzer: the types of a grid in a file of polygons, fewer than it has of these.
 TEST(MeshIo, VtkPolygonsHaveNoCellTypes) {
   const TemporaryFolder folder;

@@ -4,6 +4,8 @@ import math
 import pathlib
 import sys
 
+import scene_files
+
 sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "validation"))
 from surface import read_ply  # noqa: E402
 
@@ -52,6 +54,10 @@ def of(scene, rest, output, reference):
                 "potential of bending [J]": output.log[-1]["bending_J"]}
     if scene["kind"] == "dynamic":
         return of_motion(scene, rest, output)
+    if scene_files.is_solid(scene):
+        if "fixed" in scene:
+            return {"mean tip drop m": tip_drop(rest, output)}
+        return of_bar(scene, rest, output)
     if "L_eff" in scene:
         return of_cantilever(scene, rest, output)
     if scene["name"].startswith("hang_strip"):
@@ -79,6 +85,19 @@ def of_motion(scene, rest, output):
     if "plane" in output.forces:
         quantities["normal force sum N"] = output.forces["plane"][2]
     return quantities
+
+
+def of_bar(scene, rest, output):
+    (_, width, height), pull = map(max, zip(*rest)), output.forces["right"][0]
+    strain = scene["stretch"] - 1
+    return {"positions": output.last, "pull force N": pull, "E recovered": pull / (width * height * strain),
+            "nu recovered": (1 - max(y for _, y, _ in output.last) / width) / strain}
+
+
+def tip_drop(rest, output):
+    end = max(x for x, _, _ in rest)
+    drops = [q[2] - p[2] for p, q in zip(output.last, rest) if q[0] == end]
+    return sum(drops) / len(drops)
 
 
 def of_cantilever(scene, rest, output):
