@@ -167,13 +167,52 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
   return solved;
 }
 
+/// Files to write, none of them another or what the dataset is read from.
+void expect_own_files(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
+  const auto place = [](const std::string& path) {
+    std::error_code error;
+    const std::filesystem::path whole = std::filesystem::weakly_canonical(path, error);
+    return error ? std::filesystem::path(path) : whole;
+  };
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (outputs[i].empty()) continue;
+    for (std::size_t j = 0; j < i; ++j)
+      if (!outputs[j].empty() && place(outputs[i]) == place(outputs[j]))
+        throw data::InputError(outputs[i] + ": named twice, each result needs a file of its own");
+    for (const std::string& input : inputs)
+      if (!input.empty() && place(outputs[i]) == place(input))
+        throw data::InputError(outputs[i] + ": the dataset is read from this file");
+  }
+}
+
+/// Frames go into URDF and command lines as they are.
+void expect_frame_names(const std::string& parent, const std::string& child) {
+  for (const auto& [option, name] :
+       {std::pair("--parent-frame", parent), std::pair("--child-frame", child)}) {
+    const bool plain = std::all_of(name.begin(), name.end(), [](char c) {
+      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+             c == '/' || c == '-' || c == '.';
+    });
+    if (!plain)
+      throw data::InputError(std::string(option) + ": expected letters, digits, _ / - and ., found \"" +
+                             name + '"');
+  }
+  if (child.empty() || parent == child)
+    throw data::InputError("--child-frame: expected a name other than that of the parent, found \"" + child +
+                           '"');
+}
+
 int run_handeye(const HandEyeOptions& options) {
   const std::string report = report_path(options);
-  for (const std::string& path :
-       {options.out, report, options.ros, options.urdf, options.easy_handeye2, options.camera_info})
+  const std::vector<std::string> outputs = {
+      options.out, report, options.ros, options.urdf, options.easy_handeye2, options.camera_info};
+  expect_own_files(outputs, {});
+  for (const std::string& path : outputs)
     if (!path.empty()) data::check_file_free(path, options.common.force);
+  expect_frame_names(options.parent, options.child);
   Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
+  expect_own_files(outputs, {dataset.source, dataset.poses_path, dataset.camera_path});
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;

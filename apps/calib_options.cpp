@@ -60,7 +60,7 @@ void add_target_size_options(CLI::App& verb, double& sd) {
   CLI::Option* known = verb.add_option("--target-size-sd", sd,
                                        "How well the size of the target is known, one standard deviation as "
                                        "a share of it; 0: as stated")
-                           ->check(CLI::Range(0.0, 1.0))
+                           ->check(number_between(0, 1))
                            ->capture_default_str();
   verb.add_option_function<std::string>(
           "--target-size",

@@ -84,6 +84,15 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   return calib::cell_member(arm, camera, dataset, target, solved.calibration);
 }
 
+/// One recording is one witness.
+void expect_different(const std::vector<std::string>& paths) {
+  for (std::size_t i = 0; i < paths.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      std::error_code error;
+      if (fs::equivalent(paths[i], paths[j], error)) throw data::InputError(paths[i] + ": given twice");
+    }
+}
+
 std::string name_of(const std::string& path) {
   const fs::path normal = fs::path(path).lexically_normal();
   return normal.has_filename() ? normal.stem().string() : normal.parent_path().filename().string();
@@ -191,6 +200,8 @@ int run_register(const RegisterOptions& options) {
   if (options.calibrations.empty() == options.cameras.empty())
     throw data::InputError(
         "register: expected either two or more extrinsics files or --cameras with datasets");
+  expect_different(options.calibrations);
+  expect_different(options.cameras);
   if (options.calibrations.size() + options.cameras.size() < 2)
     throw data::InputError("register: found one calibration, expected two or more");
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);

@@ -9,6 +9,7 @@
 #include "apps/command_line.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/cloud_check.h"
+#include "calib/check/contradiction.h"
 #include "calib/check/projection_check.h"
 #include "calib/report/overlay.h"
 #include "data/atomic_file.h"
@@ -143,6 +144,9 @@ int run_validate(const ValidateOptions& options) {
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::Dataset dataset = load_dataset(options.dataset);
   const bool pairs = dataset.frames.front().T_camera_target.has_value();
+  if (dataset.setup && *dataset.setup != extrinsics.setup)
+    throw data::InputError(dataset.source + ": found " + calib::to_string(*dataset.setup) + ", expected " +
+                           calib::to_string(extrinsics.setup) + " as in " + options.extrinsics);
   const calib::Target target = pairs ? calib::Target() : target_of(options.dataset, dataset);
   const std::vector<ValidatedView> views = views_of(dataset, target, options);
 
@@ -156,24 +160,17 @@ int run_validate(const ValidateOptions& options) {
       same_size ? *extrinsics.lens : dataset.camera.value_or(data::CameraIntrinsics{});
   if (!pairs) observations = calib::with_poses_for(lens, target, extrinsics.target, std::move(observations));
   calib::HandEyePoses poses{extrinsics.transform.T, extrinsics.target_pose.T};
-  const auto check_with = [&](const Eigen::Isometry3d& Z) {
-    return calib::check_projection(extrinsics.setup, {poses.X, Z}, lens, target, observations,
-                                   extrinsics.target);
-  };
-  const Eigen::Isometry3d refitted = calib::target_pose_from(extrinsics.setup, poses.X, observations);
-  if (options.refit_target) poses.Z = refitted;
-  const calib::ProjectionCheck check = check_with(poses.Z);
-  // Ten times better at another place: it is the target that has moved, not the camera.
-  const bool moved =
-      !options.refit_target && check.mm_rms > 5 && 10 * check_with(refitted).mm_rms < check.mm_rms;
+  if (options.refit_target) poses.Z = calib::target_pose_from(extrinsics.setup, poses.X, observations);
+  const calib::ProjectionCheck check =
+      calib::check_projection(extrinsics.setup, poses, lens, target, observations, extrinsics.target);
+  const calib::Contradiction contradiction =
+      calib::contradiction(extrinsics, poses, options.refit_target, lens, target, observations, check);
   std::vector<std::string> warnings = extrinsics.warnings;
-  if (moved) {
-    warnings.insert(warnings.begin(),
-                    "the target is not where it was at the calibration: this proves nothing; --refit-target "
-                    "takes its place from these views");
+  if (!contradiction.sentence.empty()) {
+    warnings.insert(warnings.begin(), contradiction.sentence);
     warn_calib(warnings.front());
   }
-  const int exit_code = moved || !extrinsics.usable ? exit_unusable : exit_done;
+  const int exit_code = !contradiction.sentence.empty() || !extrinsics.usable ? exit_unusable : exit_done;
 
   const std::optional<calib::CloudCheck> clouds =
       pairs ? std::nullopt : check_clouds(dataset, extrinsics, views, check);
@@ -208,7 +205,8 @@ void add_validate_verb(CLI::App& app, Action& action) {
   verb->add_option("-o,--out", options->out, "Folder for validation.json and pictures");
   add_calib_common_options(*verb, options->common, force_covers_calibrations);
   verb->footer(
-      "Exit code 3: the target has moved since the calibration, or the calibration cannot be used.\n"
+      "Exit code 3: these views are missed by three times what the calibration states, or it cannot be "
+      "used.\n"
       "Example:\n"
       "  flash-calib validate another_recording --target chessboard:9x6:0.025 --extrinsics camera.json -o "
       "checked");

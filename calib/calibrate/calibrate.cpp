@@ -26,11 +26,19 @@ std::vector<Eigen::Isometry3d> target_poses(const std::vector<Observation>& obse
   return poses;
 }
 
-void expect_enough(std::size_t used, std::size_t all, int least) {
+/// left_out: the views that were, with their reasons; one is named.
+void expect_enough(std::size_t used, std::size_t all, int least, const std::string& left_out = {}) {
   if (used >= static_cast<std::size_t>(least)) return;
   throw data::InputError(std::to_string(used) + " of " + std::to_string(all) +
                          " views can be used: at least " + std::to_string(least) +
-                         " are needed, and 12 or more for an answer to trust; add views");
+                         " are needed, and 12 or more for an answer to trust; add views" + left_out);
+}
+
+std::string first_left_out(const ViewSelection& selection) {
+  for (std::size_t i = 0; i < selection.views.size(); ++i)
+    if (!selection.views[i].used)
+      return "; left out: " + selection.observations[i].image + ": " + selection.views[i].reason;
+  return {};
 }
 
 /// Refuses input that closes only when it is read otherwise than stated, or not at all.
@@ -77,6 +85,8 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
       std::distance(squared.begin(), std::max_element(squared.begin(), squared.end())));
   constexpr double kMedianOfChiSquare6 = 5.348;
   const double usual = std::max(data::median(squared) / kMedianOfChiSquare6, 1e-12);
+  // The corrections of few views share twelve unknowns with their own noise levels.
+  surprise *= std::pow(1 + 8 / std::max(1.0, 6 * static_cast<double>(squared.size()) - 12), 2);
   // Corrections far inside the corner noise say nothing.
   if (squared[worst] < surprise * std::max(usual, 0.05)) return false;
   const Vector6d xi =
@@ -238,6 +248,28 @@ void warn_of_shapes(Calibration& result, bool disputed) {
   if (disputed && result.size->prior_sd > 0) result.usable = false;
 }
 
+/// A lens that is stated to the last digit, against one that is near to it: pictures that want another one
+/// say so, and an answer that depends on it is none.
+void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_settings,
+                       const data::CameraIntrinsics& camera, const LensCovariance& stated) {
+  refine_settings.bundle.unknowns.intrinsics = kLensUnknowns;
+  plain.priors.lenses = {lens_prior(camera, stated)};
+  const Refinement refined = refine(std::move(plain), refine_settings);
+  const LensEstimate lens =
+      lens_estimate(refined.bundle, refine_settings.bundle.unknowns, refined.covariance);
+  if (lens.far_off.empty()) return;
+  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
+  const Vector6d away = motion_between(result.poses.X, refined.bundle.cameras.front());
+  const bool depends = away.dot(result.covariance.ldlt().solve(away)) > kChiSquare999;
+  char text[200];
+  std::snprintf(
+      text, sizeof text,
+      "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --stated-intrinsics out",
+      1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
+  result.warnings.insert(result.warnings.begin(), lens_differs(lens) + text);
+  if (depends) result.usable = false;
+}
+
 void warn(Calibration& result) {
   std::size_t missing = 0;
   for (const ViewResult& view : result.views) missing += view.used ? 0 : 1;
@@ -262,6 +294,10 @@ void warn(Calibration& result) {
   if (result.selection.renumbered > 0)
     result.warnings.push_back(std::to_string(result.selection.renumbered) +
                               " views had the target numbered from its other end; put right");
+  bool unusable = false;
+  const std::string noisy = unusual_noise(result.refined.noise, unusable);
+  if (!noisy.empty()) result.warnings.insert(result.warnings.begin(), noisy);
+  if (unusable) result.usable = false;
   if (!result.refined.converged) {
     result.warnings.insert(result.warnings.begin(), "the refinement did not converge");
     result.usable = false;
@@ -283,7 +319,7 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
   result.selection = select_views(result.setup, all, symmetries, settings.selection);
   expect_convention(result.setup, all, symmetries, result.selection.robust_seed, settings);
   std::vector<Observation> observations = used_observations(result.selection, &result.used);
-  expect_enough(observations.size(), all.size(), settings.least_views);
+  expect_enough(observations.size(), all.size(), settings.least_views, first_left_out(result.selection));
   return observations;
 }
 
@@ -356,6 +392,8 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
   const bool plausible = finish(result, observations);
+  if (given.lens == LensKnowledge::stated)
+    check_stated_lens(result, std::move(plain), refine_settings, camera, settings.lens_covariance);
   warn_of_shapes(result, sized.disputed);
   if (!plausible)
     if (const auto cause = cause_of(result, all, symmetries, settings))
@@ -376,13 +414,14 @@ std::string knock_sentence(const KnockedPart& other, std::size_t used) {
   std::snprintf(
       text, sizeof text,
       "the %s moved by %.1f mm and %.2f deg before %s: the answer is of the %zu views %s; the %d views %s "
-      "were %s",
+      "were %s%s",
       !knock.told    ? "camera or the target"
       : knock.camera ? "camera"
                      : "target",
       1e3 * knock.motion.head<3>().norm(), knock.motion.tail<3>().norm() / kDegree, other.view.c_str(), used,
       other.before ? "since" : "until then", other.views, other.before ? "until then" : "since",
-      other.poses ? "solved by themselves" : "too few for a solution");
+      other.poses ? "solved by themselves" : "too few for a solution",
+      other.before || (knock.told && !knock.camera) ? "" : ": where the camera is now is not known");
   return text;
 }
 
@@ -399,29 +438,28 @@ Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const E
   const auto first = static_cast<std::size_t>(whole.used[knock->pose]);
   const std::size_t after = whole.used.size() - knock->pose;
   // What holds now counts, unless it is hardly known.
-  KnockedPart other{
-      .knock = *knock, .view = all[first].image, .before = after >= 10 || 2 * after >= whole.used.size()};
-  const auto part = [&](bool before) {
-    return solve(setup, camera, points, symmetries, side_of(all, first, before), settings);
-  };
+  constexpr std::size_t kEnough = 6;
+  KnockedPart other{.knock = *knock, .view = all[first].image, .before = after >= kEnough};
   Calibration answer;
-  try {
-    answer = part(!other.before);
+  try {  // the part may have been knocked as well
+    answer = calibrate(setup, camera, points, symmetries, side_of(all, first, !other.before), settings);
   } catch (const data::InputError&) {
     return whole;  // a part alone may turn about one axis only
   }
   other.views = static_cast<int>(other.before ? knock->pose : after);
   try {
-    other.poses = part(other.before).poses;
+    other.poses = solve(setup, camera, points, symmetries, side_of(all, first, other.before), settings).poses;
   } catch (const data::InputError&) {
     // said in the sentence
   }
+  // Who asks where the camera is now is not served by where it was.
+  if (!other.before && (knock->camera || !knock->told)) answer.usable = false;
   for (std::size_t i = 0; i < all.size(); ++i)
     if ((i < first) == other.before && !all[i].T_camera_target.empty())
       answer.views[i].reason = answer.selection.views[i].reason =
           std::string(other.before ? "before" : "after") + " the knock at " + other.view;
   answer.warnings.insert(answer.warnings.begin(), knock_sentence(other, answer.used.size()));
-  answer.other_part = std::move(other);
+  if (!answer.other_part) answer.other_part = std::move(other);  // else that next to the answer
   return answer;
 }
 

@@ -122,6 +122,12 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
     extrinsics.robot_rotation_rad = sigmas.not_negative("robot_rotation_rad");
     extrinsics.robot_translation_m = sigmas.not_negative("robot_translation_m");
   }
+  if (object.has("residuals")) {
+    const data::JsonObject residuals = object.object("residuals");
+    if (residuals.has("heldout_mm") && residuals.has("heldout_deg"))
+      extrinsics.held_out = {residuals.not_negative("heldout_deg") * M_PI / 180,
+                             1e-3 * residuals.not_negative("heldout_mm")};
+  }
   if (object.has("scale")) {
     const data::JsonObject scale = object.object("scale");
     if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");

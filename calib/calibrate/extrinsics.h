@@ -42,6 +42,8 @@ struct Extrinsics {
   TargetShape target;                          ///< that transform and target_pose are for
   std::optional<data::CameraIntrinsics> lens;  ///< likewise; none of pose pairs
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
+  std::optional<ClosingError>
+      held_out;        ///< rms of the target's pose in views left out; none in files without
   bool pixels = true;  ///< false: of pose pairs, which have no corners
   Use use = Use::workspace;
   std::vector<std::string> warnings;  ///< of the calibration, worst first

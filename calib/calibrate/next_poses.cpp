@@ -10,6 +10,7 @@
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
 #include "data/error.h"
+#include "data/text.h"
 
 namespace flash::calib {
 namespace {
@@ -79,6 +80,10 @@ std::vector<Eigen::Isometry3d> draw_poses(const Bundle& bundle, const PlanSettin
     lower = lower.cwiseMin(pose.T_base_gripper.translation());
     upper = upper.cwiseMax(pose.T_base_gripper.translation());
   }
+  for (Eigen::Index k = 0; k < 3; ++k)
+    if (settings.lower[k] > settings.upper[k])
+      throw data::InputError("plan: --lower " + data::format_short(settings.lower[k]) + " is above --upper " +
+                             data::format_short(settings.upper[k]) + " along " + "xyz"[k]);
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(settings.reach);
   lower = (lower - reach).cwiseMax(settings.lower);
   upper = (upper + reach).cwiseMin(settings.upper);

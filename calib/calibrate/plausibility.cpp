@@ -58,6 +58,17 @@ std::string implausible_noise(const NoiseLevels& levels, const std::vector<Obser
       kAdvice);
 }
 
+std::string unusual_noise(const NoiseLevels& noise, bool& unusable, const ArmNoise& arm) {
+  const double translation = noise.translation.front(), rotation = noise.rotation.front();
+  if (translation < arm.doubtful_m && rotation < arm.doubtful_rad) return {};
+  unusable = unusable || translation > arm.unusable_m || rotation > arm.unusable_rad;
+  return formatted(
+      "the robot's poses would have to be wrong by %.1f mm and %.2f deg an axis, more than arms are: look "
+      "for poses of two "
+      "tools or two bases, for mirrored pictures, for a marker that is not where it was; %s",
+      1e3 * translation, rotation / kDegree, kAdvice);
+}
+
 std::string implausibility(const Calibration& calibration, const std::vector<Observation>& used,
                            const PlausibilitySettings& settings) {
   std::vector<Eigen::Isometry3d> target;

@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,16 @@ struct PlausibilitySettings {
 /// solution.
 std::string implausibility(const Calibration& calibration, const std::vector<Observation>& used,
                            const PlausibilitySettings& settings = {});
+
+/// Noise of the robot's poses, an axis, that no arm has.
+struct ArmNoise {
+  double doubtful_m = 5e-3, doubtful_rad = 1 * M_PI / 180;   ///< is told
+  double unusable_m = 10e-3, unusable_rad = 3 * M_PI / 180;  ///< is no answer
+};
+
+/// Empty, or one sentence that says how far the robot's poses would have to be wrong. `unusable` becomes true
+/// where they are so by more than any arm.
+std::string unusual_noise(const NoiseLevels& noise, bool& unusable, const ArmNoise& arm = {});
 
 /// The part that is known before views are left out: whether the robot would have to be wrong by about as
 /// much as it moved.

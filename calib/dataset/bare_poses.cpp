@@ -112,7 +112,7 @@ PoseList interpreted(const std::vector<Row>& rows, const std::vector<double>& st
   const std::string unit = millimetres ? "mm" : "m";
   list.guess = path + ": columns without names were read as " + (numbered ? "the picture's number, " : "") +
                (numbers == 6 ? "x y z [" + unit + "], three angles [" + (degrees ? "deg" : "rad") +
-                                   "] about fixed x, y, z"
+                                   "] as --angles says (else about fixed x, y, z)"
                 : numbers == 7 ? "x y z [" + unit + "], quaternion x y z w"
                                : "a matrix, row by row [" + unit + "]") +
                (list.in_order ? "; poses are in the order of the pictures" : "");

@@ -349,9 +349,19 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
                               " poses in " + dataset.poses_path + " have no picture");
 }
 
-}  // namespace
+/// Refuses places that no robot and no camera has, which sums of squares would not survive.
+void expect_places(const Dataset& dataset) {
+  constexpr double kFarthest = 1e4;  // [m]
+  for (const Frame& frame : dataset.frames) {
+    double farthest = frame.T_base_gripper.translation().norm();
+    if (frame.T_camera_target) farthest = std::max(farthest, frame.T_camera_target->translation().norm());
+    if (!(farthest < kFarthest))
+      throw data::input_error(dataset.source, frame.name,
+                              "found a pose " + data::format_short(farthest) + " m away, expected metres");
+  }
+}
 
-Dataset load_dataset(const std::string& path, const DatasetOptions& options) {
+Dataset read_dataset(const std::string& path, const DatasetOptions& options) {
   Dataset dataset;
   dataset.source = path;
   dataset.depth_scale = options.depth_scale;
@@ -369,6 +379,14 @@ Dataset load_dataset(const std::string& path, const DatasetOptions& options) {
   }
   read_pictures(folder, options, dataset);
   if (!options.angles.empty()) read_angles(options.angles, dataset);
+  return dataset;
+}
+
+}  // namespace
+
+Dataset load_dataset(const std::string& path, const DatasetOptions& options) {
+  Dataset dataset = read_dataset(path, options);
+  expect_places(dataset);
   return dataset;
 }
 

@@ -56,6 +56,13 @@ std::string column_name(const std::string& header) {
                                                              {"file", "image"},
                                                              {"filename", "image"},
                                                              {"name", "image"},
+                                                             {"picture", "image"},
+                                                             {"x_mm", "tx_mm"},
+                                                             {"y_mm", "ty_mm"},
+                                                             {"z_mm", "tz_mm"},
+                                                             {"a", "rx_deg"},  // KUKA's, about turning ZYX
+                                                             {"b", "ry_deg"},
+                                                             {"c", "rz_deg"},
                                                              {"roll", "rx"},
                                                              {"pitch", "ry"},
                                                              {"yaw", "rz"},
@@ -87,8 +94,13 @@ struct CsvLine {
   }
 };
 
-/// To which picture the line belongs.
+bool names_pictures(const Columns& columns) {
+  return columns.count("image") + columns.count("index") + columns.count("t") > 0;
+}
+
+/// To which picture the line belongs; without a column that says so, to that of its place.
 void read_picture(const CsvLine& line, RecordedPose& pose) {
+  if (!names_pictures(line.columns)) return;
   if (line.has("image"))
     pose.image = line.text("image");
   else
@@ -99,7 +111,9 @@ void read_picture(const CsvLine& line, RecordedPose& pose) {
 RecordedPose pose_of_line(const CsvLine& line) {
   RecordedPose pose;
   const std::string where = "line " + std::to_string(line.number);
-  const Eigen::Vector3d translation = line.vector({"tx", "ty", "tz"});
+  const Eigen::Vector3d translation = line.has("tx_mm")
+                                          ? Eigen::Vector3d(1e-3 * line.vector({"tx", "ty", "tz"}, "_mm"))
+                                          : line.vector({"tx", "ty", "tz"});
   if (line.has("qw")) {
     const Eigen::Vector3d axis = line.vector({"qx", "qy", "qz"});
     pose.pose = pose_of(translation, {axis.x(), axis.y(), axis.z(), line.value("qw")}, line.path, where);
@@ -130,9 +144,14 @@ void expect_columns(const Columns& columns, const std::string& path) {
   const auto all = [&](std::initializer_list<const char*> names) {
     return std::all_of(names.begin(), names.end(), [&](const char* name) { return columns.count(name) > 0; });
   };
-  if (!all({"image"}) && !all({"index"}) && !all({"t"}))
-    throw input_error(path, "header", "found none of the columns image, index, t");
-  if (!all({"tx", "ty", "tz"})) throw input_error(path, "header", "expected the columns tx, ty, tz [m]");
+  if (!all({"tx", "ty", "tz"}) && !all({"tx_mm", "ty_mm", "tz_mm"})) {
+    const bool joints = all({"q1"}) || std::any_of(columns.begin(), columns.end(), [](const auto& column) {
+                          return column.first.find("joint") != std::string::npos;
+                        });
+    throw input_error(path, "header",
+                      std::string("expected the columns tx, ty, tz [m], or tx_mm, ty_mm, tz_mm") +
+                          (joints ? "; joints need --robot with their URDF" : ""));
+  }
   if (!all({"qx", "qy", "qz", "qw"}) && !all({"rx", "ry", "rz"}) && !all({"rx_deg", "ry_deg", "rz_deg"}) &&
       !all({"rotvec_x", "rotvec_y", "rotvec_z"}))
     throw input_error(path, "header",
@@ -141,9 +160,9 @@ void expect_columns(const Columns& columns, const std::string& path) {
 
 /// Reads the lines below a header; `check` looks at its columns, `read` makes a pose of each line.
 template <class Check, class Read>
-std::vector<RecordedPose> read_csv(const std::string& path, const Check& check, const Read& read) {
+PoseList read_csv(const std::string& path, const Check& check, const Read& read) {
   const std::string text = data::read_file(path);
-  std::vector<RecordedPose> poses;
+  PoseList list;
   Columns columns;
   const char* separator = ",";
   data::LineReader lines(text);
@@ -161,13 +180,18 @@ std::vector<RecordedPose> read_csv(const std::string& path, const Check& check, 
       throw input_error(
           path, "line " + std::to_string(lines.number()),
           "found " + std::to_string(cells.size()) + " columns, expected " + std::to_string(columns.size()));
-    poses.push_back(read(CsvLine{path, columns, std::move(cells), lines.number()}));
+    list.poses.push_back(read(CsvLine{path, columns, std::move(cells), lines.number()}));
+    if (!names_pictures(columns)) list.poses.back().stamp = static_cast<double>(list.poses.size() - 1);
   }
-  if (poses.empty()) throw InputError(path + ": found no poses below its header");
-  return poses;
+  if (list.poses.empty()) throw InputError(path + ": found no poses below its header");
+  list.in_order = !names_pictures(columns);
+  if (list.in_order)
+    list.guess =
+        path + ": no column image, index or t; its lines are taken to be in the order of the pictures";
+  return list;
 }
 
-std::vector<RecordedPose> load_csv(const std::string& path) {
+PoseList load_csv(const std::string& path) {
   return read_csv(
       path, [&](const Columns& columns) { expect_columns(columns, path); }, pose_of_line);
 }
@@ -301,7 +325,7 @@ PoseList load_pose_list(const std::string& path) {
     list.guess = path + ": its samples are taken to be in the order of the pictures";
   } else if (extension != ".tum" && !is_tum(path)) {
     if (!has_header(path)) return load_bare_poses(path);
-    list.poses = load_csv(path);
+    list = load_csv(path);
   } else {
     const data::Trajectory trajectory = data::load_tum(path);
     for (std::size_t i = 0; i < trajectory.times.size(); ++i)
@@ -314,11 +338,7 @@ PoseList load_pose_list(const std::string& path) {
 PoseList load_joint_list(const std::string& path, const SerialChain& robot) {
   constexpr double kTurns = 4 * M_PI;  // beyond which no joint turns
   std::vector<std::string> names;
-  const auto check = [&](const Columns& columns) {
-    if (columns.count("image") + columns.count("index") + columns.count("t") == 0)
-      throw input_error(path, "header", "found none of the columns image, index, t");
-    names = joint_columns(columns, robot, path);
-  };
+  const auto check = [&](const Columns& columns) { names = joint_columns(columns, robot, path); };
   const auto read = [&](const CsvLine& line) {
     RecordedPose pose;
     read_picture(line, pose);
@@ -335,9 +355,7 @@ PoseList load_joint_list(const std::string& path, const SerialChain& robot) {
     pose.pose = gripper_pose(robot, pose.joints);
     return pose;
   };
-  PoseList list;
-  list.poses = read_csv(path, check, read);
-  return list;
+  return read_csv(path, check, read);
 }
 
 RecordedPose load_pose_yaml(const std::string& path) {

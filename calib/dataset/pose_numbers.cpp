@@ -69,9 +69,10 @@ bool beyond_reach(std::vector<double> distances) {
 
 void expect_metres(const std::vector<double>& distances, const std::string& path) {
   if (beyond_reach(distances))
-    throw data::input_error(path, "translations",
-                            "half of them are beyond " + data::format_short(data::median(distances)) +
-                                " m, expected metres (are these millimetres?)");
+    throw data::input_error(
+        path, "translations",
+        "half of them are beyond " + data::format_short(data::median(distances)) +
+            " m, expected metres (are these millimetres? name the columns x_mm, y_mm, z_mm)");
 }
 
 }  // namespace flash::calib

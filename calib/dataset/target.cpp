@@ -33,6 +33,8 @@ class Parts {
     const std::optional<double> value = data::parse_number(words_[k]);
     if (!value || !(*value > 0) || !std::isfinite(*value))
       throw error(field, "metres above 0, found \"" + words_[k] + '"');
+    constexpr double kLeast = 1e-5;  // finer than any print
+    if (*value < kLeast) throw error(field, "metres, found " + words_[k]);
     if (*value > 5) throw error(field, "metres, found " + words_[k] + " (millimetres?)");
     return *value;
   }

@@ -28,11 +28,24 @@ double yaml_number(const YAML::Node& node, const std::string& path, const std::s
   return *value;
 }
 
+namespace {
+
+void add_numbers(const YAML::Node& node, const std::string& path, const std::string& field, int depth,
+                 std::vector<double>& values) {
+  constexpr int kDeepest = 8;  // an alias may hold itself
+  if (depth > kDeepest) throw data::input_error(path, field, "lists within lists, expected numbers");
+  if (node.IsScalar()) {
+    values.push_back(yaml_number(node, path, field));
+    return;
+  }
+  for (const YAML::Node& item : node) add_numbers(item, path, field, depth + 1, values);
+}
+
+}  // namespace
+
 std::vector<double> yaml_numbers(const YAML::Node& node, const std::string& path, const std::string& field) {
-  if (node.IsScalar()) return {yaml_number(node, path, field)};
   std::vector<double> values;
-  for (const YAML::Node& item : node)
-    for (const double value : yaml_numbers(item, path, field)) values.push_back(value);
+  add_numbers(node, path, field, 0, values);
   return values;
 }
 

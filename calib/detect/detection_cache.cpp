@@ -1,8 +1,10 @@
 #include "calib/detect/detection_cache.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
@@ -15,8 +17,20 @@ namespace {
 
 constexpr int kFinderVersion = 3;  // counts changes of what the finders return
 
-std::optional<Found> read(const std::string& path) {
-  if (!std::filesystem::exists(path)) return std::nullopt;
+/// Points of the target, each once, at places in or near a picture.
+bool is_sound(const Sighting& sighting, int points) {
+  constexpr double kFarthest = 1e6;  // [px]
+  const std::set<int> different(sighting.points.begin(), sighting.points.end());
+  return sighting.pixels.size() == sighting.points.size() && different.size() == sighting.points.size() &&
+         (different.empty() || (*different.begin() >= 0 && *different.rbegin() < points)) &&
+         std::all_of(sighting.pixels.begin(), sighting.pixels.end(),
+                     [](const Eigen::Vector2d& pixel) { return pixel.cwiseAbs().maxCoeff() < kFarthest; });
+}
+
+/// points: of the target.
+std::optional<Found> read(const std::string& path, int points) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
   try {
     const nlohmann::json json = data::load_json(path);
     Found found;
@@ -25,7 +39,7 @@ std::optional<Found> read(const std::string& path) {
       Sighting sighting{item.at("refiner").get<std::string>(), item.at("points").get<std::vector<int>>(), {}};
       for (const nlohmann::json& pixel : item.at("pixels"))
         sighting.pixels.emplace_back(pixel.at(0).get<double>(), pixel.at(1).get<double>());
-      if (sighting.pixels.size() != sighting.points.size()) return std::nullopt;
+      if (!is_sound(sighting, points)) return std::nullopt;
       found.sightings.push_back(std::move(sighting));
     }
     return found;
@@ -49,7 +63,7 @@ void write(const Found& found, const std::string& path) {
 
 DetectionCache::DetectionCache(std::string folder, const std::optional<data::CameraIntrinsics>& camera,
                                const Target& target)
-    : folder_(std::move(folder)) {
+    : folder_(std::move(folder)), points_(static_cast<int>(target_points(target).cols())) {
   if (folder_.empty()) return;
   const auto add = [&](double value) { key_ += data::format_number(value) + ' '; };
   key_ = std::string(FLASH_VERSION) + ' ' + std::to_string(kFinderVersion) + ' ' + target.dictionary + ' ';
@@ -77,7 +91,7 @@ Found DetectionCache::get(const std::string& image, const std::function<Found()>
     return find();  // says why it cannot be read
   }
   const std::string path = (std::filesystem::path(folder_) / (data::sha256(key_ + bytes) + ".json")).string();
-  if (std::optional<Found> kept = read(path)) return std::move(*kept);
+  if (std::optional<Found> kept = read(path, points_)) return std::move(*kept);
   Found found = find();
   write(found, path);
   return found;

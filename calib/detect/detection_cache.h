@@ -23,6 +23,7 @@ class DetectionCache {
 
  private:
   std::string folder_;
+  int points_ = 0;   ///< of the target
   std::string key_;  ///< of everything but the picture
 };
 

@@ -44,7 +44,7 @@ LensEstimate lens_estimate(const Bundle& bundle, const Unknowns& unknowns, const
   return lens;
 }
 
-std::string lens_sentence(const LensEstimate& lens) {
+std::string lens_differs(const LensEstimate& lens) {
   constexpr const char* kNames[kLensUnknowns] = {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
   std::string text = "the lens is not as stated:";
   for (const int i : lens.far_off) {
@@ -54,8 +54,13 @@ std::string lens_sentence(const LensEstimate& lens) {
                   lens.estimate[i], 2 * lens.sd[i], lens.stated[i]);
     text += part;
   }
-  return text +
-         " the answer is for the lens solved for (--camera-info writes it); calibrate the lens (flash-calib "
+  text.pop_back();
+  return text;
+}
+
+std::string lens_sentence(const LensEstimate& lens) {
+  return lens_differs(lens) +
+         "; the answer is for the lens solved for (--camera-info writes it); calibrate the lens (flash-calib "
          "intrinsics)";
 }
 

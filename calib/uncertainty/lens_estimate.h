@@ -24,7 +24,10 @@ struct LensEstimate {
 LensEstimate lens_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
                            std::size_t camera = 0);
 
-/// "the lens is not as stated: fx 582.1 +- 1.2 (2 sd) px, stated 611.0 ...", of a lens that is far off.
+/// "the lens is not as stated: fx 582.1 +- 1.2, stated 611.0; ...", of a lens that is far off.
+std::string lens_differs(const LensEstimate& lens);
+
+/// The same, and what follows for the answer.
 std::string lens_sentence(const LensEstimate& lens);
 
 WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,

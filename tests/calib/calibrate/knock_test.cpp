@@ -77,6 +77,33 @@ TEST_P(Knocks, EightMillimetresHalfWayAreFoundByTheirTimeAndBothPartsSolved) {
   EXPECT_NE(result.views[3].reason.find("the knock at 10"), std::string::npos);
 }
 
+TEST_P(Knocks, TheSecondOfTwoCounts) {
+  const auto& [setup, camera] = GetParam();
+  HandEyeScene scene = scene_of(setup, 5);
+  Vector6d motion = Vector6d::Zero();
+  motion.head<3>() << 0.012, -0.008, 0.007;  // 16 mm, twice
+  knock(scene, 7, camera, motion);
+  knock(scene, 14, camera, -motion.cwiseAbs());
+  const Calibration result = calibrated(scene);
+  ASSERT_TRUE(result.other_part);
+  ASSERT_EQ(result.used.front(), 14);
+  const Eigen::Isometry3d now = camera ? moved(scene.truth.X, -motion.cwiseAbs()) : scene.truth.X;
+  const Vector6d error = motion_between(result.poses.X, now);
+  EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
+}
+
+TEST_P(Knocks, BeforeTheLastViewsLeaveTheCameraUnknown) {
+  const auto& [setup, camera] = GetParam();
+  HandEyeScene scene = scene_of(setup, 5);
+  Vector6d motion = Vector6d::Zero();
+  motion.head<3>() << 0.006, -0.004, 0.0035;
+  knock(scene, 16, camera, motion);
+  const Calibration result = calibrated(scene);
+  if (!result.other_part) GTEST_SKIP() << "four views are left out one by one";
+  EXPECT_FALSE(result.other_part->before);
+  EXPECT_EQ(result.usable, !camera && result.other_part->knock.told);
+}
+
 TEST_P(Knocks, AreNotSeenWhereThereAreNone) {
   // One in twenty is the prior; of 12 recordings, half of arms with wrong kinematics, none is likelier than
   // not.

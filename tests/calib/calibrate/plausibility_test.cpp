@@ -24,5 +24,21 @@ TEST(Plausibility, RobotThatOnlyTurnsMayBeWrongByMoreThanItMoves) {
   EXPECT_EQ(implausible_noise(kOrdinary, scene.observations), "");
 }
 
+TEST(UnusualNoise, IsToldWhereNoArmErrsSoAndNoAnswerWhereNoneCould) {
+  for (const auto& [millimetres, degrees, told, unusable] :
+       {std::tuple(4.0, 0.9, false, false), std::tuple(6.0, 0.1, true, false),
+        std::tuple(0.1, 1.5, true, false), std::tuple(18.0, 0.02, true, true),
+        std::tuple(0.2, 6.8, true, true)}) {
+    bool no_answer = false;
+    const std::string sentence = unusual_noise({.corner = {0.1},
+                                                .rotation = {degrees * M_PI / 180},
+                                                .translation = {1e-3 * millimetres},
+                                                .depth = {}},
+                                               no_answer);
+    EXPECT_EQ(!sentence.empty(), told) << millimetres;
+    EXPECT_EQ(no_answer, unusable) << millimetres;
+  }
+}
+
 }  // namespace
 }  // namespace flash::calib

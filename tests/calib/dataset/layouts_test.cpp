@@ -89,6 +89,44 @@ TEST(Layouts, BarePosesAreReadAndTheReadingIsSaid) {
   }
 }
 
+TEST(Layouts, HeadersOfManyProgramsAreRead) {
+  struct Case {
+    const char *text, *guess;
+  };
+  const Case cases[] = {
+      {"x,y,z,rx,ry,rz\n0.1,0.2,0.3,0,0,1.5708\n0.4,0.5,0.6,0,0,0\n", "in the order of the pictures"},
+      {"x,y,z,qw,qx,qy,qz\n0.1,0.2,0.3,0.7071068,0,0,0.7071068\n0.4,0.5,0.6,1,0,0,0\n",
+       "in the order of the pictures"},
+      {"X,Y,Z,A,B,C\n0.1,0.2,0.3,0,0,90\n0.4,0.5,0.6,0,0,0\n", "in the order of the pictures"},
+      {"filename,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\na_9.png,100,200,300,0,0,90\na_10.png,400,500,600,0,0,"
+       "0\n",
+       ""},
+  };
+  for (const Case& c : cases) {
+    const data::TemporaryFolder folder;
+    write_pictures(folder);
+    folder.write("poses.csv", c.text);
+    expect_read(folder, c.guess);
+  }
+}
+
+TEST(Layouts, PlacesThatNoRobotReachesAreRefused) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  folder.write("poses.tum", "9 1e300 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+  const std::string message = data::input_error_of([&] { load_dataset(folder / ""); });
+  EXPECT_NE(message.find("m away, expected metres"), std::string::npos) << message;
+}
+
+TEST(Layouts, ListsThatHoldThemselvesAreRefused) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  folder.write("poses.tum", "9 0 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+  folder.write("camera_info.yaml",
+               "image_width: 640\nimage_height: 480\na: &a [*a]\ncamera_matrix: {data: *a}\n");
+  EXPECT_NE(data::input_error_of([&] { load_dataset(folder / ""); }), "");
+}
+
 TEST(Layouts, MatrixPerTextFile) {
   for (const char* beginning : {"poses/pose_", "poses/"}) {
     const data::TemporaryFolder folder;

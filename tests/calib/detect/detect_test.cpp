@@ -65,8 +65,22 @@ TEST(Detect, WhatIsKeptIsWhatWasFound) {
   EXPECT_EQ(first[0].readings[0].observation.pixels, second[0].readings[0].observation.pixels);
   // Another target is another question, and a broken file no answer.
   EXPECT_THROW(detect(dataset, parse_target("chessboard:8x5:0.03"), settings), data::InputError);
-  for (const auto& entry : std::filesystem::directory_iterator(folder / "cache"))
-    std::ofstream(entry.path()) << "{";
+  const auto spoil = [&](const std::string& text) {
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "cache"))
+      std::ofstream(entry.path()) << text;
+  };
+  const auto kept = [](const std::string& points, const std::string& pixels) {
+    return R"({"reason": "", "sightings": [{"refiner": "image_model", "points": [)" + points +
+           R"(], "pixels": [)" + pixels + "]}]}";
+  };
+  for (const std::string& text : {kept("99999", "[1, 2]"), kept("-1", "[1, 2]"),
+                                  kept("3, 3", "[1, 2], [1, 2]"), kept("3", "[1e300, 2]")}) {
+    spoil(text);
+    EXPECT_EQ(detect(dataset, target, settings)[0].readings[0].observation.pixels,
+              first[0].readings[0].observation.pixels)
+        << text;
+  }
+  spoil("{");
   EXPECT_EQ(detect(dataset, target, settings)[0].readings[0].observation.pixels,
             first[0].readings[0].observation.pixels);
 }

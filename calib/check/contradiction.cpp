@@ -1,0 +1,104 @@
+#include "calib/check/contradiction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "calib/geometry/pose.h"
+#include "data/median.h"
+
+namespace flash::calib {
+namespace {
+
+constexpr double kDegrees = 180 / M_PI;
+constexpr double kContradicts = 3;  // times the stated error
+
+double ratio_of(double mm, double deg, const StatedError& stated) {
+  return std::max(mm / stated.mm, deg / stated.deg);
+}
+
+/// X as the mean over the views, with the target where it is said to be.
+Eigen::Isometry3d camera_pose_from(Setup setup, const Eigen::Isometry3d& Z,
+                                   const std::vector<Observation>& observations) {
+  std::vector<Eigen::Isometry3d> poses;
+  for (const Observation& view : observations) {
+    if (view.T_camera_target.empty()) continue;
+    const PoseLoop loop = pose_loop(setup, view.T_base_gripper, view.T_camera_target.front());
+    poses.push_back(loop.G.inverse() * Z * loop.C.inverse());
+  }
+  return mean_pose(poses);
+}
+
+std::string moved_by(const Eigen::Isometry3d& before, const Eigen::Isometry3d& now) {
+  const Vector6d motion = motion_between(before, now);
+  char text[80];
+  std::snprintf(text, sizeof text, "by %.1f mm and %.2f deg", 1e3 * motion.head<3>().norm(),
+                kDegrees * motion.tail<3>().norm());
+  return text;
+}
+
+/// The view from which on all miss, where all before it do not.
+std::string first_that_misses(const ProjectionCheck& check, const StatedError& stated) {
+  const auto misses = [&](const ViewProjection& view) {
+    return ratio_of(view.mm, view.deg, stated) > kContradicts;
+  };
+  const auto first = std::find_if(check.views.begin(), check.views.end(), misses);
+  const bool step = first != check.views.begin() && std::all_of(first, check.views.end(), misses);
+  return step ? ", from " + first->image + " on" : "";
+}
+
+}  // namespace
+
+std::optional<StatedError> stated_error(const Extrinsics& extrinsics, double distance) {
+  if (!extrinsics.held_out) return std::nullopt;
+  const double turn = extrinsics.covariance.bottomRightCorner<3, 3>()
+                          .trace(),  // [rad^2], two of three axes count
+      shift = extrinsics.covariance.topLeftCorner<3, 3>().trace() + 2.0 / 3 * turn * distance * distance;
+  return StatedError{std::hypot(1e3 * extrinsics.held_out->translation, 1e3 * std::sqrt(shift)),
+                     kDegrees * std::hypot(extrinsics.held_out->rotation, std::sqrt(turn))};
+}
+
+Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& poses, bool target_is_refitted,
+                            const data::CameraIntrinsics& lens, const Target& target,
+                            const std::vector<Observation>& observations, const ProjectionCheck& check) {
+  std::vector<double> distances;
+  for (const Observation& view : observations)
+    if (!view.T_camera_target.empty()) distances.push_back(view.T_camera_target.front().translation().norm());
+  if (distances.empty()) return {};
+  const std::optional<StatedError> stated = stated_error(extrinsics, data::median(distances));
+  if (!stated) return {};
+  Contradiction result{.ratio = ratio_of(check.mm_rms, check.deg_rms, *stated), .sentence = {}};
+  if (result.ratio <= kContradicts) return result;
+
+  const auto ratio_at = [&](const HandEyePoses& at) {
+    const ProjectionCheck moved =
+        check_projection(extrinsics.setup, at, lens, target, observations, extrinsics.target);
+    return ratio_of(moved.mm_rms, moved.deg_rms, *stated);
+  };
+  const HandEyePoses target_moved{poses.X, target_pose_from(extrinsics.setup, poses.X, observations)},
+      camera_moved{camera_pose_from(extrinsics.setup, poses.Z, observations), poses.Z};
+  const double by_target = target_is_refitted ? result.ratio : ratio_at(target_moved),
+               by_camera = ratio_at(camera_moved);
+  std::string cause;
+  if (by_target <= kContradicts && by_target <= by_camera)
+    cause = "the target is not where it was at the calibration, " + moved_by(poses.Z, target_moved.Z) +
+            ": this proves nothing; --refit-target takes its place from these views";
+  else if (by_camera <= kContradicts)
+    cause = "the camera is not where it was at the calibration, " + moved_by(poses.X, camera_moved.X) +
+            ": calibrate again";
+  else
+    cause =
+        "neither a target nor a camera that was moved explains it: another setup, target, robot or lens, "
+        "something "
+        "that moved meanwhile, or a robot that errs more in these poses";
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the target is missed by %.1f mm and %.2f deg (rms%s), where the calibration states %.1f mm "
+                "and %.2f deg: ",
+                check.mm_rms, check.deg_rms, first_that_misses(check, *stated).c_str(), stated->mm,
+                stated->deg);
+  result.sentence = text + cause;
+  return result;
+}
+
+}  // namespace flash::calib
