@@ -17,7 +17,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
+.PHONY: help demo configure build test validate routes coverage size-study use-study locking reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -84,6 +84,10 @@ random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on; sa
 deep-starts: configure-test  ## Simulate SCENES random sheets that start across obstacles; say how fast they come out
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
 	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --list
+
+locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever over Poisson's ratio and mesh
+	cmake --build $(BUILD) -j $(JOBS) --target locking_study
+	$(BUILD)/tests/locking_study
 
 reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py
 	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \

@@ -19,6 +19,7 @@
 #include "data/text.h"
 #include "data/worst.h"
 #include "sim/newton/solver.h"
+#include "sim/newton/solver_memory.h"
 #include "sim/oracle/projective.h"
 #include "sim/scene/scene.h"
 #include "sim/scene/solid.h"
@@ -91,7 +92,9 @@ std::size_t vertices_of(const std::vector<SceneBody>& bodies) {
 
 void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies) {
   const std::size_t vertices = vertices_of(bodies);
-  const double needed = solver_bytes_per_vertex * static_cast<double>(vertices), limit = data::memory_limit();
+  double needed = 0;
+  for (const SceneBody& body : bodies) needed += solver_bytes(body.sheet);
+  const double limit = data::memory_limit();
   if (limit > 0 && needed > limit)
     throw data::input_error(scene.source, "objects",
                             data::format_count(vertices) + " vertices take about " +

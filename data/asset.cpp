@@ -349,6 +349,8 @@ void transform(const Asset& asset, Points& vertices) {
 }  // namespace
 
 TriangleMesh load_rest_mesh(const Asset& asset) {
+  if (asset.element_type != ElementType::triangle)
+    throw input_error(asset.source, "element_type", "found TETRAHEDRON, expected TRIANGLE: a sheet");
   TriangleMesh mesh = is_mesh_spec(asset.mesh) ? parse_mesh_spec(asset.mesh, asset.source, "mesh")
                                                : load_triangle_mesh(asset.mesh);
   check_size(asset, mesh.vertices);

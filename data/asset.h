@@ -79,13 +79,15 @@ struct ResolvedSolid {
 /// rest_volume: of the solid [m^3]. Throws InputError for triangles.
 ResolvedSolid resolve_solid(const Asset& asset, double rest_volume);
 
-/// The asset's triangle mesh. Throws InputError where it is so large that it must be in millimetres.
+/// The asset's triangle mesh. Throws InputError where it is so large that it must be in millimetres, and for
+/// tetrahedra.
 TriangleMesh load_rest_mesh(const Asset& asset);
 
 /// The asset's triangle mesh, moved by its transformation.
 TriangleMesh load_asset_mesh(const Asset& asset);
 
-/// The asset's tetrahedra, moved likewise. Throws InputError as load_rest_mesh does.
+/// The asset's tetrahedra, moved likewise. Throws InputError where they are so large, and for a mesh made on
+/// the spot.
 TetMesh load_asset_tet_mesh(const Asset& asset);
 
 /// Rotation about fixed x, then y, then z [deg], then translation.

@@ -15,6 +15,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
 #include "data/scene.h"
 #include "sim/scene/scene.h"
 
@@ -341,6 +342,66 @@ TEST_F(SceneRunTest, AHandIsNoObstacleToWhatItHolds) {
   EXPECT_TRUE(run_scene(scene, {}, out()).warnings.empty());
   // A name with a comma is one field.
   EXPECT_NE(data::read_file(out() + "/forces.csv").find("\n0.01,\"hand, left\","), std::string::npos);
+}
+
+/// A box of tetrahedra on a table, from files.
+std::string box_scene(const std::string& poisson, const std::string& solver, const std::string& start) {
+  return R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 20, "gravity": [0, 0, -9.81],
+    "solver": {"type": ")" +
+         solver + R"("}, "obstacles": {"table": {"shape": "plane", "point": [0, 0, 0], "normal": [0, 0, 1]}},
+    "objects": {"box": {"asset": "box)" +
+         poisson + R"(.json")" + start + "}}}";
+}
+
+TEST_F(SceneRunTest, SolidsRunFromFilesAndTellWhereTheyLock) {
+  data::save_tet_mesh(data::tet_box({0.04, 0.04, 0.04}, {2, 2, 2}), (folder_ / "box.tet").string());
+  for (const char* poisson : {"0.3", "0.45"})
+    write(std::string("box") + poisson + ".json",
+          std::string(R"({"schema": "flash-asset/1", "mesh": "box.tet", "element_type": "TETRAHEDRON",
+      "mechanical_props": {"constitutive": "TET_NEOHOOKEAN", "density": 300, "young": 3e4, "stiffness_damping": 0.02,
+      "poisson": )") +
+              poisson + "}}");
+  const auto run = [&](const std::string& poisson) {
+    const data::Scene scene = data::load_scene(write("scene.json", box_scene(poisson, "newton", "")));
+    return run_scene(scene, {}, out());
+  };
+  const SceneSummary soft = run("0.3");
+  EXPECT_TRUE(soft.warnings.empty());
+  EXPECT_EQ(soft.unconverged_steps, 0);
+  // It carries its weight, 300 kg/m^3 of 64 cm^3, once it has come to rest; its frames show its surface.
+  EXPECT_NEAR(std::stod(column("forces.csv", "fz").back()), 300 * 6.4e-5 * 9.81, 1e-3);
+  const data::Geometry frame = data::load_geometry((fs::path(out()) / "frames" / "000020.ply").string());
+  EXPECT_EQ(frame.points.rows(), 27);
+  EXPECT_EQ(frame.triangles.rows(), 6 * 4 * 2);
+  EXPECT_GT(std::stod(column("log.csv", "elastic_J").back()), 0);
+  const SceneSummary locking = run("0.45");
+  ASSERT_EQ(locking.warnings.size(), 1u);
+  EXPECT_NE(locking.warnings[0].find("box: linear tetrahedra lock at nu = 0.45, from 0.4 on"),
+            std::string::npos);
+}
+
+TEST_F(SceneRunTest, SolidsThatCannotBeAreNamed) {
+  data::TetMesh mesh = data::tet_box({0.04, 0.04, 0.04}, {1, 1, 1});
+  data::save_tet_mesh(mesh, (folder_ / "box.tet").string());
+  mesh.vertices.col(2) *= -1;
+  data::save_point_cloud(mesh.vertices, (folder_ / "start.ply").string());
+  write("box0.3.json", R"({"schema": "flash-asset/1", "mesh": "box.tet", "element_type": "TETRAHEDRON",
+      "mechanical_props": {"constitutive": "TET_COROTATED", "density": 300, "young": 3e4, "poisson": 0.3}})");
+  const auto message = [&](const std::string& text) -> std::string {
+    try {
+      run_scene(data::load_scene(write("scene.json", text)), {}, out());
+    } catch (const data::InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_NE(message(box_scene("0.3", "newton", R"(, "start": {"mesh": "start.ply"})"))
+                .find("objects.box.start: turns tetrahedron 0 of "),
+            std::string::npos);
+  EXPECT_EQ(
+      message(box_scene("0.3", "projective", "")),
+      "solver.type projective: box is a solid (element_type TETRAHEDRON), which type newton simulates alone");
+  EXPECT_FALSE(fs::exists(fs::path(out()) / "log.csv"));
 }
 
 }  // namespace

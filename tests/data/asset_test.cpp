@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <nlohmann/json.hpp>
 
+#include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
 #include "tests/data/temporary_folder.h"
 
@@ -163,6 +164,34 @@ TEST(Asset, SolidsHaveADensity) {
   EXPECT_NE(
       input_error_of([&] { resolve_sheet(load_asset(path), 1); }).find("element_type: found TETRAHEDRON"),
       std::string::npos);
+}
+
+TEST(Asset, SolidsLoadTheirTetrahedraMovedAsTheAssetSays) {
+  const TemporaryFolder folder;
+  const TetMesh mesh = tet_box({0.3, 0.2, 0.1}, {1, 1, 1});
+  save_tet_mesh(mesh, folder / "part.tet");
+  const auto asset = [&](const std::string& file) {
+    return load_asset(folder.write("part.json", R"({"schema": "flash-asset/1", "mesh": ")" + file +
+                                                    R"(", "element_type": "TETRAHEDRON",
+    "transformation": {"trans": [1, 2, 3], "rotation": [0, 0, 90]},
+    "mechanical_props": {"density": 900, "young": 2e5, "poisson": 0.45, "constitutive": "TET_NEOHOOKEAN_LOG",
+                         "friction": 0.7, "stiffness_damping": 0.01}})"));
+  };
+  const TetMesh moved = load_asset_tet_mesh(asset("part.tet"));
+  EXPECT_EQ(moved.tetrahedra, mesh.tetrahedra);
+  for (Eigen::Index i = 0; i < mesh.vertices.rows(); ++i) {
+    const Eigen::RowVector3d x = mesh.vertices.row(i);
+    EXPECT_LT((moved.vertices.row(i) - Eigen::RowVector3d(1 - x.y(), 2 + x.x(), 3 + x.z())).norm(), 1e-15);
+  }
+  const SolidMaterial material = resolve_solid(asset("part.tet"), 0.006).material;
+  EXPECT_EQ(material, (SolidMaterial{Constitutive::tet_neohookean_log, 2e5, 0.45, 900, 0.7, 0, 0.01}));
+  EXPECT_NE(
+      input_error_of([&] { load_rest_mesh(asset("part.tet")); }).find("found TETRAHEDRON, expected TRIANGLE"),
+      std::string::npos);
+  EXPECT_NE(input_error_of([&] {
+              load_asset_tet_mesh(asset("sheet:0.1x0.1:0.01"));
+            }).find("mesh: found \"sheet:0.1x0.1:0.01\", expected a .vtk or .tet file of tetrahedra"),
+            std::string::npos);
 }
 
 TEST(Asset, WrongFieldsAreNamed) {

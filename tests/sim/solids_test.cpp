@@ -241,6 +241,27 @@ TEST(Solids, AHungWeightDrawsABar) {
   EXPECT_NEAR(found, expected, 1e-3 * expected);  // strains are 3e-4
 }
 
+// The vertex within is pushed out through a face, so that tetrahedra are inside out: without stress from
+// elsewhere the rest shape is where they end.
+TEST(Solids, NeoHookeanTetrahedraThatAreInsideOutComeBack) {
+  const Sheet block = solid_box({0.06, 0.06, 0.06}, {2, 2, 2});
+  const std::vector<int> middle =
+      vertices_where(block, [](const Vector3d& x) { return (x - Vector3d::Constant(0.03)).norm() < 1e-9; });
+  ASSERT_EQ(middle.size(), 1u);
+  for (const Constitutive model : {Constitutive::tet_neohookean, Constitutive::tet_neohookean_log})
+    for (const double nu : {0.3, 0.45}) {
+      Environment environment =
+          solid_environment(block, {.constitutive = model, .youngs_modulus = 3e4, .poissons_ratio = nu});
+      environment.gravity.setZero();
+      environment.state.positions(middle[0], 2) += 0.045;
+      ASSERT_GE(first_inverted(block, environment.state.positions), 0);
+      const StepReport report = settle(block, environment);
+      EXPECT_TRUE(report.converged);
+      EXPECT_EQ(first_inverted(block, environment.state.positions), -1);
+      EXPECT_LT(report.solid, 1e-12 * 3e4 * 0.06 * 0.06 * 0.06);
+    }
+}
+
 std::vector<Environment> three_blocks(const Sheet& block) {
   std::vector<Environment> environments;
   for (const Constitutive model :

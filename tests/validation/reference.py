@@ -6,7 +6,8 @@ KINDS = {"cantilever": "heavy strip, clamped (elastica)", "equil": "equilibria t
          "free_fall": "free fall", "hang_strip": "strip under its weight", "impact": "impact with friction",
          "incline": "stick and slip on an incline", "lift11": "corner lift from a table",
          "shear": "pure shear", "slide": "sliding to rest", "stretch": "uniaxial stretch",
-         "unit": "energy and forces at given positions"}
+         "tet_cantilever": "solid cantilever and its limit", "tet_uniaxial": "solid bar, drawn and pressed",
+         "tetdrop": "soft cube on a slope", "unit": "energy and forces at given positions"}
 
 
 def rows_of(name, scenes, results):
