@@ -44,6 +44,49 @@ __device__ inline void project_to_feasible(const SheetTables& tables, const Step
   for_obstacles_of(step, [&](auto most) { project_vertices<most>(tables, step, contacts, positions); });
 }
 
+template <int most>
+__device__ __noinline__ void take_back_slips(const SheetTables& tables, const StepProblem& step,
+                                             const Point* slid, Point* positions) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  SurfaceRoom<most> room;
+  VertexTouch touches[most];
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    positions[i] = slid[i];
+    if (step.held_axes[i] != 0) continue;
+    const Triple start = triple(step.start[i]), place = triple(slid[i]);
+    if (clearance_of(obstacles, start, place) > touching_gap) continue;
+    const Triple starting = starting_place(obstacles, start, place, touches, room);
+    positions[i] = {starting.x, starting.y, starting.z, 0};
+  }
+  __syncthreads();
+}
+
+/// Writes where vertices may start the search for the end of the step. `slid`: feasible, where their speeds
+/// take them.
+__device__ inline void write_starting_places(const SheetTables& tables, const StepProblem& step,
+                                             const Point* slid, Point* positions) {
+  for_obstacles_of(step, [&](auto most) { take_back_slips<most>(tables, step, slid, positions); });
+}
+
+/// Takes vertices that friction does not hold where they have not slipped back to where they `slid`, or
+/// `all` once there is one. Returns whether there is one, to all.
+__device__ inline bool let_slide(const SheetTables& tables, const StepProblem& step,
+                                 const ContactSet& contacts, const Point* slid, bool all, Point* positions) {
+  const auto differ = [](const Point& a, const Point& b) { return a.x != b.x || a.y != b.y || a.z != b.z; };
+  bool any = false;
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    if (step.held_axes[i] != 0 || contacts.listed[i] == 0 || !differ(positions[i], slid[i])) continue;
+    if (read(contacts.contacts, i).freedom != Freedom::slip) continue;
+    positions[i] = slid[i];
+    any = true;
+  }
+  const bool found = __syncthreads_or(any) != 0;
+  if (found && all)
+    for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) positions[i] = slid[i];
+  __syncthreads();
+  return found;
+}
+
 /// Copies what holds the vertices at an iterate.
 __device__ inline void copy_contacts(const SheetTables& tables, const StepProblem& step,
                                      const ContactSet& from, const ContactSet& to) {

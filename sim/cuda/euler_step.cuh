@@ -173,6 +173,23 @@ __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const S
   step.numbers.own_blocks = w.memory.own_blocks;
 }
 
+/// From where speeds take the vertices, w.now, to where the search for the end of the step starts: without
+/// slip where it would be small and friction holds them so. Evaluates it.
+__device__ __noinline__ void start_search(Work& w, const StepProblem& step) {
+  const SheetTables& tables = w.replay.sheet;
+  project_to_feasible(tables, step, nullptr, w.now.positions);
+  if (step.obstacles.count == 0) return evaluate(w, step, nullptr, w.now);
+  __syncthreads();
+  swap_iterates(w.now, w.trial);
+  const Point* slid = w.trial.positions;
+  write_starting_places(tables, step, slid, w.now.positions);
+  evaluate(w, step, nullptr, w.now);
+  for (int round = 1; round <= sticking_rounds; ++round) {
+    if (!let_slide(tables, step, w.now.contacts, slid, round == sticking_rounds, w.now.positions)) return;
+    evaluate(w, step, nullptr, w.now);
+  }
+}
+
 struct PartEnd {
   StepEnd end;
   bool solved;  ///< as well as halves would be
@@ -183,8 +200,7 @@ __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const Ste
                                            ReplayStats& stats) {
   constexpr double rounding_tolerance = 1e-6;
   predict(w, step, motion, share);
-  project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
-  evaluate(w, step, nullptr, w.now);
+  start_search(w, step);
   iterate_to_balance(w, step, stats);
   const double tolerance = w.replay.tolerance;
   const StepEnd end = judge_end(w, step);

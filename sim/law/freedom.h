@@ -16,7 +16,4 @@ inline constexpr double touching_gap = 1e-10;
 /// Slip up to which a vertex has not moved: rounding of a position [m].
 inline constexpr double resting_slip = 1e-13;
 
-/// Slip at which friction is 0.7 of its bound, for a smooth start of sliding [m].
-inline constexpr double slip_smoothing = 1e-8;
-
 }  // namespace flash::sim

@@ -16,9 +16,20 @@ struct VertexContact {
       slip_stiffness{};  ///< how friction turns with the slip: sum of mu lambda_n / |slip| across it [N/m]
 };
 
-/// Length of a slip as friction takes it, smooth where it starts [m].
-FLASH_HOST_DEVICE inline double smooth_length(double length) {
-  return square_root(length * length + slip_smoothing * slip_smoothing);
+/// Slip over a step of `time_step` [s] at which friction is 0.7 of its bound, for a smooth start of sliding
+/// [m]. It is that of an acceleration far below gravity, so that it is small beside any motion in the step.
+FLASH_HOST_DEVICE inline double slip_smoothing(double time_step) {
+  constexpr double acceleration = 1e-3;           // [m/s^2]
+  constexpr double longest = 1e-8;                // [m]
+  constexpr double shortest = 10 * resting_slip;  // above the rounding of positions [m]
+  const double length = larger_of(shortest, acceleration * time_step * time_step);
+  return length < longest ? length : longest;
+}
+
+/// Length of a slip over a step as friction takes it, smooth where it starts [m].
+FLASH_HOST_DEVICE inline double smooth_length(double length, double time_step) {
+  const double smoothing = slip_smoothing(time_step);
+  return square_root(length * length + smoothing * smoothing);
 }
 
 /// Displacement of a vertex since the start of the step along and against the surfaces that hold it [m].
@@ -71,7 +82,7 @@ FLASH_HOST_DEVICE inline VertexContact decide_contact(const ObstacleStep<double>
     const Vector3<double> slip = along_plane(touch.normal, point - start - touch.surface_moved);
     const double length = norm(slip);
     longest = larger_of(longest, length);
-    touch.slip = smooth_length(length);
+    touch.slip = smooth_length(length, step.time_step);
     touch.slip_direction = (1 / touch.slip) * slip;
   }
   const bool slipped = longest > resting_slip;
@@ -105,7 +116,7 @@ FLASH_HOST_DEVICE inline VertexContact decide_contact(const ObstacleStep<double>
     contact.slip_direction = (-1 / norm(tangential)) * tangential;
   } else if (held > 1) {
     const Vector3<double> slip = slip_against(step, start, point, touches);
-    contact.slip_direction = (1 / smooth_length(norm(slip))) * slip;
+    contact.slip_direction = (1 / smooth_length(norm(slip), step.time_step)) * slip;
   }
   for (int k = 0; k < step.count; ++k) {
     VertexTouch& touch = touches[k];
@@ -135,7 +146,7 @@ FLASH_HOST_DEVICE inline double friction_potential_of(const ObstacleStep<double>
     const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
     const double slip = norm(along_plane(gap.normal, point - start - gap.surface_moved));
     potential += step.obstacles[k].friction * touches[k].normal_force *
-                 (is_zero(contact.slip_stiffness) ? slip : smooth_length(slip));
+                 (is_zero(contact.slip_stiffness) ? slip : smooth_length(slip, step.time_step));
   }
   return potential;
 }

@@ -4,6 +4,7 @@
 #include <limits>
 #include <utility>
 
+#include "sim/law/feasible_place.h"
 #include "sim/newton/newton_iteration.h"
 #include "sim/step/exits.h"
 #include "sim/step/feasible_positions.h"
@@ -30,15 +31,33 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWo
   return elastic;
 }
 
+/// Fills in w.now where the search for the end of the step starts: where speeds take the vertices, but
+/// without slip where it would be small and friction holds them so.
+void start_search(const StepProblem& problem, NewtonWorkspace& w) {
+  const State& start = problem.contacts.environment.state;
+  Points slid = start.positions + problem.contacts.time_step * start.velocities;
+  w.now.contacts = begin_step(problem.contacts, slid);
+  project_to_feasible(problem.contacts, w.now.contacts, slid);
+  w.now.positions = starting_positions(problem.contacts, w.now.contacts, slid);
+  problem.evaluate(w.now);
+  for (int round = 1; round <= sticking_rounds; ++round) {
+    bool any = false;
+    for (const VertexConstraint& c : w.now.contacts.constraints) {
+      if (c.freedom != Freedom::slip || w.now.positions.row(c.vertex) == slid.row(c.vertex)) continue;
+      w.now.positions.row(c.vertex) = slid.row(c.vertex);
+      any = true;
+    }
+    if (!any) return;
+    if (round == sticking_rounds) w.now.positions = slid;
+    problem.evaluate(w.now);
+  }
+}
+
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
 /// solved, or to all that rounding allows.
 bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
-  const State& start = problem.contacts.environment.state;
   const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
-  w.now.positions = start.positions + problem.contacts.time_step * start.velocities;
-  w.now.contacts = begin_step(problem.contacts, w.now.positions);
-  project_to_feasible(problem.contacts, w.now.contacts, w.now.positions);
-  problem.evaluate(w.now);
+  start_search(problem, w);
   iterate_to_balance(problem, w, report);
 
   report.residual = problem.relative_residual(w.now);
