@@ -72,6 +72,7 @@ def holds(finding, truth):
 
 
 def coverage_rows(found):
+    """A parameter a row. What claims nothing, "no", is no success: how many claims there are, and how many of them hold."""
     rows = []
     for name in RANGES:
         verdicts = [twin["parameters"][name]["identifiable"] for twin in found]
@@ -79,8 +80,8 @@ def coverage_rows(found):
         two_sided = [twin["parameters"][name] for twin in found if twin["parameters"][name]["identifiable"] == "yes"]
         factors = sorted(math.sqrt(f["interval95"][1] / f["interval95"][0]) for f in two_sided)
         errors = sorted(abs(math.log(twin["parameters"][name]["estimate"] / twin["truth"][name])) for twin in found)
-        rows.append({"name": name, "twins": len(found), "held": sum(h is not False for h in held),
-                     "no": verdicts.count("no"), "one_sided": len(found) - verdicts.count("yes") - verdicts.count("no"),
+        rows.append({"name": name, "twins": len(found), "claims": len(found) - verdicts.count("no"), "held": held.count(True),
+                     "one_sided": len(found) - verdicts.count("yes") - verdicts.count("no"),
                      "factor": factors[len(factors) // 2] if factors else math.nan,
                      "error": math.exp(errors[len(errors) // 2]) - 1})
     return rows
