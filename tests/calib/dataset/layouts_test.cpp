@@ -113,7 +113,7 @@ TEST(Layouts, HeadersOfManyProgramsAreRead) {
 TEST(Layouts, PlacesThatNoRobotReachesAreRefused) {
   const data::TemporaryFolder folder;
   write_pictures(folder);
-  folder.write("poses.tum", "9 1e300 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n");
+  folder.write("poses.tum", "9 1e300 0 0 0 0 0 1\n10 0 0 0 0 0 0 1\n11 0 0 0 0 0 0 1\n");
   const std::string message = data::input_error_of([&] { load_dataset(folder / ""); });
   EXPECT_NE(message.find("m away, expected metres"), std::string::npos) << message;
 }
