@@ -8,6 +8,7 @@ FUZZ_SECONDS ?= 600
 CMAKE_ARGS ?=
 SEED ?= 10001
 SCENES ?= 1000
+ROUND ?= 0.3
 RUNS ?= 20
 
 PYTHON ?= /usr/bin/python3
@@ -84,11 +85,11 @@ use-study: configure-test  ## Say what each use of a hand-eye calibration (--for
 
 random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
-	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --list
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --round $(ROUND) --list
 
 deep-starts: configure-test  ## Simulate SCENES random sheets that start across obstacles; say how fast they come out
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
-	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --list
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --round $(ROUND) --list
 
 locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever over Poisson's ratio and mesh
 	cmake --build $(BUILD) -j $(JOBS) --target locking_study

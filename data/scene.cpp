@@ -124,11 +124,25 @@ Trajectory read_trajectory(const JsonObject& object) {
   return trajectory;
 }
 
+/// What moves stands in the frame of its trajectory, where `point` is the origin unless it says otherwise.
+SceneCapsule read_capsule(const JsonObject& object, bool has_length) {
+  SceneCapsule capsule;
+  capsule.trajectory = read_trajectory(object);
+  if (capsule.trajectory.times.empty() || object.has("point")) capsule.point = object.vector("point", 3);
+  capsule.radius = object.positive("radius");
+  if (has_length) {
+    capsule.axis = object.direction("axis", Eigen::Vector3d::UnitX());
+    capsule.half_length = object.positive("half_length");
+  }
+  return capsule;
+}
+
 void read_obstacles(const JsonObject& file, Scene& scene) {
   for (const auto& [name, object] : file.members("obstacles")) {
     SceneObstacle obstacle;
     obstacle.name = name;
-    const std::string shape = read_choice(object, "shape", "", {"plane", "box", "cylinder"});
+    const std::string shape =
+        read_choice(object, "shape", "", {"plane", "box", "cylinder", "sphere", "capsule"});
     if (shape == "plane") {
       object.expect_fields({"shape", "point", "normal", "friction"});
       obstacle.shape = read_plane(object);
@@ -137,6 +151,13 @@ void read_obstacles(const JsonObject& file, Scene& scene) {
       obstacle.shape =
           SceneCylinder{object.vector("point", 3), object.direction("axis", Eigen::Vector3d::UnitX()),
                         object.positive("radius")};
+    } else if (shape == "sphere") {
+      object.expect_fields({"shape", "point", "radius", "trajectory", "keyframes", "friction"});
+      obstacle.shape = read_capsule(object, false);
+    } else if (shape == "capsule") {
+      object.expect_fields(
+          {"shape", "point", "axis", "half_length", "radius", "trajectory", "keyframes", "friction"});
+      obstacle.shape = read_capsule(object, true);
     } else {
       object.expect_fields({"shape", "size", "pose", "trajectory", "keyframes", "friction"});
       SceneBox box;

@@ -48,10 +48,19 @@ struct SceneCylinder {
   double radius = 0.01;                             ///< [m]
 };
 
+/// All within `radius` of a stretch of an axis. Shape `sphere` is one without length.
+struct SceneCapsule {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< in the middle of the stretch [m]
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< unit
+  double half_length = 0.0;                         ///< of the stretch [m]
+  double radius = 0.01;                             ///< [m]
+  Trajectory trajectory;                            ///< of a frame in which it stands; empty: it stays
+};
+
 /// Rigid surface. `planecollisions` become obstacles like any other.
 struct SceneObstacle {
   std::string name;
-  std::variant<ScenePlane, SceneBox, SceneCylinder> shape;
+  std::variant<ScenePlane, SceneBox, SceneCylinder, SceneCapsule> shape;
   std::optional<double> friction;  ///< empty: the material's
 };
 

@@ -151,7 +151,7 @@ __device__ inline void write_own_blocks(const SheetTables& tables, const StepPro
       if (contact.freedom == Freedom::slip) sum = restricted(contact.slip_stiffness, contact.free);
       for (int k = 0; k < step.obstacles.count && curved; ++k) {
         const VertexTouch touch = read(contacts.touches, i, k);
-        if (touch.holds) sum = sum - touch.normal_force * square(touch.curvature_direction);
+        if (touch.holds) sum = sum - touch.normal_force * curvature_of(touch);
       }
     }
     for (int e = 0; e < 9; ++e) blocks[9 * i + e] = static_cast<float>(sum.at(e % 3, e / 3));

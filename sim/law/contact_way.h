@@ -224,6 +224,18 @@ FLASH_HOST_DEVICE inline bool ends_behind_its_entry(const MovingObstacle<Real>& 
 }
 
 /// The parts of gap_after for each shape.
+/// The share of a way after which it first comes within `radius` of the origin: 0 where it starts there,
+/// no_such_side where it never does. `from`, `way`: across the axis for a cylinder.
+template <typename Real>
+FLASH_HOST_DEVICE inline Real entry_into_round(const Vector3<Real>& from, const Vector3<Real>& way,
+                                               const Real& radius) {
+  const Real a = dot(way, way), b = dot(from, way), c = dot(from, from) - radius * radius;
+  if (!(c > 0)) return 0;
+  const Real root = b * b - a * c;
+  if (!(root > 0 && b < 0)) return no_such_side;
+  return (-b - square_root(root)) / a;
+}
+
 template <typename Real>
 FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_cylinder(const MovingObstacle<Real>& cylinder,
                                                              const Vector3<Real>& start,
@@ -234,15 +246,8 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_cylinder(const MovingObstacl
   from.z = to.z = 0;
   const Vector3<Real> way = to - from;
   const Real radius = cylinder.radius;
-  // The way enters the circle at the first s with from + s way on its rim, or at once where it starts inside.
-  const Real a = dot(way, way), b = dot(from, way), c = dot(from, from) - radius * radius;
-  Real entry = 0;
-  if (c > 0) {
-    const Real root = b * b - a * c;
-    if (!(root > 0 && b < 0)) return gap;
-    entry = (-b - square_root(root)) / a;
-    if (entry > 1) return gap;
-  }
+  const Real entry = entry_into_round(from, way, radius);
+  if (entry > 1) return gap;
   const auto stand_against = [&](const Vector3<Real>& normal) {
     gap.normal = direction_from(cylinder.end, normal);
     gap.distance = dot(normal, to) - radius;
@@ -258,6 +263,59 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_cylinder(const MovingObstacl
   const Real length = norm(entered);
   if (length > 0 && dot(entered, to) <= 0) stand_against((1 / length) * entered);
   return let_out(gap, radius - norm(from), time_step, way_out);
+}
+
+/// The share of a way in the frame of a capsule after which it enters its side or one of its ends: 0 where it
+/// starts inside, no_such_side where it does not enter.
+template <typename Real>
+FLASH_HOST_DEVICE inline Real entry_into_capsule(const MovingObstacle<Real>& capsule,
+                                                 const Vector3<Real>& from, const Vector3<Real>& way) {
+  const Real end = capsule.half_length, radius = capsule.radius;
+  Real entry = entry_into_round(Vector3<Real>{from.x, from.y, 0}, Vector3<Real>{way.x, way.y, 0}, radius);
+  if (magnitude(from.z + entry * way.z) > end) entry = no_such_side;
+  for (int side = -1; side <= 1; side += 2) {
+    const Real own = entry_into_round(from - Vector3<Real>{0, 0, side * end}, way, radius);
+    if (own < entry) entry = own;
+  }
+  return entry;
+}
+
+/// Distance of a capsule's tangent plane across `normal` from its middle, both in its frame.
+template <typename Real>
+FLASH_HOST_DEVICE inline Real tangent_offset(const MovingObstacle<Real>& capsule,
+                                             const Vector3<Real>& normal) {
+  return capsule.half_length * magnitude(normal.z) + capsule.radius;
+}
+
+template <typename Real>
+FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_capsule(const MovingObstacle<Real>& capsule,
+                                                            const Vector3<Real>& start,
+                                                            const Vector3<Real>& point, Real time_step,
+                                                            const WayOut<Real>& way_out) {
+  SurfaceGap<Real> gap = gap_to(capsule, point);
+  const Vector3<Real> from = place_in(capsule.start, start), to = place_in(capsule.end, point),
+                      way = to - from;
+  const Real entry = entry_into_capsule(capsule, from, way);
+  if (entry > 1) return gap;
+  const auto stand_against = [&](const Vector3<Real>& normal, Real distance) {
+    gap.normal = direction_from(capsule.end, normal);
+    gap.distance = distance;
+    gap.curvature_direction = {};
+    gap.ball_curvature = 0;
+  };
+  const Real depth = capsule.radius - norm(from - nearest_on_axis(capsule, from));
+  if (depth > inside_depth && !is_zero(way_out.direction)) {
+    if (gap.distance >= 0) return gap;
+    const Vector3<Real> side = direction_in(capsule.start, way_out.direction);
+    const Real offset = tangent_offset(capsule, side);
+    stand_against(side, dot(side, to) - offset);
+    return let_out(gap, offset - dot(side, from), time_step, way_out);
+  }
+  const Vector3<Real> entered = from + entry * way, middle = nearest_on_axis(capsule, entered),
+                      out = entered - middle;
+  const Real length = norm(out), height = dot(out, to - middle);
+  if (length > 0 && height <= 0) stand_against((1 / length) * out, height / length - capsule.radius);
+  return let_out(gap, depth, time_step, way_out);
 }
 
 template <typename Real>
@@ -289,8 +347,8 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_box(const MovingObstacle<Rea
 /// How a vertex that comes from `start` [m] at the start of the step stands at `point` at its end. The way
 /// between them is straight, seen from the obstacle:
 /// - a point in a box, or behind it, stands against the face through which its way entered; one behind the
-///   axis of a cylinder against the tangent plane where its way entered. So nothing passes through, however
-///   thin. A way that leaves a box by a face beside rounds its edge and is released.
+///   axis of a cylinder or a capsule against the tangent plane where its way entered. So nothing passes
+///   through, however thin. A way that leaves a box by a face beside rounds its edge and is released.
 /// - a way in the plane of a face, to within a micrometre, belongs to that face. Where another obstacle
 ///   covers it, it is no surface: the way enters by the face that it crosses.
 /// - a vertex that meets other surfaces before slides along them: `slid` is where its way would end so,
@@ -309,6 +367,8 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after(const MovingObstacle<Real>& 
                    way_out);
   if (obstacle.shape == ObstacleShape::cylinder)
     return gap_after_cylinder(obstacle, start, point, time_step, way_out);
+  if (obstacle.shape == ObstacleShape::capsule)
+    return gap_after_capsule(obstacle, start, point, time_step, way_out);
   return gap_after_box(obstacle, others, start, point, slid, time_step, way_out);
 }
 
@@ -322,13 +382,13 @@ struct MetSurface {
 };
 
 /// The surface of a plane or a box that the straight way from `start` to `end`, seen from the obstacle,
-/// meets, also where it ends on it or leaves it by an edge beside. None for a cylinder, and where the way
-/// starts inside.
+/// meets, also where it ends on it or leaves it by an edge beside. None for a cylinder and a capsule, and
+/// where the way starts inside.
 template <typename Real>
 FLASH_HOST_DEVICE inline MetSurface<Real> met_surface(const MovingObstacle<Real>& obstacle,
                                                       const OtherObstacles<Real>& others,
                                                       const Vector3<Real>& start, const Vector3<Real>& end) {
-  if (obstacle.shape == ObstacleShape::cylinder) return {};
+  if (obstacle.shape == ObstacleShape::cylinder || obstacle.shape == ObstacleShape::capsule) return {};
   if (obstacle.shape == ObstacleShape::plane) {
     const Real from = dot(obstacle.start.z, start - obstacle.start.origin),
                to = dot(obstacle.end.z, end - obstacle.end.origin);
@@ -368,6 +428,8 @@ FLASH_HOST_DEVICE inline Real depth_along(const MovingObstacle<Real>& obstacle, 
     const Vector3<Real> side = side_facing(local_direction);
     return is_zero(side) ? Real(no_such_side) : obstacle.radius - dot(side, local);
   }
+  if (obstacle.shape == ObstacleShape::capsule)
+    return tangent_offset(obstacle, local_direction) - dot(local_direction, local);
   const int axis = largest_axis(Vector3<Real>{magnitude(local_direction.x), magnitude(local_direction.y),
                                               magnitude(local_direction.z)});
   return obstacle.half_extents[axis] - with_sign(Real(1), local_direction[axis]) * local[axis];

@@ -4,15 +4,18 @@
 namespace flash::sim {
 inline namespace FLASH_LEVEL {
 
-enum class ObstacleShape { plane, box, cylinder };
+enum class ObstacleShape { plane, box, cylinder, capsule };
 
 /// An obstacle over one step. A plane stands across the third axis of its frame, through the origin, and its
-/// solid is below. A box stands about the origin, along the axes. A cylinder has its axis along the third.
+/// solid is below. A box stands about the origin, along the axes. A cylinder has its axis along the third. A
+/// capsule is all within `radius` of a stretch of the third axis, `half_length` to either side of the origin;
+/// without length it is a sphere.
 template <typename Real>
 struct MovingObstacle {
   ObstacleShape shape = ObstacleShape::plane;
   Vector3<Real> half_extents{};  ///< of a box [m]
-  Real radius{};                 ///< of a cylinder [m]
+  Real radius{};                 ///< of a cylinder or a capsule [m]
+  Real half_length{};            ///< of the axis of a capsule [m]
   Frame<Real> start{}, end{};    ///< at the start and at the end of the step
   bool moves = false;            ///< whether the two differ
   Real friction{};               ///< Coulomb coefficient on the body at hand
@@ -25,6 +28,7 @@ struct SurfaceGap {
   Vector3<Real> normal{};         ///< unit, out of the obstacle
   Vector3<Real> surface_moved{};  ///< motion of the obstacle's material at the contact over the step [m]
   Vector3<Real> curvature_direction{};  ///< sqrt(curvature) times the direction of the curvature [m^-1/2]
+  Real ball_curvature{};                ///< curvature in all directions along the surface [1/m]
   bool starts_inside = false;           ///< whether the vertex starts the step inside
   Real sunk{};  ///< how far the surface that `distance` is to lies below the obstacle's own [m]
 };
@@ -58,6 +62,33 @@ FLASH_HOST_DEVICE inline Real largest(const Vector3<Real>& v) {
   return v[largest_axis(v)];
 }
 
+/// The point of a capsule's axis nearest to a place in its frame.
+template <typename Real>
+FLASH_HOST_DEVICE inline Vector3<Real> nearest_on_axis(const MovingObstacle<Real>& capsule,
+                                                       const Vector3<Real>& local) {
+  const Real end = capsule.half_length;
+  return {Real(0), Real(0), local.z > end ? end : local.z < -end ? -end : local.z};
+}
+
+/// Signed distance to a capsule, without the motion of its material.
+template <typename Real>
+FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_to_capsule(const MovingObstacle<Real>& capsule,
+                                                         const Vector3<Real>& local) {
+  const Frame<Real>& frame = capsule.end;
+  const Vector3<Real> nearest = nearest_on_axis(capsule, local), out = local - nearest;
+  const Real length = norm(out);
+  SurfaceGap<Real> gap;
+  gap.distance = length - capsule.radius;
+  gap.normal = frame.x;
+  if (length == 0) return gap;
+  gap.normal = direction_from(frame, (1 / length) * out);
+  if (nearest.z == local.z)
+    gap.curvature_direction = (1 / square_root(length)) * cross(frame.z, gap.normal);
+  else
+    gap.ball_curvature = 1 / length;
+  return gap;
+}
+
 /// Gap at the end of the step to the face of a box across `axis`, on the side of `sign`, as if it had no end.
 template <typename Real>
 FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_to_face(const MovingObstacle<Real>& box,
@@ -89,6 +120,8 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_to(const MovingObstacle<Real>& obs
       gap.normal = (local.x / length) * frame.x + (local.y / length) * frame.y;
       gap.curvature_direction = (1 / square_root(length)) * cross(frame.z, gap.normal);
     }
+  } else if (obstacle.shape == ObstacleShape::capsule) {
+    gap = gap_to_capsule(obstacle, place_in(frame, point));
   } else {
     const Vector3<Real> local = place_in(frame, point), excess = excess_over(obstacle.half_extents, local);
     const int axis = largest_axis(excess);

@@ -17,12 +17,18 @@ struct VertexTouch {
   double slip = 0;          ///< length of the slip against it in this step, as friction takes it [m]
   Vector3<double> normal{};
   Vector3<double> curvature_direction{};  ///< as in SurfaceGap [m^-1/2]
+  double ball_curvature = 0;              ///< as in SurfaceGap [1/m]
   Vector3<double> surface_moved{};        ///< motion of the surface over the step [m]
   Vector3<double> slip_direction{};       ///< slip of the vertex on this surface over `slip`
   Vector3<double> friction{};             ///< friction force of the surface on the vertex [N]
 
   FLASH_HOST_DEVICE bool touches() const { return gap <= touching_gap; }
 };
+
+/// Second derivative of the gap to a surface that a vertex touches [1/m].
+FLASH_HOST_DEVICE inline Symmetric3 curvature_of(const VertexTouch& touch) {
+  return square(touch.curvature_direction) + touch.ball_curvature * (identity3() - square(touch.normal));
+}
 
 /// Room for the problems of one vertex with at most so many surfaces. What has no such bound gives arrays of
 /// another kind the same names.
@@ -57,6 +63,7 @@ FLASH_HOST_DEVICE inline void find_touches(const ObstacleStep<double>& step, con
     touch.starts_inside = gap.starts_inside;
     touch.normal = gap.normal;
     touch.curvature_direction = gap.curvature_direction;
+    touch.ball_curvature = gap.ball_curvature;
     touch.surface_moved = gap.surface_moved;
     touches[k] = touch;
   }

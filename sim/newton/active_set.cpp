@@ -22,9 +22,8 @@ void add_slip_stiffness(const ContactSet& contacts, BlockValues<double>& values)
 void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& values) {
   for (size_t k = contacts.held; k < contacts.constraints.size(); ++k)
     for (const VertexTouch& touch : contacts.touches_of(k))
-      if (touch.holds && !is_zero(touch.curvature_direction))
-        block(values, contacts.constraints[k].vertex) -=
-            matrix3d(touch.normal_force * square(touch.curvature_direction));
+      if (touch.holds && !(is_zero(touch.curvature_direction) && touch.ball_curvature == 0))
+        block(values, contacts.constraints[k].vertex) -= matrix3d(touch.normal_force * curvature_of(touch));
 }
 
 void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, BlockValues<double>& values) {

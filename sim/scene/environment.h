@@ -32,9 +32,17 @@ struct Cylinder {
   double radius = 0.01;                             ///< [m]
 };
 
+/// All within `radius` of a stretch of the axis: a finger. Without length it is a sphere.
+struct Capsule {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< [m]
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();   ///< unit
+  double half_length = 0.0;                          ///< of the stretch of the axis [m]
+  double radius = 0.01;                              ///< [m]
+};
+
 /// A rigid shape that a sheet meets.
 struct Obstacle {
-  std::variant<Plane, Box, Cylinder> shape = {};
+  std::variant<Plane, Box, Cylinder, Capsule> shape = {};
   std::vector<double> friction =
       {};                  ///< Coulomb coefficient on each body; missing or below zero: the material's
   std::string name = {};   ///< under which the force is told

@@ -39,6 +39,8 @@ Obstacle obstacle_of(const data::Scene& scene, const std::string& object, const 
     obstacle.shape = Box{0.5 * box->size, frame == base_frame ? box->pose : Eigen::Isometry3d::Identity()};
   else if (const auto* cylinder = std::get_if<data::SceneCylinder>(&other.shape))
     obstacle.shape = Cylinder{cylinder->point, cylinder->axis, cylinder->radius};
+  else if (const auto* capsule = std::get_if<data::SceneCapsule>(&other.shape))
+    obstacle.shape = Capsule{capsule->point, capsule->axis, capsule->half_length, capsule->radius};
   return obstacle;
 }
 
@@ -165,8 +167,10 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, T
   environment.state.velocities =
       object.start_velocity.transpose().replicate(environment.state.positions.rows(), 1);
   for (const data::SceneObstacle& other : scene.obstacles) {
-    const auto* box = std::get_if<data::SceneBox>(&other.shape);
-    const int frame = box == nullptr ? base_frame : timeline.frame_of(box->trajectory);
+    const data::Trajectory* path = nullptr;
+    if (const auto* box = std::get_if<data::SceneBox>(&other.shape)) path = &box->trajectory;
+    if (const auto* capsule = std::get_if<data::SceneCapsule>(&other.shape)) path = &capsule->trajectory;
+    const int frame = path == nullptr ? base_frame : timeline.frame_of(*path);
     environment.obstacles.push_back(obstacle_of(scene, object.name, other, frame));
   }
   add_supports(scene, object, timeline, environment);

@@ -37,6 +37,13 @@ Isometry3d describe(const Cylinder& cylinder, MovingObstacle<double>& moving) {
   return frame_along(cylinder.point, cylinder.axis);
 }
 
+Isometry3d describe(const Capsule& capsule, MovingObstacle<double>& moving) {
+  moving.shape = ObstacleShape::capsule;
+  moving.radius = capsule.radius;
+  moving.half_length = capsule.half_length;
+  return frame_along(capsule.centre, capsule.axis);
+}
+
 /// The obstacle itself, and where it stands in the frame that carries it.
 std::pair<MovingObstacle<double>, Isometry3d> described(const Obstacle& obstacle, double friction) {
   MovingObstacle<double> moving;
@@ -70,6 +77,7 @@ Gap gap_of(const SurfaceGap<double>& gap) {
           vector3d(gap.normal),
           vector3d(gap.surface_moved),
           vector3d(gap.curvature_direction),
+          gap.ball_curvature,
           gap.starts_inside,
           gap.sunk};
 }

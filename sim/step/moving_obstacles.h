@@ -21,6 +21,7 @@ inline Eigen::Matrix3d matrix3d(const Symmetric3& a) {
 struct Gap {
   double distance;  ///< [m]
   Eigen::Vector3d normal, surface_moved, curvature_direction;
+  double ball_curvature;  ///< [1/m]
   bool starts_inside;
   double sunk;  ///< [m]
 };

@@ -84,6 +84,41 @@ TEST_F(SceneFiles, PlanesStandAloneInAListOrByName) {
   }
 }
 
+TEST_F(SceneFiles, SpheresAndCapsulesAreRead) {
+  json file = json::parse(kFlash);
+  file["obstacles"] = json::parse(R"({
+    "ball": {"shape": "sphere", "point": [0, 0, 1], "radius": 0.2, "friction": 0.4},
+    "finger": {"shape": "capsule", "axis": [0, 0, 2], "half_length": 0.03, "radius": 0.01, "trajectory": "left.tum"},
+    "rod": {"shape": "capsule", "point": [1, 0, 0], "half_length": 0.5, "radius": 0.02},
+    "thumb": {"shape": "sphere", "radius": 0.01, "keyframes": [{"t": 0, "translation": [0, 0, 1]}]}})");
+  const Scene scene = load(file.dump());
+  ASSERT_EQ(scene.obstacles.size(), 5u);  // the table first, then by name
+  const SceneCapsule& ball = std::get<SceneCapsule>(scene.obstacles[1].shape);
+  EXPECT_EQ(ball.point, Eigen::Vector3d::UnitZ());
+  EXPECT_EQ(ball.radius, 0.2);
+  EXPECT_EQ(ball.half_length, 0);
+  EXPECT_EQ(scene.obstacles[1].friction, 0.4);
+  const SceneCapsule& finger = std::get<SceneCapsule>(scene.obstacles[2].shape);
+  EXPECT_EQ(finger.axis, Eigen::Vector3d::UnitZ());
+  EXPECT_EQ(finger.half_length, 0.03);
+  EXPECT_EQ(finger.point, Eigen::Vector3d::Zero());
+  EXPECT_EQ(finger.trajectory.times.size(), 2u);
+  EXPECT_EQ(std::get<SceneCapsule>(scene.obstacles[3].shape).axis, Eigen::Vector3d::UnitX());
+  EXPECT_EQ(std::get<SceneCapsule>(scene.obstacles[4].shape).trajectory.times.size(), 1u);
+
+  const std::string text = file.dump();
+  EXPECT_EQ(changed(text.c_str(), "/obstacles/ball/radius", 0),
+            "obstacles.ball.radius: found 0, expected a number above 0");
+  EXPECT_EQ(changed(text.c_str(), "/obstacles/rod/half_length", -1),
+            "obstacles.rod.half_length: found -1, expected a number above 0");
+  EXPECT_NE(
+      changed(text.c_str(), "/obstacles/ball/half_length", 1).find("obstacles.ball.half_length: unknown"),
+      std::string::npos);
+  file["obstacles"]["rod"].erase("point");
+  EXPECT_NE(input_error_of([&] { load(file.dump()); }).find("obstacles.rod.point: missing"),
+            std::string::npos);
+}
+
 TEST_F(SceneFiles, OurAdditionsAreRead) {
   const Scene scene = load(kFlash);
   EXPECT_EQ(scene.steps, 100);
@@ -160,8 +195,8 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed(kPublished, "/planecollisions/table", {{"point", {0, 0, 0}}}),
             "planecollisions.table.normal: missing, expected a direction, out of the solid");
   EXPECT_EQ(changed(kFlash, "/steps", 5), "steps: found duration beside it, expected one of the two");
-  EXPECT_EQ(changed(kFlash, "/obstacles/rail/shape", "sphere"),
-            "obstacles.rail.shape: found \"sphere\", expected one of plane, box, cylinder");
+  EXPECT_EQ(changed(kFlash, "/obstacles/rail/shape", "cone"),
+            "obstacles.rail.shape: found \"cone\", expected one of plane, box, cylinder, sphere, capsule");
   EXPECT_EQ(changed(kFlash, "/obstacles/rail/radius", -1),
             "obstacles.rail.radius: found -1, expected a number above 0");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/axes", "w"),

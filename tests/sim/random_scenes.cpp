@@ -209,6 +209,31 @@ void draw_scene(Lot& lot, double side, RandomScene& scene) {
   }
 }
 
+/// Puts a capsule or a sphere in place of a share of the boxes and cylinders. It draws from a lot of its own,
+/// so that all else is as it would be without.
+void round_off(unsigned long seed, double share, double largest_radius, RandomScene& scene) {
+  Lot lot(seed + 1'000'003);
+  for (Obstacle& obstacle : scene.environment.obstacles) {
+    const bool chosen = lot.chance(share), ball = lot.chance(0.5);
+    const double length = lot.uniform(0.01, 0.2);
+    Capsule capsule;
+    if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
+      capsule = {cylinder->point, cylinder->axis, length, cylinder->radius};
+    } else if (const auto* box = std::get_if<Box>(&obstacle.shape)) {
+      Vector3d sizes = box->half_extents;
+      int longest = 0;
+      box->half_extents.maxCoeff(&longest);
+      std::sort(sizes.begin(), sizes.end());
+      capsule = {box->pose.translation(), box->pose.linear().col(longest), sizes[2], sizes[1]};
+    } else {
+      continue;
+    }
+    capsule.radius = std::min(capsule.radius, largest_radius);
+    if (ball) capsule.half_length = 0;
+    if (chosen) obstacle.shape = capsule;
+  }
+}
+
 /// Whether the straight way from `from` to `to`, seen from the obstacle as it moves, goes through it: in by
 /// one face of a box and out by the one behind, or past the axis of a cylinder.
 bool goes_through(const Environment& environment, const Obstacle& obstacle, const Vector3d& from,
@@ -220,6 +245,27 @@ bool goes_through(const Environment& environment, const Obstacle& obstacle, cons
                                 from_time + share * (to_time - from_time)) > 1e-6;
   }
   if (!inside) return false;
+  if (const auto* capsule = std::get_if<Capsule>(&obstacle.shape)) {
+    // Out on the far side of where it came in.
+    if (depth_in(environment, obstacle, from, from_time) > 0 ||
+        depth_in(environment, obstacle, to, to_time) > 0)
+      return false;
+    Vector3d first, last;
+    bool any = false;
+    for (int k = 0; k <= 400; ++k) {
+      const double share = k / 400.0, time = from_time + share * (to_time - from_time);
+      const Vector3d at =
+          frame_pose(environment, obstacle.frame, time).inverse() * (from + share * (to - from)) -
+          capsule->centre;
+      const double along = std::clamp(at.dot(capsule->axis), -capsule->half_length, capsule->half_length);
+      const Vector3d out = at - along * capsule->axis;
+      if (out.norm() > capsule->radius) continue;
+      if (!any) first = out;
+      any = true;
+      last = out;
+    }
+    return any && first.normalized().dot(last.normalized()) < -0.1;
+  }
   if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
     const auto radial = [&](const Vector3d& x) {
       return Vector3d((x - cylinder->point) - cylinder->axis * cylinder->axis.dot(x - cylinder->point));
@@ -261,7 +307,7 @@ const char* to_string(SceneKind kind) {
   return names[static_cast<int>(kind)];
 }
 
-RandomScene random_scene(unsigned long seed) {
+RandomScene random_scene(unsigned long seed, double round_share) {
   Lot lot(seed);
   RandomScene scene;
   scene.kind = static_cast<SceneKind>(lot.below(static_cast<int>(SceneKind::last) + 1));
@@ -273,10 +319,12 @@ RandomScene random_scene(unsigned long seed) {
   scene.environment.state.positions = scene.sheet.rest.vertices;
   scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
   draw_scene(lot, side, scene);
+  constexpr double below_sheets = 0.08;  // [m]
+  round_off(seed, round_share, below_sheets, scene);
   return scene;
 }
 
-RandomScene random_deep_start(unsigned long seed) {
+RandomScene random_deep_start(unsigned long seed, double round_share) {
   Lot lot(seed);
   RandomScene scene;
   scene.kind = SceneKind::deep;
@@ -304,6 +352,8 @@ RandomScene random_deep_start(unsigned long seed) {
     box.pose = Eigen::Translation3d(aside) * (lot.chance(0.5) ? tumbled(lot) : Isometry3d::Identity());
     environment.obstacles.push_back({box});
   }
+  constexpr double any_radius = 1;  // [m]
+  round_off(seed, round_share, any_radius, scene);
   return scene;
 }
 

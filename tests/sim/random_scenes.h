@@ -20,8 +20,9 @@ struct RandomScene {
   int steps = 40;
 };
 
-/// The same seed gives the same scene, on every machine.
-RandomScene random_scene(unsigned long seed);
+/// The same seed gives the same scene, on every machine. `round_share`: of the boxes and cylinders that are
+/// capsules or spheres instead.
+RandomScene random_scene(unsigned long seed, double round_share = 0);
 
 /// What an observer finds who knows positions, velocities, forces and obstacles alone.
 struct SceneFindings {
@@ -38,9 +39,9 @@ struct SceneFindings {
   bool finite = true;
 };
 
-/// The same for a sheet at rest that starts across boxes and cylinders, from thin boards to blocks it lies
+/// The same for a sheet at rest that starts across such obstacles, from thin boards to blocks it lies
 /// in whole; of kind `deep`.
-RandomScene random_deep_start(unsigned long seed);
+RandomScene random_deep_start(unsigned long seed, double round_share = 0);
 
 SceneFindings observe(RandomScene scene);
 

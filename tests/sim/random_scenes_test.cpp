@@ -24,6 +24,27 @@ TEST(RandomScenes, AreSolvedOrSaidNotToBe) {
   EXPECT_LE(unsolved, 1);  // 2 % of the scenes
 }
 
+/// The same with capsules and spheres in place of all boxes and cylinders.
+TEST(RandomScenes, WithRoundObstaclesAreSolvedOrSaidNotToBe) {
+  int unsolved = 0;
+  for (unsigned long seed = 20101; seed <= 20130; ++seed) {
+    const SceneFindings found = observe(random_scene(seed, 1));
+    EXPECT_TRUE(found.finite) << seed;
+    EXPECT_LT(found.unseen_depth, 1e-4) << seed;
+    EXPECT_LT(found.free_depth, 1e-9) << seed;
+    EXPECT_EQ(found.crossed, 0) << seed;
+    EXPECT_LT(found.energy_gain_share, 1e-2) << seed;
+    unsolved += found.unconverged > 0;
+  }
+  EXPECT_LE(unsolved, 1);
+  for (unsigned long seed = 1; seed <= 5; ++seed) {
+    const SceneFindings found = observe(random_deep_start(seed, 1));
+    EXPECT_TRUE(found.finite) << seed;
+    EXPECT_LT(found.unseen_depth, 1e-4) << seed;
+    EXPECT_LT(found.free_depth, 1e-9) << seed;
+  }
+}
+
 /// Scenes that once had eight and ten unsolved steps: a sheet so soft that its triangles become lines, and a
 /// stiff one that slides under ten million times its weight.
 TEST(RandomScenes, DrawnAndPressedSheetsAreSolved) {

@@ -9,21 +9,25 @@
 #include "tests/sim/random_scenes.h"
 
 // What an observer finds in many random scenes, by kind and in all. Arguments: first seed, number of scenes,
-// then --list to name those with something to say, --deep for sheets that start across obstacles.
+// then --list to name those with something to say, --deep for sheets that start across obstacles, --round and
+// the share of boxes and cylinders that are capsules and spheres instead.
 int main(int argc, char** argv) {
   using namespace flash;
   const unsigned long first = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const std::size_t count = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1000;
   bool list = false, deep = false;
+  double round_share = 0;
   for (int k = 3; k < argc; ++k) {
     list = list || std::string(argv[k]) == "--list";
     deep = deep || std::string(argv[k]) == "--deep";
+    if (std::string(argv[k]) == "--round" && k + 1 < argc) round_share = std::strtod(argv[k + 1], nullptr);
   }
 
   std::vector<sim::RandomScene> scenes(count);
   std::vector<sim::SceneFindings> findings(count);
   data::for_each_in_parallel(count, 0, [&](std::size_t k) {
-    scenes[k] = deep ? sim::random_deep_start(first + k) : sim::random_scene(first + k);
+    scenes[k] =
+        deep ? sim::random_deep_start(first + k, round_share) : sim::random_scene(first + k, round_share);
     findings[k] = sim::observe(scenes[k]);
   });
 

@@ -129,6 +129,22 @@ std::vector<Scene> scenes() {
   add("starts in a cylinder", 0.0, 6, [&](Environment& e) {
     e.obstacles = {{Cylinder{{middle.x(), middle.y() + 0.01, 0.001}, Vector3d::UnitX(), 0.012}}};
   });
+  add("over a sphere", 0.002, 25, [&](Environment& e) {
+    e.obstacles = {{Capsule{{middle.x() + 0.01, middle.y(), -0.05}, Vector3d::UnitZ(), 0, 0.05}}};
+  });
+  add("a finger turns up from below", 0.03, 20, [&](Environment& e) {
+    e.obstacles = {{Capsule{Vector3d::Zero(), Vector3d::UnitX(), 0.03, 0.01}}};
+    e.obstacles[0].frame = add_frame(
+        e, path({0, 0.05}, {moved({middle.x(), middle.y(), 0}), moved({middle.x(), middle.y(), 0.06}, 0.4)}));
+  });
+  add("on a table beside a capsule", 0.002, 20, [&](Environment& e) {
+    e.obstacles = {{Plane{}},
+                   {Capsule{{middle.x(), middle.y(), 0.0}, Vector3d(1, 1, 0).normalized(), 0.03, 0.01}}};
+    e.state.positions.col(2).array() += 0.01;
+  });
+  add("starts in a capsule", 0.0, 6, [&](Environment& e) {
+    e.obstacles = {{Capsule{{middle.x(), middle.y() + 0.01, 0.001}, Vector3d::UnitX(), 0.04, 0.012}}};
+  });
   return scenes;
 }
 

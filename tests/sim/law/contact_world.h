@@ -50,6 +50,9 @@ inline ContactWorld mixed_world(unsigned seed) {
     if ((seed / 3 + k) % 3 == 1)
       obstacle.shape = Box{0.02 * Eigen::Vector3d::Ones() + 0.05 * vector().cwiseAbs(), pose(0.05)};
     if ((seed / 3 + k) % 3 == 2) obstacle.shape = Cylinder{0.02 * vector(), vector().normalized(), 0.03};
+    // Every other round one is a capsule, every fourth a sphere.
+    if ((seed / 3 + k) % 6 == 2)
+      obstacle.shape = Capsule{0.02 * vector(), vector().normalized(), (seed + k) % 4 < 2 ? 0.03 : 0.0, 0.03};
     obstacle.friction = {k == 1 ? 0 : 0.5};
     obstacle.frame = seed % 2 == 0 && k == 0 ? 0 : base_frame;
     environment.obstacles.push_back(obstacle);

@@ -96,7 +96,8 @@ TEST(FeasiblePlace, AVertexThatWouldHardlySlipStartsWhereTheSurfaceCarriesIt) {
       to = from * Eigen::Translation3d(1e-3 * vector()) * Eigen::AngleAxisd(1e-3, vector().normalized());
   for (const Obstacle& obstacle :
        {Obstacle{Plane{}}, Obstacle{Cylinder{Vector3d::Zero(), Vector3d::UnitY(), 0.03}},
-        Obstacle{Box{{0.03, 0.03, 0.03}, Eigen::Isometry3d::Identity()}}}) {
+        Obstacle{Box{{0.03, 0.03, 0.03}, Eigen::Isometry3d::Identity()}},
+        Obstacle{Capsule{{0, 0.012, 0}, Vector3d::UnitY(), 0, 0.03}}}) {
     ContactWorld world;
     world.sheet.bodies = {{.vertex_count = 1}};
     world.environment.obstacles = {obstacle};
@@ -105,8 +106,9 @@ TEST(FeasiblePlace, AVertexThatWouldHardlySlipStartsWhereTheSurfaceCarriesIt) {
         std::make_shared<const Schedule>(Schedule{0, ContactWorld::time_step, {{from, to}}});
     const double height = std::holds_alternative<Plane>(obstacle.shape) ? 0 : 0.03;
     const Vector3d place(0.01, 0.012, height);
-    const Vector3d on_surface =
-        std::holds_alternative<Cylinder>(obstacle.shape) ? Vector3d(0, 0.012, 0.03) : place;
+    const bool round =
+        std::holds_alternative<Cylinder>(obstacle.shape) || std::holds_alternative<Capsule>(obstacle.shape);
+    const Vector3d on_surface = round ? Vector3d(0, 0.012, 0.03) : place;
     world.environment.state.positions = (from * on_surface).transpose();
     const ContactStep step = world.step();
     ContactRoom room(1);

@@ -26,13 +26,20 @@ Obstacle draw_obstacle(Environment& environment) {
   const Vector3d place(draw(0, 0.2), draw(0, 0.2), 0);
   std::vector<double> friction;
   if (draw_chance(0.3)) friction.push_back(draw(0, 1));
-  const int kind = draw_below(3);
+  const int kind = draw_below(4);
   if (kind == 0) {
     Vector3d normal = draw_direction();
     normal.z() = 0.4 + std::abs(normal.z());
     return {Plane{place, normal.normalized()}, friction};
   }
   if (kind == 1) return {Cylinder{place, draw_direction(), draw(0.01, 0.05)}, friction};
+  if (kind == 2) {
+    const double half_length = draw_chance(0.5) ? 0 : draw(0.01, 0.1);
+    const Capsule finger{{}, draw_direction(), half_length, draw(0.01, 0.05)};
+    return {.shape = finger,
+            .friction = friction,
+            .frame = add_frame(environment, even_path(place, draw(0, 0.5) * draw_direction()))};
+  }
   Box box{.half_extents = {draw(0.01, 0.1), draw(0.01, 0.1), draw(0.005, 0.05)}};
   if (draw_chance(0.5))
     return {.shape = box,

@@ -20,7 +20,8 @@ data::SheetMaterial draw_material();
 /// Turned, dented by a few percent of a cell, moving, spinning and shaking; nothing holds it.
 Environment draw_flight(const Sheet& sheet);
 
-/// Such a flight above one to three planes, boxes and cylinders, which it does not touch yet; boxes may move.
+/// Such a flight above one to three planes, boxes, cylinders and capsules, which it does not touch yet; boxes
+/// and capsules may move.
 Environment draw_fall(const Sheet& sheet);
 
 /// Vertices about one of the sheet's, carried evenly.
