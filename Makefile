@@ -17,7 +17,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
+.PHONY: help demo configure build test validate routes coverage answer-time size-study use-study reference fuzz sanitize sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
@@ -68,6 +68,10 @@ routes: configure-test  ## Say whether every route to an answer gives the same o
 coverage: configure-test  ## Say whether intervals hold the truth of RUNS strips from SEED on, and of as many that the model is wrong of
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage --seed $(SEED) --runs $(RUNS)
+
+answer-time: configure-test  ## Say how long it takes from kept motions to the answer: at most 10 s on two idle cores
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/answer_time.py --sysid $(sysid) --out $(BUILD)/answer_time
 
 size-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly, over 200 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target size_study

@@ -27,15 +27,25 @@ class MotionInterpolant {
   /// it.
   MotionInterpolant slice(double value) const;
 
+  /// The same in place of `rest`, a former slice, of which the memory is used again.
+  void slice(double value, MotionInterpolant& rest) const;
+
+  /// motion += share times that at `values`; both have positions at the same steps.
+  void add_to(Motion& motion, const std::vector<double>& values, double share) const;
+
+  /// The interpolant of positions at these steps alone; others are empty.
+  MotionInterpolant only(const std::vector<bool>& steps) const;
+
  private:
   MotionInterpolant() = default;
-  Motion motion() const;
+  Motion zero() const;
 
   std::vector<bool> logarithmic_;
   std::vector<Spline> splines_;
-  Motion layout_;  // of which the numbers do not count
-  /// One column a point of the grid: positions step by step, then forces. Shared by copies, never changed.
-  std::shared_ptr<const Eigen::MatrixXd> points_;
+  std::shared_ptr<const Motion> layout_;  // of which the numbers do not count
+  /// One column a point of the grid: positions step by step, then forces. Shared by copies; only a slice that
+  /// no copy shares is ever changed.
+  std::shared_ptr<Eigen::MatrixXd> points_;
 };
 
 }  // namespace flash::sysid

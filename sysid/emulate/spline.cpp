@@ -40,11 +40,17 @@ Eigen::MatrixXd second_derivatives(const Eigen::VectorXd& x) {
 Spline::Spline(Eigen::VectorXd knots) : knots_(std::move(knots)), second_(second_derivatives(knots_)) {}
 
 Eigen::RowVectorXd Spline::weights(double t, int derivative) const {
+  Eigen::RowVectorXd weights(knots_.size());
+  this->weights(t, derivative, weights);
+  return weights;
+}
+
+void Spline::weights(double t, int derivative, Eigen::Ref<Eigen::RowVectorXd> weights) const {
   const Eigen::Index n = knots_.size();
-  Eigen::RowVectorXd weights = Eigen::RowVectorXd::Zero(n);
+  weights.setZero();
   if (n == 1) {
     weights[0] = derivative == 0 ? 1 : 0;
-    return weights;
+    return;
   }
   const Eigen::Index i = std::clamp<Eigen::Index>(
       std::upper_bound(knots_.data(), knots_.data() + n, t) - knots_.data() - 1, 0, n - 2);
@@ -60,7 +66,6 @@ Eigen::RowVectorXd Spline::weights(double t, int derivative) const {
   } else {
     weights = a * second_.row(i) + b * second_.row(i + 1);
   }
-  return weights;
 }
 
 }  // namespace flash::sysid

@@ -15,6 +15,7 @@ class Spline {
   /// Weights of the values at the knots in the spline's value (derivative 0), slope (1) or curvature (2) at
   /// t.
   Eigen::RowVectorXd weights(double t, int derivative = 0) const;
+  void weights(double t, int derivative, Eigen::Ref<Eigen::RowVectorXd> weights) const;
 
  private:
   Eigen::VectorXd knots_;

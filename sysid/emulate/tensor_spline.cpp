@@ -11,13 +11,19 @@ TensorSpline::TensorSpline(const std::vector<Eigen::VectorXd>& knots, Eigen::Vec
 }
 
 double TensorSpline::contract(const Eigen::VectorXd& x, const std::vector<int>& derivatives) const {
-  Eigen::VectorXd tensor = values_;
-  for (std::size_t k = splines_.size(); k-- > 0;) {
+  // A sampler asks hundreds of thousands of times: what it takes is kept by the thread.
+  thread_local Eigen::VectorXd tensor, next;
+  thread_local Eigen::RowVectorXd weights;
+  tensor = values_;
+  Eigen::Index count = values_.size();
+  for (std::size_t k = 0; k < splines_.size(); ++k) {
     const Eigen::Index size = splines_[k].knots().size();
-    const Eigen::RowVectorXd weights = splines_[k].weights(x[static_cast<Eigen::Index>(k)], derivatives[k]);
-    tensor = (weights * Eigen::Map<const Eigen::MatrixXd>(tensor.data(), size, tensor.size() / size))
-                 .transpose()
-                 .eval();
+    count /= size;
+    weights.resize(size);
+    splines_[k].weights(x[static_cast<Eigen::Index>(k)], derivatives[k], weights);
+    next.setZero(count);
+    for (Eigen::Index i = 0; i < size; ++i) next += weights[i] * tensor.segment(i * count, count);
+    tensor.swap(next);
   }
   return tensor[0];
 }

@@ -8,9 +8,11 @@ namespace {
 
 /// As `motion` on the other mesh; positions that are not kept stay empty.
 Motion prolonged(const Motion& motion, const Eigen::SparseMatrix<double>& prolongation) {
-  Motion result = motion;
-  for (data::Points& positions : result.positions)
-    if (positions.rows() > 0) positions = prolongation * positions;
+  Motion result{motion.start, motion.step, {}, motion.forces};
+  result.positions.reserve(motion.positions.size());
+  for (const data::Points& positions : motion.positions)
+    result.positions.emplace_back(positions.rows() > 0 ? data::Points(prolongation * positions)
+                                                       : data::Points(0, 3));
   return result;
 }
 
@@ -83,7 +85,7 @@ Motion TwoMeshMotions::at(const std::vector<double>& values, double share) const
   Motion motion = coarse_.at(values);
   if (difference_) {
     motion = prolonged(motion, *prolongation_);
-    if (share != 0) add(motion, share, difference_->at(values));
+    if (share != 0) difference_->add_to(motion, values, share);
   }
   return motion;
 }
@@ -93,6 +95,18 @@ TwoMeshMotions TwoMeshMotions::slice(double value) const {
   if (difference_) rest.difference_ = difference_->slice(value);
   rest.prolongation_ = prolongation_;
   return rest;
+}
+
+void TwoMeshMotions::slice(double value, TwoMeshMotions& rest) const {
+  coarse_.slice(value, rest.coarse_);
+  if (difference_) difference_->slice(value, *rest.difference_);
+}
+
+TwoMeshMotions TwoMeshMotions::only(const std::vector<bool>& steps) const {
+  TwoMeshMotions part(coarse_.only(steps));
+  if (difference_) part.difference_ = difference_->only(steps);
+  part.prolongation_ = prolongation_;
+  return part;
 }
 
 Motion TwoMeshMotions::on_its_mesh(const Motion& motion) const {

@@ -45,6 +45,12 @@ class TwoMeshMotions {
   /// The motions with the first axis held at `value`.
   TwoMeshMotions slice(double value) const;
 
+  /// The same in place of `rest`, a former slice.
+  void slice(double value, TwoMeshMotions& rest) const;
+
+  /// The motions at these steps alone.
+  TwoMeshMotions only(const std::vector<bool>& steps) const;
+
   /// A motion of the search's mesh on the mesh of the model.
   Motion on_its_mesh(const Motion& motion) const;
 

@@ -1,7 +1,9 @@
 #include "sysid/infer/adaptive_design.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <mutex>
 
 #include "data/error.h"
 #include "data/parallel.h"
@@ -105,29 +107,77 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
                               const MotionLikelihood& likelihood, const GridSettings& grid,
                               const TellWork& told) {
   std::vector<TwoMeshMotions> all;
-  for (const ModelledReplay& model : emulator.models) all.push_back(model.model);
+  for (std::size_t r = 0; r < emulator.models.size(); ++r)
+    all.push_back(emulator.models[r].model.only(likelihood.steps_about(r)));
   const std::size_t points = cartesian_product(axes).size();
   Eigen::VectorXd deviance(static_cast<Eigen::Index>(points));
   const std::atomic<bool>* const stop = emulator.models.front().replay.settings.solver.stop;
-  const auto look = [&](const std::vector<TwoMeshMotions>& slices, std::size_t i) {
+  // `left`: values of the axes that the slices still have.
+  const auto look = [&](const std::vector<TwoMeshMotions>& slices, const std::vector<double>& left,
+                        std::size_t i) {
     if (stop != nullptr && *stop) throw data::Stopped();
     std::vector<Motion> motions;
-    for (const TwoMeshMotions& slice : slices) motions.push_back(slice.at({}, emulator.share));
-    deviance[static_cast<Eigen::Index>(i)] = likelihood.deviance(motions);
+    for (const TwoMeshMotions& slice : slices) motions.push_back(slice.at(left, emulator.share));
+    double found = likelihood.deviance(motions);
+    if (std::isnan(found)) {  // its clock is far from the reference's
+      const std::vector<double> values = values_of(axes, static_cast<int>(i));
+      for (std::size_t r = 0; r < motions.size(); ++r)
+        motions[r] = emulator.models[r].model.at(values, emulator.share);
+      found = likelihood.deviance(motions);
+    }
+    deviance[static_cast<Eigen::Index>(i)] = found;
     if (told) told({0, 1}, {});
+  };
+  const auto take_slices = [](const std::vector<TwoMeshMotions>& slices, double value,
+                              std::vector<TwoMeshMotions>& held) {
+    for (std::size_t r = 0; r < slices.size(); ++r)
+      if (r < held.size())
+        slices[r].slice(value, held[r]);
+      else
+        held.push_back(slices[r].slice(value));
   };
   // Points that share their first values share the slices there.
   const auto visit = [&](const auto& self, const std::vector<TwoMeshMotions>& slices, std::size_t k,
                          std::size_t first, std::size_t count) -> void {
-    if (k == axes.size()) return look(slices, first);
     const std::size_t values = axes[k].values.size(), part = count / values;
-    data::for_each_in_parallel(values, k == 0 ? grid.threads : 1, [&](std::size_t i) {
-      std::vector<TwoMeshMotions> held;
-      for (const TwoMeshMotions& slice : slices) held.push_back(slice.slice(axes[k].values[i]));
-      self(self, held, k + 1, first + i * part, part);
-    });
+    std::vector<TwoMeshMotions> held;
+    for (std::size_t i = 0; i < values; ++i) {
+      if (k + 1 == axes.size()) {
+        look(slices, {axes[k].values[i]}, first + i);
+      } else {
+        take_slices(slices, axes[k].values[i], held);
+        self(self, held, k + 1, first + i * part, part);
+      }
+    }
   };
-  visit(visit, all, 0, 0, points);
+  const std::size_t firsts = axes[0].values.size();
+  if (axes.size() == 1) {
+    data::for_each_in_parallel(firsts, grid.threads,
+                               [&](std::size_t i) { look(all, {axes[0].values[i]}, i); });
+    return deviance;
+  }
+  // A thread takes all points of one value of the first two axes; of the first, the slices are shared.
+  struct Shared {
+    std::once_flag made;
+    std::vector<TwoMeshMotions> slices;
+    std::atomic<std::size_t> left = 0;  // of the second axis
+  };
+  const std::size_t seconds = axes[1].values.size(), part = points / (firsts * seconds);
+  std::vector<Shared> shared(firsts);
+  for (Shared& each : shared) each.left = seconds;
+  data::for_each_in_parallel(firsts * seconds, grid.threads, [&](std::size_t pair) {
+    Shared& each = shared[pair / seconds];
+    std::call_once(each.made, [&] { take_slices(all, axes[0].values[pair / seconds], each.slices); });
+    const double value = axes[1].values[pair % seconds];
+    if (axes.size() == 2) {
+      look(each.slices, {value}, pair);
+    } else {
+      std::vector<TwoMeshMotions> held;
+      take_slices(each.slices, value, held);
+      visit(visit, held, 2, pair * part, part);
+    }
+    if (--each.left == 0) each.slices.clear();
+  });
   return deviance;
 }
 

@@ -331,11 +331,12 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.horizons.resize(replays.size());
   answer.best = best_of(results);
   if (answer.best < 0) return answer;
+  const MotionStore store(grid.rollouts);
   std::vector<double> best = results.candidates[static_cast<std::size_t>(answer.best)].values;
   if (settings.horizon) {
     const ReplayCandidate candidate = candidate_at(best, grid);
     for (std::size_t r = 0; r < replays.size(); ++r)
-      answer.horizons[r] = predictability_horizon(replays[r], candidate);
+      answer.horizons[r] = predictability_horizon(replays[r], candidate, store);
     drop_beyond_horizons(answer.horizons, results);
     for (std::size_t r = 0; r < replays.size(); ++r) drop_beyond_horizon(answer.horizons[r], replays[r]);
     answer.best = best_of(results);
@@ -347,7 +348,6 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   if (cartesian_product(usable.axes).size() < results.candidates.size())
     answer.warnings.emplace_back(
         "some candidates diverged: the answer leaves out the values of a parameter at which they did");
-  const MotionStore store(grid.rollouts);
   const std::vector<Axis> ranges =
       settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
   const Task task{replays, usable, ranges, settings, store, told};

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <map>
 
+#include "data/parallel.h"
+
 namespace flash::sysid {
 namespace {
 
@@ -64,6 +66,23 @@ std::pair<Eigen::Vector3d, Eigen::Matrix<double, 3, 2>> plane_of(const data::Poi
   return {centre.transpose(), eigen.eigenvectors().rightCols<2>()};
 }
 
+/// The steps of which positions are read at clocks less than half a step from `time_offset` [s].
+std::vector<bool> steps_near(const Replay& replay, const Motion& motion, double time_offset) {
+  const double room = replay.recording.nuisance.time > 0 ? 0.5 : 0;
+  const auto last = static_cast<double>(motion.positions.size() - 1);
+  std::vector<bool> steps(motion.positions.size(), false);
+  steps.front() = steps.back() = true;
+  for (const Observation& observation : replay.observations) {
+    const double at = (observation.t + time_offset - motion.start) / motion.step;
+    const double first = std::clamp(std::floor(at - room - kSameStep), 0.0, last),
+                 end = std::clamp(std::ceil(at + room + kSameStep), 0.0, last);
+    for (double i = first; i <= end; ++i) steps[static_cast<std::size_t>(i)] = true;
+  }
+  // What the motion itself lacks, nothing reads.
+  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = steps[i] && motion.positions[i].rows() > 0;
+  return steps;
+}
+
 ObservedRows rows_of(const Replay& replay, const LinearObservations& places, const Robust& robust) {
   ObservedRows rows;
   std::map<std::size_t, int> keyframes;
@@ -95,10 +114,11 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
   constexpr int kPasses = 2;  // where the nuisance is linear: without known errors, then at those found
   const CandidateResult score = score_motions(replays, reference, settings);
   const Robust& robust = settings.objective.robust;
-  for (std::size_t r = 0; r < replays.size(); ++r) {
+  recordings_.resize(replays.size());
+  data::for_each_in_parallel(replays.size(), replays.front().settings.threads, [&](std::size_t r) {
     const Replay& replay = replays[r];
     const RecordingScore& fit = score.recordings[r];
-    Recording recording;
+    Recording& recording = recordings_[r];
     recording.replay = replay;
     recording.objective = settings.objective;
     const data::NuisanceBounds& bounds = replay.recording.nuisance;
@@ -124,15 +144,16 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
       if (errors.empty()) break;
       if (pass + 1 < kPasses) recording.nuisance = fit_nuisance(recording, reference[r].motion).first;
     }
-    recordings_.push_back(std::move(recording));
-  }
+    recording.steps = steps_near(replay, reference[r].motion, recording.nuisance.registration[4]);
+  });
 }
 
 void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
                                  const std::vector<SheetShifts>& rates, std::optional<double> repeatability,
                                  std::optional<double> limit) {
   const Replay& replay = recording.replay;
-  const LinearObservations places = places_at(recording, motion, recording.nuisance);
+  recording.near = places_at(recording, motion, recording.nuisance);
+  const LinearObservations& places = *recording.near;
   const Eigen::Index count = places.rows();
   recording.scale.resize(count);
   Eigen::VectorXd residuals(count), of_rows(count);
@@ -165,6 +186,15 @@ Eigen::MatrixXd MotionLikelihood::known_at(const Recording& recording, const Eig
   return recording.slopes + 2 * recording.curves * errors.asDiagonal();
 }
 
+bool MotionLikelihood::is_read(const Recording& recording, const Motion& motion, double time_offset) {
+  const Replay& replay = recording.replay;
+  return !(replay.recording.nuisance.time > 0) ||
+         std::all_of(replay.observations.begin(), replay.observations.end(),
+                     [&](const Observation& observation) {
+                       return observation.weight <= 0 || has_surface_at(motion, observation.t + time_offset);
+                     });
+}
+
 LinearObservations MotionLikelihood::places_at(const Recording& recording, const Motion& motion,
                                                const Nuisance& nuisance) {
   const Registered& found = nuisance.registration;
@@ -176,7 +206,8 @@ LinearObservations MotionLikelihood::places_at(const Recording& recording, const
     add(shifts, size, recording.errors[e]);
     if (!recording.bends[e].empty()) add(shifts, size * size, recording.bends[e]);
   }
-  return {recording.replay, motion, registration, recording.objective, shifts};
+  return {recording.replay,    motion, registration,
+          recording.objective, shifts, recording.near ? &*recording.near : nullptr};
 }
 
 std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(const Recording& recording,
@@ -186,6 +217,7 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(con
   Nuisance at = recording.nuisance;
   ResidualLikelihood::Fit fit;
   for (int step = 0; step < kSteps; ++step) {
+    if (!is_read(recording, motion, at.registration[4])) return {at, NAN};
     const LinearObservations places = places_at(recording, motion, at);
     Eigen::VectorXd residuals(places.rows());
     for (Eigen::Index i = 0; i < residuals.size(); ++i)

@@ -23,8 +23,13 @@ class MotionLikelihood {
 
   std::size_t recordings() const { return recordings_.size(); }
 
-  /// -2 log likelihood of motions, one a recording, up to a constant.
+  /// -2 log likelihood of motions, one a recording, up to a constant. NaN where the clock that fits one leads
+  /// to steps that it lacks.
   double deviance(const std::vector<Motion>& motions) const;
+
+  /// The steps of a recording's motions that are read where its clock is less than half a step from that of
+  /// the reference.
+  const std::vector<bool>& steps_about(std::size_t r) const { return recordings_[r].steps; }
 
   /// How well the recording that tells most tells a known error beside the parameters, in its standard
   /// deviations.
@@ -50,6 +55,8 @@ class MotionLikelihood {
     Eigen::VectorXd scale;                                ///< of each row: by its stated error
     Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by what the registration moves each row
     Eigen::MatrixXd slopes, curves;                       ///< by what each known error does, and its square
+    std::optional<LinearObservations> near;               ///< of the reference
+    std::vector<bool> steps;                              ///< see steps_about
     std::optional<ResidualLikelihood> likelihood;
   };
   /// Makes the likelihood that is linear about a motion at the recording's nuisance.
@@ -57,6 +64,8 @@ class MotionLikelihood {
                         std::optional<double> repeatability, std::optional<double> limit);
   /// By what each known error moves each row about its size.
   static Eigen::MatrixXd known_at(const Recording& recording, const Eigen::VectorXd& errors);
+  /// Whether a motion has what its keyframes read.
+  static bool is_read(const Recording& recording, const Motion& motion, double time_offset);
   static LinearObservations places_at(const Recording& recording, const Motion& motion,
                                       const Nuisance& nuisance);
   /// The likeliest nuisance of a motion, by Gauss and Newton, and its -2 log likelihood.

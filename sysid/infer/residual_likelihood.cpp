@@ -52,17 +52,31 @@ ResidualLikelihood::Fit ResidualLikelihood::fit(const Eigen::VectorXd& residuals
   Eigen::MatrixXd columns = known_;
   if (known.size() > 0) columns.rightCols(known.cols()) = known;
   const double precision = 1 / (spread_ * spread_);
+  const Eigen::MatrixXd by_row = columns.transpose();
+  // The normal equations as if every row counted by its square.
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(columns.cols(), columns.cols());
+  all.selfadjointView<Eigen::Lower>().rankUpdate(by_row * weights_.cwiseSqrt().asDiagonal(), precision);
+  const Eigen::VectorXd all_right = precision * (by_row * weights_.cwiseProduct(residuals));
+  all.diagonal() += priors_;
   Fit fit{0, {}, {}, residuals, weights_};
   Eigen::VectorXd errors = Eigen::VectorXd::Zero(columns.cols());
   double before = INFINITY;
   for (int round = 0; round < kFits; ++round) {
-    // Where rho is a distance, its weight is that of a square of the same slope.
-    fit.weights = weights_.cwiseProduct(
-        fit.left.unaryExpr([&](double y) { return std::abs(y) <= limit_ ? 1 : limit_ / std::abs(y); }));
-    const Eigen::MatrixXd weighed = fit.weights.asDiagonal() * columns;
-    Eigen::MatrixXd normal = precision * columns.transpose() * weighed;
-    normal.diagonal() += priors_;
-    errors = solve_within(normal, precision * (weighed.transpose() * residuals), free_);
+    // Where rho is a distance, its weight is that of a square of the same slope: what such rows, few, count
+    // less is taken off.
+    Eigen::MatrixXd normal = all;
+    Eigen::VectorXd right = all_right;
+    fit.weights = weights_;
+    for (Eigen::Index i = 0; i < fit.left.size(); ++i) {
+      const double size = std::abs(fit.left[i]);
+      if (size <= limit_) continue;
+      fit.weights[i] *= limit_ / size;
+      const double less = precision * (weights_[i] - fit.weights[i]);
+      right -= less * residuals[i] * by_row.col(i);
+      for (Eigen::Index c = 0; c < by_row.rows(); ++c)
+        normal.col(c).tail(by_row.rows() - c) -= less * by_row(c, i) * by_row.col(i).tail(by_row.rows() - c);
+    }
+    errors = solve_within(normal.selfadjointView<Eigen::Lower>(), right, free_);
     fit.left = residuals - columns * errors;
     double sum = 0;
     for (Eigen::Index i = 0; i < fit.left.size(); ++i) {

@@ -5,12 +5,14 @@
 namespace flash::sysid {
 
 std::optional<double> predictability_horizon(const Replay& replay, const ReplayCandidate& candidate,
-                                             double limit, double perturbation) {
+                                             const MotionStore& store, double limit, double perturbation) {
   ReplayCandidate twin = candidate;
   twin.material.membrane_stiffness *= 1 + perturbation;
   twin.material.bending_rigidity *= 1 + perturbation;
   twin.material.friction *= 1 + perturbation;
-  const std::vector<ReplayResult> results = run(replay, {candidate, twin});
+  std::vector<ReplayResult> results(2);
+  store.run(replay, {candidate, twin},
+            [&](std::size_t i, ReplayResult result) { results[i] = std::move(result); });
   for (const auto& [t, distance] : motion_distance(replay, results[0].motion, results[1].motion))
     if (!(distance <= limit)) return t;
   return std::nullopt;

@@ -19,6 +19,12 @@ Eigen::Vector3d normal_of(const data::Points& positions, const Eigen::Vector3i& 
   return (b - a).cross(c - a).normalized();
 }
 
+/// The sheet's hierarchy, to be moved.
+SheetDistance sheet_of(const Replay& replay) {
+  const data::TriangleMesh& mesh = replay.recording.mesh;
+  return replay.queries ? *replay.queries : SheetDistance(mesh.triangles, mesh.vertices);
+}
+
 /// Out of the sheet, in its surface, across the border edge that the place lies on.
 Eigen::Vector3d border_normal(const data::Points& positions, const Eigen::Vector3i& corners,
                               const Eigen::Vector3d& barycentric) {
@@ -34,7 +40,8 @@ Eigen::Vector3d border_normal(const data::Points& positions, const Eigen::Vector
 void LinearObservations::add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
                                   const Eigen::Isometry3d& simulated_from_observed,
                                   const SheetDistance& sheet, const Replay& replay,
-                                  const data::Points& positions, const data::Points& velocities) {
+                                  const data::Points& positions, const data::Points& velocities,
+                                  const LinearObservations* near) {
   const Eigen::Index count = std::min(points.rows(), at_most);
   if (count == 0 || !(common.weight > 0)) return;
   int hint = -1;
@@ -44,6 +51,8 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
     Place place = common;
     place.mark = static_cast<std::size_t>(row);
     SurfacePoint nearest;
+    if (near != nullptr && places_.size() < near->places_.size())
+      hint = near->places_[places_.size()].triangle;
     if (place.term == Term::surface) nearest = sheet.nearest(point, hint);
     if (place.term == Term::border) nearest = sheet.nearest_on_border(point);
     if (place.term == Term::mark)
@@ -71,9 +80,11 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
 
 LinearObservations::LinearObservations(const Replay& replay, const Motion& motion,
                                        const Registration& registration, const Objective& objective,
-                                       const SheetShifts& shifts, Eigen::Index points_per_term)
+                                       const SheetShifts& shifts, const LinearObservations* near,
+                                       Eigen::Index points_per_term)
     : registration_(registration) {
-  SheetDistance sheet(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  SheetDistance sheet = sheet_of(replay);
+  if (near != nullptr) places_.reserve(near->places_.size());
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
   double total = 0;
   for (const Observation& observation : replay.observations)
@@ -96,7 +107,7 @@ LinearObservations::LinearObservations(const Replay& replay, const Motion& motio
     };
     const auto add = [&](const data::Points& points, Term term, double weight) {
       add_term(points, points_per_term, common(term, weight), simulated_from_observed, sheet, replay,
-               positions, velocities);
+               positions, velocities, near);
     };
     add(observation.points, Term::surface, weights[0]);
     add(observation.contour, Term::border, weights[1]);
@@ -141,7 +152,7 @@ Eigen::VectorXd LinearObservations::residuals() const {
 }
 
 Eigen::VectorXd LinearObservations::displacements(const Replay& replay, const Motion& motion) const {
-  SheetDistance sheet(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  SheetDistance sheet = sheet_of(replay);
   Eigen::VectorXd rows(this->rows());
   data::Points positions;
   std::size_t current = static_cast<std::size_t>(-1);

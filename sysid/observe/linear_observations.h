@@ -18,10 +18,11 @@ namespace flash::sysid {
 class LinearObservations {
  public:
   /// `replay`: of `motion`; its observations count. `shifts`: of the motion, where there are any.
-  /// `points_per_term`: of a keyframe, evenly thinned.
+  /// `near`: the same observations on a motion close by; where they belong there is where they are looked for
+  /// first. It changes speed only. `points_per_term`: of a keyframe, evenly thinned.
   LinearObservations(const Replay& replay, const Motion& motion, const Registration& registration,
                      const Objective& objective, const SheetShifts& shifts = {},
-                     Eigen::Index points_per_term = 200);
+                     const LinearObservations* near = nullptr, Eigen::Index points_per_term = 200);
 
   Eigen::Index rows() const { return static_cast<Eigen::Index>(places_.size()); }
 
@@ -70,7 +71,8 @@ class LinearObservations {
   };
   void add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
                 const Eigen::Isometry3d& simulated_from_observed, const SheetDistance& sheet,
-                const Replay& replay, const data::Points& positions, const data::Points& velocities);
+                const Replay& replay, const data::Points& positions, const data::Points& velocities,
+                const LinearObservations* near);
 
   std::vector<Place> places_;
   Registration registration_;

@@ -36,6 +36,17 @@ void surface_at(const Motion& motion, double t, data::Points& positions, data::P
   }
 }
 
+bool has_surface_at(const Motion& motion, double t) {
+  const std::size_t last = motion.positions.size() - 1;
+  const double steps = (t - motion.start) / motion.step;
+  if (!(steps > 0) || last == 0) return motion.positions.front().rows() > 0;
+  if (steps >= static_cast<double>(last)) return motion.positions[last].rows() > 0;
+  const auto below = static_cast<std::size_t>(steps);
+  const double fraction = steps - static_cast<double>(below);
+  return (fraction > 1 - kSameStep || motion.positions[below].rows() > 0) &&
+         (fraction < kSameStep || motion.positions[below + 1].rows() > 0);
+}
+
 Eigen::Vector3d force_at(const Motion& motion, double t) {
   if (motion.forces.empty()) return Eigen::Vector3d::Zero();
   const double last = static_cast<double>(motion.forces.size());

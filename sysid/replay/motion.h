@@ -23,6 +23,9 @@ constexpr double kSameStep = 1e-6;
 /// for, is the slope used, zero outside the span and where a neighbour is empty.
 void surface_at(const Motion& motion, double t, data::Points& positions, data::Points* velocities = nullptr);
 
+/// Whether the positions are there that surface_at takes for the time.
+bool has_surface_at(const Motion& motion, double t);
+
 /// The last gripper's force on the sheet in the step that ends at t, rounded; zero where there is no grasp.
 Eigen::Vector3d force_at(const Motion& motion, double t);
 

@@ -9,6 +9,7 @@
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/parallel.h"
 #include "data/sha256.h"
 
 namespace flash::sysid {
@@ -173,18 +174,22 @@ void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& 
   const auto path_of = [&](const std::string& key) {
     return (std::filesystem::path(folder_) / (key + ".rollout")).string();
   };
+  std::vector<std::string> wanted(candidates.size());
+  data::for_each_in_parallel(candidates.size(), replay.settings.threads, [&](std::size_t i) {
+    std::string key = key_of(replay, make_environment(replay, candidates[i]), kept);
+    if (std::filesystem::exists(path_of(key)))
+      finished(i, load(replay, kept, key, path_of(key)));
+    else
+      wanted[i] = std::move(key);
+  });
   std::vector<std::size_t> missing;
   std::vector<ReplayCandidate> simulated;
   std::vector<std::string> keys;
   for (std::size_t i = 0; i < candidates.size(); ++i) {
-    const std::string key = key_of(replay, make_environment(replay, candidates[i]), kept);
-    if (std::filesystem::exists(path_of(key))) {
-      finished(i, load(replay, kept, key, path_of(key)));
-    } else {
-      keys.push_back(key);
-      missing.push_back(i);
-      simulated.push_back(candidates[i]);
-    }
+    if (wanted[i].empty()) continue;
+    keys.push_back(std::move(wanted[i]));
+    missing.push_back(i);
+    simulated.push_back(candidates[i]);
   }
   sysid::run(replay, simulated, kept, [&](std::size_t k, ReplayResult result) {
     save(result, kept, keys[k], path_of(keys[k]));

@@ -89,47 +89,69 @@ SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::P
     size = (size + width - 1) / width;
     levels_.emplace_back(size);
   }
+  for (auto& nodes : levels_)  // a box without triangles stays so
+    for (BoxNode& node : nodes) {
+      std::fill(&node.low[0][0], &node.low[0][0] + 3 * width, kInfinity);
+      std::fill(&node.high[0][0], &node.high[0][0] + 3 * width, -kInfinity);
+    }
   move(layout);
 }
 
 void SurfaceDistance::move(const data::Points& positions) {
   positions_ = positions;
-  for (auto& level : levels_) {
-    for (BoxNode& node : level) {
-      std::fill(&node.low[0][0], &node.low[0][0] + 3 * width, kInfinity);
-      std::fill(&node.high[0][0], &node.high[0][0] + 3 * width, -kInfinity);
+  // Loops over the lanes of a packet, which the compiler takes several at a time.
+  double b[3][width], c[3][width], low[width], high[width];
+  for (std::size_t p = 0; p < packets_.size(); ++p) {
+    TrianglePacket& packet = packets_[p];
+    for (int lane = 0; lane < width; ++lane) {
+      // Empty slots repeat the last triangle, which changes no answer.
+      const int slot = order_[p * width + static_cast<std::size_t>(lane)];
+      const int triangle = slot >= 0 ? slot : order_[slot_of_.size() - 1];
+      for (int k = 0; k < 3; ++k) {
+        packet.a[k][lane] = positions(triangles_(triangle, 0), k);
+        b[k][lane] = positions(triangles_(triangle, 1), k);
+        c[k][lane] = positions(triangles_(triangle, 2), k);
+      }
     }
-  }
-  for (std::size_t slot = 0; slot < order_.size(); ++slot) {
-    // Empty slots repeat the last triangle, which changes no answer.
-    const int triangle = order_[slot] >= 0 ? order_[slot] : order_[slot_of_.size() - 1];
-    const Eigen::Vector3d a = positions.row(triangles_(triangle, 0)),
-                          b = positions.row(triangles_(triangle, 1)),
-                          c = positions.row(triangles_(triangle, 2));
-    const Eigen::Vector3d e = b - a, f = c - a, n = e.cross(f);
-    const auto inverse = [](double x) { return x > 0 ? 1 / x : 0.0; };
-    TrianglePacket& packet = packets_[slot / width];
-    const int lane = static_cast<int>(slot % width);
-    const double area2 = n.squaredNorm();
+    BoxNode& node = levels_[0][p / width];
     for (int k = 0; k < 3; ++k) {
-      packet.a[k][lane] = a[k];
-      packet.e[k][lane] = e[k];
-      packet.f[k][lane] = f[k];
-      packet.n[k][lane] = area2 > 0 ? n[k] / std::sqrt(area2) : 0.0;
+      for (int lane = 0; lane < width; ++lane) {
+        const double at = packet.a[k][lane];
+        packet.e[k][lane] = b[k][lane] - at;
+        packet.f[k][lane] = c[k][lane] - at;
+        low[lane] = std::min(std::min(at, b[k][lane]), c[k][lane]);
+        high[lane] = std::max(std::max(at, b[k][lane]), c[k][lane]);
+      }
+      node.low[k][p % width] = *std::min_element(low, low + width);
+      node.high[k][p % width] = *std::max_element(high, high + width);
     }
-    packet.ee[lane] = e.squaredNorm();
-    packet.ff[lane] = f.squaredNorm();
-    packet.ef[lane] = e.dot(f);
-    packet.inverse_ee[lane] = inverse(e.squaredNorm());
-    packet.inverse_ff[lane] = inverse(f.squaredNorm());
-    packet.inverse_gg[lane] = inverse((c - b).squaredNorm());
-    packet.inverse_determinant[lane] = area2 > 0 ? 1 / area2 : std::numeric_limits<double>::quiet_NaN();
-
-    BoxNode& node = levels_[0][slot / (width * width)];
-    const int child = static_cast<int>(slot / width % width);
-    for (int k = 0; k < 3; ++k) {
-      node.low[k][child] = std::min({node.low[k][child], a[k], b[k], c[k]});
-      node.high[k][child] = std::max({node.high[k][child], a[k], b[k], c[k]});
+    const auto &e = packet.e, &f = packet.f;
+    for (int lane = 0; lane < width; ++lane) {
+      const double nx = e[1][lane] * f[2][lane] - e[2][lane] * f[1][lane],
+                   ny = e[2][lane] * f[0][lane] - e[0][lane] * f[2][lane],
+                   nz = e[0][lane] * f[1][lane] - e[1][lane] * f[0][lane];
+      const double area2 = nx * nx + ny * ny + nz * nz, root = std::sqrt(area2);
+      const bool has_area = area2 > 0;
+      const auto over = [](double x, double y, bool defined) {
+        const double ratio = x / y;
+        return defined ? ratio : 0.0;
+      };
+      packet.n[0][lane] = over(nx, root, has_area);
+      packet.n[1][lane] = over(ny, root, has_area);
+      packet.n[2][lane] = over(nz, root, has_area);
+      const auto product = [&](const auto& u, const auto& v) {
+        return u[0][lane] * v[0][lane] + u[1][lane] * v[1][lane] + u[2][lane] * v[2][lane];
+      };
+      const double ee = product(e, e), ff = product(f, f), ef = product(e, f);
+      const double gx = c[0][lane] - b[0][lane], gy = c[1][lane] - b[1][lane], gz = c[2][lane] - b[2][lane];
+      const double gg = gx * gx + gy * gy + gz * gz, determinant = 1 / area2;
+      packet.ee[lane] = ee;
+      packet.ff[lane] = ff;
+      packet.ef[lane] = ef;
+      packet.inverse_ee[lane] = over(1, ee, ee > 0);
+      packet.inverse_ff[lane] = over(1, ff, ff > 0);
+      packet.inverse_gg[lane] = over(1, gg, gg > 0);
+      packet.inverse_determinant[lane] = has_area ? determinant : std::numeric_limits<double>::quiet_NaN();
     }
   }
   for (std::size_t level = 1; level < levels_.size(); ++level) {

@@ -37,6 +37,33 @@ TEST(MotionInterpolant, IsExactForMotionsCubicInTheCoordinates) {
   }
 }
 
+TEST(MotionInterpolant, OfSomeStepsIsTheWholeOneThereAndFormerSlicesAreUsedAgain) {
+  const std::vector<Axis> axes = {parse_axis("friction", "0.1,0.3,0.5"), parse_axis("poisson", "0,0.2,0.4")};
+  std::vector<Motion> motions;
+  for (const std::vector<double>& p : cartesian_product(axes)) {
+    Motion motion{0, 0.1, {}, {{p[0], p[1], 1}, {p[1], p[0], 2}}};
+    for (int i = 0; i < 3; ++i)
+      motion.positions.emplace_back(data::Points::Constant(2, 3, p[0] + i * p[1] * p[1]));
+    motions.push_back(motion);
+  }
+  const MotionInterpolant whole(axes, motions), part = whole.only({true, false, true});
+  const Motion all = whole.at({0.2, 0.3}), some = part.at({0.2, 0.3});
+  EXPECT_EQ(some.positions[1].rows(), 0);
+  for (const int i : {0, 2}) EXPECT_EQ(some.positions[i], all.positions[i]);
+  EXPECT_EQ(some.forces, all.forces);
+  Motion twice = all;
+  whole.add_to(twice, {0.2, 0.3}, 1);
+  EXPECT_LT((twice.positions[2] - 2 * all.positions[2]).norm(), 1e-12);
+
+  MotionInterpolant rest = whole.slice(0.2);
+  const MotionInterpolant copy = rest;
+  whole.slice(0.4, rest);  // the memory is the copy's as well
+  EXPECT_EQ(copy.at({0.3}).positions[2], all.positions[2]);
+  EXPECT_EQ(rest.at({0.3}).positions[2], whole.at({0.4, 0.3}).positions[2]);
+  whole.slice(0.2, rest);  // nobody else's
+  EXPECT_EQ(rest.at({0.3}).positions[2], all.positions[2]);
+}
+
 struct Lift {
   data::TemporaryFolder folder;
   Replay replay = short_lift(folder, "sheet:0.2x0.05:0.0125");

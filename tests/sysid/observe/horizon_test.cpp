@@ -14,6 +14,7 @@ namespace {
 TEST(Horizon, IsWhereTwoNearlyEqualMotionsPart) {
   const data::TemporaryFolder folder;
   const Replay replay = short_lift(folder);
+  const MotionStore store(folder / "motions");
   ReplayCandidate candidate;
   candidate.material = short_lift_material();
   constexpr double kPerturbation = 0.2;
@@ -31,11 +32,12 @@ TEST(Horizon, IsWhereTwoNearlyEqualMotionsPart) {
   }
   const double most = *std::max_element(apart.begin(), apart.end());
   ASSERT_GT(most, 1e-4);
-  EXPECT_FALSE(predictability_horizon(replay, candidate, 1.01 * most, kPerturbation));
-  EXPECT_EQ(predictability_horizon(replay, candidate, -1, kPerturbation), replay.observations.front().t);
+  EXPECT_FALSE(predictability_horizon(replay, candidate, store, 1.01 * most, kPerturbation));
+  EXPECT_EQ(predictability_horizon(replay, candidate, store, -1, kPerturbation),
+            replay.observations.front().t);
   // Both motions begin alike: a tenth of where they end is crossed on the way.
   const double limit = 0.1 * most;
-  const auto found = predictability_horizon(replay, candidate, limit, kPerturbation);
+  const auto found = predictability_horizon(replay, candidate, store, limit, kPerturbation);
   ASSERT_TRUE(found);
   for (std::size_t k = 0; k < apart.size(); ++k) {
     if (replay.observations[k].t != *found) continue;
@@ -43,7 +45,7 @@ TEST(Horizon, IsWhereTwoNearlyEqualMotionsPart) {
   }
   EXPECT_GT(*found, replay.observations.front().t);
   // Equal motions never part.
-  EXPECT_FALSE(predictability_horizon(replay, candidate, 1e-12, 0));
+  EXPECT_FALSE(predictability_horizon(replay, candidate, store, 1e-12, 0));
 }
 
 TEST(Horizon, ARecordingIsNeverLeftWithoutKeyframes) {
