@@ -34,8 +34,8 @@ TEST(Capsule, ItsGapIsTheDistanceToItsAxisLessItsRadius) {
   }
 }
 
-/// Height over the radius, cos theta, at which a sheet as small as a particle leaves a sphere without friction
-/// on which it starts at rest at cos theta = `from`.
+/// Height over the radius, cos theta, at which a sheet as small as a particle leaves a sphere without
+/// friction on which it starts at rest at cos theta = `from`.
 double leaves_at(double from, double time_step) {
   const double radius = 1, side = 1e-4;
   const Sheet sheet = small_sheet(1, side);
@@ -66,7 +66,8 @@ TEST(Capsule, AParticleLeavesAFrictionlessSphereAtTwoThirdsOfItsHeight) {
   for (const double time_step : {8e-3, 4e-3, 2e-3, 1e-3, 5e-4}) {
     // In a step it sinks by v sin(theta) h <= sqrt(2 g / 3) h of the radius of 1 m, of which the place of
     // leaving is known to a half. Implicit Euler takes energy: each step a^2 h^2 / 2, with a <= g, of g (c -
-    // cos theta) in all; in the time that it takes, sqrt(1 / g) ln(...) < 1.2 s, so of the height h g 1.2 / 2.
+    // cos theta) in all; in the time that it takes, sqrt(1 / g) ln(...) < 1.2 s, so of the height h g 1.2
+    // / 2.
     const double error = std::sqrt(2 * 9.81 / 3) / 2 * time_step + 0.6 * 9.81 * time_step;
     EXPECT_NEAR(leaves_at(from, time_step), expected, error) << time_step;
   }
