@@ -18,8 +18,6 @@ namespace flash::calib {
 namespace {
 
 constexpr double kAlwaysGood = 2;  // small markers, seen aslant, vary by that much [px]
-constexpr std::size_t kFirstPictures =
-    4;  // where none of them shows the target, another one is tried before the rest
 
 Observation observe(const Frame& frame, const Sighting& sighting) {
   Observation observation;
