@@ -237,7 +237,7 @@ FLASH_HOST_DEVICE inline Real entry_into_round(const Vector3<Real>& from, const 
 }
 
 template <typename Real>
-FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_cylinder(const MovingObstacle<Real>& cylinder,
+FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_cylinder(const MovingObstacle<Real>& cylinder,
                                                              const Vector3<Real>& start,
                                                              const Vector3<Real>& point, Real time_step,
                                                              const WayOut<Real>& way_out) {
@@ -288,7 +288,7 @@ FLASH_HOST_DEVICE inline Real tangent_offset(const MovingObstacle<Real>& capsule
 }
 
 template <typename Real>
-FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_capsule(const MovingObstacle<Real>& capsule,
+FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_capsule(const MovingObstacle<Real>& capsule,
                                                             const Vector3<Real>& start,
                                                             const Vector3<Real>& point, Real time_step,
                                                             const WayOut<Real>& way_out) {
@@ -319,7 +319,7 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_capsule(const MovingObstacle
 }
 
 template <typename Real>
-FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_box(const MovingObstacle<Real>& box,
+FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_box(const MovingObstacle<Real>& box,
                                                         const OtherObstacles<Real>& others,
                                                         const Vector3<Real>& start,
                                                         const Vector3<Real>& point, const Vector3<Real>& slid,

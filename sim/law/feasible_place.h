@@ -28,7 +28,7 @@ FLASH_HOST_DEVICE inline bool stays(const ObstacleStep<double>& step, const Vect
 /// The nearest place out of all obstacles, and on those where the vertex is to land. Exact for planes at
 /// once; round surfaces and faces that change take a few rounds.
 template <typename Room>
-FLASH_HOST_DEVICE inline Vector3<double> projected_out(const ObstacleStep<double>& step,
+FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<double>& step,
                                                        const Vector3<double>& start,
                                                        const VertexTouch* touches, Vector3<double> point,
                                                        Room& room) {
@@ -60,7 +60,7 @@ FLASH_HOST_DEVICE inline Vector3<double> projected_out(const ObstacleStep<double
 
 /// The place near `place` where the vertex stands on the surfaces that hold it and has not slipped.
 template <typename Room>
-FLASH_HOST_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<double>& step,
+FLASH_CALLED_ON_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<double>& step,
                                                        const Vector3<double>& start,
                                                        const VertexTouch* touches, Vector3<double> place,
                                                        Room& room) {
