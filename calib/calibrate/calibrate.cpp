@@ -425,12 +425,33 @@ std::string knock_sentence(const KnockedPart& other, std::size_t used) {
   return text;
 }
 
+/// Views that were left out one by one are a knock if they are the last ones: the answer is then of the past.
+void doubt_last_views(Calibration& result, const std::vector<Observation>& all) {
+  constexpr std::size_t kTold = 2, kUnusable = 3;
+  std::vector<std::size_t> seen;
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (!all[i].T_camera_target.empty()) seen.push_back(i);
+  std::size_t last = 0;
+  while (last < seen.size() && !result.views[seen[seen.size() - 1 - last]].used) ++last;
+  const auto before = static_cast<double>(seen.size() - last);
+  const double left_out = before - static_cast<double>(result.used.size());
+  constexpr double kUsual = 0.1;  // share of views that are left out anyway
+  if (last < kTold || left_out > kUsual * before) return;
+  result.warnings.insert(result.warnings.begin(),
+                         "the last " + std::to_string(last) +
+                             " views do not close with those before: if camera or target moved before " +
+                             all[seen[seen.size() - last]].image +
+                             ", the answer is of where they were; record anew, or take these views out");
+  if (last >= kUnusable) result.usable = false;
+}
+
 }  // namespace
 
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
                       const CalibrateSettings& settings) {
   Calibration whole = solve(setup, camera, points, symmetries, all, settings);
+  doubt_last_views(whole, all);
   if (!whole.pose_errors) return whole;
   const std::optional<Knock> knock =
       find_knock(whole.refined, {.unknowns = whole.unknowns}, whole.pose_errors->gain);

@@ -17,7 +17,8 @@ double ratio_of(double mm, double deg, const StatedError& stated) {
   return std::max(mm / stated.mm, deg / stated.deg);
 }
 
-/// X as the mean over the views, with the target where it is said to be.
+/// The camera where these views want it: X as the mean over the views, with the target where it is said to
+/// be.
 Eigen::Isometry3d camera_pose_from(Setup setup, const Eigen::Isometry3d& Z,
                                    const std::vector<Observation>& observations) {
   std::vector<Eigen::Isometry3d> poses;
@@ -75,8 +76,14 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
         check_projection(extrinsics.setup, at, lens, target, observations, extrinsics.target);
     return ratio_of(moved.mm_rms, moved.deg_rms, *stated);
   };
-  const HandEyePoses target_moved{poses.X, target_pose_from(extrinsics.setup, poses.X, observations)},
-      camera_moved{camera_pose_from(extrinsics.setup, poses.Z, observations), poses.Z};
+  const HandEyePoses target_moved{poses.X, target_pose_from(extrinsics.setup, poses.X, observations)};
+  // A target that was placed by a camera which has moved is wrong as well: both are taken from the views.
+  std::vector<Observation> seen = observations;
+  std::erase_if(seen, [](const Observation& view) { return view.T_camera_target.empty(); });
+  const HandEyePoses camera_moved =
+      target_is_refitted && seen.size() >= 3
+          ? shah(pose_loops(extrinsics.setup, seen))
+          : HandEyePoses{camera_pose_from(extrinsics.setup, poses.Z, observations), poses.Z};
   const double by_target = target_is_refitted ? result.ratio : ratio_at(target_moved),
                by_camera = ratio_at(camera_moved);
   std::string cause;

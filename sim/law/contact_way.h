@@ -238,9 +238,9 @@ FLASH_HOST_DEVICE inline Real entry_into_round(const Vector3<Real>& from, const 
 
 template <typename Real>
 FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_cylinder(const MovingObstacle<Real>& cylinder,
-                                                             const Vector3<Real>& start,
-                                                             const Vector3<Real>& point, Real time_step,
-                                                             const WayOut<Real>& way_out) {
+                                                                  const Vector3<Real>& start,
+                                                                  const Vector3<Real>& point, Real time_step,
+                                                                  const WayOut<Real>& way_out) {
   SurfaceGap<Real> gap = gap_to(cylinder, point);
   Vector3<Real> from = place_in(cylinder.start, start), to = place_in(cylinder.end, point);
   from.z = to.z = 0;
@@ -289,9 +289,9 @@ FLASH_HOST_DEVICE inline Real tangent_offset(const MovingObstacle<Real>& capsule
 
 template <typename Real>
 FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_capsule(const MovingObstacle<Real>& capsule,
-                                                            const Vector3<Real>& start,
-                                                            const Vector3<Real>& point, Real time_step,
-                                                            const WayOut<Real>& way_out) {
+                                                                 const Vector3<Real>& start,
+                                                                 const Vector3<Real>& point, Real time_step,
+                                                                 const WayOut<Real>& way_out) {
   SurfaceGap<Real> gap = gap_to(capsule, point);
   const Vector3<Real> from = place_in(capsule.start, start), to = place_in(capsule.end, point),
                       way = to - from;
@@ -319,11 +319,9 @@ FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_capsule(const MovingObs
 }
 
 template <typename Real>
-FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_box(const MovingObstacle<Real>& box,
-                                                        const OtherObstacles<Real>& others,
-                                                        const Vector3<Real>& start,
-                                                        const Vector3<Real>& point, const Vector3<Real>& slid,
-                                                        Real time_step, const WayOut<Real>& way_out) {
+FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_box(
+    const MovingObstacle<Real>& box, const OtherObstacles<Real>& others, const Vector3<Real>& start,
+    const Vector3<Real>& point, const Vector3<Real>& slid, Real time_step, const WayOut<Real>& way_out) {
   LocalWay<Real> way = local_way(box, others, start, slid);
   if (ends_at_grazed_face(box, way)) {
     const int axis = way.grazed_axis;

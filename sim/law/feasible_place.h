@@ -29,9 +29,9 @@ FLASH_HOST_DEVICE inline bool stays(const ObstacleStep<double>& step, const Vect
 /// once; round surfaces and faces that change take a few rounds.
 template <typename Room>
 FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<double>& step,
-                                                       const Vector3<double>& start,
-                                                       const VertexTouch* touches, Vector3<double> point,
-                                                       Room& room) {
+                                                            const Vector3<double>& start,
+                                                            const VertexTouch* touches, Vector3<double> point,
+                                                            Room& room) {
   constexpr int rounds = 40;
   if (stays(step, start, point, touches)) return point;
   for (int round = 0; round < rounds; ++round) {
@@ -61,9 +61,9 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<d
 /// The place near `place` where the vertex stands on the surfaces that hold it and has not slipped.
 template <typename Room>
 FLASH_CALLED_ON_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<double>& step,
-                                                       const Vector3<double>& start,
-                                                       const VertexTouch* touches, Vector3<double> place,
-                                                       Room& room) {
+                                                            const Vector3<double>& start,
+                                                            const VertexTouch* touches, Vector3<double> place,
+                                                            Room& room) {
   constexpr int rounds = 10;
   Vector3<double> slip = slip_against(step, start, place, touches);
   // The way back leaves a round surface: the vertex is projected on it, and the slip taken back again.

@@ -3,7 +3,8 @@
 /// Marks a formula that stands once for host and device code.
 #ifdef __CUDACC__
 #define FLASH_HOST_DEVICE __host__ __device__
-/// One that kernels call instead of taking it in at each of many places, where it would be most of their code.
+/// One that kernels call instead of taking it in at each of many places, where it would be most of their
+/// code.
 #define FLASH_CALLED_ON_DEVICE __host__ __device__ __noinline__
 #else
 #define FLASH_HOST_DEVICE
