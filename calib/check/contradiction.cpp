@@ -50,13 +50,13 @@ std::string first_that_misses(const ProjectionCheck& check, const StatedError& s
 
 }  // namespace
 
-std::optional<StatedError> stated_error(const Extrinsics& extrinsics, double distance) {
-  if (!extrinsics.held_out) return std::nullopt;
-  const double turn = extrinsics.covariance.bottomRightCorner<3, 3>()
-                          .trace(),  // [rad^2], two of three axes count
+StatedError stated_error(const Extrinsics& extrinsics, double distance) {
+  constexpr ClosingError kUsual{.rotation = 0.2 / kDegrees, .translation = 2e-3};
+  const ClosingError left_out = extrinsics.held_out.value_or(kUsual);
+  const double turn = extrinsics.covariance.bottomRightCorner<3, 3>().trace(),  // two of its three axes shift
       shift = extrinsics.covariance.topLeftCorner<3, 3>().trace() + 2.0 / 3 * turn * distance * distance;
-  return StatedError{std::hypot(1e3 * extrinsics.held_out->translation, 1e3 * std::sqrt(shift)),
-                     kDegrees * std::hypot(extrinsics.held_out->rotation, std::sqrt(turn))};
+  return {1e3 * std::hypot(left_out.translation, std::sqrt(shift)),
+          kDegrees * std::hypot(left_out.rotation, std::sqrt(turn))};
 }
 
 Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& poses, bool target_is_refitted,
@@ -66,15 +66,14 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
   for (const Observation& view : observations)
     if (!view.T_camera_target.empty()) distances.push_back(view.T_camera_target.front().translation().norm());
   if (distances.empty()) return {};
-  const std::optional<StatedError> stated = stated_error(extrinsics, data::median(distances));
-  if (!stated) return {};
-  Contradiction result{.ratio = ratio_of(check.mm_rms, check.deg_rms, *stated), .sentence = {}};
+  const StatedError stated = stated_error(extrinsics, data::median(distances));
+  Contradiction result{.ratio = ratio_of(check.mm_rms, check.deg_rms, stated), .sentence = {}};
   if (result.ratio <= kContradicts) return result;
 
   const auto ratio_at = [&](const HandEyePoses& at) {
     const ProjectionCheck moved =
         check_projection(extrinsics.setup, at, lens, target, observations, extrinsics.target);
-    return ratio_of(moved.mm_rms, moved.deg_rms, *stated);
+    return ratio_of(moved.mm_rms, moved.deg_rms, stated);
   };
   const HandEyePoses target_moved{poses.X, target_pose_from(extrinsics.setup, poses.X, observations)};
   // A target that was placed by a camera which has moved is wrong as well: both are taken from the views.
@@ -102,8 +101,7 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
   std::snprintf(text, sizeof text,
                 "the target is missed by %.1f mm and %.2f deg (rms%s), where the calibration states %.1f mm "
                 "and %.2f deg: ",
-                check.mm_rms, check.deg_rms, first_that_misses(check, *stated).c_str(), stated->mm,
-                stated->deg);
+                check.mm_rms, check.deg_rms, first_that_misses(check, stated).c_str(), stated.mm, stated.deg);
   result.sentence = text + cause;
   return result;
 }

@@ -1,5 +1,4 @@
 #pragma once
-#include <optional>
 #include <string>
 
 #include "calib/calibrate/extrinsics.h"
@@ -14,8 +13,8 @@ struct StatedError {
 };
 
 /// Of independent parts: what the calibration found on views that it left out, and its own covariance at the
-/// target. None where the file does not say the first.
-std::optional<StatedError> stated_error(const Extrinsics& extrinsics, double distance);
+/// target. A file that does not say the first is taken to be of an arm in use: 2 mm and 0.2 deg.
+StatedError stated_error(const Extrinsics& extrinsics, double distance);
 
 /// What recorded views say against a calibration.
 struct Contradiction {
