@@ -98,6 +98,7 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
       xi.tail<3>().norm() / kDegree, 1e3 * xi.head<3>().norm(), std::sqrt(squared[worst] / (6 * usual)));
   ViewVerdict& verdict = result.selection.views[static_cast<std::size_t>(result.used[worst])];
   verdict.used = false;
+  verdict.misfit = true;
   verdict.reason = text;
   observations.erase(observations.begin() + static_cast<std::ptrdiff_t>(worst));
   result.used.erase(result.used.begin() + static_cast<std::ptrdiff_t>(worst));
@@ -432,7 +433,7 @@ void doubt_last_views(Calibration& result, const std::vector<Observation>& all) 
   for (std::size_t i = 0; i < all.size(); ++i)
     if (!all[i].T_camera_target.empty()) seen.push_back(i);
   std::size_t last = 0;
-  while (last < seen.size() && !result.views[seen[seen.size() - 1 - last]].used) ++last;
+  while (last < seen.size() && result.selection.views[seen[seen.size() - 1 - last]].misfit) ++last;
   const auto before = static_cast<double>(seen.size() - last);
   const double left_out = before - static_cast<double>(result.used.size());
   constexpr double kUsual = 0.1;  // share of views that are left out anyway

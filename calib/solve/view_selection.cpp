@@ -91,6 +91,7 @@ void drop_outliers(const RobustSeed& robust_seed, const std::vector<Eigen::Isome
           return closes(closing_error({robot[i], half_turn * C}, robust_seed.poses), usual, factor);
         });
     drop(views[i], turned ? "the picture is turned by 180 deg" : closing_reason(error, usual));
+    views[i].misfit = !turned;
   }
 }
 

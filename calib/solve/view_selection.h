@@ -15,8 +15,9 @@ struct ViewSelectionSettings {
 
 struct ViewVerdict {
   bool used = true;
-  std::string reason;  ///< why not
-  int symmetry = 0;    ///< by which the points were renumbered
+  std::string reason;   ///< why not
+  bool misfit = false;  ///< left out as it does not fit the others
+  int symmetry = 0;     ///< by which the points were renumbered
   ClosingError error;
 };
 
