@@ -33,7 +33,7 @@ FLASH_HOST_DEVICE inline Vector3<double> exit_direction(const MovingObstacle<dou
   if (obstacle.shape == ObstacleShape::box) return (k % 2 == 0 ? 1.0 : -1.0) * frame.axis(k / 2);
   if (obstacle.shape == ObstacleShape::capsule) {
     const int cell = k < 13 ? k : k + 1;  // without that in the middle
-    const Vector3<double> way = {cell % 3 - 1.0, cell / 3 % 3 - 1.0, cell / 9 - 1.0};
+    const Vector3<double> way = {cell % 3 - 1.0, cell / 3 % 3 - 1.0, cell / 9 - 1.0};  // NOLINT
     return direction_from(frame, (1 / norm(way)) * way);
   }
   const double angle = 2 * std::numbers::pi * k / exit_directions(obstacle);
