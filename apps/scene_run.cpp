@@ -36,6 +36,9 @@ Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sc
   if (solver.integrator != "newton" && has_solids(body.sheet))
     throw data::InputError("solver.type " + solver.integrator + ": " + body.name +
                            " is a solid (element_type TETRAHEDRON), which type newton simulates alone");
+  if (solver.integrator != "newton" && !body.environment.point_masses.empty())
+    throw data::InputError("solver.type " + solver.integrator + ": " + body.name +
+                           " has an attached_mass, which type newton simulates alone");
   if (solver.integrator == "newton") {
     SolverSettings settings;
     settings.time_step = time_step;
@@ -183,12 +186,13 @@ std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) 
   std::vector<std::string> warnings;
   for (const SceneBody& body : bodies)
     for (const auto& [number, solid] : body.environment.solids)
-      if (solid.poissons_ratio >= locking_poissons_ratio)
+      if (solid.poissons_ratio >= locking_poissons_ratio &&
+          !is_quadratic(body.sheet, body.sheet.bodies[static_cast<std::size_t>(number)]))
         warnings.push_back(body.name +
                            ": linear tetrahedra lock at nu = " + data::format_short(solid.poissons_ratio) +
                            ", from " + data::format_short(locking_poissons_ratio) +
-                           " on: bent, they are stiffer than their E says, the more the coarser; compare "
-                           "with a mesh of half the edge (docs/theory.md)");
+                           " on: bent, they are stiffer than their E says, the more the coarser; take "
+                           "\"element_order\": 2 in the asset (docs/theory.md)");
   return warnings;
 }
 

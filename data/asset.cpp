@@ -47,6 +47,8 @@ auto value_in(const Names& names, const std::string& name, const std::string& so
   throw input_error(source, field, "found \"" + name + "\", expected one of " + expected);
 }
 
+bool is_made_on_the_spot(const std::string& mesh) { return is_mesh_spec(mesh) || is_tet_mesh_spec(mesh); }
+
 bool is_solid(Constitutive constitutive) {
   return constitutive == Constitutive::tet_arap || constitutive == Constitutive::tet_corotated ||
          constitutive == Constitutive::tet_neohookean || constitutive == Constitutive::tet_neohookean_log;
@@ -113,6 +115,14 @@ void read_properties(const JsonObject& props, Asset& asset) {
   asset.stiffness_damping = props.not_negative("stiffness_damping", 0);
 }
 
+ElementOrder read_element_order(const JsonObject& file, ElementType type) {
+  const double order = file.number("element_order");
+  if (type == ElementType::triangle && order != 1)
+    throw file.error("element_order", "1, as 2 is for element_type TETRAHEDRON alone");
+  if (order != 1 && order != 2) throw file.error("element_order", "1 or 2");
+  return order == 2 ? ElementOrder::quadratic : ElementOrder::linear;
+}
+
 nlohmann::ordered_json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
 double areal_density_of(const Asset& asset, double rest_area) {
@@ -152,15 +162,18 @@ Asset load_asset(const std::string& path) {
   asset.format = file.has("schema") ? AssetFormat::flash_1 : AssetFormat::published;
   if (file.has("schema") && file.string("schema") != "flash-asset/1")
     throw file.error("schema", "\"flash-asset/1\", or no schema for the published format");
-  file.expect_fields(
-      {"schema", "name", "mesh", "element_type", "transformation", "mechanical_props", "identification"});
+  if (asset.format == AssetFormat::published && file.has("element_order"))
+    throw file.error("element_order", "no such field, or \"schema\": \"flash-asset/1\"");
+  file.expect_fields({"schema", "name", "mesh", "element_type", "element_order", "transformation",
+                      "mechanical_props", "identification"});
 
   const std::string mesh = file.string("mesh");
-  asset.mesh = is_mesh_spec(mesh) ? mesh : resolve_path(mesh, path);
+  asset.mesh = is_made_on_the_spot(mesh) ? mesh : resolve_path(mesh, path);
   const std::string element_type = file.string("element_type", "TRIANGLE");
   if (element_type != "TRIANGLE" && element_type != "TETRAHEDRON")
     throw file.error("element_type", "TRIANGLE or TETRAHEDRON");
   if (element_type == "TETRAHEDRON") asset.element_type = ElementType::tetrahedron;
+  if (file.has("element_order")) asset.element_order = read_element_order(file, asset.element_type);
   if (file.has("transformation")) {
     const JsonObject transformation = file.object("transformation");
     transformation.expect_fields({"trans", "rotation"});
@@ -176,8 +189,9 @@ void save_asset(const Asset& asset, const std::string& path) {
   nlohmann::ordered_json file, props;
   const bool published = asset.format == AssetFormat::published;
   if (!published) file["schema"] = "flash-asset/1";
-  file["mesh"] = is_mesh_spec(asset.mesh) ? asset.mesh : relative_path(asset.mesh, path);
+  file["mesh"] = is_made_on_the_spot(asset.mesh) ? asset.mesh : relative_path(asset.mesh, path);
   file["element_type"] = asset.element_type == ElementType::triangle ? "TRIANGLE" : "TETRAHEDRON";
+  if (asset.element_order == ElementOrder::quadratic) file["element_order"] = 2;
   file["transformation"] = {{"trans", vector_json(asset.translation)},
                             {"rotation", vector_json(asset.rotation_degrees)}};
   const auto put = [&](const char* key, const std::optional<double>& value) {
@@ -306,6 +320,8 @@ Asset express_as(const Asset& asset, AssetFormat format, double rest_area,
     result.bending_model.reset();
     if (!sheet.uniform_vertex_mass) lose("mass by area: obj_mass is spread evenly over vertices");
   }
+  if (asset.element_order == ElementOrder::quadratic) lose("element_order 2: its tetrahedra are linear");
+  result.element_order = ElementOrder::linear;
   lose("friction " + format_short(asset.friction));
   if (asset.air_drag != 0) lose("air_drag " + format_short(asset.air_drag));
   if (asset.stiffness_damping != 0) lose("stiffness_damping " + format_short(asset.stiffness_damping));
@@ -351,6 +367,9 @@ void transform(const Asset& asset, Points& vertices) {
 TriangleMesh load_rest_mesh(const Asset& asset) {
   if (asset.element_type != ElementType::triangle)
     throw input_error(asset.source, "element_type", "found TETRAHEDRON, expected TRIANGLE: a sheet");
+  if (is_tet_mesh_spec(asset.mesh))
+    throw input_error(asset.source, "mesh",
+                      "found \"" + asset.mesh + "\", expected sheet:..., disc:... or a file");
   TriangleMesh mesh = is_mesh_spec(asset.mesh) ? parse_mesh_spec(asset.mesh, asset.source, "mesh")
                                                : load_triangle_mesh(asset.mesh);
   check_size(asset, mesh.vertices);
@@ -366,8 +385,9 @@ TriangleMesh load_asset_mesh(const Asset& asset) {
 TetMesh load_asset_tet_mesh(const Asset& asset) {
   if (is_mesh_spec(asset.mesh))
     throw input_error(asset.source, "mesh",
-                      "found \"" + asset.mesh + "\", expected a .vtk or .tet file of tetrahedra");
-  TetMesh mesh = load_tet_mesh(asset.mesh);
+                      "found \"" + asset.mesh + "\", expected box:... or a .vtk or .tet file of tetrahedra");
+  TetMesh mesh = is_tet_mesh_spec(asset.mesh) ? parse_tet_mesh_spec(asset.mesh, asset.source, "mesh")
+                                              : load_tet_mesh(asset.mesh);
   check_size(asset, mesh.vertices);
   transform(asset, mesh.vertices);
   return mesh;

@@ -21,6 +21,7 @@ struct Asset {
   std::string
       mesh;  ///< path already resolved against the asset file, or a mesh spec such as "sheet:0.4x0.4:0.01"
   ElementType element_type = ElementType::triangle;
+  ElementOrder element_order = ElementOrder::linear;           ///< of tetrahedra
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();       ///< [m]
   Eigen::Vector3d rotation_degrees = Eigen::Vector3d::Zero();  ///< about fixed x, then y, then z [deg]
 
@@ -86,8 +87,7 @@ TriangleMesh load_rest_mesh(const Asset& asset);
 /// The asset's triangle mesh, moved by its transformation.
 TriangleMesh load_asset_mesh(const Asset& asset);
 
-/// The asset's tetrahedra, moved likewise. Throws InputError where they are so large, and for a mesh made on
-/// the spot.
+/// The asset's tetrahedra, moved likewise. Throws InputError where they are so large, and for a sheet.
 TetMesh load_asset_tet_mesh(const Asset& asset);
 
 /// Rotation about fixed x, then y, then z [deg], then translation.

@@ -14,6 +14,9 @@ struct TriangleMesh {
   Triangles triangles;
 };
 
+/// Of tetrahedra: linear with four vertices, quadratic with six more in the middle of the edges.
+enum class ElementOrder { linear = 1, quadratic = 2 };
+
 struct TetMesh {
   Points vertices;
   Tetrahedra tetrahedra;

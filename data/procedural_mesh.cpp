@@ -272,4 +272,30 @@ TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source,
   return rectangle(settings);
 }
 
+bool is_tet_mesh_spec(const std::string& text) { return text.starts_with("box:"); }
+
+TetMesh parse_tet_mesh_spec(const std::string& spec, const std::string& source, const std::string& field) {
+  constexpr double most_cells = 1e5;
+  const auto fail = [&](const std::string& expected) {
+    return input_error(source, field, "found \"" + spec + "\", expected " + expected);
+  };
+  const auto length = [&](std::string_view word) {
+    const std::optional<double> value = parse_number(word);
+    if (!value || !std::isfinite(*value) || *value <= 0)
+      throw fail("box:WIDTHxDEPTHxHEIGHT:CELL in metres, such as box:0.1x0.03x0.03:0.01");
+    return *value;
+  };
+  const std::vector<std::string_view> parts = split(spec, ":");
+  const std::vector<std::string_view> sizes =
+      parts.size() == 3 ? split(parts[1], "x") : std::vector<std::string_view>();
+  if (sizes.size() != 3) length("");
+  const double cell = length(parts[2]);
+  Eigen::Vector3d size;
+  for (int axis = 0; axis < 3; ++axis) size[axis] = length(sizes[static_cast<std::size_t>(axis)]);
+  const Eigen::Array3d cells = (size.array() / cell).round().max(1.0);
+  if (!(cells.prod() <= most_cells))
+    throw fail("at most " + format_count(std::size_t(most_cells)) + " cells");
+  return tet_box(size, cells.cast<int>());
+}
+
 }  // namespace flash::data

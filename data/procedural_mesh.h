@@ -41,6 +41,11 @@ bool is_mesh_spec(const std::string& text);
 TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source = "mesh",
                              const std::string& field = "sheet");
 
+/// "box:0.1x0.03x0.03:0.01": tet_box of that size with whole cells of about that edge, at most 100,000.
+/// Throws InputError naming `source` and `field`.
+bool is_tet_mesh_spec(const std::string& text);
+TetMesh parse_tet_mesh_spec(const std::string& spec, const std::string& source, const std::string& field);
+
 /// The name used in specs and files.
 const char* to_string(DiagonalPattern pattern);
 

@@ -225,14 +225,21 @@ ScenePrescribed read_prescribed(const JsonObject& object) {
 }
 
 SceneLoad read_load(const JsonObject& object, const Eigen::Vector3d& gravity) {
-  object.expect_fields({"vertices", "force", "hung_mass"});
+  object.expect_fields({"vertices", "force", "hung_mass", "attached_mass"});
   SceneLoad load;
   load.vertices = read_vertices(object);
-  if (object.has("force") == object.has("hung_mass"))
-    throw object.error("force", "either force [N] on each vertex, or hung_mass [kg] shared by them");
-  load.force = object.has("force") ? Eigen::Vector3d(object.vector("force", 3))
-                                   : Eigen::Vector3d(object.positive("hung_mass") /
-                                                     static_cast<double>(load.vertices.size()) * gravity);
+  const auto share = [&](const char* key) {
+    return object.positive(key) / static_cast<double>(load.vertices.size());
+  };
+  if (object.has("force") + object.has("hung_mass") + object.has("attached_mass") != 1)
+    throw object.error("force",
+                       "one of force [N] on each vertex, hung_mass and attached_mass [kg] shared by them");
+  if (object.has("force"))
+    load.force = object.vector("force", 3);
+  else if (object.has("hung_mass"))
+    load.force = share("hung_mass") * gravity;
+  else
+    load.attached_mass = share("attached_mass");
   return load;
 }
 

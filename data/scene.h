@@ -84,10 +84,11 @@ struct ScenePrescribed {
 };
 
 /// The same constant force on each of some vertices (a hung mass arrives here as mass times gravity, shared
-/// evenly).
+/// evenly), or the same mass.
 struct SceneLoad {
   std::vector<int> vertices;
   Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< on each vertex [N]
+  double attached_mass = 0;                         ///< at each vertex, that moves with it [kg]
 };
 
 struct SceneObject {

@@ -11,7 +11,7 @@ using data::Points;
 
 namespace {
 
-constexpr double sheet_neighbours = 6, solid_neighbours = 14;  ///< of a vertex, in a regular mesh
+constexpr double sheet_neighbours = 6, solid_neighbours = 14;  ///< of a vertex, in a regular linear mesh
 constexpr double little = 0.01;  ///< share of the least eigenvalue that rounding may change
 
 /// The matrices on the vertices of the constraints: what each leaves free, and its coupling where there is
@@ -50,7 +50,8 @@ void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse,
   }
   for (size_t k = plan_->pattern.size; k < plan_->pattern.size + plan_->edge_count; ++k)
     for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(blocks[9 * k + 4 * c]));
-  const double neighbours = has_solids(plan_->sheet) ? solid_neighbours : sheet_neighbours;
+  const double mean = 2.0 * static_cast<double>(plan_->edge_count) / plan_->pattern.size;
+  const double neighbours = has_solids(plan_->sheet) ? std::max(solid_neighbours, mean) : sheet_neighbours;
   single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < little * least_eigenvalue;
   const ProductPattern& pattern = sparse ? plan_->triangle_product : plan_->full_product;
   with_product([&](auto& product) { product.assign(pattern, blocks, std::move(scalar_parts)); });

@@ -1,37 +1,86 @@
 #include "sim/plan/solid_plan.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numeric>
+
+#include "sim/scene/solid.h"
 
 namespace flash::sim {
 
-Eigen::Matrix3d SolidElement::deformation(const data::Points& positions) const {
-  // About one vertex: far from the origin the sum of all four would cancel.
+namespace {
+
+using Gradients = decltype(QuadraturePoint::gradients);
+
+/// Of the barycentric coordinates, which are the shape functions of a linear tetrahedron.
+Eigen::Matrix<double, 4, 3> barycentric_gradients(const RestTetrahedron& tetrahedron) {
+  Eigen::Matrix<double, 4, 3> gradients;
+  gradients.bottomRows<3>() = tetrahedron.inverse_edges;
+  gradients.row(0) = -tetrahedron.inverse_edges.colwise().sum();
+  return gradients;
+}
+
+/// Of the ten shape functions where the barycentric coordinates are L: L_i (2 L_i - 1) at the corners, 4 L_i
+/// L_j at the middle of an edge.
+Gradients quadratic_gradients(const Eigen::Matrix<double, 4, 3>& barycentric, const Eigen::Vector4d& L) {
+  Gradients gradients(10, 3);
+  for (int i = 0; i < 4; ++i) gradients.row(i) = (4 * L[i] - 1) * barycentric.row(i);
+  for (int k = 0; k < 6; ++k) {
+    const auto [i, j] = tetrahedron_edges[k];
+    gradients.row(4 + k) = 4 * (L[i] * barycentric.row(j) + L[j] * barycentric.row(i));
+  }
+  return gradients;
+}
+
+/// The rule of four points that is exact for polynomials of the second degree (Hammer and Stroud 1956): for
+/// the energy of small strains, which are linear in a quadratic element.
+std::vector<QuadraturePoint> quadratic_points(const RestTetrahedron& tetrahedron) {
+  const double near = (5 + 3 * std::sqrt(5.0)) / 20, far = (5 - std::sqrt(5.0)) / 20;
+  const Eigen::Matrix<double, 4, 3> barycentric = barycentric_gradients(tetrahedron);
+  std::vector<QuadraturePoint> points;
+  for (int p = 0; p < 4; ++p) {
+    Eigen::Vector4d L = Eigen::Vector4d::Constant(far);
+    L[p] = near;
+    points.push_back({quadratic_gradients(barycentric, L), tetrahedron.volume / 4});
+  }
+  return points;
+}
+
+}  // namespace
+
+Eigen::Matrix3d SolidElement::deformation(const QuadraturePoint& point, const data::Points& positions) const {
+  // About one vertex: far from the origin the sum of all would cancel.
   Eigen::Matrix3d F = Eigen::Matrix3d::Zero();
-  for (int k = 1; k < 4; ++k)
-    F += (positions.row(vertices[k]) - positions.row(vertices[0])).transpose() * gradients.row(k);
+  for (std::size_t k = 1; k < vertices.size(); ++k)
+    F += (positions.row(vertices[k]) - positions.row(vertices[0])).transpose() *
+         point.gradients.row(static_cast<Eigen::Index>(k));
   return F;
 }
 
 std::vector<SolidElement> solid_elements(const Sheet& sheet, const std::function<int(int, int)>& slot) {
   std::vector<SolidElement> elements;
+  int first_point = 0;
   for (const RestTetrahedron& tetrahedron : sheet.tetrahedra) {
-    Eigen::Matrix<double, 4, 3> gradients;
-    gradients.bottomRows<3>() = tetrahedron.inverse_edges;
-    gradients.row(0) = -tetrahedron.inverse_edges.colwise().sum();
-    std::array<int, 4> order;
-    std::iota(order.begin(), order.end(), 0);
-    std::sort(order.begin(), order.end(),
-              [&](int a, int b) { return tetrahedron.vertices[a] < tetrahedron.vertices[b]; });
-    SolidElement element;
-    element.volume = tetrahedron.volume;
-    for (int k = 0; k < 4; ++k) {
-      element.vertices[k] = tetrahedron.vertices[order[k]];
-      element.gradients.row(k) = gradients.row(order[k]);
+    std::vector<int> vertices(tetrahedron.vertices.begin(), tetrahedron.vertices.end());
+    std::vector<QuadraturePoint> points = {{barycentric_gradients(tetrahedron), tetrahedron.volume}};
+    if (tetrahedron.is_quadratic()) {
+      vertices.insert(vertices.end(), tetrahedron.midsides.begin(), tetrahedron.midsides.end());
+      points = quadratic_points(tetrahedron);
     }
-    for (int k = 0; k < 6; ++k)
-      element.slots[k] = slot(element.vertices[solid_pairs[k][0]], element.vertices[solid_pairs[k][1]]);
-    elements.push_back(element);
+    std::vector<int> order(vertices.size());
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](int a, int b) { return vertices[a] < vertices[b]; });
+    SolidElement element;
+    element.first_point = first_point;
+    first_point += static_cast<int>(points.size());
+    for (const int k : order) element.vertices.push_back(vertices[k]);
+    for (const QuadraturePoint& point : points)
+      element.points.push_back({point.gradients(order, Eigen::all), point.volume});
+    for (std::size_t row = 1; row < vertices.size(); ++row)
+      for (std::size_t column = 0; column < row; ++column)
+        element.slots.push_back(slot(element.vertices[row], element.vertices[column]));
+    elements.push_back(std::move(element));
   }
   return elements;
 }

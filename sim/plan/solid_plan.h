@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Core>
-#include <array>
 #include <functional>
 #include <vector>
 
@@ -8,19 +7,26 @@
 
 namespace flash::sim {
 
-/// A tetrahedron with its place in the system matrix. Its vertices ascend, so that its blocks (1, 0), (2, 0),
-/// (2, 1), (3, 0), (3, 1) and (3, 2) are stored as they are.
-struct SolidElement {
-  std::array<int, 4> vertices;
-  std::array<int, 6> slots;               ///< of these blocks in a BlockPattern
-  Eigen::Matrix<double, 4, 3> gradients;  ///< rows w_i of F = sum_i x_i w_i^T [1/m]
-  double volume;                          ///< at rest [m^3]
-
-  Eigen::Matrix3d deformation(const data::Points& positions) const;
+/// A place in a tetrahedron at which its strain is taken.
+struct QuadraturePoint {
+  static constexpr int most_vertices = 10;
+  /// Rows w_i, one a vertex of the element, of F = sum_i x_i w_i^T [1/m].
+  Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::ColMajor, most_vertices, 3> gradients;
+  double volume;  ///< at rest, that it stands for [m^3]
 };
 
-/// The pairs (row, column) of the blocks of an element, in the order of its slots.
-inline constexpr int solid_pairs[6][2] = {{1, 0}, {2, 0}, {2, 1}, {3, 0}, {3, 1}, {3, 2}};
+/// A tetrahedron with its place in the system matrix. Its vertices ascend, so that its blocks are stored as
+/// they are. A linear one has four vertices and one strain. A quadratic one has ten, and four points with
+/// strains of their own.
+struct SolidElement {
+  std::vector<int> vertices;
+  std::vector<int> slots;  ///< of the blocks (1, 0), (2, 0), (2, 1), (3, 0), ... in a BlockPattern
+  std::vector<QuadraturePoint> points;
+  int first_point;  ///< number of the first among the points of all elements
+
+  /// Deformation gradient at one of its points.
+  Eigen::Matrix3d deformation(const QuadraturePoint& point, const data::Points& positions) const;
+};
 
 /// The elements of all solid bodies, in the order of the sheet's tetrahedra. slot(row, column) is the place
 /// of a block, row > column.

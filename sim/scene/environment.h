@@ -55,6 +55,12 @@ struct Load {
   Eigen::Vector3d force;  ///< [N]
 };
 
+/// A weight that is fixed to a vertex and moves with it.
+struct PointMass {
+  int vertex;
+  double mass;  ///< [kg]
+};
+
 struct State {
   double time = 0.0;               ///< [s]
   data::Points positions;          ///< [m]
@@ -70,6 +76,7 @@ struct Environment {
   std::vector<Obstacle> obstacles;
   std::vector<Hold> holds;
   std::vector<Load> loads;
+  std::vector<PointMass> point_masses = {};
   std::shared_ptr<const Schedule>
       schedule;  ///< of the frames that holds and obstacles name; none: all at rest
   State state;

@@ -66,12 +66,17 @@ data::Points start_positions(const data::Scene& scene, const data::SceneObject& 
   return start;
 }
 
-Hold support_of(const data::SceneFixed& fixed, const data::Points& start) {
-  Hold hold{.name = fixed.name, .vertices = fixed.vertices, .axes = fixed.axes};
+Hold support_of(const data::SceneFixed& fixed, const Sheet& sheet, const data::Points& start) {
+  std::vector<int> vertices = fixed.vertices;
   if (fixed.all)
-    for (int i = 0; i < int(start.rows()); ++i) hold.vertices.push_back(i);
-  hold.targets =
-      fixed.positions.rows() > 0 ? fixed.positions : data::Points(start(hold.vertices, Eigen::all));
+    for (int i = 0; i < int(mesh_vertices(sheet)); ++i) vertices.push_back(i);
+  Hold hold{.name = fixed.name, .vertices = with_midsides(sheet, vertices), .axes = fixed.axes};
+  data::Points places = start;
+  if (fixed.positions.rows() > 0) {
+    places(vertices, Eigen::all) = fixed.positions;
+    places = with_midsides(sheet, places.topRows(mesh_vertices(sheet)));
+  }
+  hold.targets = places(hold.vertices, Eigen::all);
   if (fixed.over > 0) {
     hold.from = 0;
     hold.closing_time = fixed.over;
@@ -80,21 +85,26 @@ Hold support_of(const data::SceneFixed& fixed, const data::Points& start) {
   return hold;
 }
 
-void add_supports(const data::Scene& scene, const data::SceneObject& object, Timeline& timeline,
-                  Environment& environment) {
+void add_supports(const data::Scene& scene, const data::SceneObject& object, const Sheet& sheet,
+                  Timeline& timeline, Environment& environment) {
   const data::Points& start = environment.state.positions;
+  const Eigen::Index count = mesh_vertices(sheet);
   for (const data::SceneFixed& fixed : object.fixed) {
-    check_vertices(scene, object, "fixed", fixed.vertices, start.rows());
-    environment.holds.push_back(support_of(fixed, start));
+    check_vertices(scene, object, "fixed", fixed.vertices, count);
+    environment.holds.push_back(support_of(fixed, sheet, start));
   }
   for (const data::SceneLoad& load : object.loads) {
-    check_vertices(scene, object, "loads", load.vertices, start.rows());
-    for (int vertex : load.vertices) environment.loads.push_back({vertex, load.force});
+    check_vertices(scene, object, "loads", load.vertices, count);
+    for (int vertex : load.vertices)
+      if (load.attached_mass > 0)
+        environment.point_masses.push_back({vertex, load.attached_mass});
+      else
+        environment.loads.push_back({vertex, load.force});
   }
   for (const data::ScenePrescribed& prescribed : object.prescribed) {
-    check_vertices(scene, object, "prescribed", prescribed.vertices, start.rows());
+    check_vertices(scene, object, "prescribed", prescribed.vertices, count);
     environment.holds.push_back({.name = prescribed.name,
-                                 .vertices = prescribed.vertices,
+                                 .vertices = with_midsides(sheet, prescribed.vertices),
                                  .frame = timeline.frame_of(prescribed.trajectory),
                                  .from = prescribed.from,
                                  .to = prescribed.to});
@@ -139,7 +149,7 @@ void make_sheet_body(const data::Scene& scene, const data::Asset& asset, SceneBo
 
 /// Mesh and material of an object of tetrahedra.
 void make_solid_body(const data::Asset& asset, SceneBody& body, std::vector<std::string>& notices) {
-  body.sheet = make_solid(data::load_asset_tet_mesh(asset));
+  body.sheet = make_solid(data::load_asset_tet_mesh(asset), {}, asset.element_order);
   Eigen::VectorXd& volume = body.sheet.vertex_volume;
   const data::ResolvedSolid resolved = data::resolve_solid(asset, volume.sum());
   for (const std::string& notice : resolved.notices) notices.push_back(body.name + ": " + notice);
@@ -159,7 +169,9 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, T
 
   Environment& environment = body.environment;
   environment.gravity = scene.gravity;
-  environment.state.positions = start_positions(scene, object, body.sheet.rest.vertices);
+  environment.state.positions = with_midsides(
+      body.sheet,
+      start_positions(scene, object, body.sheet.rest.vertices.topRows(mesh_vertices(body.sheet))));
   if (const int inverted = first_inverted(body.sheet, environment.state.positions); inverted >= 0)
     throw data::input_error(scene.source, "objects." + object.name + ".start",
                             "turns tetrahedron " + std::to_string(inverted) + " of " + asset.mesh +
@@ -173,7 +185,7 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, T
     const int frame = path == nullptr ? base_frame : timeline.frame_of(*path);
     environment.obstacles.push_back(obstacle_of(scene, object.name, other, frame));
   }
-  add_supports(scene, object, timeline, environment);
+  add_supports(scene, object, body.sheet, timeline, environment);
   add_end_effectors(scene, object.name, timeline, environment);
   for (const Hold& hold : environment.holds)
     if (hold.axes != std::array<bool, 3>{true, true, true} && !environment.obstacles.empty())

@@ -90,8 +90,12 @@ Sheet joined(std::span<const Sheet> sheets) {
     whole.solid_surface.middleRows(first_face, own_faces) = sheet.solid_surface.array() + first_vertex;
     for (RestTetrahedron tetrahedron : sheet.tetrahedra) {
       tetrahedron.vertices.array() += first_vertex;
+      if (tetrahedron.is_quadratic())
+        for (int& midside : tetrahedron.midsides) midside += first_vertex;
       whole.tetrahedra.push_back(tetrahedron);
     }
+    for (const auto& [vertex, ends] : sheet.midsides)
+      whole.midsides.push_back({vertex + first_vertex, {ends[0] + first_vertex, ends[1] + first_vertex}});
     for (Body body : sheet.bodies) {
       body.first_vertex += first_vertex;
       body.first_triangle += first_triangle;

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 #include <span>
 #include <string>
 #include <vector>
@@ -21,6 +22,16 @@ struct RestTetrahedron {
   Eigen::Vector4i vertices;
   Eigen::Matrix3d inverse_edges;  ///< inverse of the matrix of rest edges (x1 - x0, x2 - x0, x3 - x0) [1/m]
   double volume;                  ///< [m^3]
+  /// Of a quadratic element: the vertices in the middle of its edges 01, 02, 03, 12, 13 and 23. Else -1.
+  std::array<int, 6> midsides = {-1, -1, -1, -1, -1, -1};
+
+  bool is_quadratic() const { return midsides[0] >= 0; }
+};
+
+/// A vertex that stands in the middle of an edge of quadratic tetrahedra, at rest.
+struct Midside {
+  int vertex;
+  std::array<int, 2> ends;
 };
 
 /// A part of the mesh with a material of its own: a sheet of triangles, or a solid of tetrahedra. Its
@@ -43,7 +54,8 @@ struct Sheet {
   // Of the solid bodies; empty where there are none.
   std::vector<RestTetrahedron> tetrahedra = {};
   data::Triangles solid_surface = {};  ///< outer faces, counter-clockwise seen from outside
-  Eigen::VectorXd vertex_volume = {};  ///< a quarter of the volume of the adjacent tetrahedra [m^3]
+  Eigen::VectorXd vertex_volume = {};  ///< share of the volume of the adjacent tetrahedra [m^3]
+  std::vector<Midside> midsides = {};  ///< of quadratic bodies, each behind the body's other vertices
 };
 
 /// A sheet of one body. Throws data::InputError on degenerate or duplicate triangles and on vertices without

@@ -22,6 +22,7 @@ IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const std::vec
       rows_of(law.place.body, mass_) = law.solid->density * rows_of(law.place.body, plan.sheet.vertex_volume);
     else
       rows_of(law.place.body, mass_) *= law.material.areal_density;
+  for (const PointMass& point : environment.point_masses) mass_[point.vertex] += point.mass;
   target_ = start.positions + h_ * start.velocities;
   target_.rowwise() += h_ * h_ * environment.gravity.transpose();
   loads_ = Points::Zero(start.positions.rows(), 3);

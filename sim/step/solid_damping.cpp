@@ -21,10 +21,11 @@ Matrix3d stress_of(const SolidLame& lame, const Matrix3d& strain) {
 
 std::vector<Matrix3d> solid_metrics(const SheetPlan& plan, const Points& positions) {
   std::vector<Matrix3d> metrics;
-  for (const SolidElement& element : plan.solid_elements) {
-    const Matrix3d F = element.deformation(positions);
-    metrics.push_back(F.transpose() * F);
-  }
+  for (const SolidElement& element : plan.solid_elements)
+    for (const QuadraturePoint& point : element.points) {
+      const Matrix3d F = element.deformation(point, positions);
+      metrics.push_back(F.transpose() * F);
+    }
   return metrics;
 }
 
@@ -32,14 +33,15 @@ double add_solid_damping_gradient(const SheetPlan& plan, const Body& body,
                                   const std::vector<Matrix3d>& start_metrics, const SolidLame& lame,
                                   const Points& positions, Points& gradient) {
   double potential = 0;
-  const Matrix3d* start = start_metrics.data() + body.first_tetrahedron;
   for (const SolidElement& element : elements_of(plan, body)) {
-    const Matrix3d F = element.deformation(positions);
-    const Matrix3d strain = 0.5 * (F.transpose() * F - *start++);
-    const Matrix3d stress = stress_of(lame, strain);
-    potential += 0.5 * element.volume * stress.cwiseProduct(strain).sum();
-    const Matrix3d P = element.volume * F * stress;
-    for (int k = 0; k < 4; ++k) gradient.row(element.vertices[k]) += element.gradients.row(k) * P.transpose();
+    const Matrix3d* start = start_metrics.data() + element.first_point;
+    for (const QuadraturePoint& point : element.points) {
+      const Matrix3d F = element.deformation(point, positions);
+      const Matrix3d strain = 0.5 * (F.transpose() * F - *start++);
+      const Matrix3d stress = stress_of(lame, strain);
+      potential += 0.5 * point.volume * stress.cwiseProduct(strain).sum();
+      add_stress(element, point, point.volume * F * stress, gradient);
+    }
   }
   return potential;
 }
@@ -47,25 +49,24 @@ double add_solid_damping_gradient(const SheetPlan& plan, const Body& body,
 void add_solid_damping_hessian(const SheetPlan& plan, const Body& body,
                                const std::vector<Matrix3d>& start_metrics, const SolidLame& lame,
                                const Points& positions, Curvature curvature, BlockValues<double>& values) {
-  const Matrix3d* start = start_metrics.data() + body.first_tetrahedron;
   for (const SolidElement& element : elements_of(plan, body)) {
-    const Matrix3d F = element.deformation(positions);
-    Matrix3d stress = stress_of(lame, 0.5 * (F.transpose() * F - *start++));
-    if (curvature == Curvature::positive) {
-      const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(stress);
-      stress = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
-               eigen.eigenvectors().transpose();
+    const Matrix3d* start = start_metrics.data() + element.first_point;
+    for (const QuadraturePoint& point : element.points) {
+      const Matrix3d F = element.deformation(point, positions);
+      Matrix3d stress = stress_of(lame, 0.5 * (F.transpose() * F - *start++));
+      if (curvature == Curvature::positive) {
+        const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(stress);
+        stress = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
+                 eigen.eigenvectors().transpose();
+      }
+      // As that of a triangle in sim/step/membrane_damping.cpp.
+      for_blocks(element, values, [&](int i, int j, auto& block) {
+        const Vector3d wi = point.gradients.row(i), wj = point.gradients.row(j);
+        const Matrix3d material = lame.mu * (wi.dot(wj) * Matrix3d::Identity() + wj * wi.transpose()) +
+                                  lame.lambda * wi * wj.transpose();
+        block += point.volume * (wj.dot(stress * wi) * Matrix3d::Identity() + F * material * F.transpose());
+      });
     }
-    // As that of a triangle in sim/step/membrane_damping.cpp.
-    const auto add = [&](int slot, int i, int j) {
-      const Vector3d wi = element.gradients.row(i), wj = element.gradients.row(j);
-      const Matrix3d material = lame.mu * (wi.dot(wj) * Matrix3d::Identity() + wj * wi.transpose()) +
-                                lame.lambda * wi * wj.transpose();
-      Eigen::Map<Matrix3d>(values.data() + 9L * slot) +=
-          element.volume * (wj.dot(stress * wi) * Matrix3d::Identity() + F * material * F.transpose());
-    };
-    for (int k = 0; k < 4; ++k) add(element.vertices[k], k, k);
-    for (int k = 0; k < 6; ++k) add(element.slots[k], solid_pairs[k][0], solid_pairs[k][1]);
   }
 }
 

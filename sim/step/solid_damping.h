@@ -7,7 +7,7 @@
 
 namespace flash::sim {
 
-/// F^T F of each tetrahedron of all bodies at `positions`, in the order of the plan's elements.
+/// F^T F at each point of quadrature of all bodies, in the order of the plan's elements.
 std::vector<Eigen::Matrix3d> solid_metrics(const SheetPlan& plan, const data::Points& positions);
 
 /// Potential of the Kelvin-Voigt solid over a step that started at `start_metrics`, as that of the membrane

@@ -188,10 +188,49 @@ TEST(Asset, SolidsLoadTheirTetrahedraMovedAsTheAssetSays) {
   EXPECT_NE(
       input_error_of([&] { load_rest_mesh(asset("part.tet")); }).find("found TETRAHEDRON, expected TRIANGLE"),
       std::string::npos);
-  EXPECT_NE(input_error_of([&] {
-              load_asset_tet_mesh(asset("sheet:0.1x0.1:0.01"));
-            }).find("mesh: found \"sheet:0.1x0.1:0.01\", expected a .vtk or .tet file of tetrahedra"),
+  EXPECT_NE(
+      input_error_of([&] {
+        load_asset_tet_mesh(asset("sheet:0.1x0.1:0.01"));
+      }).find("mesh: found \"sheet:0.1x0.1:0.01\", expected box:... or a .vtk or .tet file of tetrahedra"),
+      std::string::npos);
+  EXPECT_NE(
+      input_error_of([&] { load_asset_tet_mesh(asset("box:1x1:0.1")); }).find("expected box:WIDTHxDEPTH"),
+      std::string::npos);
+  const Asset box = asset("box:0.3x0.2x0.1:0.1");
+  EXPECT_EQ(load_asset_tet_mesh(box).tetrahedra, tet_box({0.3, 0.2, 0.1}, {3, 2, 1}).tetrahedra);
+  save_asset(box, folder / "copy.json");
+  EXPECT_EQ(load_asset(folder / "copy.json").mesh, "box:0.3x0.2x0.1:0.1");
+}
+
+TEST(Asset, ElementsMayBeQuadratic) {
+  const TemporaryFolder folder;
+  const auto load = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {
+    return load_asset(folder.write("part.json", "{" + fields + R"(, "mesh": "box:1x1x1:1",
+      "mechanical_props": {"mass": 1, "young": 1, "poisson": 0.3, "thickness": 1, "constitutive": ")" +
+                                                    law + "\"}}"));
+  };
+  const auto error = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {
+    return input_error_of([&] { load(fields, law); });
+  };
+  const std::string solid = R"("schema": "flash-asset/1", "element_type": "TETRAHEDRON")";
+  EXPECT_EQ(load(solid).element_order, ElementOrder::linear);
+  EXPECT_EQ(load(solid + R"(, "element_order": 1)").element_order, ElementOrder::linear);
+  const Asset quadratic = load(solid + R"(, "element_order": 2)");
+  EXPECT_EQ(quadratic.element_order, ElementOrder::quadratic);
+  save_asset(quadratic, folder / "copy.json");
+  EXPECT_EQ(load_asset(folder / "copy.json").element_order, ElementOrder::quadratic);
+  std::vector<std::string> notices;
+  EXPECT_EQ(express_as(quadratic, AssetFormat::published, 0, notices).element_order, ElementOrder::linear);
+  EXPECT_EQ(notices.front(),
+            "the published format cannot express element_order 2: its tetrahedra are linear");
+  EXPECT_NE(error(solid + R"(, "element_order": 3)").find("element_order: found 3, expected 1 or 2"),
             std::string::npos);
+  EXPECT_NE(error(R"("schema": "flash-asset/1", "element_order": 2)", "TRI_ARAP")
+                .find("expected 1, as 2 is for element_type TETRAHEDRON alone"),
+            std::string::npos);
+  EXPECT_NE(
+      error(R"("element_type": "TETRAHEDRON", "element_order": 2)").find("\"schema\": \"flash-asset/1\""),
+      std::string::npos);
 }
 
 TEST(Asset, WrongFieldsAreNamed) {

@@ -27,7 +27,8 @@ const char* const kFlash =
   "objects": {"cloth": {"asset": "assets/cloth.json", "start": {"T_base_object": [0, 0, 1, 0, 0, 0.6, 0.8]}, "velocity": [1, 0, 0],
       "fixed": [{"vertices": [0, 1], "positions": [[0, 0, 0], [1, 0, 0]]}, {"vertices": "all", "axes": "z"}],
       "prescribed": [{"vertices": [4], "to": 2, "keyframes": [{"t": 0}, {"t": 1, "translation": [0, 0, 1], "rotation_xyzw": [1, 0, 0, 0]}]}],
-      "loads": [{"vertices": [2], "force": [1, 2, 3]}, {"vertices": [5, 6], "hung_mass": 0.4}]},
+      "loads": [{"vertices": [2], "force": [1, 2, 3]}, {"vertices": [5, 6], "hung_mass": 0.4},
+                {"vertices": [5, 6], "attached_mass": 0.4}]},
     "flag": "assets/cloth.json"},
   "end_effectors": {"left": {"size": [0.01, 0.02, 0.03], "trajectory": "left.tum", "collides": true, "friction": 0.9,
       "grasps": [{"object": "flag", "from": 0.1, "to": 0.4, "threshold": 0.015, "zero_length": true, "closing_time": 0.05}]}},
@@ -145,6 +146,8 @@ TEST_F(SceneFiles, OurAdditionsAreRead) {
   EXPECT_EQ(cloth.prescribed[0].to, 2);
   EXPECT_EQ(cloth.loads[0].force, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(cloth.loads[1].force, Eigen::Vector3d(0, 0, -2));  // 0.4 kg at 10 m/s^2 over two vertices
+  EXPECT_EQ(cloth.loads[2].force, Eigen::Vector3d(0, 0, 0));
+  EXPECT_EQ(cloth.loads[2].attached_mass, 0.2);
 
   const SceneEndEffector& left = scene.end_effectors.at(0);
   EXPECT_EQ(left.size, Eigen::Vector3d(0.01, 0.02, 0.03));
@@ -206,8 +209,10 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/vertices", {3, 1, 3}),
             "objects.cloth.fixed[0].vertices: found [3,1,3], expected each vertex once");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/0/hung_mass", 1),
-            "objects.cloth.loads[0].force: found [1,2,3], expected either force [N] on each vertex, or "
-            "hung_mass [kg] shared by them");
+            "objects.cloth.loads[0].force: found [1,2,3], expected one of force [N] on each vertex, "
+            "hung_mass and attached_mass [kg] shared by them");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/loads/2/attached_mass", -1),
+            "objects.cloth.loads[2].attached_mass: found -1, expected a number above 0");
   EXPECT_EQ(changed(kFlash, "/end_effectors/left/grasps/0/object", "rag"),
             "end_effectors.left.grasps[0].object: found \"rag\", expected a name of objects");
   EXPECT_EQ(changed(kFlash, "/friction/0/b", "floor"),

@@ -9,8 +9,9 @@
 namespace flash::sim {
 
 /// A box of tetrahedra from the origin to `size` [m].
-inline Sheet solid_box(const Eigen::Vector3d& size, const Eigen::Vector3i& cells) {
-  return make_solid(data::tet_box(size, cells));
+inline Sheet solid_box(const Eigen::Vector3d& size, const Eigen::Vector3i& cells,
+                       data::ElementOrder order = data::ElementOrder::linear) {
+  return make_solid(data::tet_box(size, cells), {}, order);
 }
 
 /// A solid at rest in its rest shape, without obstacles or supports.

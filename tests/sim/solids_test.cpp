@@ -241,6 +241,42 @@ TEST(Solids, AHungWeightDrawsABar) {
   EXPECT_NEAR(found, expected, 1e-3 * expected);  // strains are 3e-4
 }
 
+// A heavy weight fixed to the end of a light bar: a spring E A / L and a mass. Implicit Euler takes (omega
+// h)^2 / 2 of the energy in a step, and makes the period longer by less than (omega h)^2; the bar's own mass
+// adds a third of itself to the weight (Rayleigh).
+TEST(Solids, AnAttachedWeightSwingsAsAMassOnASpring) {
+  const double length = 0.2, side = 0.04, E = 1e6, mass = 2, density = 10, h = 1e-3;
+  const Sheet bar = solid_box({side, side, length}, {1, 1, 4}, data::ElementOrder::quadratic);
+  Environment environment =
+      solid_environment(bar, {.youngs_modulus = E, .poissons_ratio = 0, .density = density});
+  environment.gravity.setZero();
+  environment.holds = {{.vertices = face_of(bar, 2, length)}};
+  // As an even stress acts on a quadratic face: on the middle of its edges alone. The last triangle of four
+  // of a face lies between these.
+  for (Eigen::Index f = 3; f < bar.solid_surface.rows(); f += 4) {
+    const Points x = bar.rest.vertices(bar.solid_surface.row(f), Eigen::all);
+    if (x.col(2).maxCoeff() > 1e-9) continue;
+    const Vector3d a = x.row(1) - x.row(0), b = x.row(2) - x.row(0);
+    const double share = 4 * a.cross(b).norm() / 2 / (side * side) / 3;
+    for (const int i : bar.solid_surface.row(f)) environment.point_masses.push_back({i, share * mass});
+  }
+  for (Eigen::Index i = 0; i < bar.rest.vertices.rows(); ++i)
+    environment.state.velocities(i, 2) = -0.01 * (1 - bar.rest.vertices(i, 2) / length);
+  Solver solver(bar, {.time_step = h, .tolerance = 1e-8});
+  const auto height = [&] { return mean_on_face(bar, environment.state.positions, 2, 0); };
+  double before = 0, now = 0;
+  int step = 0;
+  do {
+    before = now;
+    solver.step(environment);
+    now = height();
+    ++step;
+  } while (step < 1000 && (step < 3 || now < 0));
+  const double half = h * (step - 1 + before / (before - now)), own = density * side * side * length;
+  const double omega = std::sqrt(E * side * side / length / (mass + own / 3)), expected = M_PI / omega;
+  EXPECT_NEAR(half, expected, std::pow(omega * h, 2) * expected);
+}
+
 // The vertex within is pushed out through a face, so that tetrahedra are inside out: without stress from
 // elsewhere the rest shape is where they end.
 TEST(Solids, NeoHookeanTetrahedraThatAreInsideOutComeBack) {

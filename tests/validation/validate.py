@@ -5,6 +5,7 @@ import argparse
 import pathlib
 import shutil
 
+import beam
 import handeye
 import convergence
 import lifts
@@ -21,14 +22,14 @@ def main():
     parser.add_argument("--sysid", required=True, help="the program flash-sysid")
     parser.add_argument("--calib", help="the program flash-calib")
     parser.add_argument("--hand-eye-study", help="the program hand_eye_study")
-    parser.add_argument("--data", required=True, type=pathlib.Path, help="folder with handeye/, lift/ and twin/")
+    parser.add_argument("--data", required=True, type=pathlib.Path, help="folder with handeye/, lift/, twin/ and beam/")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder of the runs")
     parser.add_argument("--documents", required=True, type=pathlib.Path, help="folder of the chapters, where the tables go")
     parser.add_argument("--sim", help="the program flash-sim")
     parser.add_argument("--scenes", type=pathlib.Path, help="folder of the reference scenes")
     parser.add_argument("--results", type=pathlib.Path, help="what make reference wrote of them")
-    parser.add_argument("--only", help="handeye, lifts, twins, synthetic, convergence or reference: that part of the "
-                                       "document; a recording: its fits alone, printed")
+    parser.add_argument("--only", help="handeye, lifts, twins, synthetic, convergence, beam or reference: that part "
+                                       "of the document; a recording: its fits alone, printed")
     parser.add_argument("--twins", type=int, default=len(synthetic.TWINS), help="how many of the coverage study")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
@@ -46,6 +47,8 @@ def main():
         document |= handeye.tables(results, tables.table)
     if options.only in (None, "convergence") and options.sim:
         document |= convergence.tables(options.sim, options.out, tables.table)
+    if options.only in (None, "beam") and options.sim:
+        document |= beam.tables(options.sim, options.data / "beam", options.out, tables.table)
     if options.only in (None, "lifts"):
         results = run_lifts(runs, options.data)
         document |= tables.lift_tables(results)

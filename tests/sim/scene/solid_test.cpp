@@ -33,6 +33,47 @@ TEST(SolidMesh, VolumeAndSurfaceOfABoxGoToItsVertices) {
   EXPECT_NEAR(volume, size.prod(), 1e-15);
 }
 
+TEST(SolidMesh, QuadraticElementsHaveVerticesInTheMiddleOfTheirEdges) {
+  const data::TetMesh mesh = data::tet_box(size, {3, 2, 1});
+  const Sheet box = make_solid(mesh, {}, data::ElementOrder::quadratic);
+  // Euler: edges of a ball of tetrahedra, from its vertices, faces and tetrahedra.
+  const Eigen::Index vertices = mesh.vertices.rows(), tetrahedra = mesh.tetrahedra.rows(),
+                     outer = box.solid_surface.rows() / 4, faces = (4 * tetrahedra + outer) / 2;
+  EXPECT_EQ(static_cast<Eigen::Index>(box.midsides.size()), vertices + faces - tetrahedra - 1);
+  EXPECT_EQ(mesh_vertices(box), vertices);
+  EXPECT_TRUE(is_quadratic(box, box.bodies[0]));
+  for (const auto& [vertex, ends] : box.midsides)
+    EXPECT_LT(
+        (box.rest.vertices.row(vertex) - 0.5 * (mesh.vertices.row(ends[0]) + mesh.vertices.row(ends[1])))
+            .norm(),
+        1e-16);
+  EXPECT_NEAR(box.vertex_volume.sum(), size.prod(), 1e-15);
+  EXPECT_GT(box.vertex_volume.minCoeff(), 0);
+  EXPECT_LT((box.rest.vertices.transpose() * box.vertex_volume - 0.5 * size.prod() * size).norm(), 1e-15);
+  EXPECT_NEAR(box.vertex_area.sum(), 2 * (0.3 * 0.2 + 0.2 * 0.1 + 0.1 * 0.3), 1e-14);
+  double volume = 0;
+  for (Eigen::Index f = 0; f < box.solid_surface.rows(); ++f) {
+    Eigen::Matrix3d corners;
+    for (int k = 0; k < 3; ++k) corners.col(k) = box.rest.vertices.row(box.solid_surface(f, k));
+    volume += corners.determinant() / 6;
+  }
+  EXPECT_NEAR(volume, size.prod(), 1e-15);
+}
+
+TEST(SolidMesh, WhatHoldsBothEndsOfAnEdgeHoldsItsMiddle) {
+  const Sheet box = make_solid(data::tet_box(size, {2, 2, 2}), {}, data::ElementOrder::quadratic);
+  std::vector<int> corners, face;
+  for (int i = 0; i < static_cast<int>(box.rest.vertices.rows()); ++i) {
+    if (box.rest.vertices(i, 0) > 1e-12) continue;
+    face.push_back(i);
+    if (i < mesh_vertices(box)) corners.push_back(i);
+  }
+  EXPECT_EQ(with_midsides(box, corners), face);
+  EXPECT_EQ(with_midsides(box, {corners[0]}), std::vector<int>{corners[0]});
+  const data::Points moved = 2 * box.rest.vertices;
+  EXPECT_EQ(with_midsides(box, moved.topRows(mesh_vertices(box))), moved);
+}
+
 TEST(SolidMesh, WhatIsBrokenIsNamed) {
   const auto message = [](const data::TetMesh& mesh) -> std::string {
     try {
@@ -71,6 +112,15 @@ TEST(SolidMesh, JoinsWithSheets) {
   EXPECT_EQ(whole.vertex_volume.head(own).sum(), 0);
   EXPECT_EQ(Eigen::VectorXd(whole.vertex_volume.tail(box.vertex_volume.size())), box.vertex_volume);
   EXPECT_EQ(visible_triangles(whole).rows(), sheet.rest.triangles.rows() + box.solid_surface.rows());
+
+  const Sheet quadratic = make_solid(data::tet_box(size, {1, 2, 1}), "box", data::ElementOrder::quadratic);
+  const std::vector<Sheet> mixed = {sheet, quadratic};
+  const Sheet joint = joined(mixed);
+  EXPECT_TRUE(is_quadratic(joint, joint.bodies[1]));
+  EXPECT_FALSE(is_quadratic(joint, joint.bodies[0]));
+  ASSERT_EQ(joint.midsides.size(), quadratic.midsides.size());
+  EXPECT_EQ(joint.midsides[0].vertex, quadratic.midsides[0].vertex + int(own));
+  EXPECT_EQ(joint.tetrahedra[0].midsides[5], quadratic.tetrahedra[0].midsides[5] + int(own));
 }
 
 }  // namespace
