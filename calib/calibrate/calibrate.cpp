@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "calib/calibrate/compare_methods.h"
+#include "calib/calibrate/moving_rig.h"
 #include "calib/calibrate/plausibility.h"
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
@@ -402,87 +403,14 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   return result;
 }
 
-/// The views of one side of a knock; the others are left without a pose of the target.
-std::vector<Observation> side_of(std::vector<Observation> views, std::size_t first, bool before) {
-  for (std::size_t i = 0; i < views.size(); ++i)
-    if ((i < first) != before) views[i].T_camera_target.clear();
-  return views;
-}
-
-std::string knock_sentence(const KnockedPart& other, std::size_t used) {
-  const Knock& knock = other.knock;
-  char text[400];
-  std::snprintf(
-      text, sizeof text,
-      "the %s moved by %.1f mm and %.2f deg before %s: the answer is of the %zu views %s; the %d views %s "
-      "were %s%s",
-      !knock.told    ? "camera or the target"
-      : knock.camera ? "camera"
-                     : "target",
-      1e3 * knock.motion.head<3>().norm(), knock.motion.tail<3>().norm() / kDegree, other.view.c_str(), used,
-      other.before ? "since" : "until then", other.views, other.before ? "until then" : "since",
-      other.poses ? "solved by themselves" : "too few for a solution",
-      other.before || (knock.told && !knock.camera) ? "" : ": where the camera is now is not known");
-  return text;
-}
-
-/// Views that were left out one by one are a knock if they are the last ones: the answer is then of the past.
-void doubt_last_views(Calibration& result, const std::vector<Observation>& all) {
-  constexpr std::size_t kTold = 2, kUnusable = 3;
-  std::vector<std::size_t> seen;
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (!all[i].T_camera_target.empty()) seen.push_back(i);
-  std::size_t last = 0;
-  while (last < seen.size() && result.selection.views[seen[seen.size() - 1 - last]].misfit) ++last;
-  const auto before = static_cast<double>(seen.size() - last);
-  const double left_out = before - static_cast<double>(result.used.size());
-  constexpr double kUsual = 0.1;  // share of views that are left out anyway
-  if (last < kTold || left_out > kUsual * before) return;
-  result.warnings.insert(result.warnings.begin(),
-                         "the last " + std::to_string(last) +
-                             " views do not close with those before: if camera or target moved before " +
-                             all[seen[seen.size() - last]].image +
-                             ", the answer is of where they were; record anew, or take these views out");
-  if (last >= kUnusable) result.usable = false;
-}
-
 }  // namespace
 
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
                       const CalibrateSettings& settings) {
-  Calibration whole = solve(setup, camera, points, symmetries, all, settings);
-  doubt_last_views(whole, all);
-  if (!whole.pose_errors) return whole;
-  const std::optional<Knock> knock =
-      find_knock(whole.refined, {.unknowns = whole.unknowns}, whole.pose_errors->gain);
-  if (!knock) return whole;
-  const auto first = static_cast<std::size_t>(whole.used[knock->pose]);
-  const std::size_t after = whole.used.size() - knock->pose;
-  // What holds now counts, unless it is hardly known.
-  constexpr std::size_t kEnough = 6;
-  KnockedPart other{.knock = *knock, .view = all[first].image, .before = after >= kEnough};
-  Calibration answer;
-  try {  // the part may have been knocked as well
-    answer = calibrate(setup, camera, points, symmetries, side_of(all, first, !other.before), settings);
-  } catch (const data::InputError&) {
-    return whole;  // a part alone may turn about one axis only
-  }
-  other.views = static_cast<int>(other.before ? knock->pose : after);
-  try {
-    other.poses = solve(setup, camera, points, symmetries, side_of(all, first, other.before), settings).poses;
-  } catch (const data::InputError&) {
-    // said in the sentence
-  }
-  // Who asks where the camera is now is not served by where it was.
-  if (!other.before && (knock->camera || !knock->told)) answer.usable = false;
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if ((i < first) == other.before && !all[i].T_camera_target.empty())
-      answer.views[i].reason = answer.selection.views[i].reason =
-          std::string(other.before ? "before" : "after") + " the knock at " + other.view;
-  answer.warnings.insert(answer.warnings.begin(), knock_sentence(other, answer.used.size()));
-  if (!answer.other_part) answer.other_part = std::move(other);  // else that next to the answer
-  return answer;
+  return calibrate_moving(all, [&](const std::vector<Observation>& views) {
+    return solve(setup, camera, points, symmetries, views, settings);
+  });
 }
 
 }  // namespace flash::calib

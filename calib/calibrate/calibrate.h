@@ -80,6 +80,7 @@ struct Calibration {
   double covariance_factor = 1;    ///< by which the splits have widened the covariance
   std::optional<CorrelatedPoseErrors> pose_errors;  ///< of the robot, which the covariance holds where found
   std::optional<KnockedPart> other_part;
+  std::optional<Drift> drift;         ///< the answer is of where camera and target were at the last view
   std::vector<std::string> warnings;  ///< worst first
   bool usable = true;
 };

@@ -209,6 +209,13 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
                                {"other_views", other.views}};
     if (other.poses) json["splits"]["knock"]["other_transform"] = list(data::to_vector(other.poses->X));
   }
+  if (calibration.drift) {
+    const Vector6d& motion = calibration.drift->motion;
+    json["splits"]["drift"] = {{"what", calibration.drift->camera ? "camera" : "target"},
+                               {"told", calibration.drift->told},
+                               {"moved_mm", list(Eigen::Vector3d(1e3 * motion.head<3>()))},
+                               {"moved_deg", list(Eigen::Vector3d(kDegrees * motion.tail<3>()))}};
+  }
   json["joint_zeros"] = nullptr;
   if (const auto zeros =
           joint_zeros(calibration.refined.bundle, calibration.unknowns, calibration.shared_covariance))

@@ -134,6 +134,13 @@ def knocked(poses):
                                 *pose[4:]] for i, pose in enumerate(poses)]
 
 
+def drifting(poses):
+    """The camera in the hand slips by 10 mm from the first picture to the last."""
+    last = len(poses) - 1
+    return [[pose[0], *(x + (i / last - 1) * y for x, y in zip(pose[1:4], rotate(pose[4:], (0.0075, -0.005, 0.0043)))),
+             *pose[4:]] for i, pose in enumerate(poses)]
+
+
 def first_views(count):
     def spoil(folder):
         for image in sorted((folder / "images").iterdir())[count:]:
@@ -227,6 +234,7 @@ def traps():
     yield Trap("no intrinsics", "in_hand", without_intrinsics, 2, "flash-calib intrinsics")
     yield Trap("half a target", "in_hand", option("--target", "chessboard:9x6"), 2, "chessboard:COLUMNSxROWS:SQUARE")
     yield Trap("a knock half-way", "in_hand", poses_changed(knocked), 0, "the camera moved by", "before 008.png", used=8)
+    yield Trap("a slow slip", "in_hand", poses_changed(drifting), 3, "the camera moved all the time, by", used=16)
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
     yield Trap("a misspelt setup", "in_hand", option("--setup", "eye-in-hnad"), 2, "--setup", "eye-in-hand,eye-to-hand")
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")

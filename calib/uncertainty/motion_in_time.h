@@ -1,0 +1,55 @@
+#pragma once
+#include <Eigen/Cholesky>
+#include <optional>
+#include <vector>
+
+#include "calib/solve/errors_in_variables.h"
+
+namespace flash::calib {
+
+/// What a solution's views say of a camera or a target that did not stand still: at pose i its frame stood
+/// moved by shape[i] * motion, (dt, dtheta) [m, rad], from where the solution has it. The motion's six
+/// unknowns are added to the linearised solution; its likelihood is that of robot errors that become as much
+/// smaller.
+class MotionInTime {
+ public:
+  /// Corrections are unknowns, and there is one arm and one camera; see `applies`.
+  MotionInTime(const Refinement& refined, const BundleSettings& settings);
+  static bool applies(const Bundle& bundle, const BundleSettings& settings);
+
+  struct Fit {
+    Eigen::VectorXd motion;  ///< six numbers for each shape
+    double fall = 0;         ///< of -2 log likelihood
+  };
+  /// Several shapes together; empty where they determine nothing.
+  Fit fit(const std::vector<std::vector<double>>& shapes, bool camera) const;
+
+  /// By how much X moves, along its own axes, where a motion of unit size and that shape took place, but is
+  /// not solved for; `solved`: another that is, or none.
+  Matrix6d shift_of_camera(const std::vector<double>& shape, const std::vector<double>& solved,
+                           bool camera) const;
+  /// By how much the covariance of X grows where a motion of that shape is solved for.
+  Matrix6d growth(const std::vector<double>& shape, bool camera) const;
+
+  double numbers() const { return numbers_; }  ///< that the robot's errors are told by
+
+ private:
+  struct Joint {
+    Eigen::MatrixXd cross;        ///< of shared unknowns and motions
+    Eigen::MatrixXd information;  ///< of motions, shared unknowns eliminated
+    Eigen::VectorXd pull;
+  };
+  Joint joint(const std::vector<std::vector<double>>& shapes, bool camera) const;
+
+  std::vector<Eigen::MatrixXd> grams_;  ///< of each pose: [shared residual], its correction eliminated
+  Eigen::MatrixXd all_;
+  Eigen::LDLT<Eigen::MatrixXd> shared_;
+  int camera_column_ = 0, target_column_ = 0;
+  double squares_ = 0, numbers_ = 0;
+};
+
+/// More than what the errors of an arm in use that two halves of a recording do not share put between them:
+/// 0.1 deg, and what they amount to at the target.
+bool beyond_usual(const Bundle& bundle, const Vector6d& motion);
+
+}  // namespace flash::calib
