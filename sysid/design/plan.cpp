@@ -2,12 +2,98 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
+#include <algorithm>
 #include <cmath>
 
 #include "data/error.h"
 #include "sysid/emulate/sensitivity.h"
+#include "sysid/infer/expected_information.h"
+#include "sysid/infer/held.h"
+#include "sysid/infer/observed_rows.h"
 
 namespace flash::sysid {
+namespace {
+
+/// From the precision before an experiment and its information.
+PlannedExperiment planned(const std::string& name, const Eigen::MatrixXd& before,
+                          const Eigen::MatrixXd& information) {
+  const Eigen::MatrixXd after = before + information;
+  const Eigen::LLT<Eigen::MatrixXd> factor(after);
+  const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(after.rows(), after.cols()));
+  PlannedExperiment experiment{name, {}};
+  for (Eigen::Index k = 0; k < after.rows(); ++k) experiment.spread.push_back(std::sqrt(covariance(k, k)));
+  const auto log_root = [](const Eigen::LLT<Eigen::MatrixXd>& of) {
+    return Eigen::MatrixXd(of.matrixL()).diagonal().array().log2().sum();
+  };
+  experiment.bits = log_root(factor) - log_root(before.llt());
+  return experiment;
+}
+
+Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix) {
+  return matrix.llt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
+}
+
+Eigen::MatrixXd precision_before(const PlanSettings& settings) {
+  if (settings.known) return inverse(settings.known->covariance);
+  Eigen::VectorXd precisions(static_cast<Eigen::Index>(settings.grid.axes.size()));
+  const std::vector<double> ranges = spread_of_ranges(settings.grid.axes);
+  for (std::size_t k = 0; k < ranges.size(); ++k)
+    precisions[static_cast<Eigen::Index>(k)] = 1 / (ranges[k] * ranges[k]);
+  return precisions.asDiagonal();
+}
+
+/// The search's parameters and, behind them, what is held without a measurement.
+struct Asked {
+  GridSettings grid;
+  std::vector<double> at;
+  std::vector<double> held;  ///< standard deviation of each that is held, in the coordinate of its axis
+};
+
+Asked with_held(const PlanSettings& settings, const std::vector<Replay>& replays) {
+  const std::vector<HeldParameter> all = held_parameters(settings.grid, replays);
+  const auto is_held = [&](const Axis& axis) {
+    return std::any_of(all.begin(), all.end(), [&](const auto& held) { return held.name == axis.name; });
+  };
+  Asked asked{settings.grid, {}, {}};
+  asked.grid.axes.clear();
+  for (std::size_t k = 0; k < settings.at.size(); ++k) {
+    const Axis& axis = settings.grid.axes[k];
+    if (axis.values.size() > 1) {
+      asked.grid.axes.push_back(axis);
+      asked.at.push_back(settings.at[k]);
+    } else if (!is_held(axis)) {
+      asked.grid.fixed.push_back(axis);
+    }
+  }
+  for (const HeldParameter& held : all) {
+    const auto [low, high] = held.values;
+    const bool logarithmic = low > 0;
+    asked.grid.axes.push_back({held.name, {low, high}, logarithmic});
+    asked.at.push_back(logarithmic ? std::sqrt(low * high) : 0.5 * (low + high));
+    asked.held.push_back(0.5 * (logarithmic ? std::log(high / low) : high - low));
+  }
+  return asked;
+}
+
+/// What the rows of one recording tell of the first `searched` parameters.
+Eigen::MatrixXd information_of(const Replay& replay, const LinearObservations& places,
+                               const Eigen::MatrixXd& parameters, const Eigen::MatrixXd& nuisance,
+                               const Asked& asked, const Misfit& misfit) {
+  ObservedRows rows = observed_rows(replay, places, {.kind = RobustKind::plain});
+  const auto held = static_cast<Eigen::Index>(asked.held.size()), searched = parameters.cols() - held;
+  Eigen::VectorXd scale(places.rows());  // from rows of the score to those of the likelihood
+  for (Eigen::Index i = 0; i < places.rows(); ++i) {
+    const auto row = places.row(i);
+    scale[i] = scale_of(row, asked.grid.score.objective) / row.weight;
+  }
+  rows.rates = scale.asDiagonal() * parameters.leftCols(searched);
+  rows.known = scale.asDiagonal() * parameters.rightCols(held) *
+               Eigen::VectorXd::Map(asked.held.data(), held).asDiagonal();
+  rows.free = scale.asDiagonal() * nuisance;
+  return expected_information(rows, misfit);
+}
+
+}  // namespace
 
 std::vector<double> spread_of_ranges(const std::vector<Axis>& axes) {
   std::vector<double> spreads;
@@ -18,25 +104,63 @@ std::vector<double> spread_of_ranges(const std::vector<Axis>& axes) {
   return spreads;
 }
 
+std::vector<double> spread_before(const PlanSettings& settings) {
+  if (!settings.known) return spread_of_ranges(settings.grid.axes);
+  const Eigen::VectorXd spreads = settings.known->covariance.diagonal().cwiseSqrt();
+  return {spreads.begin(), spreads.end()};
+}
+
+Misfit expected_misfit(const std::vector<Misfit>& misfits) {
+  Misfit expected;
+  const auto count = static_cast<double>(misfits.size());
+  for (const Misfit& misfit : misfits) {
+    expected.noise += misfit.noise * misfit.noise / count;
+    expected.size += misfit.size * misfit.size / count;
+    expected.reach_time += misfit.reach_time / count;
+    expected.reach_sheet += misfit.reach_sheet / count;
+  }
+  expected.noise = std::sqrt(expected.noise);
+  expected.size = std::sqrt(expected.size);
+  return expected;
+}
+
 PlannedExperiment plan_experiment(const std::string& name, const std::vector<Replay>& replays,
-                                  const PlanSettings& settings) {
-  const Sensitivity sensitivity = measure_sensitivity(replays, settings.grid, settings.at);
+                                  const PlanSettings& settings, const MotionStore* store) {
+  const Eigen::MatrixXd before = precision_before(settings);
+  const Asked asked = settings.known ? with_held(settings, replays) : Asked{settings.grid, settings.at, {}};
+  MotionsAt motions;
+  if (store != nullptr)
+    motions = [&](std::size_t r, const std::vector<std::vector<double>>& values) {
+      std::vector<ReplayCandidate> candidates;
+      for (const std::vector<double>& each : values) candidates.push_back(candidate_at(each, asked.grid));
+      std::vector<ReplayResult> results(candidates.size());
+      store->run(replays[r], candidates,
+                 [&](std::size_t i, ReplayResult result) { results[i] = std::move(result); });
+      return results;
+    };
+  const Sensitivity sensitivity = measure_sensitivity(replays, asked.grid, asked.at, true, motions);
   if (sensitivity.places.empty()) throw data::InputError(name + ": the simulation diverges");
-  Eigen::MatrixXd rates = sensitivity.parameters;
-  if (sensitivity.nuisance.cols() > 0)
-    rates -= sensitivity.nuisance * sensitivity.nuisance.colPivHouseholderQr().solve(sensitivity.parameters);
-  const std::vector<double> ranges = spread_of_ranges(settings.grid.axes);
-  Eigen::MatrixXd information =
-      settings.keyframes / (settings.error * settings.error) * (rates.transpose() * rates);
-  for (std::size_t k = 0; k < ranges.size(); ++k)
-    information(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k)) += 1 / (ranges[k] * ranges[k]);
-  const Eigen::MatrixXd covariance =
-      information.ldlt().solve(Eigen::MatrixXd::Identity(information.rows(), information.cols()));
-  PlannedExperiment planned{name, {}};
-  for (std::size_t k = 0; k < ranges.size(); ++k)
-    planned.spread.push_back(
-        std::sqrt(covariance(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(k))));
-  return planned;
+  if (!settings.known) {
+    Eigen::MatrixXd rates = sensitivity.parameters;
+    if (sensitivity.nuisance.cols() > 0)
+      rates -=
+          sensitivity.nuisance * sensitivity.nuisance.colPivHouseholderQr().solve(sensitivity.parameters);
+    return planned(name, before,
+                   settings.keyframes / (settings.error * settings.error) * (rates.transpose() * rates));
+  }
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(before.rows(), before.cols());
+  const double root = std::sqrt(static_cast<double>(replays.size()));  // see Sensitivity
+  Eigen::Index row = 0;
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    const LinearObservations& places = sensitivity.places[r];
+    const auto part = [&](const Eigen::MatrixXd& all) {
+      return Eigen::MatrixXd(root * all.middleRows(row, places.rows()));
+    };
+    information += information_of(replays[r], places, part(sensitivity.parameters),
+                                  part(sensitivity.nuisance), asked, settings.known->misfit);
+    row += places.rows();
+  }
+  return planned(name, before, information);
 }
 
 }  // namespace flash::sysid

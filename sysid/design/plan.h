@@ -1,8 +1,11 @@
 #pragma once
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sysid/emulate/grid_search.h"
+#include "sysid/infer/discrepancy.h"
+#include "sysid/replay/motion_store.h"
 
 namespace flash::sysid {
 
@@ -11,6 +14,13 @@ struct PlannedExperiment {
   std::string name;
   std::vector<double> spread;  ///< one standard deviation, one an axis: of its logarithm or in its unit; no
                                ///< larger than what is known without the experiment
+  double bits = 0;             ///< expected information: by how many powers of two what is likely shrinks
+};
+
+/// What a search left to be known.
+struct KnownSoFar {
+  Eigen::MatrixXd covariance;  ///< of the searched parameters, in the coordinates of their axes
+  Misfit misfit;               ///< noise and discrepancy to reckon with
 };
 
 struct PlanSettings {
@@ -18,15 +28,28 @@ struct PlanSettings {
   std::vector<double> at;  ///< where the sensitivities are measured, one an axis
   double error = 1e-3;     ///< of a keyframe: the distance by which model and sheet differ [m]
   double keyframes = 10;   ///< that count as independent
+  std::optional<KnownSoFar> known = {};  ///< in place of ranges, error and keyframes
 };
 
 /// Spreads from the Fisher information F = n / error^2 J^T J, J the sensitivities of what is observed with
 /// registration projected out, and a prior that is the searched range (a uniform of that width): (F + P)^-1.
 /// The errors of a keyframe are taken as common to it: n keyframes, not points.
+///
+/// With `known`, P is the inverse of its covariance and F what rows under its noise and discrepancy tell
+/// (expected_information), registration within its bounds and what is held without a measurement
+/// (held_parameters) unknown beside the parameters; axes of one value are no parameters. `store`: keeps the
+/// motions, where there is one.
 PlannedExperiment plan_experiment(const std::string& name, const std::vector<Replay>& replays,
-                                  const PlanSettings& settings);
+                                  const PlanSettings& settings, const MotionStore* store = nullptr);
 
 /// Spread of each parameter by its range alone.
 std::vector<double> spread_of_ranges(const std::vector<Axis>& axes);
+
+/// Spread of each parameter before any experiment: by what is known, else by its range.
+std::vector<double> spread_before(const PlanSettings& settings);
+
+/// The error to reckon with in another recording: the mean squares of noise and discrepancy, the mean
+/// reaches.
+Misfit expected_misfit(const std::vector<Misfit>& misfits);
 
 }  // namespace flash::sysid

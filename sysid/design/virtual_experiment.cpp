@@ -71,7 +71,9 @@ Replay virtual_experiment(const std::string& kind, const data::Recording& like,
   replay.threads = settings.threads;
   const ScratchFolder scratch;  // after the simulation, so that it stands for a moment only
   save_synthetic(made, scratch.path);
-  return make_replay(data::load_recording(scratch.path), replay);
+  data::Recording recording = data::load_recording(scratch.path);
+  recording.nuisance = like.nuisance;
+  return make_replay(recording, replay);
 }
 
 }  // namespace flash::sysid

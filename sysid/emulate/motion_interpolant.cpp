@@ -35,87 +35,43 @@ MotionInterpolant::MotionInterpolant(const std::vector<Axis>& axes, const std::v
   points_ = points;
 }
 
-MotionInterpolant MotionInterpolant::slice(double value) const {
-  MotionInterpolant rest;
-  slice(value, rest);
-  return rest;
-}
-
-void MotionInterpolant::slice(double value, MotionInterpolant& rest) const {
-  rest.logarithmic_.assign(logarithmic_.begin() + 1, logarithmic_.end());
-  rest.splines_.assign(splines_.begin() + 1, splines_.end());
-  rest.layout_ = layout_;
-  const Eigen::RowVectorXd weights = splines_.front().weights(logarithmic_.front() ? std::log(value) : value);
-  const Eigen::Index columns = points_->cols() / weights.size();
-  if (rest.points_.use_count() != 1 || rest.points_->rows() != points_->rows() ||
-      rest.points_->cols() != columns)
-    rest.points_ = std::make_shared<Eigen::MatrixXd>(points_->rows(), columns);
-  for (Eigen::Index j = 0; j < columns; ++j) {
-    auto sum = rest.points_->col(j);
-    sum = weights[0] * points_->col(j);
-    for (Eigen::Index i = 1; i < weights.size(); ++i)
-      if (weights[i] != 0) sum += weights[i] * points_->col(i * columns + j);
+Eigen::VectorXd MotionInterpolant::weights(const std::vector<double>& values) const {
+  Eigen::VectorXd all = Eigen::VectorXd::Ones(1);
+  for (std::size_t k = 0; k < splines_.size(); ++k) {
+    const Eigen::RowVectorXd of_axis = splines_[k].weights(logarithmic_[k] ? std::log(values[k]) : values[k]);
+    const Eigen::MatrixXd product = of_axis.transpose() * all.transpose();  // the last axis fastest
+    all = product.reshaped();
   }
+  return all;
 }
 
-Motion MotionInterpolant::zero() const {
-  Motion motion{layout_->start, layout_->step, {}};
-  motion.positions.reserve(layout_->positions.size());
-  for (const data::Points& positions : layout_->positions)
-    motion.positions.emplace_back(data::Points::Zero(positions.rows(), 3));
-  motion.forces.assign(layout_->forces.size(), Eigen::Vector3d::Zero());
-  return motion;
+std::vector<Motion> MotionInterpolant::at(const std::vector<std::vector<double>>& points) const {
+  Eigen::MatrixXd weights(points_->cols(), static_cast<Eigen::Index>(points.size()));
+  for (std::size_t i = 0; i < points.size(); ++i)
+    weights.col(static_cast<Eigen::Index>(i)) = this->weights(points[i]);
+  const Eigen::MatrixXd numbers = *points_ * weights;
+  std::vector<Motion> motions(points.size(), *layout_);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double* from = numbers.col(static_cast<Eigen::Index>(i)).data();
+    for_each_block(motions[i], [&](double* to, Eigen::Index count) {
+      std::copy(from, from + count, to);
+      from += count;
+    });
+  }
+  return motions;
 }
 
 Motion MotionInterpolant::at(const std::vector<double>& values) const {
-  Motion motion = zero();
-  add_to(motion, values, 1);
-  return motion;
+  return std::move(at(std::vector<std::vector<double>>{values}).front());
 }
 
 void MotionInterpolant::add_to(Motion& motion, const std::vector<double>& values, double share) const {
-  if (values.size() > 1) {
-    MotionInterpolant rest = slice(values.front());
-    for (std::size_t k = 1; k + 1 < values.size(); ++k) rest = rest.slice(values[k]);
-    return rest.add_to(motion, {values.back()}, share);
-  }
-  // The sum over the last axis, without a slice between.
-  const Eigen::RowVectorXd weights =
-      values.empty() ? Eigen::RowVectorXd::Ones(1)
-                     : splines_.front().weights(logarithmic_.front() ? std::log(values[0]) : values[0]);
+  const Eigen::VectorXd numbers = *points_ * weights(values);
   Eigen::Index first = 0;
   for_each_block(motion, [&](double* to, Eigen::Index count) {
-    Eigen::Map<Eigen::VectorXd> sum(to, count);
-    for (Eigen::Index i = 0; i < weights.size(); ++i)
-      if (weights[i] != 0) sum += share * weights[i] * points_->col(i).segment(first, count);
+    Eigen::Map<Eigen::VectorXd>(to, count) += share * numbers.segment(first, count);
     first += count;
   });
-}
-
-MotionInterpolant MotionInterpolant::only(const std::vector<bool>& steps) const {
-  MotionInterpolant part = *this;
-  Motion layout = *layout_;
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> kept;  // first row and count, of this
-  Eigen::Index first = 0, rows = 0;
-  for (std::size_t i = 0; i < layout.positions.size(); ++i) {
-    const Eigen::Index count = layout.positions[i].size();
-    if (steps[i])
-      kept.emplace_back(first, count);
-    else
-      layout.positions[i].resize(0, 3);
-    first += count;
-  }
-  kept.emplace_back(first, points_->rows() - first);  // the forces
-  for (const auto& [from, count] : kept) rows += count;
-  const auto points = std::make_shared<Eigen::MatrixXd>(rows, points_->cols());
-  Eigen::Index to = 0;
-  for (const auto& [from, count] : kept) {
-    points->middleRows(to, count) = points_->middleRows(from, count);
-    to += count;
-  }
-  part.points_ = points;
-  part.layout_ = std::make_shared<const Motion>(std::move(layout));
-  return part;
 }
 
 }  // namespace flash::sysid

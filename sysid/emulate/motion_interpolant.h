@@ -23,29 +23,23 @@ class MotionInterpolant {
   /// The motion at values inside the grid, one an axis.
   Motion at(const std::vector<double>& values) const;
 
-  /// The interpolant over all axes but the first, which is held at `value`: cheaper where many points share
-  /// it.
-  MotionInterpolant slice(double value) const;
-
-  /// The same in place of `rest`, a former slice, of which the memory is used again.
-  void slice(double value, MotionInterpolant& rest) const;
+  /// Motions at several points, for little more than one alone takes.
+  std::vector<Motion> at(const std::vector<std::vector<double>>& points) const;
 
   /// motion += share times that at `values`; both have positions at the same steps.
   void add_to(Motion& motion, const std::vector<double>& values, double share) const;
 
-  /// The interpolant of positions at these steps alone; others are empty.
-  MotionInterpolant only(const std::vector<bool>& steps) const;
-
  private:
-  MotionInterpolant() = default;
-  Motion zero() const;
+  friend class MotionSlice;
+
+  /// Of each column, at a point.
+  Eigen::VectorXd weights(const std::vector<double>& values) const;
 
   std::vector<bool> logarithmic_;
   std::vector<Spline> splines_;
   std::shared_ptr<const Motion> layout_;  // of which the numbers do not count
-  /// One column a point of the grid: positions step by step, then forces. Shared by copies; only a slice that
-  /// no copy shares is ever changed.
-  std::shared_ptr<Eigen::MatrixXd> points_;
+  /// One column a point of the grid: positions step by step, then forces. Shared by copies.
+  std::shared_ptr<const Eigen::MatrixXd> points_;
 };
 
 }  // namespace flash::sysid

@@ -81,32 +81,18 @@ Eigen::SparseMatrix<double> prolongation(const data::TriangleMesh& from, const d
   return matrix;
 }
 
+std::vector<Motion> TwoMeshMotions::at(const std::vector<std::vector<double>>& points, double share) const {
+  std::vector<Motion> motions = coarse_.at(points);
+  if (!difference_) return motions;
+  for (Motion& motion : motions) motion = prolonged(motion, *prolongation_);
+  if (share == 0) return motions;
+  const std::vector<Motion> differences = difference_->at(points);
+  for (std::size_t i = 0; i < motions.size(); ++i) add(motions[i], share, differences[i]);
+  return motions;
+}
+
 Motion TwoMeshMotions::at(const std::vector<double>& values, double share) const {
-  Motion motion = coarse_.at(values);
-  if (difference_) {
-    motion = prolonged(motion, *prolongation_);
-    if (share != 0) difference_->add_to(motion, values, share);
-  }
-  return motion;
-}
-
-TwoMeshMotions TwoMeshMotions::slice(double value) const {
-  TwoMeshMotions rest(coarse_.slice(value));
-  if (difference_) rest.difference_ = difference_->slice(value);
-  rest.prolongation_ = prolongation_;
-  return rest;
-}
-
-void TwoMeshMotions::slice(double value, TwoMeshMotions& rest) const {
-  coarse_.slice(value, rest.coarse_);
-  if (difference_) difference_->slice(value, *rest.difference_);
-}
-
-TwoMeshMotions TwoMeshMotions::only(const std::vector<bool>& steps) const {
-  TwoMeshMotions part(coarse_.only(steps));
-  if (difference_) part.difference_ = difference_->only(steps);
-  part.prolongation_ = prolongation_;
-  return part;
+  return std::move(at(std::vector<std::vector<double>>{values}, share).front());
 }
 
 Motion TwoMeshMotions::on_its_mesh(const Motion& motion) const {
@@ -116,8 +102,9 @@ Motion TwoMeshMotions::on_its_mesh(const Motion& motion) const {
 MotionsAt motions_of(const std::vector<ModelledReplay>& models, double share) {
   return [&models, share](std::size_t r, const std::vector<std::vector<double>>& values) {
     std::vector<ReplayResult> results(values.size());
+    std::vector<Motion> motions = models[r].model.at(values, share);
     for (std::size_t i = 0; i < values.size(); ++i) {
-      results[i].motion = models[r].model.at(values[i], share);
+      results[i].motion = std::move(motions[i]);
       results[i].converged = results[i].finite = true;
     }
     return results;
@@ -154,8 +141,14 @@ std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Motion
   const auto matrix = std::make_shared<const Eigen::SparseMatrix<double>>(
       prolongation(replay.recording.mesh, fine->recording.mesh));
   const std::vector<std::vector<double>> points = cartesian_product(axes);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    add((*differences)[i], -1, prolonged(motions.at(points[i]), *matrix));
+  constexpr std::size_t kAtOnce = 8;  // of the motions that stand in memory beside the differences
+  for (std::size_t first = 0; first < points.size(); first += kAtOnce) {
+    const auto from = points.begin() + static_cast<std::ptrdiff_t>(first),
+               to = points.begin() + static_cast<std::ptrdiff_t>(std::min(first + kAtOnce, points.size()));
+    const std::vector<Motion> own = motions.at(std::vector<std::vector<double>>(from, to));
+    for (std::size_t i = 0; i < own.size(); ++i)
+      add((*differences)[first + i], -1, prolonged(own[i], *matrix));
+  }
   return ModelledReplay{std::move(*fine),
                         TwoMeshMotions(motions, MotionInterpolant(axes, *differences), matrix)};
 }

@@ -39,22 +39,16 @@ class TwoMeshMotions {
         difference_(std::move(difference)),
         prolongation_(std::move(prolongation)) {}
 
-  /// The motion at `values`, one for each axis that is left.
+  /// The motion at `values`, one an axis, or motions at several points.
   Motion at(const std::vector<double>& values, double share) const;
-
-  /// The motions with the first axis held at `value`.
-  TwoMeshMotions slice(double value) const;
-
-  /// The same in place of `rest`, a former slice.
-  void slice(double value, TwoMeshMotions& rest) const;
-
-  /// The motions at these steps alone.
-  TwoMeshMotions only(const std::vector<bool>& steps) const;
+  std::vector<Motion> at(const std::vector<std::vector<double>>& points, double share) const;
 
   /// A motion of the search's mesh on the mesh of the model.
   Motion on_its_mesh(const Motion& motion) const;
 
  private:
+  friend class TwoMeshSlice;
+
   MotionInterpolant coarse_;
   std::optional<MotionInterpolant> difference_;
   std::shared_ptr<const Eigen::SparseMatrix<double>> prolongation_;

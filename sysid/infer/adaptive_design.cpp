@@ -7,6 +7,7 @@
 
 #include "data/error.h"
 #include "data/parallel.h"
+#include "sysid/emulate/motion_slice.h"
 
 namespace flash::sysid {
 namespace {
@@ -103,78 +104,100 @@ std::vector<ReplayResult> motions_at(const Emulator& emulator, const std::vector
   return motions;
 }
 
+namespace {
+
+/// The motions of all recordings at one point of a grid, worked out at the steps that are read.
+class ReadMotions {
+ public:
+  explicit ReadMotions(const Emulator& emulator) : emulator_(&emulator) {}
+
+  /// `slices`: with every axis held, one a recording.
+  void take(const std::vector<TwoMeshSlice>& slices) {
+    motions_.resize(slices.size());
+    slices_ = &slices;
+    for (std::size_t r = 0; r < slices.size(); ++r) {
+      if (motions_[r].positions.empty()) motions_[r] = slices[r].empty();
+      slices[r].forces(emulator_->share, motions_[r].forces);
+    }
+    made_.assign(slices.size(), {});
+    for (std::size_t r = 0; r < slices.size(); ++r) made_[r].assign(motions_[r].positions.size(), false);
+  }
+
+  const Motion& at(std::size_t r, double time_offset) {
+    Motion& motion = motions_[r];
+    for (const Observation& observation : emulator_->models[r].replay.observations) {
+      if (observation.weight <= 0) continue;
+      const auto [first, last] = steps_at(motion, observation.t + time_offset);
+      for (const std::size_t step : {first, last}) {
+        if (made_[r][step]) continue;
+        (*slices_)[r].positions(step, emulator_->share, motion.positions[step]);
+        made_[r][step] = true;
+      }
+    }
+    return motion;
+  }
+
+ private:
+  const Emulator* emulator_;
+  const std::vector<TwoMeshSlice>* slices_ = nullptr;
+  std::vector<Motion> motions_;
+  std::vector<std::vector<bool>> made_;
+};
+
+/// Slices of all recordings with one axis more held.
+void hold(const std::vector<TwoMeshSlice>& from, double value, std::vector<TwoMeshSlice>& to) {
+  if (to.empty()) to = std::vector<TwoMeshSlice>(from.size());
+  for (std::size_t r = 0; r < from.size(); ++r) to[r].hold(from[r], value);
+}
+
+}  // namespace
+
 Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>& axes,
                               const MotionLikelihood& likelihood, const GridSettings& grid,
                               const TellWork& told) {
-  std::vector<TwoMeshMotions> all;
-  for (std::size_t r = 0; r < emulator.models.size(); ++r)
-    all.push_back(emulator.models[r].model.only(likelihood.steps_about(r)));
-  const std::size_t points = cartesian_product(axes).size();
+  using Slices = std::vector<TwoMeshSlice>;
+  Slices all(emulator.models.size());
+  for (std::size_t r = 0; r < all.size(); ++r) all[r].take(emulator.models[r].model);
+  const std::size_t points = cartesian_product(axes).size(), firsts = axes[0].values.size(),
+                    others = points / firsts;
   Eigen::VectorXd deviance(static_cast<Eigen::Index>(points));
   const std::atomic<bool>* const stop = emulator.models.front().replay.settings.solver.stop;
-  // `left`: values of the axes that the slices still have.
-  const auto look = [&](const std::vector<TwoMeshMotions>& slices, const std::vector<double>& left,
-                        std::size_t i) {
-    if (stop != nullptr && *stop) throw data::Stopped();
-    std::vector<Motion> motions;
-    for (const TwoMeshMotions& slice : slices) motions.push_back(slice.at(left, emulator.share));
-    double found = likelihood.deviance(motions);
-    if (std::isnan(found)) {  // its clock is far from the reference's
-      const std::vector<double> values = values_of(axes, static_cast<int>(i));
-      for (std::size_t r = 0; r < motions.size(); ++r)
-        motions[r] = emulator.models[r].model.at(values, emulator.share);
-      found = likelihood.deviance(motions);
-    }
-    deviance[static_cast<Eigen::Index>(i)] = found;
-    if (told) told({0, 1}, {});
-  };
-  const auto take_slices = [](const std::vector<TwoMeshMotions>& slices, double value,
-                              std::vector<TwoMeshMotions>& held) {
-    for (std::size_t r = 0; r < slices.size(); ++r)
-      if (r < held.size())
-        slices[r].slice(value, held[r]);
-      else
-        held.push_back(slices[r].slice(value));
-  };
-  // Points that share their first values share the slices there.
-  const auto visit = [&](const auto& self, const std::vector<TwoMeshMotions>& slices, std::size_t k,
-                         std::size_t first, std::size_t count) -> void {
-    const std::size_t values = axes[k].values.size(), part = count / values;
-    std::vector<TwoMeshMotions> held;
-    for (std::size_t i = 0; i < values; ++i) {
-      if (k + 1 == axes.size()) {
-        look(slices, {axes[k].values[i]}, first + i);
-      } else {
-        take_slices(slices, axes[k].values[i], held);
-        self(self, held, k + 1, first + i * part, part);
-      }
-    }
-  };
-  const std::size_t firsts = axes[0].values.size();
-  if (axes.size() == 1) {
-    data::for_each_in_parallel(firsts, grid.threads,
-                               [&](std::size_t i) { look(all, {axes[0].values[i]}, i); });
-    return deviance;
-  }
-  // A thread takes all points of one value of the first two axes; of the first, the slices are shared.
+  // Points that share their first values share the slices there. A thread takes all points of one value of
+  // the first two axes; of the first, the slices are shared.
   struct Shared {
     std::once_flag made;
-    std::vector<TwoMeshMotions> slices;
+    Slices slices;
     std::atomic<std::size_t> left = 0;  // of the second axis
   };
-  const std::size_t seconds = axes[1].values.size(), part = points / (firsts * seconds);
+  const std::size_t seconds = axes.size() > 1 ? axes[1].values.size() : 1, part = others / seconds;
   std::vector<Shared> shared(firsts);
   for (Shared& each : shared) each.left = seconds;
   data::for_each_in_parallel(firsts * seconds, grid.threads, [&](std::size_t pair) {
     Shared& each = shared[pair / seconds];
-    std::call_once(each.made, [&] { take_slices(all, axes[0].values[pair / seconds], each.slices); });
-    const double value = axes[1].values[pair % seconds];
-    if (axes.size() == 2) {
-      look(each.slices, {value}, pair);
+    std::call_once(each.made, [&] { hold(all, axes[0].values[pair / seconds], each.slices); });
+    std::vector<Slices> held(axes.size());  // one an axis
+    ReadMotions motions(emulator);
+    const auto visit = [&](const auto& self, const Slices& slices, std::size_t k, std::size_t first,
+                           std::size_t count) -> void {
+      if (k == axes.size()) {
+        if (stop != nullptr && *stop) throw data::Stopped();
+        motions.take(slices);
+        deviance[static_cast<Eigen::Index>(first)] = likelihood.deviance(
+            [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); });
+        if (told) told({0, 1}, {});
+        return;
+      }
+      const std::size_t values = axes[k].values.size(), under = count / values;
+      for (std::size_t i = 0; i < values; ++i) {
+        hold(slices, axes[k].values[i], held[k]);
+        self(self, held[k], k + 1, first + i * under, under);
+      }
+    };
+    if (axes.size() == 1) {
+      visit(visit, each.slices, 1, pair, 1);
     } else {
-      std::vector<TwoMeshMotions> held;
-      take_slices(each.slices, value, held);
-      visit(visit, held, 2, pair * part, part);
+      hold(each.slices, axes[1].values[pair % seconds], held[1]);
+      visit(visit, held[1], 2, pair * part, part);
     }
     if (--each.left == 0) each.slices.clear();
   });
@@ -186,24 +209,32 @@ std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<d
   constexpr double kStep = 0.1;  // of the extent, to both sides
   std::vector<Replay> replays;
   for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
-  std::vector<MotionChange> rates;
+  std::vector<std::vector<double>> points;  // to both sides along each axis
+  std::vector<double> factors;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     if (axes[k].values.size() < 2) continue;
     const double at = coordinate_of(axes[k], values[k]), low = coordinate_of(axes[k], extent[k][0]),
                  high = coordinate_of(axes[k], extent[k][1]);
     const std::array<double, 2> range = range_of(axes[k]);
-    std::array<double, 2> ends = {std::max(range[0], at - kStep * (high - low)),
-                                  std::min(range[1], at + kStep * (high - low))};
-    const double factor = (high - low) / (ends[1] - ends[0]);
-    MotionChange rate;
-    for (const std::size_t side : {0, 1}) {
-      std::vector<double> moved = values;
-      moved[k] = value_of(axes[k], ends[side]);
-      rate.push_back(
-          {side == 0 ? -factor : factor,
-           std::make_shared<const Motions>(Motions{replays, motions_at(emulator, moved, emulator.share)})});
+    const std::array<double, 2> ends = {std::max(range[0], at - kStep * (high - low)),
+                                        std::min(range[1], at + kStep * (high - low))};
+    factors.push_back((high - low) / (ends[1] - ends[0]));
+    for (const double end : ends) {
+      points.push_back(values);
+      points.back()[k] = value_of(axes[k], end);
     }
-    rates.push_back(std::move(rate));
+  }
+  std::vector<std::vector<ReplayResult>> at_points(points.size());  // one a recording
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    std::vector<ReplayResult> results = motions_of(emulator.models, emulator.share)(r, points);
+    for (std::size_t i = 0; i < points.size(); ++i) at_points[i].push_back(std::move(results[i]));
+  }
+  std::vector<MotionChange> rates;
+  for (std::size_t k = 0; k < factors.size(); ++k) {
+    MotionChange& rate = rates.emplace_back();
+    for (const std::size_t side : {0, 1})
+      rate.push_back({side == 0 ? -factors[k] : factors[k],
+                      std::make_shared<const Motions>(Motions{replays, std::move(at_points[2 * k + side])})});
   }
   return rates;
 }

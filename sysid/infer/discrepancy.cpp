@@ -14,7 +14,6 @@ namespace {
 
 constexpr double kTimes[] = {0.125, 0.25, 0.5, 1};   // reaches over the duration
 constexpr double kSheets[] = {0.125, 0.25, 0.5, 1};  // over the longest side of the sheet
-constexpr Eigen::Index kModes = 24;                  // along the sheet, at most
 constexpr Eigen::Index kCoordinates = 160;           // of a field, at most
 constexpr double kLeast = 1e-5;                      // variance of a coordinate over the largest
 constexpr int kSizes = 20;                           // values of tau, to that of the residuals
@@ -23,11 +22,6 @@ constexpr double kLarge = 2.995732;                  // -log of one in twenty
 constexpr double kVague = 100;                       // of what is not known, over the residuals
 // Chi-square with 3 degrees of freedom: a size and two reaches.
 constexpr double kOnceInTwenty = 7.815;
-
-double matern(double distance) {
-  const double x = std::sqrt(5.0) * distance;
-  return (1 + x + x * x / 3) * std::exp(-x);
-}
 
 /// Row of (keyframe, channel) blocks, `modes` long each.
 Eigen::Index block(int keyframe, int channel, int channels, int modes) {
@@ -55,38 +49,15 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
     if (const double norm = known_.col(c).norm(); norm > 0) known_.col(c) *= kVague * residuals.norm() / norm;
   channels_ = 1 + *std::max_element(rows_.channel.begin(), rows_.channel.end());
   duration_ = std::max(rows_.times.back() - rows_.times.front(), 1e-9);
-  const Eigen::RowVector2d corner = rows_.places.colwise().minCoeff();
-  const Eigen::Vector2d sides = (rows_.places.colwise().maxCoeff() - corner).transpose().cwiseMax(1e-9);
-  length_ = sides.maxCoeff();
-
-  struct Mode {
-    int a, b;
-    double wave_number;
-  };
-  std::vector<Mode> modes;
-  for (int a = 0; a < kModes; ++a)
-    for (int b = 0; b < kModes; ++b) modes.push_back({a, b, M_PI * std::hypot(a / sides[0], b / sides[1])});
-  std::stable_sort(modes.begin(), modes.end(),
-                   [](const Mode& one, const Mode& other) { return one.wave_number < other.wave_number; });
-  modes.resize(kModes);
-  modes_ = kModes;
-  wave_numbers_.resize(modes_);
-  phi_.resize(residuals.size(), modes_);
-  for (int j = 0; j < modes_; ++j) {
-    const auto [a, b, wave_number] = modes[static_cast<std::size_t>(j)];
-    wave_numbers_[j] = wave_number;
-    const double scale = std::sqrt((a > 0 ? 2.0 : 1.0) * (b > 0 ? 2.0 : 1.0));  // mean square 1
-    const auto x = (rows_.places.col(0).array() - corner[0]) / sides[0];
-    const auto y = (rows_.places.col(1).array() - corner[1]) / sides[1];
-    phi_.col(j) = scale * (M_PI * a * x).cos() * (M_PI * b * y).cos();
-  }
+  along_ = sheet_modes(rows_.places);
+  modes_ = static_cast<int>(along_.wave_numbers.size());
 
   const Eigen::Index stacked = block(keyframes_, 0, channels_, modes_);
   modes_modes_ = Eigen::MatrixXd::Zero(modes_, stacked);
   for (Eigen::Index i = 0; i < residuals.size(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     modes_modes_.middleCols(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_) +=
-        rows_.weights[i] * phi_.row(i).transpose() * phi_.row(i);
+        rows_.weights[i] * along_.values.row(i).transpose() * along_.values.row(i);
   }
   modes_known_ = sums(known_).modes;
   estimate_noise(residuals);
@@ -114,40 +85,36 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
 std::vector<DiscrepancyModel::Shape> DiscrepancyModel::shapes() const {
   std::vector<Shape> shapes;
   for (const double time : kTimes)
-    for (const double sheet : kSheets) shapes.push_back({time * duration_, sheet * length_});
+    for (const double sheet : kSheets) shapes.push_back({time * duration_, sheet * along_.length});
   return shapes;
-}
-
-Eigen::VectorXd DiscrepancyModel::along(const Shape& shape) const {
-  const Eigen::VectorXd variances = (1 + (shape.reach_sheet * wave_numbers_.array()).square() / 3).pow(-2.5);
-  return variances / variances.sum();
 }
 
 Eigen::MatrixXd DiscrepancyModel::in_time(const Shape& shape) const {
   Eigen::MatrixXd kernel(keyframes_, keyframes_);
   for (int k = 0; k < keyframes_; ++k)
     for (int l = 0; l < keyframes_; ++l)
-      kernel(k, l) = matern(
+      kernel(k, l) = correlation_in_time(
           std::abs(rows_.times[static_cast<std::size_t>(k)] - rows_.times[static_cast<std::size_t>(l)]) /
           shape.reach_time);
   return kernel;
 }
 
-Eigen::MatrixXd DiscrepancyModel::sheet_modes(const Shape& shape) const {
-  return phi_ * along(shape).cwiseSqrt().asDiagonal();
+Eigen::MatrixXd DiscrepancyModel::scaled_modes(const Shape& shape) const {
+  return along_.values * variances_along(along_, shape.reach_sheet).cwiseSqrt().asDiagonal();
 }
 
 Eigen::MatrixXd DiscrepancyModel::covariance(std::size_t shape) const {
   const Shape reach = shapes()[shape];
-  const Eigen::MatrixXd modes = sheet_modes(reach);
+  const Eigen::MatrixXd modes = scaled_modes(reach);
   Eigen::MatrixXd covariance = modes * modes.transpose();
   for (Eigen::Index i = 0; i < covariance.rows(); ++i)
     for (Eigen::Index j = 0; j < covariance.cols(); ++j) {
       const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
       const double apart = rows_.times[static_cast<std::size_t>(rows_.keyframe[a])] -
                            rows_.times[static_cast<std::size_t>(rows_.keyframe[b])];
-      covariance(i, j) *=
-          rows_.channel[a] == rows_.channel[b] ? matern(std::abs(apart) / reach.reach_time) : 0.0;
+      covariance(i, j) *= rows_.channel[a] == rows_.channel[b]
+                              ? correlation_in_time(std::abs(apart) / reach.reach_time)
+                              : 0.0;
     }
   return covariance;
 }
@@ -158,7 +125,7 @@ DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals) 
   for (Eigen::Index i = 0; i < residuals.rows(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     sums.modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_)
-        .noalias() += rows_.weights[i] * phi_.row(i).transpose() * residuals.row(i);
+        .noalias() += rows_.weights[i] * along_.values.row(i).transpose() * residuals.row(i);
   }
   sums.known = known_.transpose() * rows_.weights.asDiagonal() * residuals;
   sums.squares = (rows_.weights.asDiagonal() * residuals).cwiseProduct(residuals).colwise().sum().transpose();
@@ -167,7 +134,7 @@ DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals) 
 
 DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> times(in_time(shape));
-  const Eigen::VectorXd sheet = along(shape);
+  const Eigen::VectorXd sheet = variances_along(along_, shape.reach_sheet);
 
   // The coordinates of largest variance; each is one mode in time times one along the sheet.
   struct Coordinate {
@@ -230,7 +197,7 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
   const double rows = rows_.weights.sum();
   const double all = std::sqrt(residuals.cwiseAbs2().dot(rows_.weights) / rows);
   noise_ = std::max(all, 1e-9);
-  const Shape flexible{kTimes[0] * duration_, kSheets[0] * length_};
+  const Shape flexible{kTimes[0] * duration_, kSheets[0] * along_.length};
   const double variance = 100 * noise_ * noise_;
   for (int round = 0; round < 8; ++round) {
     const Eigen::Index count = known_.cols();
@@ -310,10 +277,10 @@ Eigen::MatrixXd DiscrepancyModel::covariance_of(const Eigen::MatrixXd& combinati
   for (Eigen::Index i = 0; i < combinations.rows(); ++i) {
     const auto at = static_cast<std::size_t>(i);
     modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_).noalias() +=
-        phi_.row(i).transpose() * combinations.row(i);
+        along_.values.row(i).transpose() * combinations.row(i);
   }
   for (std::size_t f = 0; f < fields_.size(); ++f) {
-    const Eigen::VectorXd sheet = variances_[f] * along(fields_[f].shape);
+    const Eigen::VectorXd sheet = variances_[f] * variances_along(along_, fields_[f].shape.reach_sheet);
     const Eigen::MatrixXd times = in_time(fields_[f].shape);
     for (int channel = 0; channel < channels_; ++channel)
       for (int k = 0; k < keyframes_; ++k)

@@ -3,6 +3,8 @@
 #include <optional>
 #include <vector>
 
+#include "sysid/infer/sheet_modes.h"
+
 namespace flash::sysid {
 
 /// Signed residuals of one recording, a row each: where they are, and how much each counts.
@@ -97,18 +99,16 @@ class DiscrepancyModel {
   Reduced reduce(const Eigen::MatrixXd& residuals) const;
   void estimate_noise(const Eigen::VectorXd& residuals);
   void weigh(const Eigen::VectorXd& residuals);
-  Eigen::VectorXd along(const Shape& shape) const;        ///< variances of the modes, of sum one
-  Eigen::MatrixXd in_time(const Shape& shape) const;      ///< correlation between keyframes
-  Eigen::MatrixXd sheet_modes(const Shape& shape) const;  ///< scaled, a row each
+  Eigen::MatrixXd in_time(const Shape& shape) const;       ///< correlation between keyframes
+  Eigen::MatrixXd scaled_modes(const Shape& shape) const;  ///< along the sheet, a row each
 
   ObservedRows rows_;
   Eigen::MatrixXd known_;  ///< errors of known shape and, of no known size, free ones and the parameters
   int channels_ = 1, keyframes_ = 0, modes_ = 0;
-  double noise_ = 0, left_ = 0, explained_ = 0, duration_ = 0, length_ = 0;
-  Eigen::MatrixXd phi_;           ///< modes of each row, unscaled
-  Eigen::VectorXd wave_numbers_;  ///< of the modes [1/m]
-  Eigen::MatrixXd modes_modes_;   ///< (keyframe, channel) blocks of sum w phi phi^T, side by side
-  Eigen::MatrixXd modes_known_;   ///< (keyframe, channel, mode) by known
+  double noise_ = 0, left_ = 0, explained_ = 0, duration_ = 0;
+  SheetModes along_;             ///< of each row
+  Eigen::MatrixXd modes_modes_;  ///< (keyframe, channel) blocks of sum w phi phi^T, side by side
+  Eigen::MatrixXd modes_known_;  ///< (keyframe, channel, mode) by known
   Eigen::MatrixXd inverse_known_;
   std::vector<Field> fields_;
   std::vector<double> sizes_, priors_;  ///< tau [m] and the prior of each

@@ -1,111 +1,12 @@
 #include "sysid/infer/motion_likelihood.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "data/parallel.h"
+#include "sysid/infer/observed_rows.h"
 
 namespace flash::sysid {
-namespace {
-
-using Term = LinearObservations::Term;
-
-/// Metres of a row's error for a metre of the cloud's, one over; forces become lengths by it.
-double scale_of(const LinearObservations::Row& row, const Objective& objective) {
-  switch (row.term) {
-    case Term::surface:
-      break;
-    case Term::border:
-      return objective.cloud_sigma / objective.contour_sigma;
-    case Term::mark:
-      return objective.cloud_sigma / objective.marker_sigma;
-    case Term::force:
-      return objective.cloud_sigma / objective.force_sigma;
-  }
-  return 1;
-}
-
-/// Distances beyond this count by less than their square: none without robustness.
-double limit_of(std::vector<double> distances, const Robust& robust) {
-  constexpr double kSpread = 1.4826;  // standard deviation over the median of normal distances
-  if (robust.kind != RobustKind::trimmed) return INFINITY;
-  const auto at = [&](double share) {
-    const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(distances.size() - 1));
-    std::nth_element(distances.begin(), distances.begin() + k, distances.end());
-    return distances[static_cast<std::size_t>(k)];
-  };
-  return std::max(3 * kSpread * at(0.5), at(1 - robust.trim_fraction));
-}
-
-/// What counts less: of each keyframe and term, distances that are larger than its others.
-Eigen::VectorXd robust_weights(const LinearObservations& places, const Robust& robust) {
-  std::map<std::pair<std::size_t, Term>, std::vector<double>> distances;
-  for (Eigen::Index i = 0; i < places.rows(); ++i) {
-    const auto row = places.row(i);
-    distances[{row.observation, row.term}].push_back(std::abs(row.distance));
-  }
-  std::map<std::pair<std::size_t, Term>, double> limits;
-  for (const auto& [key, values] : distances) limits[key] = limit_of(values, robust);
-  Eigen::VectorXd weights(places.rows());
-  for (Eigen::Index i = 0; i < places.rows(); ++i) {
-    const auto row = places.row(i);
-    const double ratio = limits[{row.observation, row.term}] / std::max(std::abs(row.distance), 1e-15);
-    weights[i] = row.term == Term::force || ratio >= 1 ? 1 : ratio * ratio;
-  }
-  return weights;
-}
-
-/// The two directions in which the sheet at rest extends most, and its centre.
-std::pair<Eigen::Vector3d, Eigen::Matrix<double, 3, 2>> plane_of(const data::Points& vertices) {
-  const Eigen::RowVector3d centre = vertices.colwise().mean();
-  const Eigen::MatrixXd from_centre = vertices.rowwise() - centre;
-  const Eigen::Matrix3d spread = from_centre.transpose() * from_centre;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(spread);
-  return {centre.transpose(), eigen.eigenvectors().rightCols<2>()};
-}
-
-/// The steps of which positions are read at clocks less than half a step from `time_offset` [s].
-std::vector<bool> steps_near(const Replay& replay, const Motion& motion, double time_offset) {
-  const double room = replay.recording.nuisance.time > 0 ? 0.5 : 0;
-  const auto last = static_cast<double>(motion.positions.size() - 1);
-  std::vector<bool> steps(motion.positions.size(), false);
-  steps.front() = steps.back() = true;
-  for (const Observation& observation : replay.observations) {
-    const double at = (observation.t + time_offset - motion.start) / motion.step;
-    const double first = std::clamp(std::floor(at - room - kSameStep), 0.0, last),
-                 end = std::clamp(std::ceil(at + room + kSameStep), 0.0, last);
-    for (double i = first; i <= end; ++i) steps[static_cast<std::size_t>(i)] = true;
-  }
-  // What the motion itself lacks, nothing reads.
-  for (std::size_t i = 0; i < steps.size(); ++i) steps[i] = steps[i] && motion.positions[i].rows() > 0;
-  return steps;
-}
-
-ObservedRows rows_of(const Replay& replay, const LinearObservations& places, const Robust& robust) {
-  ObservedRows rows;
-  std::map<std::size_t, int> keyframes;
-  std::map<std::pair<Term, int>, int> channels;
-  rows.places.resize(places.rows(), 2);
-  rows.weights = robust_weights(places, robust);
-  const auto [centre, plane] = plane_of(replay.recording.mesh.vertices);
-  for (Eigen::Index i = 0; i < places.rows(); ++i) {
-    const auto row = places.row(i);
-    const auto [keyframe, is_new] =
-        keyframes.try_emplace(row.observation, static_cast<int>(keyframes.size()));
-    if (is_new) rows.times.push_back(replay.observations[row.observation].t);
-    const auto channel = channels.try_emplace({row.term, row.axis}, static_cast<int>(channels.size())).first;
-    rows.keyframe.push_back(keyframe->second);
-    rows.channel.push_back(channel->second);
-    rows.weights[i] *= replay.observations[row.observation].weight;
-    const Eigen::Vector3d rest = row.term == Term::force ? centre : row.rest;
-    rows.places.row(i) = (plane.transpose() * (rest - centre)).transpose();
-  }
-  return rows;
-}
-
-}  // namespace
 
 MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                                    const std::vector<ReplayResult>& reference, const ScoreSettings& settings,
@@ -142,9 +43,10 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
       linearize(recording, reference[r].motion, by_parameter, repeatability,
                 robust.kind == RobustKind::huber ? std::optional<double>(robust.huber_delta) : std::nullopt);
       if (errors.empty()) break;
-      if (pass + 1 < kPasses) recording.nuisance = fit_nuisance(recording, reference[r].motion).first;
+      if (pass + 1 < kPasses)
+        recording.nuisance =
+            fit_nuisance(recording, [&](double) -> const Motion& { return reference[r].motion; }).first;
     }
-    recording.steps = steps_near(replay, reference[r].motion, recording.nuisance.registration[4]);
   });
 }
 
@@ -152,7 +54,9 @@ void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
                                  const std::vector<SheetShifts>& rates, std::optional<double> repeatability,
                                  std::optional<double> limit) {
   const Replay& replay = recording.replay;
-  recording.near = places_at(recording, motion, recording.nuisance);
+  const LinearObservations* const near = recording.near ? &*recording.near : nullptr;
+  recording.near = LinearObservations(replay, motion, registration_of(recording, recording.nuisance),
+                                      recording.objective, shifts_at(recording, recording.nuisance), near);
   const LinearObservations& places = *recording.near;
   const Eigen::Index count = places.rows();
   recording.scale.resize(count);
@@ -173,7 +77,7 @@ void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
   recording.registered = of_rows.asDiagonal() * places.registration_derivatives();
   recording.slopes = columns_of(recording.errors);
   recording.curves = columns_of(recording.bends);
-  ObservedRows rows = rows_of(replay, places, recording.objective.robust);
+  ObservedRows rows = observed_rows(replay, places, recording.objective.robust);
   const Nuisance& at = recording.nuisance;
   rows.known = known_at(recording, at.errors);
   rows.free = recording.registered * recording.bounds.asDiagonal();
@@ -195,33 +99,36 @@ bool MotionLikelihood::is_read(const Recording& recording, const Motion& motion,
                      });
 }
 
-LinearObservations MotionLikelihood::places_at(const Recording& recording, const Motion& motion,
-                                               const Nuisance& nuisance) {
+Registration MotionLikelihood::registration_of(const Recording& recording, const Nuisance& nuisance) {
   const Registered& found = nuisance.registration;
-  const Registration registration{found.head<3>(), found[3], found[4], recording.replay.pivot,
-                                  recording.replay.up};
+  return {found.head<3>(), found[3], found[4], recording.replay.pivot, recording.replay.up};
+}
+
+SheetShifts MotionLikelihood::shifts_at(const Recording& recording, const Nuisance& nuisance) {
   SheetShifts shifts = recording.correction;
   for (std::size_t e = 0; e < recording.errors.size(); ++e) {
     const double size = nuisance.errors[static_cast<Eigen::Index>(e)];
+    if (size == 0) continue;
     add(shifts, size, recording.errors[e]);
     if (!recording.bends[e].empty()) add(shifts, size * size, recording.bends[e]);
   }
-  return {recording.replay,    motion, registration,
-          recording.objective, shifts, recording.near ? &*recording.near : nullptr};
+  return shifts;
 }
 
-std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(const Recording& recording,
-                                                                             const Motion& motion) {
+std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
+    const Recording& recording, const std::function<const Motion&(double time_offset)>& motion_at) {
   constexpr int kSteps = 6;
   constexpr double kSame = 0.03;  // of the noise: what a step moves rows by
   Nuisance at = recording.nuisance;
   ResidualLikelihood::Fit fit;
+  SheetDistance sheet = sheet_of(recording.replay);
+  std::vector<int> triangles;
   for (int step = 0; step < kSteps; ++step) {
+    const Motion& motion = motion_at(at.registration[4]);
     if (!is_read(recording, motion, at.registration[4])) return {at, NAN};
-    const LinearObservations places = places_at(recording, motion, at);
-    Eigen::VectorXd residuals(places.rows());
-    for (Eigen::Index i = 0; i < residuals.size(); ++i)
-      residuals[i] = recording.scale[i] * places.row(i).distance;
+    const Eigen::VectorXd residuals = recording.scale.cwiseProduct(
+        recording.near->distances(recording.replay, motion, registration_of(recording, at),
+                                  shifts_at(recording, at), sheet, triangles));
     const Eigen::MatrixXd known = known_at(recording, at.errors);
     fit = recording.likelihood->fit(residuals + recording.registered * at.registration + known * at.errors,
                                     known);
@@ -243,10 +150,17 @@ double MotionLikelihood::spread_of(std::size_t error) const {
   return spread;
 }
 
-double MotionLikelihood::deviance(const std::vector<Motion>& motions) const {
+double MotionLikelihood::deviance(const MotionAtClock& motions) const {
   double sum = 0;
-  for (std::size_t r = 0; r < recordings_.size(); ++r) sum += fit_nuisance(recordings_[r], motions[r]).second;
+  for (std::size_t r = 0; r < recordings_.size(); ++r)
+    sum += fit_nuisance(recordings_[r], [&](double time_offset) -> const Motion& {
+             return motions(r, time_offset);
+           }).second;
   return sum;
+}
+
+double MotionLikelihood::deviance(const std::vector<Motion>& motions) const {
+  return deviance([&](std::size_t r, double) -> const Motion& { return motions[r]; });
 }
 
 }  // namespace flash::sysid

@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -27,9 +28,10 @@ class MotionLikelihood {
   /// to steps that it lacks.
   double deviance(const std::vector<Motion>& motions) const;
 
-  /// The steps of a recording's motions that are read where its clock is less than half a step from that of
-  /// the reference.
-  const std::vector<bool>& steps_about(std::size_t r) const { return recordings_[r].steps; }
+  /// The motion of recording r with the positions that its keyframes read where its clock is off by
+  /// `time_offset` [s].
+  using MotionAtClock = std::function<const Motion&(std::size_t r, double time_offset)>;
+  double deviance(const MotionAtClock& motions) const;
 
   /// How well the recording that tells most tells a known error beside the parameters, in its standard
   /// deviations.
@@ -56,7 +58,6 @@ class MotionLikelihood {
     Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by what the registration moves each row
     Eigen::MatrixXd slopes, curves;                       ///< by what each known error does, and its square
     std::optional<LinearObservations> near;               ///< of the reference
-    std::vector<bool> steps;                              ///< see steps_about
     std::optional<ResidualLikelihood> likelihood;
   };
   /// Makes the likelihood that is linear about a motion at the recording's nuisance.
@@ -66,10 +67,12 @@ class MotionLikelihood {
   static Eigen::MatrixXd known_at(const Recording& recording, const Eigen::VectorXd& errors);
   /// Whether a motion has what its keyframes read.
   static bool is_read(const Recording& recording, const Motion& motion, double time_offset);
-  static LinearObservations places_at(const Recording& recording, const Motion& motion,
-                                      const Nuisance& nuisance);
+  static Registration registration_of(const Recording& recording, const Nuisance& nuisance);
+  /// By what the sheet is moved before distances are taken.
+  static SheetShifts shifts_at(const Recording& recording, const Nuisance& nuisance);
   /// The likeliest nuisance of a motion, by Gauss and Newton, and its -2 log likelihood.
-  static std::pair<Nuisance, double> fit_nuisance(const Recording& recording, const Motion& motion);
+  static std::pair<Nuisance, double> fit_nuisance(
+      const Recording& recording, const std::function<const Motion&(double time_offset)>& motion_at);
 
   std::vector<Recording> recordings_;
 };

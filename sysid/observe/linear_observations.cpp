@@ -19,12 +19,6 @@ Eigen::Vector3d normal_of(const data::Points& positions, const Eigen::Vector3i& 
   return (b - a).cross(c - a).normalized();
 }
 
-/// The sheet's hierarchy, to be moved.
-SheetDistance sheet_of(const Replay& replay) {
-  const data::TriangleMesh& mesh = replay.recording.mesh;
-  return replay.queries ? *replay.queries : SheetDistance(mesh.triangles, mesh.vertices);
-}
-
 /// Out of the sheet, in its surface, across the border edge that the place lies on.
 Eigen::Vector3d border_normal(const data::Points& positions, const Eigen::Vector3i& corners,
                               const Eigen::Vector3d& barycentric) {
@@ -36,6 +30,11 @@ Eigen::Vector3d border_normal(const data::Points& positions, const Eigen::Vector
 }
 
 }  // namespace
+
+SheetDistance sheet_of(const Replay& replay) {
+  const data::TriangleMesh& mesh = replay.recording.mesh;
+  return replay.queries ? *replay.queries : SheetDistance(mesh.triangles, mesh.vertices);
+}
 
 void LinearObservations::add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
                                   const Eigen::Isometry3d& simulated_from_observed,
@@ -147,6 +146,57 @@ Eigen::VectorXd LinearObservations::residuals() const {
   for (Eigen::Index i = 0; i < rows.size(); ++i) {
     const Place& place = places_[static_cast<std::size_t>(i)];
     rows[i] = place.weight * place.residual;
+  }
+  return rows;
+}
+
+Eigen::VectorXd LinearObservations::distances(const Replay& replay, const Motion& motion,
+                                              const Registration& registration, const SheetShifts& shifts,
+                                              SheetDistance& sheet, std::vector<int>& triangles) const {
+  const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
+  const data::Triangles& corners = replay.recording.mesh.triangles;
+  Eigen::VectorXd rows(this->rows());
+  if (triangles.empty())
+    for (const Place& place : places_) triangles.push_back(place.triangle);
+  data::Points positions;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  std::size_t current = static_cast<std::size_t>(-1);
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const Place& place = places_[i];
+    const Observation& observation = replay.observations[place.observation];
+    if (place.observation != current) {
+      current = place.observation;
+      const double t = observation.t + registration.time_offset;
+      surface_at(motion, t, positions);
+      force = force_at(motion, t);
+      if (!shifts.empty()) {
+        positions += shifts[current].positions;
+        force += shifts[current].force;
+      }
+      sheet.move(positions);
+    }
+    double& distance = rows[static_cast<Eigen::Index>(i)];
+    if (place.term == Term::force) {
+      distance = (*observation.force - force)[place.axis];
+      continue;
+    }
+    const auto point = [&](const data::Points& points) {
+      return Eigen::Vector3d(simulated_from_observed *
+                             points.row(static_cast<Eigen::Index>(place.mark)).transpose());
+    };
+    if (place.term == Term::mark) {
+      const Eigen::Vector3d seen = point(observation.markers);
+      distance = (seen - sheet.mark(observation.marks[place.mark], seen).position)[place.axis];
+      continue;
+    }
+    const bool border = place.term == Term::border;
+    const Eigen::Vector3d seen = point(border ? observation.contour : observation.points);
+    const SurfacePoint nearest = border ? sheet.nearest_on_border(seen) : sheet.nearest(seen, triangles[i]);
+    triangles[i] = nearest.triangle;
+    const Eigen::Vector3i at_corners = corners.row(nearest.triangle);
+    const Eigen::Vector3d direction =
+        border ? border_normal(positions, at_corners, nearest.barycentric) : normal_of(positions, at_corners);
+    distance = direction.dot(seen - nearest.position);
   }
   return rows;
 }

@@ -8,6 +8,9 @@
 
 namespace flash::sysid {
 
+/// The hierarchy of the replay's sheet, to be moved.
+SheetDistance sheet_of(const Replay& replay);
+
 /// Where on a simulated motion each observation belongs, and the direction in which it can tell the sheet
 /// from another: the normal of the surface for a point of a cloud, the normal of the border in the surface
 /// for a point of the outline, every direction for a mark and for the force. Linear identification stands on
@@ -43,6 +46,13 @@ class LinearObservations {
 
   /// How far each observation stands from its place, along the direction [m].
   Eigen::VectorXd residuals() const;
+
+  /// The distances of the rows that these observations have on another motion, at a fraction of what they
+  /// take with all else. `sheet`: of the replay, moved. `triangles`: of each row, where it belonged last, or
+  /// empty; then where it does. It changes speed only.
+  Eigen::VectorXd distances(const Replay& replay, const Motion& motion, const Registration& registration,
+                            const SheetShifts& shifts, SheetDistance& sheet,
+                            std::vector<int>& triangles) const;
 
   /// How far another motion takes the sheet from each place, along the direction [m]; `replay` is of `motion`
   /// and may have another mesh. Before any registration anew.

@@ -4,25 +4,20 @@
 #include "data/text.h"
 
 namespace flash::sysid {
-namespace {
-
-// "sheet:0.4x0.4:0.02[:pattern]" with half the cell; empty for anything else.
-std::string half_cell(const std::string& specification) {
+std::string scaled_cell(const std::string& specification, double factor) {
   if (!data::is_mesh_spec(specification)) return "";
   const std::vector<std::string_view> words = data::split(specification, ":");
   const auto cell = words.size() >= 3 ? data::parse_number(words[2]) : std::nullopt;
   if (!cell || words[0] != "sheet") return "";
-  std::string finer =
-      std::string(words[0]) + ":" + std::string(words[1]) + ":" + data::format_number(0.5 * *cell);
-  for (std::size_t k = 3; k < words.size(); ++k) finer += ":" + std::string(words[k]);
-  return finer;
+  std::string scaled =
+      std::string(words[0]) + ":" + std::string(words[1]) + ":" + data::format_number(factor * *cell);
+  for (std::size_t k = 3; k < words.size(); ++k) scaled += ":" + std::string(words[k]);
+  return scaled;
 }
-
-}  // namespace
 
 std::optional<Replay> on_half_the_cell(const Replay& replay) {
   ReplaySettings settings = replay.settings;
-  settings.mesh = half_cell(replay.recording.mesh_spec);
+  settings.mesh = scaled_cell(replay.recording.mesh_spec, 0.5);
   if (settings.mesh.empty() || !replay.recording.start_mesh.empty()) return std::nullopt;
   Replay finer = make_replay(replay.recording, settings);
   for (std::size_t k = 0; k < replay.observations.size(); ++k)

@@ -1,9 +1,13 @@
 #pragma once
 #include <optional>
+#include <string>
 
 #include "sysid/replay/replay.h"
 
 namespace flash::sysid {
+
+/// "sheet:0.4x0.4:0.02[:pattern]" with its cell times a factor; empty for anything else.
+std::string scaled_cell(const std::string& specification, double factor);
 
 /// The same recording on cells of half the size, keyframes weighing as they do; empty where the sheet is not
 /// given by a specification or lies in a shape of its own.

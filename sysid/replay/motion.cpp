@@ -36,15 +36,21 @@ void surface_at(const Motion& motion, double t, data::Points& positions, data::P
   }
 }
 
-bool has_surface_at(const Motion& motion, double t) {
+std::pair<std::size_t, std::size_t> steps_at(const Motion& motion, double t) {
   const std::size_t last = motion.positions.size() - 1;
   const double steps = (t - motion.start) / motion.step;
-  if (!(steps > 0) || last == 0) return motion.positions.front().rows() > 0;
-  if (steps >= static_cast<double>(last)) return motion.positions[last].rows() > 0;
+  if (!(steps > 0) || last == 0) return {0, 0};
+  if (steps >= static_cast<double>(last)) return {last, last};
   const auto below = static_cast<std::size_t>(steps);
   const double fraction = steps - static_cast<double>(below);
-  return (fraction > 1 - kSameStep || motion.positions[below].rows() > 0) &&
-         (fraction < kSameStep || motion.positions[below + 1].rows() > 0);
+  if (fraction < kSameStep) return {below, below};
+  if (fraction > 1 - kSameStep) return {below + 1, below + 1};
+  return {below, below + 1};
+}
+
+bool has_surface_at(const Motion& motion, double t) {
+  const auto [first, last] = steps_at(motion, t);
+  return motion.positions[first].rows() > 0 && motion.positions[last].rows() > 0;
 }
 
 Eigen::Vector3d force_at(const Motion& motion, double t) {

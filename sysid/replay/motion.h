@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "data/mesh.h"
@@ -22,6 +23,9 @@ constexpr double kSameStep = 1e-6;
 /// Positions at time t, linear between steps, held outside the simulated span; `velocities` [m/s], when asked
 /// for, is the slope used, zero outside the span and where a neighbour is empty.
 void surface_at(const Motion& motion, double t, data::Points& positions, data::Points* velocities = nullptr);
+
+/// The first and the last step whose positions surface_at takes for the time.
+std::pair<std::size_t, std::size_t> steps_at(const Motion& motion, double t);
 
 /// Whether the positions are there that surface_at takes for the time.
 bool has_surface_at(const Motion& motion, double t);

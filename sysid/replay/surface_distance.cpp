@@ -85,6 +85,12 @@ SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::P
   const int packets = (count + width - 1) / width;
   order_.resize(static_cast<std::size_t>(packets) * width, -1);
   packets_.resize(packets);
+  corners_.resize(packets);
+  for (int slot = 0; slot < packets * width; ++slot) {
+    // Empty slots repeat the last triangle, which changes no answer.
+    const int triangle = order_[slot] >= 0 ? order_[slot] : order_[count - 1];
+    for (int k = 0; k < 3; ++k) corners_[slot / width].of[k][slot % width] = triangles(triangle, k);
+  }
   for (int size = packets; levels_.empty() || size > 1;) {
     size = (size + width - 1) / width;
     levels_.emplace_back(size);
@@ -99,61 +105,8 @@ SurfaceDistance::SurfaceDistance(const data::Triangles& triangles, const data::P
 
 void SurfaceDistance::move(const data::Points& positions) {
   positions_ = positions;
-  // Loops over the lanes of a packet, which the compiler takes several at a time.
-  double b[3][width], c[3][width], low[width], high[width];
-  for (std::size_t p = 0; p < packets_.size(); ++p) {
-    TrianglePacket& packet = packets_[p];
-    for (int lane = 0; lane < width; ++lane) {
-      // Empty slots repeat the last triangle, which changes no answer.
-      const int slot = order_[p * width + static_cast<std::size_t>(lane)];
-      const int triangle = slot >= 0 ? slot : order_[slot_of_.size() - 1];
-      for (int k = 0; k < 3; ++k) {
-        packet.a[k][lane] = positions(triangles_(triangle, 0), k);
-        b[k][lane] = positions(triangles_(triangle, 1), k);
-        c[k][lane] = positions(triangles_(triangle, 2), k);
-      }
-    }
-    BoxNode& node = levels_[0][p / width];
-    for (int k = 0; k < 3; ++k) {
-      for (int lane = 0; lane < width; ++lane) {
-        const double at = packet.a[k][lane];
-        packet.e[k][lane] = b[k][lane] - at;
-        packet.f[k][lane] = c[k][lane] - at;
-        low[lane] = std::min(std::min(at, b[k][lane]), c[k][lane]);
-        high[lane] = std::max(std::max(at, b[k][lane]), c[k][lane]);
-      }
-      node.low[k][p % width] = *std::min_element(low, low + width);
-      node.high[k][p % width] = *std::max_element(high, high + width);
-    }
-    const auto &e = packet.e, &f = packet.f;
-    for (int lane = 0; lane < width; ++lane) {
-      const double nx = e[1][lane] * f[2][lane] - e[2][lane] * f[1][lane],
-                   ny = e[2][lane] * f[0][lane] - e[0][lane] * f[2][lane],
-                   nz = e[0][lane] * f[1][lane] - e[1][lane] * f[0][lane];
-      const double area2 = nx * nx + ny * ny + nz * nz, root = std::sqrt(area2);
-      const bool has_area = area2 > 0;
-      const auto over = [](double x, double y, bool defined) {
-        const double ratio = x / y;
-        return defined ? ratio : 0.0;
-      };
-      packet.n[0][lane] = over(nx, root, has_area);
-      packet.n[1][lane] = over(ny, root, has_area);
-      packet.n[2][lane] = over(nz, root, has_area);
-      const auto product = [&](const auto& u, const auto& v) {
-        return u[0][lane] * v[0][lane] + u[1][lane] * v[1][lane] + u[2][lane] * v[2][lane];
-      };
-      const double ee = product(e, e), ff = product(f, f), ef = product(e, f);
-      const double gx = c[0][lane] - b[0][lane], gy = c[1][lane] - b[1][lane], gz = c[2][lane] - b[2][lane];
-      const double gg = gx * gx + gy * gy + gz * gz, determinant = 1 / area2;
-      packet.ee[lane] = ee;
-      packet.ff[lane] = ff;
-      packet.ef[lane] = ef;
-      packet.inverse_ee[lane] = over(1, ee, ee > 0);
-      packet.inverse_ff[lane] = over(1, ff, ff > 0);
-      packet.inverse_gg[lane] = over(1, gg, gg > 0);
-      packet.inverse_determinant[lane] = has_area ? determinant : std::numeric_limits<double>::quiet_NaN();
-    }
-  }
+  kernels_->move({corners_.data(), positions_.data(), static_cast<int>(packets_.size()), packets_.data(),
+                  levels_[0].data()});
   for (std::size_t level = 1; level < levels_.size(); ++level) {
     for (std::size_t i = 0; i < levels_[level - 1].size(); ++i) {
       const BoxNode& below = levels_[level - 1][i];

@@ -42,6 +42,7 @@ class SurfaceDistance {
   data::Points positions_;
   std::vector<int> order_;    // slot -> triangle, -1 past the end of the last packet
   std::vector<int> slot_of_;  // triangle -> slot
+  std::vector<TriangleCorners> corners_;
   std::vector<TrianglePacket> packets_;
   std::vector<std::vector<BoxNode>> levels_;  // levels_[0] bounds packets, the last level has one node
 };

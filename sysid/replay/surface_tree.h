@@ -26,7 +26,23 @@ struct SurfaceTree {
   const BoxNode* const* levels;  ///< the first bounds packets
 };
 
+/// Corners of eight triangles, numbers of vertices.
+struct TriangleCorners {
+  int of[3][surface_width];
+};
+
+/// A surface that moves.
+struct MovedSurface {
+  const TriangleCorners* corners;  ///< one a packet
+  const double* positions;         ///< x, y, z of each vertex
+  int packets;
+  TrianglePacket* moved;
+  BoxNode* boxes;  ///< of the packets, eight a node
+};
+
 struct SurfaceKernels {
+  /// Takes packets and their boxes to the positions.
+  void (*move)(const MovedSurface& surface);
   /// Looks for a triangle nearer to `query` than `best` [m^2] among those of a packet, or below a node.
   /// `slot`: eight times the packet and the place in it.
   void (*search_packet)(const SurfaceTree& tree, int packet, const double* query, double& best, int& slot);

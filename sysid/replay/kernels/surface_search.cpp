@@ -45,6 +45,71 @@ Lanes distances(const TrianglePacket& t, int first, const double* query) {
   return select(inside, Lanes(vn * vn), on_edges);
 }
 
+/// x / y where y is positive, else zero.
+Lanes ratio(const Lanes& x, const Lanes& y) { return select(y > 0.0, Lanes(x / y), Lanes{}); }
+
+double least_of(const double* numbers) {
+  double least = numbers[0];
+  for (int lane = 1; lane < surface_width; ++lane) least = numbers[lane] < least ? numbers[lane] : least;
+  return least;
+}
+double most_of(const double* numbers) {
+  double most = numbers[0];
+  for (int lane = 1; lane < surface_width; ++lane) most = numbers[lane] > most ? numbers[lane] : most;
+  return most;
+}
+
+void move_packet(const MovedSurface& surface, int index) {
+  TrianglePacket& packet = surface.moved[index];
+  const TriangleCorners& corners = surface.corners[index];
+  BoxNode& node = surface.boxes[index / surface_width];
+  alignas(64) double b[3][surface_width], c[3][surface_width], low[3][surface_width], high[3][surface_width];
+  for (int lane = 0; lane < surface_width; ++lane)
+    for (int k = 0; k < 3; ++k) {
+      packet.a[k][lane] = surface.positions[3 * corners.of[0][lane] + k];
+      b[k][lane] = surface.positions[3 * corners.of[1][lane] + k];
+      c[k][lane] = surface.positions[3 * corners.of[2][lane] + k];
+    }
+  for (int first = 0; first < surface_width; first += lane_count) {
+    Lanes e[3], f[3], g[3];
+    for (int k = 0; k < 3; ++k) {
+      const Lanes at = load_lanes(packet.a[k] + first), to_b = load_lanes(b[k] + first),
+                  to_c = load_lanes(c[k] + first);
+      e[k] = to_b - at;
+      f[k] = to_c - at;
+      g[k] = to_c - to_b;
+      const Lanes lower = select(to_b < at, to_b, at), higher = select(to_b > at, to_b, at);
+      store_lanes(e[k], packet.e[k] + first);
+      store_lanes(f[k], packet.f[k] + first);
+      store_lanes(select(to_c < lower, to_c, lower), low[k] + first);
+      store_lanes(select(to_c > higher, to_c, higher), high[k] + first);
+    }
+    const auto product = [](const Lanes* u, const Lanes* v) {
+      return Lanes(u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
+    };
+    const Lanes n[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]};
+    const Lanes area2 = product(n, n), root = sim::square_root(area2), zero{}, one = zero + 1.0;
+    for (int k = 0; k < 3; ++k) store_lanes(ratio(n[k], root), packet.n[k] + first);
+    const Lanes ee = product(e, e), ff = product(f, f);
+    store_lanes(ee, packet.ee + first);
+    store_lanes(ff, packet.ff + first);
+    store_lanes(product(e, f), packet.ef + first);
+    store_lanes(ratio(one, ee), packet.inverse_ee + first);
+    store_lanes(ratio(one, ff), packet.inverse_ff + first);
+    store_lanes(ratio(one, product(g, g)), packet.inverse_gg + first);
+    store_lanes(select(area2 > 0.0, Lanes(one / area2), Lanes(zero + NAN)),
+                packet.inverse_determinant + first);
+  }
+  for (int k = 0; k < 3; ++k) {
+    node.low[k][index % surface_width] = least_of(low[k]);
+    node.high[k][index % surface_width] = most_of(high[k]);
+  }
+}
+
+void move(const MovedSurface& surface) {
+  for (int packet = 0; packet < surface.packets; ++packet) move_packet(surface, packet);
+}
+
 void search_packet(const SurfaceTree& tree, int packet, const double* query, double& best, int& slot) {
   alignas(64) double distance2[surface_width];
   for (int first = 0; first < surface_width; first += lane_count)
@@ -88,7 +153,7 @@ void search(const SurfaceTree& tree, int level, int index, const double* query, 
 }  // namespace
 
 extern const SurfaceKernels surface_kernels;
-const SurfaceKernels surface_kernels = {search_packet, search};
+const SurfaceKernels surface_kernels = {move, search_packet, search};
 
 }  // namespace FLASH_LEVEL
 }  // namespace flash::sysid

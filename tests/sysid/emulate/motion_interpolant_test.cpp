@@ -32,36 +32,19 @@ TEST(MotionInterpolant, IsExactForMotionsCubicInTheCoordinates) {
     EXPECT_EQ(found.positions[1].rows(), 0);
     for (const int i : {0, 2}) EXPECT_LT((found.positions[i] - expected.positions[i]).norm(), 1e-10);
     for (const int i : {0, 1}) EXPECT_LT((found.forces[i] - expected.forces[i]).norm(), 1e-10);
-    const Motion sliced = surface.slice(point[0]).slice(point[1]).at({point[2]});
-    EXPECT_EQ(sliced.positions[2], found.positions[2]);
   }
 }
 
-TEST(MotionInterpolant, OfSomeStepsIsTheWholeOneThereAndFormerSlicesAreUsedAgain) {
+TEST(MotionInterpolant, AddsAShareOfAMotion) {
   const std::vector<Axis> axes = {parse_axis("friction", "0.1,0.3,0.5"), parse_axis("poisson", "0,0.2,0.4")};
   std::vector<Motion> motions;
-  for (const std::vector<double>& p : cartesian_product(axes)) {
-    Motion motion{0, 0.1, {}, {{p[0], p[1], 1}, {p[1], p[0], 2}}};
-    for (int i = 0; i < 3; ++i)
-      motion.positions.emplace_back(data::Points::Constant(2, 3, p[0] + i * p[1] * p[1]));
-    motions.push_back(motion);
-  }
-  const MotionInterpolant whole(axes, motions), part = whole.only({true, false, true});
-  const Motion all = whole.at({0.2, 0.3}), some = part.at({0.2, 0.3});
-  EXPECT_EQ(some.positions[1].rows(), 0);
-  for (const int i : {0, 2}) EXPECT_EQ(some.positions[i], all.positions[i]);
-  EXPECT_EQ(some.forces, all.forces);
-  Motion twice = all;
-  whole.add_to(twice, {0.2, 0.3}, 1);
-  EXPECT_LT((twice.positions[2] - 2 * all.positions[2]).norm(), 1e-12);
-
-  MotionInterpolant rest = whole.slice(0.2);
-  const MotionInterpolant copy = rest;
-  whole.slice(0.4, rest);  // the memory is the copy's as well
-  EXPECT_EQ(copy.at({0.3}).positions[2], all.positions[2]);
-  EXPECT_EQ(rest.at({0.3}).positions[2], whole.at({0.4, 0.3}).positions[2]);
-  whole.slice(0.2, rest);  // nobody else's
-  EXPECT_EQ(rest.at({0.3}).positions[2], all.positions[2]);
+  for (const std::vector<double>& p : cartesian_product(axes))
+    motions.push_back({0, 0.1, {data::Points::Constant(2, 3, p[0] + p[1] * p[1])}, {{p[0], p[1], 1}}});
+  const MotionInterpolant interpolant(axes, motions);
+  Motion motion{0, 0.1, {data::Points::Constant(2, 3, 1)}, {{1, 1, 1}}};
+  interpolant.add_to(motion, {0.2, 0.3}, -2);
+  EXPECT_LT((motion.positions[0].array() - (1 - 2 * (0.2 + 0.09))).matrix().norm(), 1e-12);
+  EXPECT_LT((motion.forces[0] - Eigen::Vector3d(0.6, 0.4, -1)).norm(), 1e-12);
 }
 
 struct Lift {
@@ -90,7 +73,8 @@ TEST(TwoMeshMotions, IsTheFinerSimulationWhereThatWasMade) {
       const ReplayCandidate candidate = candidate_at({bending}, lift.grid);
       const Motion finer = store.run(model->replay, candidate).motion,
                    own = store.run(lift.replay, candidate).motion;
-      const Motion modelled = model->model.at({bending}, 1), coarse = model->model.at({bending}, 0);
+      const Motion modelled = model->model.at(std::vector{bending}, 1),
+                   coarse = model->model.at(std::vector{bending}, 0);
       for (std::size_t i = 0; i < finer.positions.size(); ++i) {
         if (modelled.positions[i].rows() == 0) continue;  // read by no keyframe
         EXPECT_LT((modelled.positions[i] - finer.positions[i]).norm(), 1e-12);
@@ -107,12 +91,13 @@ TEST(TwoMeshMotions, OneFinerSimulationMovesEveryMotionByWhatItHasBeyondTheOwn) 
   const auto model = with_finer_mesh(lift.replay, own, point, lift.grid, store);
   ASSERT_TRUE(model);
   const auto beyond = [&](double bending) {
-    Motion difference = model->model.at({bending}, 1);
-    add(difference, -1, model->model.at({bending}, 0));
+    Motion difference = model->model.at(std::vector{bending}, 1);
+    add(difference, -1, model->model.at(std::vector{bending}, 0));
     return difference.positions.front();
   };
   const Motion finer = store.run(model->replay, candidate_at({2e-4}, lift.grid)).motion;
-  EXPECT_LT((model->model.at({2e-4}, 1).positions.front() - finer.positions.front()).norm(), 1e-12);
+  EXPECT_LT((model->model.at(std::vector{2e-4}, 1).positions.front() - finer.positions.front()).norm(),
+            1e-12);
   EXPECT_LT((beyond(7e-4) - beyond(2e-4)).norm(), 1e-12);
 }
 

@@ -117,29 +117,35 @@ TEST(MotionLikelihood, WhatIsCorrectedIsTakenForGranted) {
   EXPECT_NEAR(likelihood.deviance({cloth.bulged(0.02)}), 1, 0.1);  // moved twice
 }
 
-// A motion may come without the steps that no keyframe reads about the clock of the reference; where the
-// clock leads beyond them, that is told.
-TEST(MotionLikelihood, ReadsTheStepsAboutItsClockAndTellsWhereItLacksOne) {
+// A motion may come without the steps that no keyframe reads at the clock that is tried, and with more of
+// them as the clock moves; where a step is missing after all, that is told.
+TEST(MotionLikelihood, ReadsTheStepsAtItsClockAndTellsWhereItLacksOne) {
   Cloth cloth(12);
   cloth.replay.recording.nuisance.time = 0.3;
   Motion motion = moving_sheet_motion(cloth.replay.recording.mesh, 0.02, 60);
   cloth.see(motion);
   ScoreSettings settings;
   const MotionLikelihood likelihood({cloth.replay}, result_of(motion), settings, {}, {}, {});
-  const std::vector<bool>& steps = likelihood.steps_about(0);
-  ASSERT_EQ(steps.size(), 61u);
-  EXPECT_TRUE(steps[5] && steps[4] && steps[6]);  // of the keyframe at 0.1 s, its clock right
-  EXPECT_FALSE(steps[2]);
-  Motion some = motion;
-  for (std::size_t i = 0; i < steps.size(); ++i)
-    if (!steps[i]) some.positions[i].resize(0, 3);
-  EXPECT_EQ(likelihood.deviance({some}), likelihood.deviance({motion}));
   // The same motion a tenth of a second later: the clock that fits it is five steps away.
   Motion late = motion;
   for (std::size_t i = 60; i >= 5; --i) late.positions[i] = motion.positions[i - 5];
-  EXPECT_TRUE(std::isfinite(likelihood.deviance({late})));
-  for (std::size_t i = 0; i < steps.size(); ++i)
-    if (!steps[i]) late.positions[i].resize(0, 3);
+  for (const Motion& whole : {motion, late}) {
+    Motion some = whole;
+    const auto with_what_is_read = [&](std::size_t, double time_offset) -> const Motion& {
+      for (data::Points& positions : some.positions) positions.resize(0, 3);
+      for (const Observation& observation : cloth.replay.observations) {
+        const double at = (observation.t + time_offset) / 0.02;
+        for (const double step : {std::floor(at), std::ceil(at)})
+          if (step >= 0 && step <= 60)
+            some.positions[static_cast<std::size_t>(step)] = whole.positions[static_cast<std::size_t>(step)];
+      }
+      some.positions.front() = whole.positions.front();
+      return some;
+    };
+    EXPECT_TRUE(std::isfinite(likelihood.deviance({whole})));
+    EXPECT_EQ(likelihood.deviance(with_what_is_read), likelihood.deviance({whole}));
+  }
+  late.positions[15].resize(0, 3);
   EXPECT_TRUE(std::isnan(likelihood.deviance({late})));
 }
 

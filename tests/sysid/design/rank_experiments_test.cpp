@@ -1,0 +1,79 @@
+#include "sysid/design/rank_experiments.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "sysid/design/virtual_experiment.h"
+#include "tests/sysid/short_lift.h"
+
+namespace flash::sysid {
+namespace {
+
+PlanSettings settings_of(double young_spread, double bending_spread) {
+  PlanSettings settings;
+  settings.grid.base.material = short_lift_material();
+  settings.grid.axes = {{"young", {3, 300}, true}, {"bending", {2e-5, 2e-3}, true}};
+  settings.at = {30, 2e-4};
+  KnownSoFar known;
+  known.covariance = Eigen::Vector2d(young_spread, bending_spread).cwiseAbs2().asDiagonal();
+  known.misfit.noise = 1e-3;
+  known.misfit.size = 1e-3;
+  known.misfit.reach_time = 0.5;
+  known.misfit.reach_sheet = 0.1;
+  settings.known = known;
+  return settings;
+}
+
+// What is flat has no curvature, whatever its rigidity, and what hangs under its own weight of 0.5 N/m at
+// most is hardly stretched: pulls tell the membrane, lifts and hangs the bending.
+TEST(RankExperiments, ProposesWhatTellsTheParameterThatIsNotKnown) {
+  const data::TemporaryFolder folder;
+  const Replay lift = short_lift(folder);
+  const MotionStore store(folder / "motions");
+  const auto ranked = [&](double young_spread, double bending_spread) {
+    return rank_experiments({lift}, settings_of(young_spread, bending_spread), store);
+  };
+  const auto membrane = ranked(1, 0.01), bending = ranked(0.01, 1);
+  ASSERT_EQ(membrane.size(), 1 + virtual_experiments.size());
+  EXPECT_TRUE(membrane[0].name == "bar_pull" || membrane[0].name == "bias_pull") << membrane[0].name;
+  EXPECT_TRUE(bending[0].name == "corner_lift" || bending[0].name == "hang" ||
+              bending[0].name == "lift again")
+      << bending[0].name;
+  for (const auto& each : {membrane, bending})
+    for (std::size_t i = 0; i < each.size(); ++i) {
+      if (i > 0) {
+        EXPECT_LE(each[i].bits, each[i - 1].bits);
+      }
+      EXPECT_GE(each[i].bits, 0);
+    }
+  EXPECT_LE(membrane[0].spread[0], 1);
+  EXPECT_LE(bending[0].spread[1], 1);
+  // Half the log of a determinant's ratio; one parameter is all that is open.
+  EXPECT_NEAR(bending[0].bits, std::log2(1 / bending[0].spread[1]), 0.02);
+}
+
+// A discrepancy of centimetres leaves little to be told.
+TEST(RankExperiments, ALargerMisfitPromisesLess) {
+  const data::TemporaryFolder folder;
+  const Replay lift = short_lift(folder);
+  const MotionStore store(folder / "motions");
+  PlanSettings settings = settings_of(0.01, 1);
+  const double bits = plan_experiment("again", {lift}, settings, &store).bits;
+  settings.known->misfit.size = 2e-2;
+  EXPECT_LT(plan_experiment("again", {lift}, settings, &store).bits, 0.5 * bits);
+}
+
+TEST(RankExperiments, CovarianceOfDrawsIsThatOfCoordinates) {
+  Eigen::MatrixXd draws(3, 3);
+  draws << 1, 0.3, 0.1, std::exp(1.0), 0.3, 0.2, std::exp(2.0), 0.3, 0.6;
+  const Eigen::MatrixXd covariance = covariance_of_draws(
+      {{"young", {1, 10}, true}, {"poisson", {0.3}, false}, {"friction", {0, 1}, false}}, draws);
+  ASSERT_EQ(covariance.rows(), 2);
+  EXPECT_NEAR(covariance(0, 0), 1, 1e-15);
+  EXPECT_NEAR(covariance(1, 1), 0.07, 1e-15);  // (0.2^2 + 0.1^2 + 0.3^2) / 2
+  EXPECT_NEAR(covariance(0, 1), 0.25, 1e-15);  // (0.2 + 0.3) / 2
+}
+
+}  // namespace
+}  // namespace flash::sysid
