@@ -57,7 +57,7 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   add_holds(parse_holds(options.holds), settings);
   std::vector<sysid::Axis> all = settings.axes;
   all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
-  sysid::check_axes(all, base.material.constitutive);
+  sysid::check_axes(all, base.material);
   return settings;
 }
 

@@ -77,6 +77,19 @@ void read_mass(const JsonObject& props, Asset& asset) {
                           ", expected exactly one of density, areal_density, mass, obj_mass");
 }
 
+void read_weave(const JsonObject& props, Asset& asset) {
+  for (const char* key : {"bending_ratio", "twisting_ratio", "warp_direction"}) {
+    if (!props.has(key)) continue;
+    if (asset.format == AssetFormat::published || asset.element_type != ElementType::triangle)
+      throw props.error(key, "no such field but for sheets in \"schema\": \"flash-asset/1\"");
+    if (asset.bending_model && *asset.bending_model != BendingModel::plate)
+      throw props.error(key, "bending_model plate, the only one that is woven");
+  }
+  asset.weave.bending_ratio = props.positive("bending_ratio", 1);
+  asset.weave.twisting_ratio = props.positive("twisting_ratio", 1);
+  asset.weave.warp_direction = props.number("warp_direction", 0) * std::numbers::pi / 180;
+}
+
 void read_properties(const JsonObject& props, Asset& asset) {
   const bool published = asset.format == AssetFormat::published;
   // The published coefficient is not D: under the wrong schema it would be off by a factor of 3 unnoticed.
@@ -85,8 +98,9 @@ void read_properties(const JsonObject& props, Asset& asset) {
   if (published && props.has("bending_rigidity"))
     throw props.error("bending_rigidity", "bending, or \"schema\": \"flash-asset/1\"");
   props.expect_fields({"obj_mass", "mass", "density", "areal_density", "young", "poisson", "constitutive",
-                       "thickness", published ? "bending" : "bending_rigidity", "bending_model", "friction",
-                       "air_drag", "stiffness_damping"});
+                       "thickness", published ? "bending" : "bending_rigidity", "bending_model",
+                       "bending_ratio", "twisting_ratio", "warp_direction", "friction", "air_drag",
+                       "stiffness_damping"});
   asset.constitutive =
       parse_constitutive(props.string("constitutive"), asset.source, props.name_of("constitutive"));
   const bool solid = asset.element_type == ElementType::tetrahedron;
@@ -103,6 +117,7 @@ void read_properties(const JsonObject& props, Asset& asset) {
   if (props.has("bending_model"))
     asset.bending_model =
         parse_bending_model(props.string("bending_model"), asset.source, props.name_of("bending_model"));
+  read_weave(props, asset);
   read_mass(props, asset);
   if (asset.density && !asset.thickness && !solid)
     throw props.error("thickness", "a thickness beside density, or areal_density");
@@ -209,6 +224,10 @@ void save_asset(const Asset& asset, const std::string& path) {
       published ? asset.published_bending : asset.bending_rigidity);
   if (!published) {
     if (asset.bending_model) props["bending_model"] = to_string(*asset.bending_model);
+    const Weave& weave = asset.weave;
+    if (weave.bending_ratio != 1) props["bending_ratio"] = weave.bending_ratio;
+    if (weave.twisting_ratio != 1) props["twisting_ratio"] = weave.twisting_ratio;
+    if (weave.warp_direction != 0) props["warp_direction"] = weave.warp_direction * 180 / std::numbers::pi;
     props["friction"] = asset.friction;
     if (asset.air_drag != 0) props["air_drag"] = asset.air_drag;
     if (asset.stiffness_damping != 0) props["stiffness_damping"] = asset.stiffness_damping;
@@ -231,6 +250,7 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
   m.friction = asset.friction;
   m.air_drag = asset.air_drag;
   m.stiffness_damping = asset.stiffness_damping;
+  m.weave = asset.weave;
   sheet.total_mass = m.areal_density * rest_area;
   sheet.uniform_vertex_mass = asset.object_mass.has_value();
 
@@ -259,6 +279,10 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
                           "), nu = " + format_short(m.poissons_ratio));
   sheet.notices.push_back(source + ": D = " + format_short(m.bending_rigidity) + " N m (" +
                           origin_of_bending + "), bending_model " + to_string(m.bending_model));
+  if (m.weave != Weave{})
+    sheet.notices.push_back(
+        source + ": woven: D_2 = " + format_short(m.weave.bending_ratio * m.bending_rigidity) +
+        " N m, warp at " + format_short(m.weave.warp_direction * 180 / std::numbers::pi) + " deg from x");
   sheet.notices.push_back(source + ": mass = " + format_short(sheet.total_mass) + " kg, " +
                           format_short(m.areal_density) + " kg/m^2" +
                           (asset.object_mass ? " (obj_mass, the total, spread evenly over vertices)" : ""));
@@ -318,6 +342,9 @@ Asset express_as(const Asset& asset, AssetFormat format, double rest_area,
     result.areal_density.reset();
     result.bending_rigidity.reset();
     result.bending_model.reset();
+    if (asset.weave != Weave{})
+      lose("bending_ratio, twisting_ratio and warp_direction: its sheets are isotropic");
+    result.weave = {};
     if (!sheet.uniform_vertex_mass) lose("mass by area: obj_mass is spread evenly over vertices");
   }
   if (asset.element_order == ElementOrder::quadratic) lose("element_order 2: its tetrahedra are linear");
@@ -339,6 +366,7 @@ Asset asset_from_sheet(const SheetMaterial& material, std::optional<double> thic
   asset.thickness = thickness;
   asset.bending_rigidity = material.bending_rigidity;
   asset.bending_model = material.bending_model;
+  asset.weave = material.weave;
   asset.areal_density = material.areal_density;
   asset.friction = material.friction;
   asset.air_drag = material.air_drag;

@@ -30,6 +30,7 @@ struct Asset {
   double poisson = 0.3;
   std::optional<double> thickness;          ///< [m]
   std::optional<double> bending_rigidity;   ///< D [N m]; empty: the plate formula, or w
+  Weave weave;                              ///< flash-asset/1 alone
   std::optional<double> published_bending;  ///< w of the published format [N m]
   std::optional<BendingModel> bending_model;
   std::optional<double> density;        ///< [kg/m^3]

@@ -16,6 +16,16 @@ enum class Constitutive {
 /// How curvature is measured; `plate` (Morley) gives D and nu on any flat mesh, the others are for parity.
 enum class BendingModel { plate, isometric, hinge };
 
+/// How a woven sheet bends along its warp, its weft and between. Isotropic by default.
+struct Weave {
+  double bending_ratio = 1.0;   ///< D_2 / D_1, weft over warp
+  double twisting_ratio = 1.0;  ///< D_66 over that of Huber's plate, (1 - nu) / 2 sqrt(D_1 D_2)
+  double warp_direction =
+      0.0;  ///< from the x axis of the rest shape, counter-clockwise seen from its normals [rad]
+
+  bool operator==(const Weave&) const = default;
+};
+
 /// A thin sheet as the simulation sees it. Motion depends on E t / rho_A, D / rho_A, nu and friction only.
 struct SheetMaterial {
   Constitutive constitutive = Constitutive::tri_corotated;
@@ -23,10 +33,11 @@ struct SheetMaterial {
   double membrane_stiffness = 100.0;  ///< E t [N/m]
   double poissons_ratio = 0.3;        ///< in (-1, 1/2]
   double areal_density = 0.2;         ///< rho_A [kg/m^2]
-  double bending_rigidity = 1e-5;     ///< D [N m]
+  double bending_rigidity = 1e-5;     ///< D, of a woven sheet D_1, along its warp [N m]
   double friction = 0.3;              ///< Coulomb coefficient against the table
   double air_drag = 0.0;              ///< mass-proportional damping [1/s]
   double stiffness_damping = 0.0;     ///< Rayleigh, stiffness-proportional [s]
+  Weave weave = {};                   ///< `plate` alone
 
   bool operator==(const SheetMaterial&) const = default;
 };

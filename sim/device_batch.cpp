@@ -52,7 +52,7 @@ std::vector<Group> grouped(const SheetPlan& plan, const std::vector<Environment>
   for (std::size_t e = 0; e < environments.size(); ++e) {
     if (at[e] >= end) continue;
     const data::SheetMaterial& material = environments[e].materials[0];
-    const BendingOperator& bending = bending_operator(plan, material.bending_model, material.poissons_ratio);
+    const BendingOperator& bending = bending_operator(plan, material);
     const int count = cuda::steps_before_a_hold_closes(environments[e], time_step, end - at[e]);
     groups[{&bending, at[e], count}].push_back(static_cast<int>(e));
   }

@@ -32,7 +32,7 @@ const BendingOperator& common_bending(const SheetPlan& plan,
                                       const std::vector<ReplayEnvironment>& environments) {
   require(!environments.empty(), "no environments");
   const auto bending = [&](const ReplayEnvironment& e) -> const BendingOperator& {
-    return bending_operator(plan, e.material.bending_model, e.material.poissons_ratio);
+    return bending_operator(plan, e.material);
   };
   for (const ReplayEnvironment& e : environments)
     require(&bending(e) == &bending(environments.front()), "all environments need the same bending operator");

@@ -21,8 +21,13 @@ Sparse sparse(Eigen::Index rows, Eigen::Index cols, const Triplets& entries) {
   return matrix;
 }
 
-// Coordinates in the plane of the rest shape, seen from the side of its normals.
-Eigen::Matrix2Xd plane_coordinates(const Sheet& sheet) {
+/// The plane of the rest shape, seen from the side of its normals.
+struct Plane {
+  Eigen::Vector3d normal, u, v;
+  Eigen::Matrix2Xd coordinates;  ///< of the vertices
+};
+
+Plane plane_of(const Sheet& sheet) {
   const data::Points& x = sheet.rest.vertices;
   const auto at = [&](int vertex) -> Eigen::Vector3d { return x.row(vertex); };
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
@@ -45,7 +50,23 @@ Eigen::Matrix2Xd plane_coordinates(const Sheet& sheet) {
     throw data::input_error("mesh", "bending_model",
                             "plate needs a flat rest shape; this one leaves its plane by " +
                                 std::to_string(height) + " m (use hinge)");
-  return plane;
+  return {normal, u, v, plane};
+}
+
+/// The rigidity of D_1 = 1 on the curvatures (k11, k22, k12) along u and v.
+Eigen::Matrix3d plate_rigidity(double poissons_ratio, const data::Weave& weave, const Plane& plane) {
+  const double weft = weave.bending_ratio, mean = std::sqrt(weft);
+  Eigen::Matrix3d rigidity;
+  rigidity << 1, poissons_ratio * mean, 0, poissons_ratio * mean, weft, 0, 0, 0,
+      2 * (1 - poissons_ratio) * weave.twisting_ratio * mean;
+  if (weave == data::Weave{}) return rigidity;
+  Eigen::Vector3d x = Eigen::Vector3d::UnitX() - plane.normal.x() * plane.normal;
+  if (x.norm() < 1e-6) x = Eigen::Vector3d::UnitY() - plane.normal.y() * plane.normal;
+  const double angle = std::atan2(x.dot(plane.v), x.dot(plane.u)) + weave.warp_direction;
+  const double c = std::cos(angle), s = std::sin(angle);
+  Eigen::Matrix3d turn;  // curvatures along warp and weft from those along u and v
+  turn << c * c, s * s, 2 * c * s, s * s, c * c, -2 * c * s, -c * s, c * s, c * c - s * s;
+  return turn.transpose() * rigidity * turn;
 }
 
 // x <- -matrix^-1 x for many right-hand sides at once: a row of x is contiguous, so the loops run over
@@ -124,11 +145,12 @@ Sparse slope_weights(const Sheet& sheet, const std::vector<Edge>& edges, const E
 
 }  // namespace
 
-MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio) {
+MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio, const data::Weave& weave) {
   if (!(poissons_ratio > -1 && poissons_ratio < 1))
     throw data::input_error("material", "poisson",
                             std::to_string(poissons_ratio) + ", expected within (-1, 1)");
-  const Eigen::Matrix2Xd plane = plane_coordinates(sheet);
+  const Plane rest = plane_of(sheet);
+  const Eigen::Matrix2Xd& plane = rest.coordinates;
   MorleyPlate plate;
   plate.edges = sheet_edges(sheet);
   std::vector<Eigen::Vector3i> triangle_edges(sheet.triangles.size());
@@ -142,8 +164,7 @@ MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio) {
     if (e.right >= 0) side(e.right, e.opposite_right) = i;
   }
 
-  Eigen::Matrix3d rigidity;  // on (k11, k22, k12)
-  rigidity << 1, poissons_ratio, 0, poissons_ratio, 1, 0, 0, 0, 2 * (1 - poissons_ratio);
+  const Eigen::Matrix3d rigidity = plate_rigidity(poissons_ratio, weave, rest);
   Triplets xx, xe, ee;
   constexpr double kStiff = 1e4;  // times the rigidity: its slopes follow its vertices to that share
   for (std::size_t t = 0; t < sheet.triangles.size(); ++t) {
@@ -183,8 +204,9 @@ MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio) {
 }
 
 CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
-                               const std::vector<ClampedEdge>& clamped, double drop_tolerance) {
-  const MorleyPlate plate = morley_plate(sheet, poissons_ratio);
+                               const std::vector<ClampedEdge>& clamped, double drop_tolerance,
+                               const data::Weave& weave) {
+  const MorleyPlate plate = morley_plate(sheet, poissons_ratio, weave);
   const auto vertices = plate.xx.rows(), edges = plate.ee.rows();
 
   data::Points slopes = data::Points::Zero(edges, 3);
@@ -215,7 +237,7 @@ CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
 
   // The energy at theta = T x + response: for the exact T the minimum over theta, for a truncated one above
   // it by the square of what was dropped.
-  const Sparse T = slope_weights(sheet, free, plane_coordinates(sheet), factor, ex, drop_tolerance);
+  const Sparse T = slope_weights(sheet, free, plane_of(sheet).coordinates, factor, ex, drop_tolerance);
   const Sparse mixed = xe * T, quadratic = T.transpose() * Sparse(ee * T);
   CondensedPlate result;
   result.stiffness = plate.xx + mixed + Sparse(mixed.transpose()) + quadratic;
@@ -229,8 +251,9 @@ CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
   return result;
 }
 
-Sparse plate_bending_stiffness(const Sheet& sheet, double poissons_ratio, double drop_tolerance) {
-  return condensed_plate(sheet, poissons_ratio, {}, drop_tolerance).stiffness;
+Sparse plate_bending_stiffness(const Sheet& sheet, double poissons_ratio, double drop_tolerance,
+                               const data::Weave& weave) {
+  return condensed_plate(sheet, poissons_ratio, {}, drop_tolerance, weave).stiffness;
 }
 
 }  // namespace flash::sim

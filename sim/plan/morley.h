@@ -2,6 +2,7 @@
 #include <Eigen/SparseCore>
 #include <vector>
 
+#include "data/material.h"
 #include "data/mesh.h"
 #include "sim/plan/edge.h"
 #include "sim/scene/sheet.h"
@@ -19,11 +20,13 @@ struct MorleyPlate {
 };
 
 /// Morley 1968; quadratic per triangle with constant curvature
-/// k = 1/A sum_e n (l_e n theta_e + t (x_b - x_a))^T, energy A/2 [nu |k11 + k22|^2 + (1 - nu) |k|^2].
-/// Where a clamp holds all vertices of stiff triangles, its border keeps its slope too. With the places of
-/// the vertices alone it would turn within a cell, an error of first order. Throws data::InputError unless
+/// k = 1/A sum_e n (l_e n theta_e + t (x_b - x_a))^T, energy A/2 [nu |k11 + k22|^2 + (1 - nu) |k|^2]. A woven
+/// sheet has along warp and weft, with r = D_2 / D_1 and q = twisting_ratio,
+/// A/2 [|k11|^2 + r |k22|^2 + 2 nu sqrt(r) k11 k22 + 2 (1 - nu) q sqrt(r) |k12|^2], D = D_1 (Huber 1923: q =
+/// 1). Where a clamp holds all vertices of stiff triangles, its border keeps its slope too. With the places
+/// of the vertices alone it would turn within a cell, an error of first order. Throws data::InputError unless
 /// the rest shape is flat to 1e-6 of its size and -1 < nu < 1.
-MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio);
+MorleyPlate morley_plate(const Sheet& sheet, double poissons_ratio, const data::Weave& weave = {});
 
 /// Prescribed derivative of the position along the outward normal n (see MorleyPlate) of the edge a - b; the
 /// undeformed sheet has slope = n.
@@ -46,10 +49,12 @@ struct CondensedPlate {
 /// is at most 0.2 % on any mode up to nu = 0.3 and 0.8 % at nu = 0.45, with about 100 entries a row.
 /// drop_tolerance = 0 is exact.
 CondensedPlate condensed_plate(const Sheet& sheet, double poissons_ratio,
-                               const std::vector<ClampedEdge>& clamped, double drop_tolerance = 1e-6);
+                               const std::vector<ClampedEdge>& clamped, double drop_tolerance = 1e-6,
+                               const data::Weave& weave = {});
 
 /// The stiffness without clamped edges, D = 1 [1/m^2].
 Eigen::SparseMatrix<double> plate_bending_stiffness(const Sheet& sheet, double poissons_ratio,
-                                                    double drop_tolerance = 1e-6);
+                                                    double drop_tolerance = 1e-6,
+                                                    const data::Weave& weave = {});
 
 }  // namespace flash::sim

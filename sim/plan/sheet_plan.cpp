@@ -1,6 +1,7 @@
 #include "sim/plan/sheet_plan.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <numeric>
 
@@ -46,8 +47,8 @@ TriangleGroup group_of(const std::vector<RestTriangle>& triangles, int first, in
 }
 
 std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& plan, const Body& body,
-                                                             data::BendingModel model,
-                                                             double poissons_ratio) {
+                                                             data::BendingModel model, double poissons_ratio,
+                                                             const data::Weave& weave) {
   auto bending = std::make_shared<BendingOperator>();
   bending->model = model;
   bending->kernels = plan.kernels;
@@ -55,7 +56,8 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
   const Sheet alone = body_alone(plan.sheet, body);
   const Eigen::SparseMatrix<double> isometric = isometric_bending_stiffness(alone);
   const Eigen::SparseMatrix<double, Eigen::RowMajor> stiffness =
-      model == data::BendingModel::plate ? plate_bending_stiffness(alone, poissons_ratio) : isometric;
+      model == data::BendingModel::plate ? plate_bending_stiffness(alone, poissons_ratio, 1e-6, weave)
+                                         : isometric;
   bending->largest_entry = stiffness.coeffs().abs().maxCoeff();
   std::vector<int> as_numbered(body.vertex_count);
   std::iota(as_numbered.begin(), as_numbered.end(), 0);
@@ -64,7 +66,7 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
       row_groups(stiffness, std::span(plan.symbolic->position).subspan(body.first_vertex));
   // Against the plate the isometric stiffness has its eigenvalues between 0.5 and 4.6 (regular meshes, nu =
   // 0.3). Scaled, they lie around 1, where those of the membrane and the mass are.
-  const double scale = model == data::BendingModel::plate ? 0.6 : 1.0;
+  const double scale = model == data::BendingModel::plate ? 0.6 * std::sqrt(weave.bending_ratio) : 1.0;
   const auto entry = [&](int row, int column) {
     const int i = row - body.first_vertex, j = column - body.first_vertex;
     return 0 <= i && i < body.vertex_count && 0 <= j && j < body.vertex_count ? scale * isometric.coeff(i, j)
@@ -121,12 +123,18 @@ std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet, Instruction
 }
 
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
-                                        double poissons_ratio, int body) {
-  const double key = model == data::BendingModel::plate ? poissons_ratio : 0.0;
+                                        double poissons_ratio, int body, const data::Weave& weave) {
+  const bool plate = model == data::BendingModel::plate;
+  const BendingOperators::Key key = {body, model, plate ? poissons_ratio : 0.0,
+                                     plate ? weave : data::Weave{}};
   const std::lock_guard lock(plan.bending->mutex);
-  auto& entry = plan.bending->made[{body, model, key}];
-  if (!entry) entry = make_bending_operator(plan, plan.bodies[body].body, model, poissons_ratio);
-  return *entry;
+  auto& made = plan.bending->made;
+  const auto known =
+      std::find_if(made.begin(), made.end(), [&](const auto& entry) { return entry.first == key; });
+  if (known != made.end()) return *known->second;
+  made.emplace_back(key,
+                    make_bending_operator(plan, plan.bodies[body].body, model, poissons_ratio, key.weave));
+  return *made.back().second;
 }
 
 std::size_t count_bending_operators(const SheetPlan& plan) {

@@ -1,10 +1,9 @@
 #pragma once
 #include <array>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <span>
-#include <tuple>
+#include <utility>
 #include <vector>
 
 #include "data/material.h"
@@ -37,7 +36,15 @@ struct BendingOperator {
 /// Bending operators made so far for the bodies of a sheet, shared by its environments.
 struct BendingOperators {
   std::mutex mutex;
-  std::map<std::tuple<int, data::BendingModel, double>, std::shared_ptr<const BendingOperator>> made;
+  struct Key {
+    int body;
+    data::BendingModel model;
+    double poissons_ratio;
+    data::Weave weave;
+
+    bool operator==(const Key&) const = default;
+  };
+  std::vector<std::pair<Key, std::shared_ptr<const BendingOperator>>> made;
 };
 
 /// The part of a plan that belongs to one body.
@@ -68,11 +75,17 @@ struct SheetPlan {
 std::shared_ptr<const SheetPlan> make_sheet_plan(const Sheet& sheet,
                                                  InstructionLevel level = highest_instruction_level());
 
-/// The bending operator of a model and a body, made once a Poisson's ratio and kept with the plan; threads
-/// may ask at once. That of a solid is empty. Throws data::InputError where the model needs a flat rest shape
-/// and the body has none.
+/// The bending operator of a model and a body, made once a Poisson's ratio and weave and kept with the plan;
+/// threads may ask at once. That of a solid is empty. Throws data::InputError where the model needs a flat
+/// rest shape and the body has none.
 const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingModel model,
-                                        double poissons_ratio, int body = 0);
+                                        double poissons_ratio, int body = 0, const data::Weave& weave = {});
+
+/// That of a material.
+inline const BendingOperator& bending_operator(const SheetPlan& plan, const data::SheetMaterial& material,
+                                               int body = 0) {
+  return bending_operator(plan, material.bending_model, material.poissons_ratio, body, material.weave);
+}
 
 /// Bending operators that were made for a plan so far.
 std::size_t count_bending_operators(const SheetPlan& plan);

@@ -144,7 +144,13 @@ void make_sheet_body(const data::Scene& scene, const data::Asset& asset, SceneBo
   for (const std::string& notice : resolved.notices) notices.push_back(body.name + ": " + notice);
   if (resolved.uniform_vertex_mass) body.sheet.vertex_area.setConstant(body.sheet.vertex_area.mean());
   body.environment.materials[0] = resolved.material;
-  if (scene.bending_model) body.environment.materials[0].bending_model = *scene.bending_model;
+  if (!scene.bending_model) return;
+  data::SheetMaterial& material = body.environment.materials[0];
+  material.bending_model = *scene.bending_model;
+  if (material.bending_model != data::BendingModel::plate && material.weave != data::Weave{})
+    throw data::input_error(scene.source, "bending_model",
+                            std::string("found ") + data::to_string(material.bending_model) +
+                                ", expected plate, as " + asset.source + " is woven");
 }
 
 /// Mesh and material of an object of tetrahedra.

@@ -12,8 +12,7 @@ std::vector<BodyLaw> body_laws(const SheetPlan& plan, const Environment& environ
     const bool has_material = solid != environment.solids.end();
     if (has_material != plan.bodies[b].body.is_solid())
       throw std::invalid_argument("environment: the bodies in `solids` have to be those of tetrahedra");
-    laws.push_back({plan.bodies[b], material,
-                    bending_operator(plan, material.bending_model, material.poissons_ratio, b),
+    laws.push_back({plan.bodies[b], material, bending_operator(plan, material, b),
                     has_material ? &solid->second : nullptr});
   }
   return laws;

@@ -365,10 +365,13 @@ std::string truth_text(const data::SheetMaterial& material, const SynthSettings&
   json["constitutive"] = data::to_string(material.constitutive);
   json["bending_model"] = data::to_string(material.bending_model);
   json["membrane_stiffness"] = material.membrane_stiffness;
-  json["parameters"] = {
-      {"poisson", material.poissons_ratio},      {"bending", material.bending_rigidity},
-      {"areal_density", material.areal_density}, {"friction", material.friction},
-      {"air_drag", material.air_drag},           {"stiffness_damping", material.stiffness_damping}};
+  json["parameters"] = {{"poisson", material.poissons_ratio},
+                        {"bending", material.bending_rigidity},
+                        {"bending_ratio", material.weave.bending_ratio},
+                        {"areal_density", material.areal_density},
+                        {"friction", material.friction},
+                        {"air_drag", material.air_drag},
+                        {"stiffness_damping", material.stiffness_damping}};
   json["offset"] = {settings.cloud_offset.x(), settings.cloud_offset.y(), settings.cloud_offset.z()};
   json["time_offset"] = settings.time_offset;
   json["depth_noise_m"] = settings.depth_noise;

@@ -11,6 +11,7 @@ double own_value(const MaterialBase& base, const std::string& name) {
   if (name == "young") return m.membrane_stiffness / base.thickness.value_or(1.0);
   if (name == "poisson") return m.poissons_ratio;
   if (name == "bending") return make_candidate(base, {}, {}).material.bending_rigidity;
+  if (name == "bending_ratio") return m.weave.bending_ratio;
   if (name == "friction") return m.friction;
   if (name == "areal_density") return m.areal_density;
   if (name == "air_drag") return m.air_drag;

@@ -146,6 +146,9 @@ void add_material(const MaterialBase& base, Fingerprint& print) {
   print["asset friction"] = data::format_number(m.friction);
   print["asset air_drag"] = data::format_number(m.air_drag);
   print["asset stiffness_damping"] = data::format_number(m.stiffness_damping);
+  if (m.weave != data::Weave{})
+    print["asset weave"] =
+        values_text({m.weave.bending_ratio, m.weave.twisting_ratio, m.weave.warp_direction});
   print["asset thickness"] = base.thickness ? data::format_number(*base.thickness) : "none";
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <numeric>
 
+#include "data/asset.h"
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
@@ -52,6 +53,7 @@ const std::vector<ParameterInfo>& known_parameters() {
       {"young", "Pa or N/m", true, kTiny, 1e13, "Young's modulus, or E t where the asset has no thickness"},
       {"poisson", "", true, -0.99, 0.5, "Poisson's ratio"},
       {"bending", "N m", true, 0, 1e6, "flexural rigidity D"},
+      {"bending_ratio", "", true, 0.01, 100, "woven: D across the warp over D along it"},
       {"friction", "", true, 0, 10, "Coulomb coefficient against the table"},
       {"areal_density", "kg/m^2", true, kTiny, 1e4, "mass per area"},
       {"air_drag", "1/s", true, 0, 1e4, "mass-proportional damping"},
@@ -166,12 +168,16 @@ double count_candidates(const std::vector<Axis>& axes) {
   return count;
 }
 
-void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) {
+void check_axes(const std::vector<Axis>& axes, const data::SheetMaterial& material) {
   bool young = false, poisson = false;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (axes[i].name == axes[j].name) throw data::InputError(option_of(axes[i].name) + ": given twice");
     }
+    if (axes[i].name == "bending_ratio" && material.bending_model != data::BendingModel::plate)
+      throw data::InputError("--bending-ratio: found bending_model " +
+                             std::string(data::to_string(material.bending_model)) +
+                             ", expected plate, the only one that is woven");
     young = young || (axes[i].name == "young" && axes[i].values.size() > 1);
     poisson = poisson || (axes[i].name == "poisson" && axes[i].values.size() > 1);
   }
@@ -184,7 +190,7 @@ void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive) 
         names + ": found " + data::format_short(count_candidates(axes)) + " candidates, expected at most " +
         data::format_count(static_cast<std::size_t>(kMostCandidates)) + ": search fewer values");
   }
-  if (constitutive == data::Constitutive::tri_arap && young && poisson) {
+  if (material.constitutive == data::Constitutive::tri_arap && young && poisson) {
     throw data::InputError(
         "--young, --poisson: under TRI_ARAP the motion depends on them only through E / (1 + nu), so that no "
         "recording "
@@ -218,6 +224,7 @@ ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>
       material.bending_rigidity = value;
       bending_given = true;
     }
+    if (name == "bending_ratio") material.weave.bending_ratio = value;
     if (name == "friction") material.friction = value;
     if (name == "areal_density") material.areal_density = value;
     if (name == "air_drag") material.air_drag = value;

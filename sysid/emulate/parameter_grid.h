@@ -24,8 +24,8 @@ struct ParameterInfo {
   std::string meaning;
 };
 
-/// young, poisson, bending, friction, areal_density, air_drag, stiffness_damping; start_yaw, table_height,
-/// grasp_depth, grasp_direction, grasp_pitch.
+/// young, poisson, bending, bending_ratio, friction, areal_density, air_drag, stiffness_damping; start_yaw,
+/// table_height, grasp_depth, grasp_direction, grasp_pitch.
 const std::vector<ParameterInfo>& known_parameters();
 
 /// How the command line calls a parameter: "--start-yaw" for start_yaw.
@@ -58,9 +58,9 @@ std::vector<double> values_of(const std::vector<Axis>& axes, int id);
 double count_candidates(const std::vector<Axis>& axes);
 
 /// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
-/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; more than a million candidates. Throws
-/// data::InputError with the reason.
-void check_axes(const std::vector<Axis>& axes, data::Constitutive constitutive);
+/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; bending_ratio under a bending model that
+/// is not woven; more than a million candidates. Throws data::InputError with the reason.
+void check_axes(const std::vector<Axis>& axes, const data::SheetMaterial& material);
 
 /// Refuses grasp_depth, grasp_direction and grasp_pitch where no grasp of the recordings is a pinch: nothing
 /// would change with them.

@@ -98,7 +98,8 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
   for (const double value :
        {static_cast<double>(m.constitutive), static_cast<double>(m.bending_model), m.membrane_stiffness,
         m.poissons_ratio, m.areal_density, m.bending_rigidity, m.friction, m.air_drag, m.stiffness_damping,
-        replay.start, replay.settings.solver.time_step, replay.settings.solver.tolerance,
+        m.weave.bending_ratio, m.weave.twisting_ratio, m.weave.warp_direction, replay.start,
+        replay.settings.solver.time_step, replay.settings.solver.tolerance,
         static_cast<double>(replay.settings.solver.max_iterations),
         static_cast<double>(replay.settings.device), static_cast<double>(replay.recording.has_table)})
     bytes.add(value);

@@ -112,6 +112,7 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
   const std::map<std::string, double> base_values = {{"young", base.young},
                                                      {"poisson", base.poisson},
                                                      {"bending", material.bending_rigidity},
+                                                     {"bending_ratio", base.weave.bending_ratio},
                                                      {"friction", base.friction},
                                                      {"areal_density", material.areal_density},
                                                      {"air_drag", base.air_drag},
@@ -129,6 +130,8 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
   asset.format = data::AssetFormat::flash_1;
   asset.young = values.at("young");
   asset.poisson = values.at("poisson");
+  if (const auto ratio = values.find("bending_ratio"); ratio != values.end())
+    asset.weave.bending_ratio = ratio->second;
   asset.friction = values.at("friction");
   asset.air_drag = values.at("air_drag");
   asset.stiffness_damping = values.at("stiffness_damping");

@@ -9,6 +9,7 @@ ParameterLabel parameter_label(const std::string& name, bool has_thickness) {
   static const std::map<std::string, ParameterLabel> labels = {
       {"poisson", {"Poisson's ratio", "ν", ""}},
       {"bending", {"bending rigidity", "D", "N m"}},
+      {"bending_ratio", {"bending, weft over warp", "D₂/D₁", ""}},
       {"friction", {"friction", "μ", ""}},
       {"areal_density", {"areal density", "ρ", "kg/m²"}},
       {"air_drag", {"air drag", "α", "1/s"}},

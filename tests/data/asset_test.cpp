@@ -202,6 +202,37 @@ TEST(Asset, SolidsLoadTheirTetrahedraMovedAsTheAssetSays) {
   EXPECT_EQ(load_asset(folder / "copy.json").mesh, "box:0.3x0.2x0.1:0.1");
 }
 
+TEST(Asset, SheetsMayBeWoven) {
+  const TemporaryFolder folder;
+  const auto load = [&](const char* text, const json& changes) {
+    json file = json::parse(text);
+    file["mechanical_props"].update(changes);
+    return load_asset(folder.write("towel.json", file.dump()));
+  };
+  const Asset woven = load(kFlash, {{"bending_ratio", 3}, {"twisting_ratio", 0.8}, {"warp_direction", 90}});
+  const SheetMaterial material = resolve_sheet(woven, 0.1).material;
+  EXPECT_EQ(material.weave.bending_ratio, 3);
+  EXPECT_EQ(material.weave.twisting_ratio, 0.8);
+  EXPECT_NEAR(material.weave.warp_direction, std::acos(0.0), 1e-15);
+  save_asset(woven, folder / "copy.json");
+  EXPECT_EQ(load_asset(folder / "copy.json").weave, woven.weave);
+  EXPECT_EQ(asset_from_sheet(material, {}, "sheet:1x1:1").weave, material.weave);
+  std::vector<std::string> notices;
+  EXPECT_EQ(express_as(woven, AssetFormat::published, 0.1, notices).weave, Weave{});
+  EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [](const std::string& notice) {
+    return notice.find("bending_ratio, twisting_ratio and warp_direction") != std::string::npos;
+  }));
+  const auto error = [&](const char* text, const json& changes) {
+    return input_error_of([&] { load(text, changes); });
+  };
+  EXPECT_NE(error(kFlash, {{"bending_ratio", 0}}).find("bending_ratio: found 0, expected a number above 0"),
+            std::string::npos);
+  EXPECT_NE(
+      error(kFlash, {{"bending_ratio", 2}, {"bending_model", "hinge"}}).find("expected bending_model plate"),
+      std::string::npos);
+  EXPECT_NE(error(kPublished, {{"warp_direction", 10}}).find("flash-asset/1"), std::string::npos);
+}
+
 TEST(Asset, ElementsMayBeQuadratic) {
   const TemporaryFolder folder;
   const auto load = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {

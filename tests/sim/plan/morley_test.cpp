@@ -113,6 +113,61 @@ TEST(Morley, CylinderAndSaddleAndBowlHaveTheEnergyOfTheContinuousPlate) {
   }
 }
 
+// The same of a woven sheet, whose curvatures count along warp and weft.
+TEST(Morley, AWovenSheetHasTheEnergyOfHubersPlate) {
+  const double nu = 0.3, degree = std::acos(-1.0) / 180;
+  for (const NamedMesh& strip : strips())
+    for (const data::Weave& weave : {data::Weave{3, 1, 0}, {0.2, 1.7, 25 * degree}, {2, 0.4, -70 * degree}}) {
+      const Sheet sheet = make_sheet(strip.mesh);
+      const MorleyPlate plate = morley_plate(sheet, nu, weave);
+      Eigen::Matrix2d k;
+      k << 0.3, 0.4, 0.4, -0.1;
+      const auto at = [&](int i) -> Eigen::Vector2d { return strip.mesh.vertices.row(i).head<2>(); };
+      Eigen::VectorXd w(strip.mesh.vertices.rows()), slope(Eigen::Index(plate.edges.size()));
+      for (int i = 0; i < w.size(); ++i) w[i] = 0.5 * at(i).dot(k * at(i));
+      for (int i = 0; i < slope.size(); ++i) {
+        const Edge& e = plate.edges[i];
+        const Eigen::Vector2d t = (at(e.b) - at(e.a)).normalized();
+        slope[i] = Eigen::Vector2d(t.y(), -t.x()).dot(k * 0.5 * (at(e.a) + at(e.b)));
+      }
+      const double energy =
+          0.5 * w.dot(plate.xx * w) + w.dot(plate.xe * slope) + 0.5 * slope.dot(plate.ee * slope);
+      const Eigen::Vector2d warp(std::cos(weave.warp_direction), std::sin(weave.warp_direction)),
+          weft(-warp.y(), warp.x());
+      const double along = warp.dot(k * warp), across = weft.dot(k * weft), twist = warp.dot(k * weft),
+                   mean = std::sqrt(weave.bending_ratio);
+      const double expected =
+          0.5 * strip_length * strip_width *
+          (along * along + weave.bending_ratio * across * across + 2 * nu * mean * along * across +
+           2 * (1 - nu) * weave.twisting_ratio * mean * twist * twist);
+      const Eigen::VectorXd a = w.cwiseAbs(), b = slope.cwiseAbs();
+      const double terms = 0.5 * a.dot(plate.xx.cwiseAbs() * a) + a.dot(plate.xe.cwiseAbs() * b) +
+                           0.5 * b.dot(plate.ee.cwiseAbs() * b);
+      EXPECT_NEAR(energy, expected, std::numeric_limits<double>::epsilon() * terms) << strip.name;
+    }
+}
+
+// Warp and weft change places, and the sheet may be turned with them.
+TEST(Morley, AWeaveTurnsWithItsDirection) {
+  const double right = std::acos(0.0);
+  const data::TriangleMesh mesh = data::rectangle({0.2, 0.1, 8, 4, DiagonalPattern::jittered, 0.25, 3});
+  const Sheet sheet = make_sheet(mesh);
+  const Sparse turned = plate_bending_stiffness(sheet, 0.3, 0.0, {3, 1.2, right}),
+               exchanged = 3 * plate_bending_stiffness(sheet, 0.3, 0.0, {1.0 / 3, 1.2, 0});
+  EXPECT_LT((turned - exchanged).norm(), 1e-10 * turned.norm());
+  data::TriangleMesh other = mesh;
+  other.vertices =
+      mesh.vertices * Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()).toRotationMatrix().transpose();
+  EXPECT_LT((plate_bending_stiffness(make_sheet(other), 0.3, 0.0, {3, 1.2, right + 0.5}) - turned).norm(),
+            1e-10 * turned.norm());
+  // Upside down the normals look down, and the direction counts the other way.
+  other.vertices = mesh.vertices;
+  other.triangles.col(1).swap(other.triangles.col(2));
+  const Sparse seen = plate_bending_stiffness(sheet, 0.3, 0.0, {3, 1.2, 0.4});
+  EXPECT_LT((plate_bending_stiffness(make_sheet(other), 0.3, 0.0, {3, 1.2, -0.4}) - seen).norm(),
+            1e-10 * seen.norm());
+}
+
 // A strip bent by end moments curves by -nu of its curvature across: then, and not as a cylinder, it needs no
 // force away from its ends.
 TEST(Morley, FreeStripBendsAnticlastically) {

@@ -18,6 +18,8 @@ std::string message_of(const std::function<void()>& call) {
   return "";
 }
 
+const data::SheetMaterial arap = {.constitutive = data::Constitutive::tri_arap};
+
 TEST(ParameterGrid, ReadsRangesListsAndSingleValues) {
   const Axis young = parse_axis("young", "1e3:1e6:4:log");
   ASSERT_EQ(young.values.size(), 4u);
@@ -41,12 +43,22 @@ TEST(ParameterGrid, NamesWhatIsWrong) {
   const std::vector<Axis> many = {parse_axis("bending", "1e-6:1e-3:100000"),
                                   parse_axis("friction", "0.1:1:100000")};
   EXPECT_NE(message_of([&] {
-              check_axes(many, data::Constitutive::tri_corotated);
+              check_axes(many, data::SheetMaterial{});
             }).find("--bending, --friction: found 1e+10 candidates, expected at most 1,000,000"),
             std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("poisson", "0.7"); }).find("expected -0.99 to 0.5"),
             std::string::npos);
   EXPECT_NE(message_of([] { parse_hold("friction"); }).find("name=value"), std::string::npos);
+}
+
+TEST(ParameterGrid, AWeaveIsSearchedWhereBendingIsThatOfAPlate) {
+  const std::vector<Axis> axes = {parse_axis("bending_ratio", "1:5:3")};
+  EXPECT_EQ(message_of([&] { check_axes(axes, data::SheetMaterial{}); }), "");
+  EXPECT_NE(message_of([&] {
+              check_axes(axes, {.bending_model = data::BendingModel::hinge});
+            }).find("--bending-ratio: found bending_model hinge, expected plate"),
+            std::string::npos);
+  EXPECT_EQ(make_candidate({}, axes, {3}).material.weave, (data::Weave{.bending_ratio = 3}));
 }
 
 TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
@@ -90,17 +102,10 @@ TEST(ParameterGrid, ParametersOfAPinchNeedAPinch) {
 
 TEST(ParameterGrid, RefusesYoungAndPoissonTogetherUnderArap) {
   const std::vector<Axis> axes = {parse_axis("young", "1e3:1e6:4:log"), parse_axis("poisson", "0:0.4:3")};
-  EXPECT_NE(message_of([&] { check_axes(axes, data::Constitutive::tri_arap); }).find("E / (1 + nu)"),
-            std::string::npos);
-  EXPECT_EQ(message_of([&] { check_axes(axes, data::Constitutive::tri_corotated); }), "");
-  EXPECT_EQ(message_of([&] {
-              check_axes({axes[0], parse_hold("poisson=0.3").axis}, data::Constitutive::tri_arap);
-            }),
-            "");
-  EXPECT_NE(message_of([&] {
-              check_axes({axes[0], axes[0]}, data::Constitutive::tri_arap);
-            }).find("twice"),
-            std::string::npos);
+  EXPECT_NE(message_of([&] { check_axes(axes, arap); }).find("E / (1 + nu)"), std::string::npos);
+  EXPECT_EQ(message_of([&] { check_axes(axes, data::SheetMaterial{}); }), "");
+  EXPECT_EQ(message_of([&] { check_axes({axes[0], parse_hold("poisson=0.3").axis}, arap); }), "");
+  EXPECT_NE(message_of([&] { check_axes({axes[0], axes[0]}, arap); }).find("twice"), std::string::npos);
 }
 
 TEST(ParameterGrid, ProductHoldsEveryCombinationOnceLastAxisFastest) {
