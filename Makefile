@@ -18,7 +18,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage answer-time size-study use-study locking reference fuzz sanitize
+.PHONY: help demo configure build test validate routes coverage answer-time size-study use-study few-views-study locking reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -82,6 +82,10 @@ size-study: configure-test  ## Say whether hand-eye calibration states its uncer
 use-study: configure-test  ## Say what each use of a hand-eye calibration (--for) gains, over 100 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target use_study
 	$(BUILD)/tests/use_study
+
+few-views-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly from 4, 5, 6 and 8 views, over 200 fresh scenes of each kind
+	cmake --build $(BUILD) -j $(JOBS) --target few_views_study
+	$(BUILD)/tests/few_views_study
 
 random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -20,6 +21,7 @@
 #include "calib/uncertainty/joint_zeros.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/folder_lock.h"
 #include "data/json_reader.h"
 #include "data/writable.h"
 
@@ -52,19 +54,26 @@ std::string report_path(const HandEyeOptions& options) {
   return std::filesystem::path(options.out).replace_extension(".html").string();
 }
 
-void write_report(const std::string& path, const calib::Calibration& calibration,
-                  const calib::Extrinsics& extrinsics, const nlohmann::ordered_json& json,
-                  const calib::Dataset& dataset, const DatasetChoice& choice) {
+std::string report_text(const calib::Calibration& calibration, const calib::Extrinsics& extrinsics,
+                        const nlohmann::ordered_json& json, const calib::Dataset& dataset,
+                        const DatasetChoice& choice) {
   calib::ReportInputs inputs;
   if (!extrinsics.inputs.refiner.empty()) inputs.points = calib::target_points(target_of(choice, dataset));
   for (const calib::Frame& frame : dataset.frames) inputs.images.push_back(frame.image);
-  data::write_atomically(path, calib::render_report(calibration, extrinsics, json, inputs));
+  return calib::render_report(calibration, extrinsics, json, inputs);
 }
 
 std::string fixed(double value, int digits) {
   char text[40];
   std::snprintf(text, sizeof text, "%.*f", digits, value);
   return text;
+}
+
+/// With as many digits as show the deviation.
+std::string with_deviation(double value, double sd) {
+  if (!(sd > 0)) return fixed(value, 1) + " (as stated)";
+  const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(sd))), 1, 6);
+  return fixed(value, digits) + " +- " + fixed(sd, digits);
 }
 
 void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
@@ -88,8 +97,9 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
               corners.c_str(), kDegrees * extrinsics.robot_rotation_rad,
               1e3 * extrinsics.robot_translation_m);
   if (extrinsics.pixels) {
-    std::printf("lens: focal lengths %.1f +- %.1f, %.1f +- %.1f px (stated %.1f, %.1f)\n", c.lens.estimate[0],
-                c.lens.sd[0], c.lens.estimate[1], c.lens.sd[1], c.lens.stated[0], c.lens.stated[1]);
+    std::printf("lens: focal lengths %s, %s px (stated %.1f, %.1f)\n",
+                with_deviation(c.lens.estimate[0], c.lens.sd[0]).c_str(),
+                with_deviation(c.lens.estimate[1], c.lens.sd[1]).c_str(), c.lens.stated[0], c.lens.stated[1]);
     const Eigen::Vector2d warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
     std::printf(
         "target: %.4f +- %.4f times as large as stated, its middle %.2f +- %.2f and %.2f +- %.2f mm behind "
@@ -140,6 +150,23 @@ class Phases {
   std::string text_;
 };
 
+/// One line for each reason, with the pictures that it is of.
+void warn_of_unused(const calib::Calibration& calibration) {
+  std::vector<std::pair<std::string, std::string>> lines;  // reasons, pictures
+  for (std::size_t i = 0; i < calibration.views.size(); ++i) {
+    if (calibration.views[i].used) continue;
+    const std::string &reason = calibration.views[i].reason,
+                      &image = calibration.selection.observations[i].image;
+    const auto line =
+        std::find_if(lines.begin(), lines.end(), [&](const auto& known) { return known.first == reason; });
+    if (line == lines.end())
+      lines.emplace_back(reason, image);
+    else
+      line->second += ", " + image;
+  }
+  for (const auto& [reason, images] : lines) warn_calib(images + ": not used: " + reason);
+}
+
 calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
                               const calib::Dataset& dataset, const calib::CalibrateSettings& settings,
                               Phases& phases) {
@@ -155,6 +182,7 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
     const std::vector<calib::Detection> detections =
         detect_all(dataset, target, options.dataset, options.common, LeftOut::told_later);
     phases.end("corners");
+    const Progress progress("solving", options.common);
     try {
       solved = calib::calibrate_images(setup, dataset, target, detections,
                                        calib::read_depth(dataset, detections), settings);
@@ -237,23 +265,25 @@ int run_handeye(const HandEyeOptions& options) {
   extrinsics.transform.child = options.child;
   json["transform"] = calib::to_json(extrinsics.transform);
   const std::string text = data::format_json(json);
-  if (!options.out.empty()) data::write_atomically(options.out, text);
-  if (!report.empty()) write_report(report, solved.calibration, extrinsics, json, dataset, options.dataset);
-  if (!options.ros.empty())
-    data::write_atomically(options.ros, calib::ros_static_transform(extrinsics.transform));
-  if (!options.urdf.empty()) data::write_atomically(options.urdf, calib::urdf_joint(extrinsics.transform));
-  if (!options.easy_handeye2.empty())
-    data::write_atomically(options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup));
-  if (!options.camera_info.empty() && extrinsics.pixels)
-    data::save_camera_info(solved.calibration.refined.bundle.intrinsics.front(), options.camera_info);
+  const std::string html =
+      report.empty() ? "" : report_text(solved.calibration, extrinsics, json, dataset, options.dataset);
+  {
+    // Another run may have written meanwhile, and none writes before all files of this one are there.
+    const data::FolderLock lock(options.out.empty() ? report : options.out);
+    for (const std::string& path : outputs)
+      if (!path.empty()) data::check_file_free(path, options.common.force);
+    if (!options.out.empty()) data::write_atomically(options.out, text);
+    if (!report.empty()) data::write_atomically(report, html);
+    if (!options.ros.empty())
+      data::write_atomically(options.ros, calib::ros_static_transform(extrinsics.transform));
+    if (!options.urdf.empty()) data::write_atomically(options.urdf, calib::urdf_joint(extrinsics.transform));
+    if (!options.easy_handeye2.empty())
+      data::write_atomically(options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup));
+    if (!options.camera_info.empty() && extrinsics.pixels)
+      data::save_camera_info(solved.calibration.refined.bundle.intrinsics.front(), options.camera_info);
+  }
 
-  if (!options.common.quiet)
-    for (const calib::ViewResult& view : solved.calibration.views)
-      if (!view.used)
-        warn_calib(solved.calibration.selection
-                       .observations[static_cast<std::size_t>(&view - solved.calibration.views.data())]
-                       .image +
-                   ": not used: " + view.reason);
+  if (!options.common.quiet) warn_of_unused(solved.calibration);
   for (const std::string& warning : solved.calibration.warnings) warn_calib(warning);
   phases.end("writing");
   if (options.common.verbose) say(options.common, phases.text());

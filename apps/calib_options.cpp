@@ -51,7 +51,7 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   group.add_option("--camera", choice.camera,
                    "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain, JSON, npz");
   group.add_option("--depth-scale", choice.depth_scale, "Metres per count of the depth pictures")
-      ->check(positive_number())
+      ->check(number_between(1e-9, 10))
       ->capture_default_str();
   group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");
 }
@@ -102,8 +102,8 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool 
 
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset) {
   if (!choice.target.empty())
-    return std::filesystem::is_regular_file(choice.target) ? calib::load_target(choice.target)
-                                                           : calib::parse_target(choice.target);
+    return std::filesystem::exists(choice.target) ? calib::load_target(choice.target)
+                                                  : calib::parse_target(choice.target);
   if (dataset.target.empty())
     throw data::InputError(dataset.source + ": names no target; add one, as --target chessboard:9x6:0.025");
   return calib::parse_target(dataset.target);
@@ -115,14 +115,28 @@ std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const ca
   calib::DetectSettings settings;
   settings.threads = options.threads;
   settings.cache = choice.cache;
-  const bool visible = !options.quiet && isatty(STDERR_FILENO) != 0;
+  Progress progress("looking for the target", options);
   std::vector<calib::Detection> detections =
       calib::detect(dataset, target, settings, [&](int done, int total) {
-        if (visible) std::cerr << "\r" << done << " of " << total << " pictures\033[K" << std::flush;
+        progress.say(std::to_string(done) + " of " + std::to_string(total) + " pictures");
       });
-  if (visible) std::cerr << "\r\033[K";
+  progress.end();
   if (left_out == LeftOut::told && !options.quiet) warn_of_left_out(detections);
   return detections;
+}
+
+Progress::Progress(const std::string& line, const CalibCommonOptions& options)
+    : visible_(!options.quiet && isatty(STDERR_FILENO) != 0) {
+  say(line);
+}
+
+void Progress::say(const std::string& line) const {
+  if (visible_) std::cerr << "\r" << line << "\033[K" << std::flush;
+}
+
+void Progress::end() {
+  if (visible_) std::cerr << "\r\033[K" << std::flush;
+  visible_ = false;
 }
 
 void warn_of_left_out(const std::vector<calib::Detection>& detections) {

@@ -65,4 +65,18 @@ void warn_of_left_out(const std::vector<calib::Detection>& detections);
 void say(const CalibCommonOptions& options, const std::string& line);
 void warn_calib(const std::string& line);
 
+/// One line on a terminal's stderr that says what a long run is at; taken away at its end.
+class Progress {
+ public:
+  Progress(const std::string& line, const CalibCommonOptions& options);
+  ~Progress() { end(); }
+  Progress(const Progress&) = delete;
+  Progress& operator=(const Progress&) = delete;
+  void say(const std::string& line) const;
+  void end();
+
+ private:
+  bool visible_;
+};
+
 }  // namespace flash

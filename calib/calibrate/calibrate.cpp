@@ -172,7 +172,8 @@ Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observatio
                        const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                        const RefineSettings& refine_settings, const CalibrateSettings& settings) {
   for (;;) {
-    const HandEyePoses seed = shah(pose_loops(result.setup, observations));
+    const std::vector<PoseLoop> loops = pose_loops(result.setup, observations);
+    const HandEyePoses seed = better_of(loops, shah(loops), result.selection.robust_seed.poses);
     Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
     plain.priors = priors_of(camera, points, settings);
     result.refined = refine(plain, refine_settings);

@@ -34,7 +34,9 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
   result.setup = setup;
   const std::vector<Observation> observations = prepare(result, all, {Symmetry{}}, settings);
   const std::vector<PoseLoop> loops = pose_loops(setup, observations);
-  const PoseSpaceFit fit = fit_pose_space(loops, shah(loops));
+  // Half turns about three axes leave Shah's equations several solutions.
+  const PoseSpaceFit fit =
+      fit_pose_space(loops, better_of(loops, shah(loops), result.selection.robust_seed.poses));
   result.poses = fit.poses;
   result.covariance = result.repeatable = fit.covariance.topLeftCorner<6, 6>();
   result.refined.noise = {{0.0}, {fit.rotation}, {fit.translation}, {0.0}};
@@ -44,8 +46,8 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
     if (method.name == "park") method.held_out = hold_out_pairs(loops, settings.folds, park);
     if (method.name == "shah") method.held_out = hold_out_pairs(loops, settings.folds, shah);
   }
-  result.held_out = hold_out_pairs(loops, settings.folds, [](const std::vector<PoseLoop>& train) {
-    return fit_pose_space(train, shah(train)).poses;
+  result.held_out = hold_out_pairs(loops, settings.folds, [&fit](const std::vector<PoseLoop>& train) {
+    return fit_pose_space(train, better_of(train, shah(train), fit.poses)).poses;
   });
   result.use = use_error(Use::workspace, result.held_out, std::nullopt);
   result.comparison.push_back({.name = "pose_space",

@@ -26,10 +26,14 @@ std::vector<fs::path> files_in(const fs::path& folder, const std::vector<std::st
   std::vector<fs::path> files;
   if (!fs::is_directory(folder)) return files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (!entry.is_regular_file() || !entry.path().filename().string().starts_with(beginning)) continue;
-    if (std::find(endings.begin(), endings.end(), data::lower_extension(entry.path().string())) !=
+    if (!entry.path().filename().string().starts_with(beginning)) continue;
+    if (std::find(endings.begin(), endings.end(), data::lower_extension(entry.path().string())) ==
         endings.end())
-      files.push_back(entry.path());
+      continue;
+    // What may never end is no input; a link to nothing is none either.
+    if (fs::is_other(entry.status()))
+      throw InputError(entry.path().string() + ": is a device, a pipe or a socket, expected a file");
+    if (entry.is_regular_file()) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   return files;

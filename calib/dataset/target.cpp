@@ -162,6 +162,31 @@ void append_marker(std::vector<Eigen::Vector2d>& points, const Eigen::Vector2d& 
 
 Target parse_target(const std::string& text) { return from_parts(Parts(text)); }
 
+std::string to_words(const Target& target) {
+  const std::string size = std::to_string(target.columns) + "x" + std::to_string(target.rows);
+  const std::string id = target.first_id < 0 ? "any" : std::to_string(target.first_id);
+  const auto number = [](double value) { return ":" + data::format_short(value); };
+  const std::string side = number(target.marker_size);
+  switch (target.kind) {
+    case TargetKind::chessboard:
+      return "chessboard:" + size + number(target.spacing);
+    case TargetKind::charuco:
+      return "charuco:" + size + number(target.spacing) + side + ":" + target.dictionary;
+    case TargetKind::aruco:
+      return "aruco:" + target.dictionary + ":" + id + side;
+    case TargetKind::aruco_grid:
+      return "aruco_grid:" + size + side + number(target.marker_gap) + ":" + target.dictionary + ":" + id;
+    case TargetKind::apriltag:
+      return "apriltag:" + target.dictionary + ":" + id + side;
+    case TargetKind::aprilgrid:
+      return "aprilgrid:" + size + side + number(target.marker_gap / target.marker_size) + ":" +
+             target.dictionary;
+    case TargetKind::circle_grid:
+      break;
+  }
+  return "circles:" + size + number(target.spacing) + (target.has_origin ? ":origin-dot" : "");
+}
+
 Target load_target(const std::string& path) {
   const std::string extension = data::lower_extension(path);
   if (extension == ".yaml" || extension == ".yml") return load_kalibr_target(path);

@@ -32,6 +32,9 @@ struct Target {
 /// Throws data::InputError naming the part that is wrong.
 Target parse_target(const std::string& text);
 
+/// What parse_target reads as that target.
+std::string to_words(const Target& target);
+
 /// The same from the JSON beside a recording, or from Kalibr's YAML of an aprilgrid.
 Target load_target(const std::string& path);
 

@@ -197,6 +197,30 @@ std::vector<Tag> chosen(std::vector<Tag> tags, const Target& target, const Recti
 
 }  // namespace
 
+std::optional<Target> shown_tags(const GreyImage& image, const Target& stated, const Rectifier& rectifier) {
+  const bool grid = stated.kind == TargetKind::aprilgrid;
+  Target best = stated;
+  std::size_t most = grid ? kGridTags - 1 : 0;
+  for (const char* family : {"36h11", "25h9", "36h10", "16h5"}) {  // others take a gigabyte
+    Target other = stated;
+    other.dictionary = family;
+    TagDetector detector(family, grid);
+    const std::vector<Tag> tags = grid ? detector.detect_grid(image, stated.columns * stated.rows)
+                                       : detector.detect(image);
+    if (!grid && !tags.empty() && stated.first_id >= 0) other.first_id = tags.front().id;
+    std::string reason;
+    std::size_t count = chosen(tags, other, rectifier, reason).size();
+    if (grid && count == 0) {
+      std::swap(other.columns, other.rows);
+      count = chosen(tags, other, rectifier, reason).size();
+    }
+    if (count <= most) continue;
+    most = count;
+    best = other;
+  }
+  return to_words(best) == to_words(stated) ? std::nullopt : std::optional(best);
+}
+
 Finder apriltag_finder(const Target& target, const Rectifier& rectifier) {
   const bool grid = target.kind == TargetKind::aprilgrid;
   const auto detector = std::make_shared<TagDetector>(target.dictionary, grid);

@@ -83,6 +83,7 @@ struct BoardFit {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();  ///< board [m] to rectified px
   std::vector<Eigen::Vector2i> squares;         ///< of each id
   int agreeing = 0;                             ///< marker corners within the tolerance
+  int corners = 0;                              ///< of markers that the board has
 };
 
 BoardFit fit_board(const Target& target, const Markers& markers, const Rectifier& rectifier,
@@ -101,6 +102,7 @@ BoardFit fit_board(const Target& target, const Markers& markers, const Rectifier
       pixels.push_back(rectifier.rectified(quad[static_cast<std::size_t>(i)]));
     }
   }
+  fit.corners = static_cast<int>(plane.size());
   fit.H = homography(plane, pixels, kTolerance);
   for (std::size_t i = 0; i < plane.size(); ++i)
     fit.agreeing += !fit.H.isZero() && (apply(fit.H, plane[i]) - pixels[i]).norm() < kTolerance;
@@ -152,7 +154,67 @@ Found charuco_corners(const GreyImage& image, const Target& target, const Rectif
   return found;
 }
 
+/// The smallest dictionary of a family that has the ids: OpenCV's larger ones begin with the smaller.
+std::string dictionary_of_family(const std::string& family, int largest_id) {
+  for (const int count : {50, 100, 250})
+    if (largest_id < count) return family + std::to_string(count);
+  return family + "1000";
+}
+
+/// Whether a board with other counts holds the markers seen; both ways to begin a board.
+bool holds(const Target& board, const Markers& markers, const Rectifier& rectifier) {
+  for (const bool marker_first : {false, true}) {
+    if (marker_first && board.rows % 2 == 1) continue;
+    const BoardFit fit = fit_board(board, markers, rectifier, marker_first);
+    if (fit.corners == 4 * static_cast<int>(markers.size()) && 10 * fit.agreeing >= 9 * fit.corners)
+      return true;
+  }
+  return false;
+}
+
+/// Counts of a ChArUco board by where its markers lie: as stated, exchanged, or others.
+bool recount(Target& board, const Markers& markers, const Rectifier& rectifier) {
+  constexpr int kMost = 20;
+  if (holds(board, markers, rectifier)) return true;
+  std::swap(board.columns, board.rows);
+  if (holds(board, markers, rectifier)) return true;
+  for (int columns = 3; columns <= kMost; ++columns) {
+    board.columns = columns;
+    board.rows = std::max(3, (2 * (markers.rbegin()->first + 1) + columns - 1) / columns);
+    if (holds(board, markers, rectifier)) return true;
+  }
+  return false;
+}
+
 }  // namespace
+
+std::optional<Target> shown_markers(const GreyImage& image, const Target& stated,
+                                    const Rectifier& rectifier) {
+  constexpr std::size_t kOfABoard = 4;  // markers, fewer may be chance
+  const bool single = stated.kind == TargetKind::aruco;
+  const std::size_t least = single ? 1 : kOfABoard;
+  Target best = stated;
+  std::vector<int> repeated;
+  Markers most = find_markers(image, dictionary_of(stated.dictionary), repeated);
+  if (most.size() < least)
+    for (const std::string family : {"DICT_4X4_", "DICT_5X5_", "DICT_6X6_", "DICT_7X7_", "DICT_ARUCO_"}) {
+      const bool original = family == "DICT_ARUCO_";
+      Markers markers =
+          find_markers(image, dictionary_of(family + (original ? "ORIGINAL" : "1000")), repeated);
+      if (markers.size() <= most.size()) continue;
+      most = std::move(markers);
+      best.dictionary =
+          original ? family + "ORIGINAL" : dictionary_of_family(family, most.rbegin()->first);
+    }
+  if (most.size() < least) return std::nullopt;
+  if (stated.kind != TargetKind::charuco) {
+    if (single && most.size() > 1) return std::nullopt;
+    if (stated.first_id >= 0) best.first_id = most.begin()->first;
+  } else if (!recount(best, most, rectifier)) {
+    return std::nullopt;
+  }
+  return to_words(best) == to_words(stated) ? std::nullopt : std::optional(best);
+}
 
 Finder aruco_finder(const Target& target, const Rectifier& rectifier) {
   return [target, &rectifier, dictionary = dictionary_of(target.dictionary)](const GreyImage& image) {
@@ -206,7 +268,8 @@ Finder charuco_finder(const Target& target, const Rectifier& rectifier) {
       const BoardFit other = fit_board(target, markers, rectifier, true);
       if (other.agreeing > fit.agreeing) fit = other;
     }
-    if (fit.agreeing < 4) {
+    // Of markers that lie otherwise the corners of one agree, whichever it is.
+    if (fit.agreeing < 4 || 2 * fit.agreeing < fit.corners) {
       found.reason = markers.empty()
                          ? "no marker of the ChArUco board"
                          : "the markers seen do not agree with a ChArUco board of " +

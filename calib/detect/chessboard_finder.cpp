@@ -157,6 +157,7 @@ bool lacks_a_side(const Sighting& sighting, const Target& target) {
 struct Board {
   std::vector<Grid> grids;  ///< by way of finding, those that were successful
   bool by_sectors = false;  ///< the last of them is OpenCV's sectors
+  bool exhausted = false;   ///< there is no other way to find it
   Sighting fitted{kImageModel, {}, {}};
   std::size_t seed = 0;  ///< the grid that the fit started from
 };
@@ -171,19 +172,33 @@ void fit(const GreyImage& image, const Rectifier& rectifier, Board& board) {
   }
 }
 
+Grid grid_of(const GreyImage& image, const Target& target, Corners corners) {
+  Grid grid{target.columns, target.rows, std::move(corners)};
+  put_in_order(image, grid);
+  return grid;
+}
+
+/// The classic search takes up to 20 s where it fails, as it does on boards that a wide lens bends: it is asked
+/// only where sectors are not enough.
 Board find_board(const GreyImage& image, const Target& target, Search search) {
-  Corners classic, sectors = find_sectors(image, target);
-  if (search == Search::thorough) {
-    classic = find_classic(image, target);  // takes seconds where there is no such board
-    if (classic.empty() && sectors.empty()) sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
+  Corners sectors = find_sectors(image, target), classic;
+  const bool exhausted = search == Search::quick || sectors.empty();
+  if (search == Search::thorough && sectors.empty()) {
+    classic = find_classic(image, target);
+    if (classic.empty()) sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
   }
-  Board board{.grids = {}, .by_sectors = !sectors.empty()};
-  for (Corners* corners : {&classic, &sectors}) {
-    if (corners->empty()) continue;
-    board.grids.push_back({target.columns, target.rows, std::move(*corners)});
-    put_in_order(image, board.grids.back());
-  }
+  Board board{.grids = {}, .by_sectors = !sectors.empty(), .exhausted = exhausted};
+  for (Corners* corners : {&classic, &sectors})
+    if (!corners->empty()) board.grids.push_back(grid_of(image, target, std::move(*corners)));
   return board;
+}
+
+/// The classic search's corners before those of the sectors.
+void add_classic(const GreyImage& image, const Target& target, Board& board) {
+  Corners classic = find_classic(image, target);
+  if (classic.empty()) return;
+  board.grids.insert(board.grids.begin(), grid_of(image, target, std::move(classic)));
+  ++board.seed;
 }
 
 }  // namespace
@@ -202,6 +217,10 @@ Finder chessboard_finder(const Target& target, const Rectifier& rectifier, Searc
       return static_cast<double>(board.fitted.points.size()) >= kLeastShare * static_cast<double>(count);
     };
     fit(image, rectifier, board);
+    if (!enough() && !board.exhausted) {
+      add_classic(image, target, board);
+      fit(image, rectifier, board);
+    }
     // A pattern that is thrown on the board, as infrared cameras do, is finer than its squares.
     if (!enough()) fit(smoothed(image), rectifier, board);
     const bool half = 2 * board.fitted.points.size() >= count;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <mutex>
 #include <optional>
 #include <tuple>
@@ -163,6 +164,29 @@ std::optional<Target> miscounted_board(const Dataset& dataset, const Target& tar
   return {};
 }
 
+/// What most of the first pictures show instead of the target, in words; empty where they do not agree.
+std::string shown_instead(const Dataset& dataset, const Target& target, const Rectifier& rectifier) {
+  constexpr std::size_t kPictures = 4;
+  const bool tags = target.kind == TargetKind::apriltag || target.kind == TargetKind::aprilgrid;
+  if (!tags && target.kind != TargetKind::aruco && target.kind != TargetKind::aruco_grid &&
+      target.kind != TargetKind::charuco)
+    return {};
+  std::map<std::string, std::size_t> votes;
+  std::size_t asked = 0;
+  for (std::size_t i = 0; i < std::min(kPictures, dataset.frames.size()); ++i) try {
+      const GreyImage image = load_grey_image(dataset.frames[i].image);
+      ++asked;
+      const std::optional<Target> shown =
+          tags ? shown_tags(image, target, rectifier) : shown_markers(image, target, rectifier);
+      if (shown) ++votes[to_words(*shown)];
+    } catch (const data::InputError&) {
+      continue;  // a picture that cannot be read shows nothing
+    }
+  for (const auto& [words, count] : votes)
+    if (2 * count > asked) return words;
+  return {};
+}
+
 }  // namespace
 
 void take_picture_size(Dataset& dataset) {
@@ -217,6 +241,10 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
   drop_misfits(settings, detections);
   const bool none = std::all_of(detections.begin(), detections.end(),
                                 [](const Detection& detection) { return detection.readings.empty(); });
+  const std::string shown = none ? shown_instead(dataset, target, rectifier) : std::string();
+  if (!shown.empty())
+    throw data::InputError(dataset.source + ": the target is seen in none of " + std::to_string(count) +
+                           " pictures; but they show another: --target " + shown);
   if (none)
     throw data::InputError(dataset.source + ": the target is seen in none of " + std::to_string(count) +
                            " pictures" +

@@ -1,26 +1,22 @@
 #include "calib/detect/grey_image.h"
 
-#include <algorithm>
 #include <opencv2/imgcodecs.hpp>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
+#include "data/png_reader.h"
 
 namespace flash::calib {
-namespace {
-
-/// The decoder tells the terminal of a PNG that was cut off; here it is told to the user.
-bool cut_off(const std::string& file) {
-  return file.starts_with("\x89PNG") &&
-         file.find("IEND", file.size() - std::min<std::size_t>(file.size(), 64)) == std::string::npos;
-}
-
-}  // namespace
-
 GreyImage load_grey_image(const std::string& path) {
-  const std::string file = data::read_file(path);
-  data::check_png_size(file, path);
-  if (cut_off(file)) throw data::InputError(path + ": cannot be read as a picture: it ends within its data");
+  if (data::read_file(path).starts_with("\x89PNG")) {  // whose decoder would tell the terminal what is wrong
+    data::RawPng png;
+    try {
+      png = data::read_png(path, data::PngSamples::grey);
+    } catch (const data::InputError& error) {
+      throw data::InputError(std::string(error.what()) + ", so it cannot be read as a picture");
+    }
+    return {png.width, png.height, std::move(png.bytes)};
+  }
   cv::Mat picture;
   try {
     picture = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);

@@ -2,7 +2,9 @@
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calib/geometry/pose.h"
 
@@ -25,6 +27,15 @@ Eigen::VectorXd solve_translations(const std::vector<PoseLoop>& loops, const Eig
   }
   // Minimum norm where the rotations do not determine it.
   return A.completeOrthogonalDecomposition().solve(b);
+}
+
+/// Closing errors, translations over the distance to the target.
+double combined(const std::vector<PoseLoop>& loops, const HandEyePoses& poses) {
+  double distance = 0;
+  for (const PoseLoop& loop : loops)
+    distance += loop.C.translation().norm() / static_cast<double>(loops.size());
+  const ClosingError error = closing_rms(loops, poses);
+  return std::hypot(error.rotation, error.translation / std::max(distance, 1e-9));
 }
 
 }  // namespace
@@ -51,6 +62,39 @@ HandEyePoses park(const std::vector<PoseLoop>& loops) {
   for (const PoseLoop& loop : loops) targets.push_back(loop.G * poses.X * loop.C);
   poses.Z = mean_pose(targets);
   return poses;
+}
+
+HandEyePoses half_turns(const std::vector<PoseLoop>& loops) {
+  const auto turn_of = [](const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+    return rotation_log(a.linear() * b.linear());
+  };
+  Eigen::Vector3d robot[2], camera[2];
+  for (std::size_t k = 0; k < 2; ++k) {
+    robot[k] = turn_of(loops[k + 1].G.inverse(), loops[0].G);
+    camera[k] = turn_of(loops[k + 1].C, loops[0].C.inverse());
+  }
+  HandEyePoses best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double first : {1.0, -1.0})
+    for (const double second : {1.0, -1.0}) {
+      const Eigen::Vector3d b[2] = {first * camera[0], second * camera[1]};
+      HandEyePoses poses;
+      poses.X.linear() = nearest_rotation(robot[0] * b[0].transpose() + robot[1] * b[1].transpose() +
+                                          robot[0].cross(robot[1]) * b[0].cross(b[1]).transpose());
+      poses.X.translation() = solve_translations(loops, poses.X.linear(), false).head<3>();
+      std::vector<Eigen::Isometry3d> targets;
+      for (const PoseLoop& loop : loops) targets.push_back(loop.G * poses.X * loop.C);
+      poses.Z = mean_pose(targets);
+      const double score = combined(loops, poses);
+      if (score >= least) continue;
+      least = score;
+      best = poses;
+    }
+  return best;
+}
+
+HandEyePoses better_of(const std::vector<PoseLoop>& loops, const HandEyePoses& a, const HandEyePoses& b) {
+  return combined(loops, b) < combined(loops, a) ? b : a;
 }
 
 HandEyePoses shah(const std::vector<PoseLoop>& loops) {

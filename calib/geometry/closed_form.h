@@ -30,6 +30,10 @@ HandEyePoses park(const std::vector<PoseLoop>& loops);
 /// by least squares.
 HandEyePoses shah(const std::vector<PoseLoop>& loops);
 
+/// As Park and Martin's for turns of nearly half a circle, whose logarithms have either sign: of both signs of each
+/// motion's the solution that closes best, its translations by least squares. Of three views.
+HandEyePoses half_turns(const std::vector<PoseLoop>& loops);
+
 /// How far Z^-1 G X C is from the identity.
 struct ClosingError {
   double rotation = 0;     ///< [rad]
@@ -37,6 +41,9 @@ struct ClosingError {
 };
 ClosingError closing_error(const PoseLoop& loop, const HandEyePoses& poses);
 ClosingError closing_rms(const std::vector<PoseLoop>& loops, const HandEyePoses& poses);
+
+/// The one that closes better, turns and translations taken over the distance to the target.
+HandEyePoses better_of(const std::vector<PoseLoop>& loops, const HandEyePoses& a, const HandEyePoses& b);
 
 /// The same between all pairs of views, of A X = X B with A = G_j^-1 G_i, B = C_j C_i^-1: free of Z.
 ClosingError relative_rms(const std::vector<PoseLoop>& loops, const Eigen::Isometry3d& X);

@@ -118,21 +118,39 @@ RobustSeed robust_seed_of(const Reading& reading, const std::vector<Observation>
     if (!reading.known[i]) continue;
     for (const Symmetry& symmetry : symmetries)
       for (const Eigen::Isometry3d& T : observations[i].T_camera_target)
-        candidates[i].push_back(T * symmetry.turn.inverse());
+        candidates[i].push_back((reading.target_inverted ? T.inverse() : T) * symmetry.turn.inverse());
   }
   return find_robust_seed(robot, candidates, settings);
 }
 
+/// Pairs of poses, which no picture shows.
+bool are_pairs(const std::vector<Observation>& observations) {
+  return std::none_of(observations.begin(), observations.end(),
+                      [](const Observation& observation) { return observation.pixels.cols() > 0; });
+}
+
+/// No camera sees what is behind it: such poses of pairs are T_target_camera. They are the same equations as the
+/// robot's poses inverted, X and Z exchanged.
+bool targets_behind(const std::vector<Observation>& observations) {
+  if (!are_pairs(observations)) return false;
+  const auto behind = std::count_if(observations.begin(), observations.end(), [](const Observation& observation) {
+    return !observation.T_camera_target.empty() && observation.T_camera_target.front().translation().z() < 0;
+  });
+  return 2 * static_cast<std::size_t>(behind) > observations.size();
+}
+
 /// Eye-to-hand with its poses is eye-in-hand with their inverses: the same equations. What tells them apart
 /// is which of the two constant transforms is short enough for a mount.
-void name_setup(Setup stated, const RobustSeed& found, std::string& sentence) {
+void name_setup(Setup stated, bool pairs, const RobustSeed& found, std::string& sentence) {
   const bool stated_in_hand = stated == Setup::eye_in_hand;
   const double camera = found.poses.X.translation().norm(), target = found.poses.Z.translation().norm();
   // In the found reading X is base <- camera if the camera stands still, gripper <- camera if it rides.
   const bool camera_rides = camera < target;
   if (camera_rides != stated_in_hand)
-    sentence = stated_in_hand ? "the setup is eye-to-hand, not eye-in-hand (or the poses are T_gripper_base)"
-                              : "the setup is eye-in-hand, not eye-to-hand (or the poses are T_gripper_base)";
+    sentence =
+        std::string(stated_in_hand ? "the setup is eye-to-hand, not eye-in-hand (or the poses are T_gripper_base"
+                                   : "the setup is eye-in-hand, not eye-to-hand (or the poses are T_gripper_base") +
+        (pairs ? ", or those of the target T_target_camera)" : ")");
   else
     sentence =
         "the poses are inverted: they are T_gripper_base where T_base_gripper is expected (or the setup is " +
@@ -186,7 +204,15 @@ std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observa
   };
   const Poses& poses = as_stated.T_base_gripper;
   std::vector<Reading> readings;
-  readings.push_back(with("", inverted(poses)));  // named by what it finds
+  if (targets_behind(observations)) {
+    readings.push_back(with(
+        "the target's poses are inverted: they are T_target_camera where T_camera_target is expected, and put "
+        "it behind the camera",
+        poses));
+    readings.back().target_inverted = true;
+  } else {
+    readings.push_back(with("", inverted(poses)));  // named by what it finds
+  }
   add_pairings(as_stated, readings);
   readings.push_back(
       with("translations of the robot are millimetres where metres were expected", scaled(poses, 1e-3)));
@@ -230,10 +256,11 @@ std::optional<Finding> check_convention(Setup setup, const std::vector<Observati
   const double score = seeds[chosen].score;
   for (std::size_t i = 0; i < seeds.size(); ++i)
     if (seeds[i].found && seeds[i].score < settings.runner_up * score &&
-        !same_poses(readings[i].T_base_gripper, readings[chosen].T_base_gripper))
+        !(readings[i].target_inverted == readings[chosen].target_inverted &&
+          same_poses(readings[i].T_base_gripper, readings[chosen].T_base_gripper)))
       return std::nullopt;
   Finding best{.sentence = readings[chosen].sentence, .stated = stated, .found = seeds[chosen]};
-  if (best.sentence.empty()) name_setup(setup, best.found, best.sentence);
+  if (best.sentence.empty()) name_setup(setup, are_pairs(observations), best.found, best.sentence);
   best.sentence += ": so the chain closes to " + closing_text(best.found) + ", as stated to " +
                    (stated.found ? closing_text(stated) : std::string("nothing consistent"));
   return best;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 
 #include "calib/solve/linearization.h"
 
@@ -10,6 +11,21 @@ namespace {
 
 // Below these a noise level means an exact robot or an exact corner; smaller ones only cost digits.
 constexpr double kFloorPixels = 1e-4, kFloorRotation = 1e-6, kFloorTranslation = 1e-6, kFloorDepth = 1e-5;
+
+/// Few poses hardly tell how noisy they are, and their likelihood is often highest where one kind of noise is
+/// none: what is usual of corners, arms and depth cameras then counts, within a factor of three.
+constexpr std::size_t kFewPoses = 8;
+constexpr double kUsualPixels = 0.2, kUsualRotation = 0.1 * M_PI / 180, kUsualTranslation = 1e-3,
+                 kUsualDepth = 2e-3;
+
+LinearModel linear_model(const Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings) {
+  LinearModel model = linearize(bundle, noise, settings);
+  if (settings.unknowns.corrections && bundle.poses.size() < kFewPoses * bundle.bases.size())
+    model.noise = {to_components(uniform_noise(bundle, kUsualPixels, kUsualRotation, kUsualTranslation,
+                                               kUsualDepth)),
+                   1};
+  return model;
+}
 
 /// Middle of what each arm's gripper saw or held, in the gripper.
 std::vector<Eigen::Vector3d> target_places(const Bundle& bundle) {
@@ -41,7 +57,7 @@ bool choose_pivots(Bundle& bundle, const NoiseLevels& noise, const BundleSetting
   double least = 0, share_of_least = 0;
   for (const double share : {0.0, 0.25, 0.5, 0.75, 1.0}) {
     for (std::size_t arm = 0; arm < places.size(); ++arm) trial.pivots[arm] = share * places[arm];
-    const LinearModel model = linearize(trial, noise, settings);
+    const LinearModel model = linear_model(trial, noise, settings);
     const VarianceComponents estimate = estimate_variance_components(model, start, floor);
     const double deviance = solve_linear(model, estimate.sigmas).deviance + (share > 0 ? kClearly : 0);
     if (share > 0 && deviance >= least) continue;
@@ -72,7 +88,7 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
   bool pivots_chosen = !settings.estimate_noise || !settings.estimate_pivots;
   for (; result.rounds < settings.rounds && !result.converged; ++result.rounds) {
     const BundleSummary summary = solve_bundle(result.bundle, result.noise, settings.bundle);
-    model = linearize(result.bundle, result.noise, settings.bundle);
+    model = linear_model(result.bundle, result.noise, settings.bundle);
     if (!settings.estimate_noise) {
       result.converged = summary.converged;
       break;
@@ -88,6 +104,9 @@ Refinement refine(Bundle bundle, const RefineSettings& settings) {
   if (settings.estimate_noise) {
     result.noise_log_sd = estimate.log_covariance.diagonal().cwiseSqrt();
     result.covariance = adjusted_covariance(model, estimate);
+    // Of the robot's rotations, or translations: three a pose, less half of the twelve of X and Z.
+    if (model.noise.spread > 0 && result.bundle.poses.size() > 3)
+      result.covariance *= tail_growth(3 * static_cast<double>(result.bundle.poses.size()) - 6);
     return result;
   }
   const LinearSolution solution = solve_linear(model, to_components(result.noise));

@@ -1,5 +1,7 @@
 #include "calib/solve/pose_space.h"
 
+#include <cmath>
+
 #include "calib/geometry/pose.h"
 #include "calib/solve/reml.h"
 
@@ -26,6 +28,9 @@ std::pair<Eigen::Matrix<double, 3, kShared + 1>, Eigen::Matrix<double, 3, kShare
 
 LinearModel linearize(const std::vector<PoseLoop>& loops, const HandEyePoses& poses) {
   LinearModel model{.groups = 1, .components = 2, .own = 0, .shared = kShared, .blocks = {}};
+  // Few pairs hardly tell how noisy they are: what robots and trackers usually are, within a factor of three.
+  constexpr std::size_t kFew = 8;
+  if (loops.size() < kFew) model.noise = {{0.1 * M_PI / 180, 1e-3}, 1};
   for (const PoseLoop& loop : loops) {
     const auto [rotation, translation] = rows_of(loop, poses);
     model.blocks.push_back({0, 0, 3, rotation.transpose() * rotation});
@@ -49,6 +54,7 @@ PoseSpaceFit fit_pose_space(const std::vector<PoseLoop>& loops, const HandEyePos
     fit.covariance = adjusted_covariance(model, estimate);
     fit.converged = solution.shared.norm() < 1e-9;
   }
+  if (loops.size() > 3) fit.covariance *= tail_growth(3 * static_cast<double>(loops.size()) - 6);
   fit.rotation = sigmas[0];
   fit.translation = sigmas[1];
   return fit;

@@ -13,12 +13,22 @@ double log_determinant(const Eigen::LDLT<Eigen::MatrixXd>& ldlt) {
   return ldlt.vectorD().array().abs().max(1e-300).log().sum();
 }
 
+/// How far log sigma is from what is usual, in units of its spread.
+double surprise(const NoisePrior& prior, std::size_t component, double sigma) {
+  return prior.spread > 0 ? std::log(sigma / prior.usual[component]) / prior.spread : 0;
+}
+
 /// d(deviance) / d(log sigma) for each component.
-Eigen::VectorXd gradient_of(const LinearSolution& solution, const std::vector<double>& sigmas) {
+Eigen::VectorXd gradient_of(const LinearModel& model, const LinearSolution& solution,
+                            const std::vector<double>& sigmas) {
   Eigen::VectorXd gradient(solution.squares.size());
   for (Eigen::Index c = 0; c < gradient.size(); ++c) {
     const double variance = sigmas[static_cast<std::size_t>(c)] * sigmas[static_cast<std::size_t>(c)];
     gradient[c] = 2 * (solution.redundancy[c] - solution.squares[c] / variance);
+    if (model.noise.spread > 0)
+      gradient[c] += 2 *
+                     surprise(model.noise, static_cast<std::size_t>(c), sigmas[static_cast<std::size_t>(c)]) /
+                     model.noise.spread;
   }
   return gradient;
 }
@@ -41,7 +51,7 @@ Eigen::MatrixXd hessian_of(const LinearModel& model, const std::vector<double>& 
     up[static_cast<std::size_t>(c)] *= std::exp(kStep);
     down[static_cast<std::size_t>(c)] *= std::exp(-kStep);
     hessian.col(c) =
-        (gradient_of(solve_linear(model, up), up) - gradient_of(solve_linear(model, down), down)) /
+        (gradient_of(model, solve_linear(model, up), up) - gradient_of(model, solve_linear(model, down), down)) /
         (2 * kStep);
   }
   return 0.5 * (hessian + hessian.transpose());
@@ -105,6 +115,8 @@ LinearSolution solve_linear(const LinearModel& model, const std::vector<double>&
   }
   for (Eigen::Index c = 0; c < solution.squares.size(); ++c)
     solution.deviance += inverse_variance[static_cast<std::size_t>(c)] * solution.squares[c];
+  for (std::size_t c = 0; c < sigmas.size(); ++c)
+    solution.deviance += std::pow(surprise(model.noise, c, sigmas[c]), 2);
   if (model.prior.size() > 0) {
     const Eigen::VectorXd x = solution.shared.homogeneous();
     solution.deviance += x.dot(model.prior * x);
@@ -123,7 +135,7 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
   LinearSolution here = solve_linear(model, result.sigmas);
   Eigen::MatrixXd hessian = Eigen::MatrixXd::Identity(model.components, model.components);
   for (; result.iterations < 50; ++result.iterations) {
-    Eigen::VectorXd gradient = gradient_of(here, result.sigmas);
+    Eigen::VectorXd gradient = gradient_of(model, here, result.sigmas);
     hessian = hessian_of(model, result.sigmas);
     for (Eigen::Index c = 0; c < gradient.size(); ++c) {
       const auto i = static_cast<std::size_t>(c);
@@ -212,6 +224,21 @@ Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComp
     covariance += mean / weights - stated + squares / weights - shift * shift.transpose();
   }
   return covariance;
+}
+
+double tail_growth(double dof) {
+  constexpr double kChiSquare99 = 16.812;  // six degrees of freedom
+  // Of F(6, dof): its regularised incomplete beta function is a polynomial.
+  const auto beyond = [dof](double f) {
+    const double x = dof / (dof + 6 * f), a = 0.5 * dof, y = 1 - x;
+    return std::pow(x, a) * (1 + a * y * (1 + 0.5 * (a + 1) * y));
+  };
+  double low = 1, high = 1e6;
+  while (high - low > 1e-6 * low) {
+    const double middle = std::sqrt(low * high);
+    (beyond(middle) > 0.01 ? low : high) = middle;
+  }
+  return 6 * low / kChiSquare99 * (dof - 2) / dof;
 }
 
 }  // namespace flash::calib

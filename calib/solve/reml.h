@@ -12,6 +12,12 @@ struct GramBlock {
   Eigen::MatrixXd gram;  ///< [J_d J_s r_0]^T [J_d J_s r_0]
 };
 
+/// What is known of standard deviations beforehand: log-normal about `usual`, `spread` of the logarithm; 0: nothing.
+struct NoisePrior {
+  std::vector<double> usual = {};  ///< of each component
+  double spread = 0;
+};
+
 /// A mixed linear model in the form that any standard deviations can be put to.
 struct LinearModel {
   int groups = 0, components = 0;
@@ -19,6 +25,7 @@ struct LinearModel {
   int shared = 0;  ///< unknowns of all
   std::vector<GramBlock> blocks;
   Eigen::MatrixXd prior = {};  ///< of the shared unknowns: [J_s r_0]^T [J_s r_0] of unit variance, or empty
+  NoisePrior noise = {};
 };
 
 /// The least squares solution for given standard deviations, group unknowns eliminated.
@@ -28,7 +35,7 @@ struct LinearSolution {
   std::vector<Eigen::VectorXd> own;
   Eigen::VectorXd squares;     ///< of each component: sum of squared residuals, unweighted
   Eigen::VectorXd redundancy;  ///< of each component: residuals minus the unknowns they pay for
-  double deviance = 0;         ///< -2 log restricted likelihood, up to a constant
+  double deviance = 0;         ///< -2 log restricted likelihood, and prior of the noise, up to a constant
 };
 LinearSolution solve_linear(const LinearModel& model, const std::vector<double>& sigmas);
 
@@ -51,5 +58,9 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
 /// component the variance of Student's distribution; to second order what Kackar and Harville 1984 and
 /// Kenward and Roger 1997 give in closed form.
 Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComponents& components);
+
+/// Student's distribution of six numbers has longer tails than the normal one of its covariance: the factor by
+/// which that has to grow for chi-square's 99 % region to hold 99 % of it. dof: degrees of freedom, above 2.
+double tail_growth(double dof);
 
 }  // namespace flash::calib

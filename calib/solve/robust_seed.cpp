@@ -87,7 +87,10 @@ class Search {
         for (const Eigen::Isometry3d& C_c : candidates_[c]) {
           const Eigen::Vector3d log_ac = rotation_log(relative(C_c, C_a.inverse()));
           if (std::abs(log_ac.norm() - axis_ac.norm()) > settings_.angle_slack) continue;
-          keep(judge(park({{robot_[a], C_a}, {robot_[b], C_b}, {robot_[c], C_c}})), best);
+          const std::vector<PoseLoop> loops = {{robot_[a], C_a}, {robot_[b], C_b}, {robot_[c], C_c}};
+          keep(judge(park(loops)), best);
+          if (M_PI - std::max(axis_ab.norm(), axis_ac.norm()) < settings_.angle_slack)
+            keep(judge(half_turns(loops)), best);
         }
       }
     }

@@ -1,6 +1,7 @@
 #include "calib/dataset/dataset.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <filesystem>
 #include <fstream>
@@ -146,6 +147,15 @@ TEST(Dataset, EverySharedSetLoadsAsItIs) {
     EXPECT_EQ(dataset.frames.size(), static_cast<std::size_t>(frames)) << name;
     EXPECT_TRUE(dataset.setup && dataset.camera && !dataset.target.empty()) << name;
   }
+}
+
+TEST(Dataset, PipesAmongThePicturesAreNamed) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder, {"1.png", "2.png"});
+  folder.write("poses.tum", "1 0 0 0 0 0 0 1\n2 0.1 0 0 0 0 0 1\n3 0.2 0 0 0 0 0 1\n");
+  ASSERT_EQ(::mkfifo((folder / "images/3.png").c_str(), 0600), 0);
+  EXPECT_TRUE(contains(message_of(folder), "images/3.png: is a device, a pipe or a socket, expected a file"))
+      << message_of(folder);
 }
 
 }  // namespace

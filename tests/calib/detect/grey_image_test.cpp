@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
 #include "data/atomic_file.h"
 #include "data/depth_image.h"
 #include "tests/data/temporary_folder.h"
@@ -21,6 +25,37 @@ TEST(GreyImage, WhatNeverEndsOrUnpacksToTooMuchIsRefused) {
               load_grey_image(folder.write("b.png", bytes));
             }).find("found 16,388 x 16,387 pixels, expected at most 268,435,456 in all"),
             std::string::npos);
+}
+
+TEST(GreyImage, PngIsTheSameAsOpenCvReadsIt) {
+  const data::TemporaryFolder folder;
+  cv::Mat colour(37, 53, CV_8UC3), grey(37, 53, CV_8UC1), deep(37, 53, CV_16UC1), clear(37, 53, CV_8UC4);
+  for (cv::Mat* picture : {&colour, &grey, &deep, &clear})
+    cv::randu(*picture, cv::Scalar::all(0), cv::Scalar::all(picture == &deep ? 65536 : 256));
+  for (const auto& [name, picture] :
+       {std::pair("colour.png", &colour), {"grey.png", &grey}, {"deep.png", &deep}, {"clear.png", &clear}}) {
+    const std::string path = folder / name;
+    cv::imwrite(path, *picture);
+    const cv::Mat theirs = cv::imread(path, cv::IMREAD_GRAYSCALE);
+    const GreyImage ours = load_grey_image(path);
+    ASSERT_EQ(ours.width, theirs.cols) << name;
+    ASSERT_EQ(ours.pixels.size(), theirs.total()) << name;
+    EXPECT_EQ(0, std::memcmp(ours.pixels.data(), theirs.data, theirs.total())) << name;
+  }
+}
+
+TEST(GreyImage, WhatIsWrongWithAPngIsSaidOnce) {
+  const data::TemporaryFolder folder;
+  cv::Mat picture(200, 200, CV_8UC1);
+  cv::randu(picture, 0, 256);
+  cv::imwrite(folder / "a.png", picture);
+  std::string bytes = data::read_file(folder / "a.png");
+  for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 40; ++i) bytes[i] ^= 0x5a;
+  const std::string path = folder.write("b.png", bytes);
+  testing::internal::CaptureStderr();
+  const std::string said = data::input_error_of([&] { load_grey_image(path); });
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_NE(said.find("b.png: PNG cannot be decoded"), std::string::npos) << said;
 }
 
 }  // namespace

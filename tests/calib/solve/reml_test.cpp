@@ -157,5 +157,33 @@ TEST(VarianceComponents, MeanOfFewGroupsIsLessCertainHoweverWeakTheirSpread) {
   }
 }
 
+TEST(VarianceComponents, WhatIsUsualDecidesWhereThereIsNothingElse) {
+  // One residual of each of two components, whose sizes are anything: the prior's equation alone is left.
+  LinearModel model = one_way_of(2, 2.0);
+  const double free = estimate_variance_components(model, {1, 1}, {1e-6, 1e-6}).sigmas[1];
+  model.noise = {{1, 0.1}, 1e-4};
+  const VarianceComponents held = estimate_variance_components(model, {1, 1}, {1e-6, 1e-6});
+  EXPECT_NEAR(held.sigmas[1], 0.1, 1e-5);
+  EXPECT_GT(std::abs(free - 0.1), 0.1);
+  // A wide one changes nothing; its gradient is that of the deviance by finite differences.
+  model.noise = {{1, 0.1}, 1e4};
+  EXPECT_NEAR(estimate_variance_components(model, {1, 1}, {1e-6, 1e-6}).sigmas[1], free, 1e-5);
+  model.noise = {{0.7, 0.1}, 1};
+  const VarianceComponents found = estimate_variance_components(model, {1, 1}, {1e-6, 1e-6});
+  for (std::size_t c = 0; c < 2; ++c) {
+    std::vector<double> up = found.sigmas, down = found.sigmas;
+    up[c] *= 1 + 1e-4;
+    down[c] *= 1 - 1e-4;
+    const double slope = (solve_linear(model, up).deviance - solve_linear(model, down).deviance) / 2e-4;
+    EXPECT_NEAR(slope, 0, 1e-4);
+  }
+}
+
+TEST(VarianceComponents, TailsGrowAsTablesOfTheFDistributionSay) {
+  // Upper 1 % points of F with 6 and so many degrees of freedom (Abramowitz and Stegun 1964, table 26.9).
+  for (const auto& [freedom, point] : {std::pair{6.0, 8.47}, {10.0, 5.39}, {20.0, 3.87}, {60.0, 3.12}})
+    EXPECT_NEAR(tail_growth(freedom) * 16.812 / 6 * freedom / (freedom - 2), point, 0.006);
+}
+
 }  // namespace
 }  // namespace flash::calib

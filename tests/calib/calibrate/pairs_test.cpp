@@ -1,0 +1,73 @@
+// Pairs of poses: what a tracker says in place of pictures.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "calib/calibrate/calibrate_pairs.h"
+#include "tests/data/temporary_folder.h"
+#include "tests/calib/hand_eye_scene.h"
+
+namespace flash::calib {
+namespace {
+
+using Mount = calib::Setup;  // testing::Test has a private member of the name Setup
+
+std::vector<Observation> pairs_of(const HandEyeScene& scene) {
+  std::vector<Observation> pairs = scene.observations;
+  for (Observation& pair : pairs) {
+    pair.points.clear();
+    pair.pixels.resize(2, 0);
+  }
+  return pairs;
+}
+
+/// Robot and target as they truly stand, but for noise of 0.05 deg and 0.5 mm, at gripper poses of turns by half a
+/// circle about three axes.
+HandEyeScene half_turns_scene() {
+  HandEyeScene scene = protocol_scene(Mount::eye_in_hand, 0, 0, 3);
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(-0.15, 0.15);
+  const Eigen::Isometry3d first = scene.true_poses.front();
+  for (std::size_t i = 0; i < scene.observations.size(); ++i) {
+    const Eigen::Vector3d axis = i % 4 == 0 ? Eigen::Vector3d::Zero().eval()
+                                            : Eigen::Vector3d::Unit(static_cast<Eigen::Index>(i % 4) - 1).eval();
+    const Eigen::Isometry3d pose = first * make_pose({uniform(random), uniform(random), uniform(random)}, M_PI * axis);
+    Vector6d noise;
+    for (Eigen::Index k = 0; k < 6; ++k) noise[k] = (k < 3 ? 5e-4 : 0.05 * M_PI / 180) * normal(random);
+    scene.observations[i].T_base_gripper = moved(pose, noise);
+    scene.observations[i].T_camera_target = {scene.truth.X.inverse() * pose.inverse() * scene.truth.Z};
+  }
+  return scene;
+}
+
+TEST(Pairs, WhoseTurnsAreAllByHalfACircleAreSolved) {
+  const HandEyeScene scene = half_turns_scene();
+  const Calibration result = calibrate_pairs(Mount::eye_in_hand, pairs_of(scene));
+  EXPECT_TRUE(result.usable);
+  const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+  EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
+}
+
+TEST(Pairs, WhoseTargetPosesAreInvertedAreNamed) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand}) {
+    std::vector<Observation> pairs = pairs_of(protocol_scene(setup, 0.05, 0.5, 7));
+    for (Observation& pair : pairs) pair.T_camera_target = {pair.T_camera_target.front().inverse()};
+    const std::string said = data::input_error_of([&] { calibrate_pairs(setup, pairs); });
+    EXPECT_EQ(said.substr(0, 33), "the target's poses are inverted: ") << said;
+  }
+}
+
+TEST(Pairs, ThatMayBeInvertedInThreeWaysAreToldAllOfThem) {
+  // A target whose z looks at the camera is before it in either direction of its poses.
+  const Eigen::Isometry3d turned(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX()));
+  std::vector<Observation> pairs = pairs_of(protocol_scene(Mount::eye_in_hand, 0.05, 0.5, 7));
+  for (Observation& pair : pairs) pair.T_camera_target = {(pair.T_camera_target.front() * turned).inverse()};
+  const std::string said = data::input_error_of([&] { calibrate_pairs(Mount::eye_in_hand, pairs); });
+  EXPECT_NE(said.find("(or the poses are T_gripper_base, or those of the target T_target_camera)"),
+            std::string::npos)
+      << said;
+}
+
+}  // namespace
+}  // namespace flash::calib
