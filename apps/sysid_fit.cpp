@@ -29,6 +29,7 @@ struct FitOptions {
   double repeatability = 0;  ///< [m]; 0: not given
   bool no_solver_check = false;
   bool no_horizon = false;
+  bool no_plan = false;
   bool resume = false;
   std::string rollouts;
   std::string out;
@@ -196,6 +197,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
                             : options.common.force ? sysid::Existing::replace
                                                    : sysid::Existing::refuse);
   Search search{asset, std::move(replays), grid, asked, {}, device, options.out, begin};
+  search.plan = !options.no_plan;
   return run_search(search, store, options.common);
 }
 
@@ -217,6 +219,7 @@ void add_fit_verb(CLI::App& app, Action& action) {
   verb->add_flag("--no-solver-check", options->no_solver_check,
                  "Do not solve the estimate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
+  verb->add_flag("--no-plan", options->no_plan, "Do not say what to record next, which takes simulations");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions; without it, that of the search it starts from");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");

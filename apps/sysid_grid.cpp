@@ -31,6 +31,7 @@ struct GridOptions {
   double repeatability = 0;  ///< [m]; 0: the residual stands for it
   bool no_solver_check = false;
   bool no_horizon = false;
+  bool no_plan = false;
   bool resume = false;
   std::string rollouts;
   std::vector<std::string> map;
@@ -148,6 +149,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   asked.horizon = !options.no_horizon;
   asked.solver_check = !options.no_solver_check;
   Search search{asset, std::move(replays), settings, asked, options.map, device, options.out, begin};
+  search.plan = !options.no_plan;
   return run_search(search, store, options.common);
 }
 
@@ -174,6 +176,7 @@ void add_grid_verb(CLI::App& app, Action& action) {
   verb->add_flag("--no-solver-check", options->no_solver_check,
                  "Do not solve the estimate again under finer settings");
   verb->add_flag("--no-horizon", options->no_horizon, "Keep keyframes beyond the predictable");
+  verb->add_flag("--no-plan", options->no_plan, "Do not say what to record next, which takes simulations");
   verb->add_option("--rollouts", options->rollouts,
                    "Folder that keeps the motions, for several searches; without it, motions/ of the run");
   verb->add_flag("--resume", options->resume, "Go on with the results in the folder");

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
@@ -14,11 +16,14 @@
 #include "data/json_reader.h"
 #include "data/text.h"
 #include "data/writable.h"
-#include "sysid/design/plan.h"
+#include "sysid/design/rank_experiments.h"
+#include "sysid/design/scratch_folder.h"
 #include "sysid/design/usual_ranges.h"
 #include "sysid/design/virtual_experiment.h"
+#include "sysid/infer/posterior.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/parameter_label.h"
+#include "sysid/report/search_folder.h"
 
 namespace flash {
 namespace {
@@ -29,6 +34,7 @@ struct PlanOptions {
   std::vector<std::string> recordings;
   std::string asset;
   std::vector<std::pair<std::string, std::string>> axes;
+  std::string run;  // of a search: what it left to be known
   double error = 1e-3;
   double keyframes = 10;
   std::string out;
@@ -39,6 +45,33 @@ std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::Materi
   std::vector<sysid::Axis> axes;
   for (const auto& [name, text] : options.axes) axes.push_back(parse_searched(name, text));
   return axes.empty() ? sysid::usual_ranges(base) : axes;
+}
+
+// What the posterior and the misfits of a search make of the settings.
+void take_search(const std::string& folder, sysid::PlanSettings& settings) {
+  const sysid::SearchFolder found = sysid::load_search_folder(folder);
+  const sysid::Summary& summary = found.summary;
+  if (summary.samples.rows() < 2 || summary.recordings.empty())
+    throw data::InputError(folder + ": found no posterior, expected a search that came to an estimate");
+  settings.grid.axes = sysid::in_own_coordinates(found.results.axes);
+  settings.at.clear();
+  std::vector<sysid::Axis> searched;
+  for (const sysid::Axis& axis : settings.grid.axes) {
+    settings.at.push_back(axis.values.size() > 1 ? summary.best.at(axis.name) : axis.values.front());
+    if (axis.values.size() > 1) searched.push_back(axis);
+  }
+  for (const auto& [name, fixed] : summary.fixed)
+    if (fixed.source == "measured") settings.grid.fixed.push_back({name, {fixed.value}, false});
+  std::vector<sysid::Misfit> misfits;
+  for (const sysid::SummaryRecording& recording : summary.recordings) misfits.push_back(recording.misfit);
+  settings.known = {sysid::covariance_of_draws(searched, summary.samples), sysid::expected_misfit(misfits)};
+}
+
+// The parameters that a plan tells of.
+std::vector<sysid::Axis> planned_axes(const sysid::PlanSettings& settings) {
+  std::vector<sysid::Axis> axes = settings.grid.axes;
+  if (settings.known) std::erase_if(axes, [](const sysid::Axis& axis) { return axis.values.size() < 2; });
+  return axes;
 }
 
 std::string spread_text(const sysid::Axis& axis, double spread) {
@@ -52,12 +85,20 @@ std::string spread_text(const sysid::Axis& axis, double spread) {
 }
 
 nlohmann::ordered_json plan_json(const std::vector<sysid::PlannedExperiment>& experiments,
-                                 const std::vector<sysid::Axis>& axes, const PlanOptions& options) {
+                                 const sysid::PlanSettings& settings) {
   nlohmann::ordered_json json;
   json["schema"] = "flash-sysid-plan/1";
-  json["error_m"] = options.error;
-  json["keyframes"] = options.keyframes;
-  const std::vector<double> before = sysid::spread_of_ranges(axes);
+  if (settings.known) {
+    json["noise_m"] = settings.known->misfit.noise;
+    json["misfit_m"] = settings.known->misfit.size;
+  } else {
+    json["error_m"] = settings.error;
+    json["keyframes"] = settings.keyframes;
+  }
+  for (const sysid::PlannedExperiment& experiment : experiments)
+    json["bits"][experiment.name] = experiment.bits;
+  const std::vector<sysid::Axis> axes = planned_axes(settings);
+  const std::vector<double> before = sysid::spread_before(settings);
   for (std::size_t k = 0; k < axes.size(); ++k) {
     std::vector<const sysid::PlannedExperiment*> order;
     for (const sysid::PlannedExperiment& experiment : experiments) order.push_back(&experiment);
@@ -85,31 +126,43 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   sysid::PlanSettings settings;
   settings.grid.base = material_base(asset, recordings.front().mesh, notices);
   settings.grid.score = score_settings(options.replay);
-  settings.grid.axes = axes_of(options, settings.grid.base);
   settings.error = options.error;
   settings.keyframes = options.keyframes;
-  settings.at = sysid::values_in_range(settings.grid.base, settings.grid.axes);
+  if (options.run.empty()) {
+    settings.grid.axes = axes_of(options, settings.grid.base);
+    settings.at = sysid::values_in_range(settings.grid.base, settings.grid.axes);
+  } else {
+    take_search(options.run, settings);
+  }
   data::check_file_free(options.out, options.common.force);
   // Refused before anything is simulated.
   sysid::steps_in(sysid::longest_virtual_experiment, options.replay.time_step);
 
   const data::SheetMaterial material = sysid::candidate_at(settings.at, settings.grid).material;
+  // Of a search: it keeps what is simulated there.
+  std::optional<sysid::MotionStore> store;
+  if (!options.run.empty()) store.emplace((std::filesystem::path(options.run) / "motions").string());
+  const sysid::MotionStore* const kept = store ? &*store : nullptr;
   std::vector<sysid::PlannedExperiment> experiments;
   for (const data::Recording& recording : recordings) {
     const std::vector<sysid::Replay> replays = {
         sysid::make_replay(data::load_recording(recording.source), replay)};
     const std::size_t batch = 2 * settings.at.size() + 1;
     sysid::check_job(replays, static_cast<double>(batch), sysid::estimate_batch(replays, batch));
-    experiments.push_back(sysid::plan_experiment(recording.name, replays, settings));
+    experiments.push_back(sysid::plan_experiment(recording.name, replays, settings, kept));
   }
+  const sysid::ScratchFolder scratch;
   for (const char* kind : sysid::virtual_experiments) {
     say(options.common, std::string("simulating ") + kind);
-    const sysid::Replay made = sysid::virtual_experiment(kind, recordings.front(), material,
-                                                         {replay.solver, threads, options.common.seed});
-    experiments.push_back(sysid::plan_experiment(kind, {made}, settings));
+    const sysid::Replay made = sysid::virtual_experiment(
+        kind, recordings.front(), material,
+        {replay.solver, threads, options.common.seed, replay.clamp_slopes}, scratch.path() + '/' + kind);
+    experiments.push_back(sysid::plan_experiment(kind, {made}, settings, kept));
   }
-  const std::vector<sysid::Axis>& axes = settings.grid.axes;
-  const std::string text = data::format_json(plan_json(experiments, axes, options));
+  std::stable_sort(experiments.begin(), experiments.end(),
+                   [](const auto& one, const auto& other) { return one.bits > other.bits; });
+  const std::vector<sysid::Axis> axes = planned_axes(settings);
+  const std::string text = data::format_json(plan_json(experiments, settings));
   end_after_signal();
   data::write_atomically(options.out, text);
   if (options.common.json) {
@@ -118,13 +171,14 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   }
   std::printf("%-16s", "experiment");
   for (const sysid::Axis& axis : axes) std::printf(" %12s", axis.name.c_str());
-  std::printf("\n%-16s", "(range alone)");
-  const std::vector<double> before = sysid::spread_of_ranges(axes);
+  std::printf(" %8s\n%-16s", "bits", settings.known ? "(as known)" : "(range alone)");
+  const std::vector<double> before = sysid::spread_before(settings);
   for (std::size_t k = 0; k < axes.size(); ++k) std::printf(" %12s", spread_text(axes[k], before[k]).c_str());
   for (const sysid::PlannedExperiment& experiment : experiments) {
     std::printf("\n%-16s", experiment.name.c_str());
     for (std::size_t k = 0; k < axes.size(); ++k)
       std::printf(" %12s", spread_text(axes[k], experiment.spread[k]).c_str());
+    std::printf(" %8.1f", experiment.bits);
   }
   std::printf("\n%s\n", options.out.c_str());
   return exit_done;
@@ -139,6 +193,8 @@ void add_plan_verb(CLI::App& app, Action& action) {
                    "Folders with recording.json: the sheet, and what is there already")
       ->required();
   verb->add_option("--asset", options->asset, "The object; without one, the asset the recording names");
+  verb->add_option("--run", options->run,
+                   "Folder of a search: its parameters, what it left unknown of them, its noise and misfit");
   verb->add_option("--error", options->error, "Distance by which model and sheet differ in a keyframe [m]")
       ->check(positive_number())
       ->capture_default_str();

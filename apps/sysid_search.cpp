@@ -1,13 +1,17 @@
 #include "apps/sysid_search.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <map>
 
 #include "apps/command_line.h"
 #include "data/error.h"
 #include "data/message_line.h"
 #include "data/text.h"
+#include "sysid/design/rank_experiments.h"
+#include "sysid/report/next_steps.h"
 #include "sysid/report/overlay.h"
 #include "sysid/report/parameter_label.h"
 #include "sysid/report/recording_names.h"
@@ -76,6 +80,8 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
                 1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
                 1000 * recording.time_offset);
   print_solver_check(summary);
+  if (!summary.next_experiments.empty())
+    for (const std::string& step : sysid::next_steps(summary)) std::printf("Next: %s\n", step.c_str());
   std::printf("%s\n%s\n", (fs::path(out) / "summary.json").c_str(), (fs::path(out) / "report.html").c_str());
 }
 
@@ -102,6 +108,38 @@ std::vector<sysid::Overlay> keep_estimate(const std::vector<std::string>& record
   return overlays;
 }
 
+// What to record next, where the recordings do not tell every parameter.
+std::vector<sysid::NextExperiment> next_experiments(const Search& search, const sysid::Answer& answer,
+                                                    const CommonOptions& options) {
+  std::vector<sysid::NextExperiment> ranked;
+  const auto is_open = [](const sysid::ParameterFinding& finding) {
+    return finding.values.size() > 1 && finding.identifiable != sysid::Identifiable::yes;
+  };
+  if (!search.plan || answer.misfits.empty() ||
+      std::none_of(answer.parameters.begin(), answer.parameters.end(), is_open))
+    return ranked;
+  sysid::PlanSettings settings;
+  settings.grid = search.settings;
+  settings.grid.axes = sysid::in_own_coordinates(settings.grid.axes);
+  settings.at = answer.values;
+  settings.known = {sysid::covariance_of_draws(settings.grid.axes, answer.samples),
+                    sysid::expected_misfit(answer.misfits)};
+  const sysid::MotionStore store(search.settings.rollouts);
+  const auto spreads = [&](const std::vector<double>& of) {
+    std::map<std::string, double> named;
+    std::size_t k = 0;
+    for (const sysid::Axis& axis : settings.grid.axes)
+      if (axis.values.size() > 1) named[axis.name] = of[k++];
+    return named;
+  };
+  const std::map<std::string, double> before = spreads(sysid::spread_before(settings));
+  for (const sysid::PlannedExperiment& experiment : sysid::rank_experiments(
+           search.replays, settings, store,
+           [&](const std::string& name) { say(options, "what to record next: simulating " + name); }))
+    ranked.push_back({experiment.name, experiment.bits, before, spreads(experiment.spread)});
+  return ranked;
+}
+
 // Judges what was found and writes the answer.
 int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptions& options) {
   sysid::GridResults results = store.results();
@@ -113,6 +151,7 @@ int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptio
         [&](const sysid::AnswerWork& done, const sysid::AnswerWork& spared) { line.take(done, spared); });
   }();
   sysid::Summary summary = sysid::summarize(results, answer, search.replays, search.settings, search.asked);
+  summary.next_experiments = next_experiments(search, answer, options);
   summary.asset = fs::absolute(search.asset.source).lexically_normal().string();
   summary.device = search.device == sim::Device::cuda ? "cuda" : "cpu";
   summary.wall_seconds =

@@ -22,6 +22,7 @@ struct Search {
   sim::Device device = sim::Device::cpu;
   std::string out;
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
+  bool plan = true;  ///< say what to record next
 };
 
 /// Shows how far an answer is, told by any thread.

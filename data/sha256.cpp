@@ -1,5 +1,10 @@
 #include "data/sha256.h"
 
+#ifdef __x86_64__
+#include <cpuid.h>
+#include <immintrin.h>
+#endif
+
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -42,14 +47,64 @@ void compress(std::array<std::uint32_t, 8>& hash, const unsigned char* block) {
   for (int k = 0; k < 8; ++k) hash[k] += mixed[k];
 }
 
+#ifdef __x86_64__
+/// The same over blocks, by the processor's own instructions: four words a register.
+__attribute__((target("sha,sse4.1"))) void compress_by_instructions(std::array<std::uint32_t, 8>& hash,
+                                                                    const unsigned char* block,
+                                                                    std::size_t blocks) {
+  const auto load = [](const void* from) { return _mm_loadu_si128(static_cast<const __m128i*>(from)); };
+  const __m128i big_endian = _mm_set_epi64x(0x0c0d0e0f08090a0bLL, 0x0405060700010203LL);
+  const __m128i abcd = _mm_shuffle_epi32(load(hash.data()), 0xb1),
+                efgh = _mm_shuffle_epi32(load(hash.data() + 4), 0x1b);
+  __m128i abef = _mm_alignr_epi8(abcd, efgh, 8), cdgh = _mm_blend_epi16(efgh, abcd, 0xf0);
+  for (; blocks > 0; --blocks, block += 64) {
+    const __m128i abef_before = abef, cdgh_before = cdgh;
+    __m128i w[4];
+    for (int t = 0; t < 4; ++t) w[t] = _mm_shuffle_epi8(load(block + 16 * t), big_endian);
+    for (int t = 0; t < 16; ++t) {
+      __m128i& now = w[t % 4];
+      const __m128i sum = _mm_add_epi32(now, load(round_constants.data() + 4 * t));
+      cdgh = _mm_sha256rnds2_epu32(cdgh, abef, sum);
+      abef = _mm_sha256rnds2_epu32(abef, cdgh, _mm_shuffle_epi32(sum, 0x0e));
+      const __m128i last = w[(t + 3) % 4];
+      now = _mm_sha256msg2_epu32(
+          _mm_add_epi32(_mm_sha256msg1_epu32(now, w[(t + 1) % 4]), _mm_alignr_epi8(last, w[(t + 2) % 4], 4)),
+          last);
+    }
+    abef = _mm_add_epi32(abef, abef_before);
+    cdgh = _mm_add_epi32(cdgh, cdgh_before);
+  }
+  const __m128i feba = _mm_shuffle_epi32(abef, 0x1b), dchg = _mm_shuffle_epi32(cdgh, 0xb1);
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(hash.data()), _mm_blend_epi16(feba, dchg, 0xf0));
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(hash.data() + 4), _mm_alignr_epi8(dchg, feba, 8));
+}
+#endif
+
+void compress_all(std::array<std::uint32_t, 8>& hash, const unsigned char* block, std::size_t blocks,
+                  [[maybe_unused]] bool by_instructions) {
+#ifdef __x86_64__
+  if (by_instructions) return compress_by_instructions(hash, block, blocks);
+#endif
+  for (; blocks > 0; --blocks, block += 64) compress(hash, block);
+}
+
 }  // namespace
 
-std::string sha256(std::string_view bytes) {
+bool has_sha256_instructions() {
+#ifdef __x86_64__
+  unsigned a = 0, b = 0, c = 0, d = 0;
+  return __get_cpuid_count(7, 0, &a, &b, &c, &d) != 0 && (b & bit_SHA) != 0 &&
+         __builtin_cpu_supports("sse4.1") != 0;
+#else
+  return false;
+#endif
+}
+
+std::string sha256(std::string_view bytes, bool by_instructions) {
   std::array<std::uint32_t, 8> hash = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
                                        0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-  std::size_t at = 0;
-  for (; at + 64 <= bytes.size(); at += 64)
-    compress(hash, reinterpret_cast<const unsigned char*>(bytes.data()) + at);
+  const std::size_t whole = bytes.size() / 64, at = 64 * whole;
+  compress_all(hash, reinterpret_cast<const unsigned char*>(bytes.data()), whole, by_instructions);
   // 5.1.1: a bit, zeros, and the length in bits.
   std::array<unsigned char, 128> tail{};
   const std::size_t rest = bytes.size() % 64;
@@ -58,7 +113,7 @@ std::string sha256(std::string_view bytes) {
   const std::size_t blocks = rest < 56 ? 1 : 2;
   const std::uint64_t bits = 8 * static_cast<std::uint64_t>(bytes.size());
   for (int k = 0; k < 8; ++k) tail[64 * blocks - 1 - k] = static_cast<unsigned char>(bits >> (8 * k));
-  for (std::size_t block = 0; block < blocks; ++block) compress(hash, tail.data() + 64 * block);
+  compress_all(hash, tail.data(), blocks, by_instructions);
 
   std::string digits;
   for (std::uint32_t word : hash) {

@@ -4,12 +4,15 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "data/error.h"
 #include "sysid/emulate/sensitivity.h"
 #include "sysid/infer/expected_information.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/observed_rows.h"
+#include "sysid/infer/solver_check.h"
+#include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 namespace {
@@ -34,7 +37,12 @@ Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix) {
 }
 
 Eigen::MatrixXd precision_before(const PlanSettings& settings) {
-  if (settings.known) return inverse(settings.known->covariance);
+  if (settings.known) {
+    constexpr double kSure = 1e-9;  // of a coordinate: what draws do not differ in
+    Eigen::MatrixXd covariance = settings.known->covariance;
+    covariance.diagonal().array() += kSure * kSure;
+    return inverse(covariance);
+  }
   Eigen::VectorXd precisions(static_cast<Eigen::Index>(settings.grid.axes.size()));
   const std::vector<double> ranges = spread_of_ranges(settings.grid.axes);
   for (std::size_t k = 0; k < ranges.size(); ++k)
@@ -75,10 +83,31 @@ Asked with_held(const PlanSettings& settings, const std::vector<Replay>& replays
   return asked;
 }
 
+/// By what the rows of one recording move with errors of the solution, one standard deviation each, as an
+/// answer reckons with them: twice the step from half the cell to cells of no size, half the step of time,
+/// more iterations. What diverges or cannot be meshed is left out.
+Eigen::MatrixXd errors_of_solution(const Replay& replay, const LinearObservations& places,
+                                   const ReplayResult& motion, const ReplayCandidate& candidate,
+                                   const MotionStore& store) {
+  constexpr double kMesh = 2.0 / 3;  // of the step to half the cell: an error of second order
+  const Eigen::VectorXd own = places.displacements(replay, motion.motion);
+  std::vector<Eigen::VectorXd> columns;
+  const auto add = [&](double share, const Replay& finer, const ReplayResult& there) {
+    if (there.finite) columns.push_back(share * (places.displacements(finer, there.motion) - own));
+  };
+  if (const std::optional<Replay> finer = on_half_the_cell(replay))
+    add(kMesh, *finer, store.run(*finer, candidate));
+  for (const FinerSolution& finer : finer_solutions({replay}, candidate, store))
+    add(1, finer.replays.front(), finer.motions.front());
+  Eigen::MatrixXd errors(places.rows(), static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t c = 0; c < columns.size(); ++c) errors.col(static_cast<Eigen::Index>(c)) = columns[c];
+  return errors;
+}
+
 /// What the rows of one recording tell of the first `searched` parameters.
 Eigen::MatrixXd information_of(const Replay& replay, const LinearObservations& places,
                                const Eigen::MatrixXd& parameters, const Eigen::MatrixXd& nuisance,
-                               const Asked& asked, const Misfit& misfit) {
+                               const Eigen::MatrixXd& errors, const Asked& asked, const Misfit& misfit) {
   ObservedRows rows = observed_rows(replay, places, {.kind = RobustKind::plain});
   const auto held = static_cast<Eigen::Index>(asked.held.size()), searched = parameters.cols() - held;
   Eigen::VectorXd scale(places.rows());  // from rows of the score to those of the likelihood
@@ -87,8 +116,10 @@ Eigen::MatrixXd information_of(const Replay& replay, const LinearObservations& p
     scale[i] = scale_of(row, asked.grid.score.objective) / row.weight;
   }
   rows.rates = scale.asDiagonal() * parameters.leftCols(searched);
-  rows.known = scale.asDiagonal() * parameters.rightCols(held) *
-               Eigen::VectorXd::Map(asked.held.data(), held).asDiagonal();
+  rows.known.resize(places.rows(), held + errors.cols());
+  rows.known << scale.asDiagonal() * parameters.rightCols(held) *
+                    Eigen::VectorXd::Map(asked.held.data(), held).asDiagonal(),
+      scale.asDiagonal() * errors;
   rows.free = scale.asDiagonal() * nuisance;
   return expected_information(rows, misfit);
 }
@@ -156,8 +187,12 @@ PlannedExperiment plan_experiment(const std::string& name, const std::vector<Rep
     const auto part = [&](const Eigen::MatrixXd& all) {
       return Eigen::MatrixXd(root * all.middleRows(row, places.rows()));
     };
+    Eigen::MatrixXd errors(places.rows(), 0);
+    if (store != nullptr)
+      errors = errors_of_solution(replays[r], places, sensitivity.motions[r],
+                                  candidate_at(asked.at, asked.grid), *store);
     information += information_of(replays[r], places, part(sensitivity.parameters),
-                                  part(sensitivity.nuisance), asked, settings.known->misfit);
+                                  part(sensitivity.nuisance), errors, asked, settings.known->misfit);
     row += places.rows();
   }
   return planned(name, before, information);

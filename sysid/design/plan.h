@@ -38,7 +38,7 @@ struct PlanSettings {
 /// With `known`, P is the inverse of its covariance and F what rows under its noise and discrepancy tell
 /// (expected_information), registration within its bounds and what is held without a measurement
 /// (held_parameters) unknown beside the parameters; axes of one value are no parameters. `store`: keeps the
-/// motions, where there is one.
+/// motions, where there is one; then errors of the solution are reckoned with too, by finer ones.
 PlannedExperiment plan_experiment(const std::string& name, const std::vector<Replay>& replays,
                                   const PlanSettings& settings, const MotionStore* store = nullptr);
 

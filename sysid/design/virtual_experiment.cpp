@@ -1,32 +1,11 @@
 #include "sysid/design/virtual_experiment.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdlib>
-#include <filesystem>
-#include <system_error>
-
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 
 namespace flash::sysid {
 namespace {
-
-namespace fs = std::filesystem;
-
-/// A folder of its own, which nobody else can read; removed with all that is in it.
-struct ScratchFolder {
-  ScratchFolder() {
-    if (mkdtemp(path.data()) == nullptr) throw std::system_error(errno, std::generic_category(), path);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path, ignored);
-  }
-  std::string path = (fs::temp_directory_path() / "flash-plan-XXXXXX").string();
-};
 
 constexpr double kMotion = 2.0;  // of the gripper [s]
 
@@ -49,7 +28,8 @@ std::vector<SynthCamera> two_cameras(const Eigen::Vector3d& target, double size)
 }  // namespace
 
 Replay virtual_experiment(const std::string& kind, const data::Recording& like,
-                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings) {
+                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings,
+                          const std::string& folder) {
   const Eigen::Vector3d low = like.mesh.vertices.colwise().minCoeff(),
                         high = like.mesh.vertices.colwise().maxCoeff();
   const double size = (high - low).maxCoeff();
@@ -61,6 +41,7 @@ Replay virtual_experiment(const std::string& kind, const data::Recording& like,
   synth.depth_noise = 0;
   synth.forces = kind == "bar_pull" || kind == "bias_pull" || kind == "drag";
   synth.seed = settings.seed;
+  synth.clamp_slopes = settings.clamp_slopes;
   synth.grasp_within = std::max(0.0201, 0.08 * size);
   synth.cameras = two_cameras(0.5 * (low + high) + 0.3 * size * Eigen::Vector3d::UnitZ(), size);
   data::TriangleMesh mesh = like.mesh;
@@ -69,9 +50,9 @@ Replay virtual_experiment(const std::string& kind, const data::Recording& like,
   ReplaySettings replay;
   replay.solver = settings.solver;
   replay.threads = settings.threads;
-  const ScratchFolder scratch;  // after the simulation, so that it stands for a moment only
-  save_synthetic(made, scratch.path);
-  data::Recording recording = data::load_recording(scratch.path);
+  replay.clamp_slopes = settings.clamp_slopes;
+  save_synthetic(made, folder);
+  data::Recording recording = data::load_recording(folder);
   recording.nuisance = like.nuisance;
   return make_replay(recording, replay);
 }

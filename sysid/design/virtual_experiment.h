@@ -15,15 +15,17 @@ inline constexpr double longest_virtual_experiment = 3.0;
 
 struct VirtualExperimentSettings {
   sim::SolverSettings solver;
-  int threads = 1;    ///< of the replay
-  unsigned seed = 1;  ///< of what is recorded
+  int threads = 1;            ///< of the replay
+  unsigned seed = 1;          ///< of what is recorded
+  bool clamp_slopes = false;  ///< the grasped patch does not bend
 };
 
 /// The experiment `kind` with the sheet of the recording `like`, simulated and seen by two cameras without
 /// noise, as a recording made ready; forces are recorded where the sheet is pulled. Registration is as
-/// unknown as that of `like`. Its files stand in a folder of their own and are gone afterwards. Throws
-/// data::InputError on an unknown kind, std::system_error where there is no place for the folder.
+/// unknown as that of `like`. Its files are written to `folder`; they are needed as long as it is made ready
+/// on other meshes. Throws data::InputError on an unknown kind.
 Replay virtual_experiment(const std::string& kind, const data::Recording& like,
-                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings);
+                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings,
+                          const std::string& folder);
 
 }  // namespace flash::sysid

@@ -45,7 +45,7 @@ Eigen::VectorXd MotionInterpolant::weights(const std::vector<double>& values) co
   return all;
 }
 
-std::vector<Motion> MotionInterpolant::at(const std::vector<std::vector<double>>& points) const {
+std::vector<Motion> MotionInterpolant::at_points(const std::vector<std::vector<double>>& points) const {
   Eigen::MatrixXd weights(points_->cols(), static_cast<Eigen::Index>(points.size()));
   for (std::size_t i = 0; i < points.size(); ++i)
     weights.col(static_cast<Eigen::Index>(i)) = this->weights(points[i]);
@@ -62,7 +62,7 @@ std::vector<Motion> MotionInterpolant::at(const std::vector<std::vector<double>>
 }
 
 Motion MotionInterpolant::at(const std::vector<double>& values) const {
-  return std::move(at(std::vector<std::vector<double>>{values}).front());
+  return std::move(at_points({values}).front());
 }
 
 void MotionInterpolant::add_to(Motion& motion, const std::vector<double>& values, double share) const {

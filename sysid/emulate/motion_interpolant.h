@@ -24,7 +24,7 @@ class MotionInterpolant {
   Motion at(const std::vector<double>& values) const;
 
   /// Motions at several points, for little more than one alone takes.
-  std::vector<Motion> at(const std::vector<std::vector<double>>& points) const;
+  std::vector<Motion> at_points(const std::vector<std::vector<double>>& points) const;
 
   /// motion += share times that at `values`; both have positions at the same steps.
   void add_to(Motion& motion, const std::vector<double>& values, double share) const;

@@ -38,10 +38,11 @@ MotionSlice::Block MotionSlice::step(std::size_t i) const {
   const Eigen::Index columns = from.cols() / weights_.size();
   step.numbers.resize(from.rows(), columns);
   for (Eigen::Index j = 0; j < columns; ++j) {
-    auto sum = step.numbers.col(j);
-    sum = weights_[0] * from.col(j);
-    for (Eigen::Index k = 1; k < weights_.size(); ++k)
-      if (weights_[k] != 0) sum += weights_[k] * from.col(k * columns + j);
+    // Columns of the points that differ in the axis held.
+    const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> along(
+        from.data() + j * from.outerStride(), from.rows(), weights_.size(),
+        Eigen::OuterStride<>(columns * from.outerStride()));
+    step.numbers.col(j).noalias() = along * weights_.transpose();
   }
   step.done.store(true, std::memory_order_release);
   return step.numbers;

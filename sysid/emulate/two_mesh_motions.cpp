@@ -81,18 +81,19 @@ Eigen::SparseMatrix<double> prolongation(const data::TriangleMesh& from, const d
   return matrix;
 }
 
-std::vector<Motion> TwoMeshMotions::at(const std::vector<std::vector<double>>& points, double share) const {
-  std::vector<Motion> motions = coarse_.at(points);
+std::vector<Motion> TwoMeshMotions::at_points(const std::vector<std::vector<double>>& points,
+                                              double share) const {
+  std::vector<Motion> motions = coarse_.at_points(points);
   if (!difference_) return motions;
   for (Motion& motion : motions) motion = prolonged(motion, *prolongation_);
   if (share == 0) return motions;
-  const std::vector<Motion> differences = difference_->at(points);
+  const std::vector<Motion> differences = difference_->at_points(points);
   for (std::size_t i = 0; i < motions.size(); ++i) add(motions[i], share, differences[i]);
   return motions;
 }
 
 Motion TwoMeshMotions::at(const std::vector<double>& values, double share) const {
-  return std::move(at(std::vector<std::vector<double>>{values}, share).front());
+  return std::move(at_points({values}, share).front());
 }
 
 Motion TwoMeshMotions::on_its_mesh(const Motion& motion) const {
@@ -102,7 +103,7 @@ Motion TwoMeshMotions::on_its_mesh(const Motion& motion) const {
 MotionsAt motions_of(const std::vector<ModelledReplay>& models, double share) {
   return [&models, share](std::size_t r, const std::vector<std::vector<double>>& values) {
     std::vector<ReplayResult> results(values.size());
-    std::vector<Motion> motions = models[r].model.at(values, share);
+    std::vector<Motion> motions = models[r].model.at_points(values, share);
     for (std::size_t i = 0; i < values.size(); ++i) {
       results[i].motion = std::move(motions[i]);
       results[i].converged = results[i].finite = true;
@@ -145,7 +146,7 @@ std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Motion
   for (std::size_t first = 0; first < points.size(); first += kAtOnce) {
     const auto from = points.begin() + static_cast<std::ptrdiff_t>(first),
                to = points.begin() + static_cast<std::ptrdiff_t>(std::min(first + kAtOnce, points.size()));
-    const std::vector<Motion> own = motions.at(std::vector<std::vector<double>>(from, to));
+    const std::vector<Motion> own = motions.at_points({from, to});
     for (std::size_t i = 0; i < own.size(); ++i)
       add((*differences)[first + i], -1, prolonged(own[i], *matrix));
   }

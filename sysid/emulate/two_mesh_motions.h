@@ -41,7 +41,7 @@ class TwoMeshMotions {
 
   /// The motion at `values`, one an axis, or motions at several points.
   Motion at(const std::vector<double>& values, double share) const;
-  std::vector<Motion> at(const std::vector<std::vector<double>>& points, double share) const;
+  std::vector<Motion> at_points(const std::vector<std::vector<double>>& points, double share) const;
 
   /// A motion of the search's mesh on the mesh of the model.
   Motion on_its_mesh(const Motion& motion) const;

@@ -44,8 +44,9 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                 robust.kind == RobustKind::huber ? std::optional<double>(robust.huber_delta) : std::nullopt);
       if (errors.empty()) break;
       if (pass + 1 < kPasses)
-        recording.nuisance =
-            fit_nuisance(recording, [&](double) -> const Motion& { return reference[r].motion; }).first;
+        recording.nuisance = fit_nuisance(recording, recording.nuisance, [&](double) -> const Motion& {
+                               return reference[r].motion;
+                             }).first;
     }
   });
 }
@@ -116,10 +117,11 @@ SheetShifts MotionLikelihood::shifts_at(const Recording& recording, const Nuisan
 }
 
 std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
-    const Recording& recording, const std::function<const Motion&(double time_offset)>& motion_at) {
+    const Recording& recording, const Nuisance& start,
+    const std::function<const Motion&(double time_offset)>& motion_at) {
   constexpr int kSteps = 6;
-  constexpr double kSame = 0.03;  // of the noise: what a step moves rows by
-  Nuisance at = recording.nuisance;
+  constexpr double kSame = 0.1;  // of the noise: what a step moves rows by; what bends is of second order
+  Nuisance at = start;
   ResidualLikelihood::Fit fit;
   SheetDistance sheet = sheet_of(recording.replay);
   std::vector<int> triangles;
@@ -150,13 +152,23 @@ double MotionLikelihood::spread_of(std::size_t error) const {
   return spread;
 }
 
-double MotionLikelihood::deviance(const MotionAtClock& motions) const {
+double MotionLikelihood::deviance(const MotionAtClock& motions, std::vector<Nuisance>& fitted) const {
   double sum = 0;
-  for (std::size_t r = 0; r < recordings_.size(); ++r)
-    sum += fit_nuisance(recordings_[r], [&](double time_offset) -> const Motion& {
-             return motions(r, time_offset);
-           }).second;
+  std::vector<Nuisance> found;
+  for (std::size_t r = 0; r < recordings_.size(); ++r) {
+    auto [nuisance, deviance] =
+        fit_nuisance(recordings_[r], fitted.empty() ? recordings_[r].nuisance : fitted[r],
+                     [&](double time_offset) -> const Motion& { return motions(r, time_offset); });
+    found.push_back(std::move(nuisance));
+    sum += deviance;
+  }
+  fitted = std::move(found);
   return sum;
+}
+
+double MotionLikelihood::deviance(const MotionAtClock& motions) const {
+  std::vector<Nuisance> fitted;
+  return deviance(motions, fitted);
 }
 
 double MotionLikelihood::deviance(const std::vector<Motion>& motions) const {

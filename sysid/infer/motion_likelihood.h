@@ -33,6 +33,15 @@ class MotionLikelihood {
   using MotionAtClock = std::function<const Motion&(std::size_t r, double time_offset)>;
   double deviance(const MotionAtClock& motions) const;
 
+  /// What is fitted to each motion.
+  struct Nuisance {
+    Eigen::Matrix<double, 5, 1> registration;  ///< offset [m], yaw [rad], time [s]
+    Eigen::VectorXd errors;                    ///< how many standard deviations of each known error
+  };
+  /// `fitted`: one a recording: where it is looked for first, unless empty; then what was found. Near what is
+  /// found it changes speed only.
+  double deviance(const MotionAtClock& motions, std::vector<Nuisance>& fitted) const;
+
   /// How well the recording that tells most tells a known error beside the parameters, in its standard
   /// deviations.
   double spread_of(std::size_t error) const;
@@ -40,12 +49,7 @@ class MotionLikelihood {
   const ResidualLikelihood& of_recording(std::size_t r) const { return *recordings_[r].likelihood; }
 
  private:
-  using Registered = Eigen::Matrix<double, 5, 1>;  ///< offset [m], yaw [rad], time [s]
-  /// What is fitted to each motion.
-  struct Nuisance {
-    Registered registration;
-    Eigen::VectorXd errors;  ///< how many standard deviations of each known error
-  };
+  using Registered = Eigen::Matrix<double, 5, 1>;
   struct Recording {
     Replay replay;
     Objective objective;
@@ -72,7 +76,8 @@ class MotionLikelihood {
   static SheetShifts shifts_at(const Recording& recording, const Nuisance& nuisance);
   /// The likeliest nuisance of a motion, by Gauss and Newton, and its -2 log likelihood.
   static std::pair<Nuisance, double> fit_nuisance(
-      const Recording& recording, const std::function<const Motion&(double time_offset)>& motion_at);
+      const Recording& recording, const Nuisance& start,
+      const std::function<const Motion&(double time_offset)>& motion_at);
 
   std::vector<Recording> recordings_;
 };

@@ -7,8 +7,8 @@ namespace flash::sysid {
 /// Triangles of a packet, children of a node.
 inline constexpr int surface_width = 8;
 
-/// Eight triangles, coordinate by coordinate: corner a, edges e = b - a and f = c - a, unit normal and the
-/// constants of the projections on edges and plane.
+/// Eight triangles, coordinate by coordinate: corner a, edges e = b - a and f = c - a, normal n = e x f and
+/// the constants of the projections on edges and plane.
 struct alignas(64) TrianglePacket {
   double a[3][surface_width], e[3][surface_width], f[3][surface_width], n[3][surface_width];
   double inverse_ee[surface_width], inverse_ff[surface_width], inverse_gg[surface_width];  // g = c - b

@@ -1,32 +1,15 @@
 #include "sysid/report/next_steps.h"
 
-#include <map>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 
+#include "data/text.h"
 #include "sysid/emulate/parameter_grid.h"
 #include "sysid/report/parameter_label.h"
 
 namespace flash::sysid {
 namespace {
-
-// Which experiment determines which parameter; the second would do as well.
-const std::map<std::string, std::string>& telling_experiments() {
-  static const std::map<std::string, std::string> experiments = {
-      {"young",
-       "Record a bar pull of 5 to 15 % with contour or gripper force: it determines the membrane stiffness."},
-      {"poisson",
-       "Record a bias pull of about 15 % with contour: it determines Poisson's ratio. Until then, the "
-       "asset keeps its value."},
-      {"bending", "Record a corner lift or a hang of a larger piece: both determine the bending rigidity."},
-      {"friction",
-       "Drag the sheet over the table, or tilt the table until it slides. A light sheet may need a lift: "
-       "flash-sysid plan ranks the experiments for yours."},
-      {"areal_density",
-       "Weigh the sheet and pass --hold areal_density=...:measured: motion determines stiffness over weight "
-       "only."},
-      {"air_drag", "Record a hanging sheet that swings to rest: it determines air drag."},
-      {"stiffness_damping", "Record a hanging sheet that swings to rest: it determines damping."}};
-  return experiments;
-}
 
 bool is_fixed_as(const Summary& summary, const std::string& name, const std::string& source) {
   const auto found = summary.fixed.find(name);
@@ -35,6 +18,66 @@ bool is_fixed_as(const Summary& summary, const std::string& name, const std::str
 
 std::string label(const Summary& summary, const std::string& name) {
   return parameter_label(name, summary.settings.count("thickness_m") > 0).label;
+}
+
+/// "a bar pull"; "\"lift\" once more".
+std::string called(const std::string& experiment) {
+  const std::string again = " again";
+  if (experiment.ends_with(again))
+    return '"' + experiment.substr(0, experiment.size() - again.size()) + "\" once more";
+  std::string words = experiment;
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return "a " + words;
+}
+
+/// "bending rigidity from a factor of 1.8 to 1.2", or "from +- 0.1 to +- 0.05", at 95 %.
+std::string narrowing(const Summary& summary, const ParameterFinding& finding, const NextExperiment& next) {
+  const auto half = [&](double spread) {
+    constexpr double kTwoSided = 1.959964;
+    return finding.logarithmic ? data::format_short(std::exp(kTwoSided * spread))
+                               : "+- " + data::format_short(kTwoSided * spread);
+  };
+  return label(summary, finding.name) + (finding.logarithmic ? " from a factor of " : " from ") +
+         half(next.spread_before.at(finding.name)) + " to " + half(next.spread.at(finding.name));
+}
+
+bool is_told(const ParameterFinding& finding) { return finding.identifiable == Identifiable::yes; }
+
+/// The experiment that adds most, and for what it hardly narrows the one that narrows that most.
+void add_experiments(const Summary& summary, std::vector<std::string>& steps) {
+  constexpr double kNarrows = 0.9;  // of a spread
+  const auto ratio = [](const NextExperiment& next, const std::string& name) {
+    return next.spread.at(name) / next.spread_before.at(name);
+  };
+  const NextExperiment& first = summary.next_experiments.front();
+  std::vector<std::pair<const NextExperiment*, std::string>> proposed = {{&first, ""}};
+  std::string hopeless;
+  for (const ParameterFinding& finding : summary.parameters) {
+    const NextExperiment* best = &first;
+    if (ratio(first, finding.name) > kNarrows) {
+      if (is_told(finding)) continue;
+      for (const NextExperiment& next : summary.next_experiments)
+        if (ratio(next, finding.name) < ratio(*best, finding.name)) best = &next;
+      if (ratio(*best, finding.name) > kNarrows) {
+        hopeless += (hopeless.empty() ? "" : ", ") + label(summary, finding.name);
+        continue;
+      }
+    }
+    auto at =
+        std::find_if(proposed.begin(), proposed.end(), [&](const auto& each) { return each.first == best; });
+    if (at == proposed.end()) at = proposed.insert(at, {best, ""});
+    at->second += (at->second.empty() ? "" : ", ") + narrowing(summary, finding, *best);
+  }
+  for (const auto& [next, gains] : proposed) {
+    char bits[32];
+    std::snprintf(bits, sizeof bits, "%.1f", next->bits);
+    if (!gains.empty())
+      steps.push_back("Record " + called(next->name) + ": it is expected to narrow " + gains + " (95 %; " +
+                      bits + " bits in all).");
+  }
+  if (!hopeless.empty())
+    steps.push_back("No experiment that was tried would narrow " + hopeless +
+                    " by a tenth: hold it at a value that is known, or record something else.");
 }
 
 }  // namespace
@@ -49,13 +92,7 @@ std::vector<std::string> next_steps(const Summary& summary) {
                       "): the best value is its " +
                       (finding.edge == RangeEdge::low ? "lowest." : "highest."));
   }
-  for (const ParameterFinding& finding : summary.parameters) {
-    const auto experiment = telling_experiments().find(finding.name);
-    const bool widen_first = finding.edge != RangeEdge::none && finding.identifiable != Identifiable::no;
-    if (finding.identifiable != Identifiable::yes && !widen_first &&
-        experiment != telling_experiments().end())
-      steps.push_back(experiment->second);
-  }
+  if (!summary.next_experiments.empty()) add_experiments(summary, steps);
   if (summary.unconverged > 0 && 10 * summary.unconverged > summary.candidates)
     steps.push_back("Allow more solver iterations: more than one candidate in ten did not converge.");
   if (usable && summary.exit_code == 0)

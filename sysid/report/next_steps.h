@@ -6,8 +6,8 @@
 
 namespace flash::sysid {
 
-/// What a user should do next, most useful first: the experiment that would tell each parameter that these
-/// recordings do not, the range to widen, the constant to measure, or the export.
+/// What a user should do next: the range to widen, the experiment that is expected to tell most, and those
+/// that tell best what it does not (Summary::next_experiments), or the export.
 std::vector<std::string> next_steps(const Summary& summary);
 
 /// What this search over these recordings cannot know, whatever its parameters: ratios to the weight where

@@ -282,6 +282,14 @@ void check_values(const Summary& summary, const std::string& path) {
   const auto count = static_cast<Eigen::Index>(summary.parameters.size());
   if (summary.covariance_log.size() > 0 && summary.covariance_log.rows() != count)
     throw data::input_error(path, "covariance_log", "expected a row for each of axes, or none");
+  for (const NextExperiment& next : summary.next_experiments)
+    for (const auto* const spreads : {&next.spread_before, &next.spread})
+      for (const ParameterFinding& finding : summary.parameters) {
+        const auto spread = spreads->find(finding.name);
+        if (spread == spreads->end() || !(spread->second >= 0))
+          throw data::input_error(path, "next_experiments." + next.name + "." + finding.name,
+                                  "expected a number of 0 or above");
+      }
   for (const SummaryRecording& recording : summary.recordings) {
     check_score(path, "recordings." + recording.name + ".score", recording.score);
     check_score(path, "recordings." + recording.name + ".noise_m", recording.misfit.noise);
@@ -323,6 +331,12 @@ std::string summary_text(const Summary& summary) {
     json["fixed"][name] = {{"value", fixed.value}, {"source", fixed.source}};
   json["covariance_log"] = to_json(summary.covariance_log);
   json["samples"] = to_json(summary.samples);
+  json["next_experiments"] = Json::array();
+  for (const NextExperiment& next : summary.next_experiments)
+    json["next_experiments"].push_back({{"experiment", next.name},
+                                        {"bits", number(next.bits)},
+                                        {"spread_before", next.spread_before},
+                                        {"spread", next.spread}});
   json["recordings"] = Json::array();
   for (const SummaryRecording& recording : summary.recordings)
     json["recordings"].push_back(to_json(recording));
@@ -351,10 +365,11 @@ Summary load_summary(const std::string& path) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject json(file, path);
   if (json.string("schema") != schema) throw json.error("schema", schema);
-  json.expect_fields({"schema",       "tool_version", "best",           "axes",           "parameters",
-                      "fixed",        "samples",      "covariance_log", "recordings",     "solver_check",
-                      "settings",     "asset",        "candidates",     "unconverged",    "device",
-                      "wall_seconds", "warnings",     "exit_code",      "results_digest", "digest"});
+  json.expect_fields({"schema",          "tool_version", "best",           "axes",           "parameters",
+                      "fixed",           "samples",      "covariance_log", "recordings",     "solver_check",
+                      "settings",        "asset",        "candidates",     "unconverged",    "device",
+                      "wall_seconds",    "warnings",     "exit_code",      "results_digest", "digest",
+                      "next_experiments"});
   check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
@@ -371,6 +386,15 @@ Summary load_summary(const std::string& path) {
     summary.fixed[name] = {fixed.number("value"), fixed.string("source")};
   summary.covariance_log = read_matrix(json, "covariance_log");
   summary.samples = read_matrix(json, "samples", static_cast<Eigen::Index>(summary.parameters.size()));
+  if (json.has("next_experiments"))  // earlier programs ranked none
+    for (const data::JsonObject& next : json.objects("next_experiments")) {
+      next.expect_fields({"experiment", "bits", "spread_before", "spread"});
+      const auto numbers_of = [&](const char* key) {
+        return typed<std::map<std::string, double>>(next, key, "numbers by name");
+      };
+      summary.next_experiments.push_back({next.string("experiment"), score_of(next, "bits"),
+                                          numbers_of("spread_before"), numbers_of("spread")});
+    }
   for (const data::JsonObject& recording : json.objects("recordings"))
     summary.recordings.push_back(read_recording(recording));
   for (const data::JsonObject& check : json.objects("solver_check"))

@@ -38,6 +38,14 @@ struct SummaryRecording {
   std::vector<SummaryFrame> frames;
 };
 
+/// What one more recording is expected to tell beside those at hand.
+struct NextExperiment {
+  std::string name;  ///< "bar_pull", or "lift again"
+  double bits = 0;   ///< expected information: by how many powers of two what is likely shrinks
+  std::map<std::string, double> spread_before, spread;  ///< standard deviation of each parameter, without and
+                                                        ///< with it: of its logarithm or in its unit
+};
+
 /// Whether no misfit was found, or repeatability explains it, to 0.01 mm.
 bool model_fits(const Misfit& misfit);
 
@@ -51,6 +59,7 @@ struct Summary {
   std::map<std::string, FixedParameter> fixed;
   Eigen::MatrixXd covariance_log;  ///< of log(parameter) in the order of `parameters`; empty: not estimated
   Eigen::MatrixXd samples;         ///< of the posterior: a draw a row, in the order of `parameters`
+  std::vector<NextExperiment> next_experiments;  ///< best first; empty: they were not ranked
   std::vector<SummaryRecording> recordings;
   std::vector<SolverCheck> solver_check;
   std::map<std::string, std::string> settings;  ///< constitutive, bending_model, mesh, time_step_s, ...

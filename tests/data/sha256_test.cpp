@@ -15,5 +15,14 @@ TEST(Sha256, GivesThePublishedDigests) {
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
+TEST(Sha256, IsTheSameWithTheProcessorsInstructionsAndWithout) {
+  if (!has_sha256_instructions()) GTEST_SKIP() << "this processor has none";
+  std::string bytes;
+  for (int length = 0; length < 300; ++length) {
+    EXPECT_EQ(sha256(bytes, true), sha256(bytes, false)) << length;
+    bytes += static_cast<char>(37 * length + 11);
+  }
+}
+
 }  // namespace
 }  // namespace flash::data

@@ -87,6 +87,7 @@ def outputs(options, folder):
               "-o", folder / "unconverged"], (3,)),
             ([options.sysid, "plan", recording, "--asset", asset, "--bending", "5e-5:5e-4:3:log", "-o", folder / "plan.json"], (0,)),
             ([options.sysid, "grid", recording, "--asset", asset, *axes, "-o", folder / "run"], (0, 3)),
+            ([options.sysid, "plan", recording, "--asset", asset, "--run", folder / "run", "-o", folder / "known.json"], (0,)),
             ([options.sysid, "report", folder / "run"], (0,)),
             ([options.sysid, "export", folder / "run", "-o", folder / "tuned.json"], (0, 3)),
             ([options.sysid, "import", recording / "frames", "--trajectory", recording / "gripper.tum", "--times", "rate:10",

@@ -42,7 +42,7 @@ Lanes distances(const TrianglePacket& t, int first, const double* query) {
   const Lanes weight_b = (ff * ve - ef * vf) * inverse_determinant;
   const Lanes weight_c = (ee * vf - ef * ve) * inverse_determinant;
   const auto inside = (weight_b >= 0.0) & (weight_c >= 0.0) & (weight_b + weight_c <= 1.0);
-  return select(inside, Lanes(vn * vn), on_edges);
+  return select(inside, Lanes(vn * vn * inverse_determinant), on_edges);  // |n|^2 is the determinant
 }
 
 /// x / y where y is positive, else zero.
@@ -88,8 +88,8 @@ void move_packet(const MovedSurface& surface, int index) {
       return Lanes(u[0] * v[0] + u[1] * v[1] + u[2] * v[2]);
     };
     const Lanes n[3] = {e[1] * f[2] - e[2] * f[1], e[2] * f[0] - e[0] * f[2], e[0] * f[1] - e[1] * f[0]};
-    const Lanes area2 = product(n, n), root = sim::square_root(area2), zero{}, one = zero + 1.0;
-    for (int k = 0; k < 3; ++k) store_lanes(ratio(n[k], root), packet.n[k] + first);
+    for (int k = 0; k < 3; ++k) store_lanes(n[k], packet.n[k] + first);
+    const Lanes area2 = product(n, n), zero{}, one = zero + 1.0;
     const Lanes ee = product(e, e), ff = product(f, f);
     store_lanes(ee, packet.ee + first);
     store_lanes(ff, packet.ff + first);
@@ -136,12 +136,19 @@ void search(const SurfaceTree& tree, int level, int index, const double* query, 
     }
     store_lanes(sum, distance2 + first);
   }
-  for (;;) {
-    int nearest = 0;
-    for (int i = 1; i < surface_width; ++i)
-      if (distance2[i] < distance2[nearest]) nearest = i;
+  // Few boxes are nearer than what was found by a hint.
+  int near[surface_width], count = 0;
+  for (int i = 0; i < surface_width; ++i) {
+    near[count] = i;
+    count += distance2[i] < best ? 1 : 0;
+  }
+  for (; count > 0; --count) {
+    int at = 0;
+    for (int i = 1; i < count; ++i)
+      if (distance2[near[i]] < distance2[near[at]]) at = i;
+    const int nearest = near[at];
     if (!(distance2[nearest] < best)) return;
-    distance2[nearest] = HUGE_VAL;
+    near[at] = near[count - 1];
     const int child = index * surface_width + nearest;
     if (level == 0)
       search_packet(tree, child, query, best, slot);

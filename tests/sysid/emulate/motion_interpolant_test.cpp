@@ -73,8 +73,7 @@ TEST(TwoMeshMotions, IsTheFinerSimulationWhereThatWasMade) {
       const ReplayCandidate candidate = candidate_at({bending}, lift.grid);
       const Motion finer = store.run(model->replay, candidate).motion,
                    own = store.run(lift.replay, candidate).motion;
-      const Motion modelled = model->model.at(std::vector{bending}, 1),
-                   coarse = model->model.at(std::vector{bending}, 0);
+      const Motion modelled = model->model.at({bending}, 1), coarse = model->model.at({bending}, 0);
       for (std::size_t i = 0; i < finer.positions.size(); ++i) {
         if (modelled.positions[i].rows() == 0) continue;  // read by no keyframe
         EXPECT_LT((modelled.positions[i] - finer.positions[i]).norm(), 1e-12);
@@ -91,13 +90,12 @@ TEST(TwoMeshMotions, OneFinerSimulationMovesEveryMotionByWhatItHasBeyondTheOwn) 
   const auto model = with_finer_mesh(lift.replay, own, point, lift.grid, store);
   ASSERT_TRUE(model);
   const auto beyond = [&](double bending) {
-    Motion difference = model->model.at(std::vector{bending}, 1);
-    add(difference, -1, model->model.at(std::vector{bending}, 0));
+    Motion difference = model->model.at({bending}, 1);
+    add(difference, -1, model->model.at({bending}, 0));
     return difference.positions.front();
   };
   const Motion finer = store.run(model->replay, candidate_at({2e-4}, lift.grid)).motion;
-  EXPECT_LT((model->model.at(std::vector{2e-4}, 1).positions.front() - finer.positions.front()).norm(),
-            1e-12);
+  EXPECT_LT((model->model.at({2e-4}, 1).positions.front() - finer.positions.front()).norm(), 1e-12);
   EXPECT_LT((beyond(7e-4) - beyond(2e-4)).norm(), 1e-12);
 }
 

@@ -13,11 +13,42 @@ bool mentions(const std::vector<std::string>& lines, const std::string& words) {
   return false;
 }
 
-TEST(NextSteps, NameTheExperimentThatWouldTell) {
-  const std::vector<std::string> steps = next_steps(example_summary());
-  EXPECT_TRUE(mentions(steps, "bias pull"));     // poisson is not known
-  EXPECT_FALSE(mentions(steps, "corner lift"));  // bending is
+NextExperiment experiment(const char* name, double bits, double poisson, double bending) {
+  return {name, bits, {{"poisson", 0.1}, {"bending", 0.2}}, {{"poisson", poisson}, {"bending", bending}}};
+}
+
+TEST(NextSteps, NameTheExperimentThatIsExpectedToTellMost) {
+  Summary summary = example_summary();
+  summary.next_experiments = {experiment("bias_pull", 2, 0.02, 0.19),
+                              experiment("lift again", 0.4, 0.1, 0.15)};
+  const std::vector<std::string> steps = next_steps(summary);
+  // 1.96 of 0.1 and of 0.02; bending is hardly narrowed.
+  EXPECT_TRUE(mentions(
+      steps, "Record a bias pull: it is expected to narrow Poisson's ratio from +- 0.196 to +- 0.0392"));
+  EXPECT_FALSE(mentions(steps, "bending rigidity"));
+  EXPECT_FALSE(mentions(steps, "once more"));
   EXPECT_TRUE(mentions(steps, "export"));
+}
+
+// The same search with another posterior proposes something else.
+TEST(NextSteps, ChangeWithTheRanking) {
+  Summary summary = example_summary();
+  summary.next_experiments = {experiment("lift again", 1, 0.095, 0.1),
+                              experiment("bias_pull", 0.5, 0.05, 0.2)};
+  const std::vector<std::string> steps = next_steps(summary);
+  // exp(1.96 0.2) and exp(1.96 0.1)
+  EXPECT_TRUE(mentions(
+      steps,
+      "Record \"lift\" once more: it is expected to narrow bending rigidity from a factor of 1.48 to 1.2"));
+  EXPECT_TRUE(
+      mentions(steps, "Record a bias pull: it is expected to narrow Poisson's ratio"));  // which is not told
+  for (NextExperiment& next : summary.next_experiments) next.spread = next.spread_before;
+  EXPECT_FALSE(mentions(next_steps(summary), "Record"));
+  EXPECT_TRUE(mentions(next_steps(summary), "No experiment that was tried would narrow Poisson's ratio"));
+}
+
+TEST(NextSteps, AreSilentOfExperimentsThatWereNotRanked) {
+  EXPECT_FALSE(mentions(next_steps(example_summary()), "Record"));
 }
 
 TEST(NextSteps, WidenTheRangeBeforeTrustingItsEdge) {
