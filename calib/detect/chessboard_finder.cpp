@@ -178,8 +178,8 @@ Grid grid_of(const GreyImage& image, const Target& target, Corners corners) {
   return grid;
 }
 
-/// The classic search takes up to 20 s where it fails, as it does on boards that a wide lens bends: it is asked
-/// only where sectors are not enough.
+/// The classic search takes up to 20 s where it fails, as it does on boards that a wide lens bends: it is
+/// asked only where sectors are not enough.
 Board find_board(const GreyImage& image, const Target& target, Search search) {
   Corners sectors = find_sectors(image, target), classic;
   const bool exhausted = search == Search::quick || sectors.empty();
