@@ -217,7 +217,7 @@ Finder chessboard_finder(const Target& target, const Rectifier& rectifier, Searc
       return static_cast<double>(board.fitted.points.size()) >= kLeastShare * static_cast<double>(count);
     };
     fit(image, rectifier, board);
-    if (!enough() && !board.exhausted) {
+    if (board.fitted.points.size() < count && !board.exhausted) {
       add_classic(image, target, board);
       fit(image, rectifier, board);
     }
