@@ -4,8 +4,8 @@
 namespace flash::data {
 
 /// While it lives, no other run holds the folder of `file`: several files that belong together are written
-/// one after the other, and no run's stand beside another's. Makes the folder. File systems without locks have
-/// none; then nothing is held. Empty: nothing is held.
+/// one after the other, and no run's stand beside another's. Makes the folder. File systems without locks
+/// have none; then nothing is held. Empty: nothing is held.
 class FolderLock {
  public:
   explicit FolderLock(const std::string& file);

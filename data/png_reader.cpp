@@ -34,7 +34,8 @@ void keep_message(png_structp png, png_const_charp message) {
 void ignore_warning(png_structp, png_const_charp) {}
 
 /// Everything that libpng may jump out of; no object with a destructor is made after setjmp.
-bool decode(png_structp png, png_infop info, PngSamples samples, RawPng& image, std::vector<png_bytep>& rows) {
+bool decode(png_structp png, png_infop info, PngSamples samples, RawPng& image,
+            std::vector<png_bytep>& rows) {
   if (setjmp(png_jmpbuf(png))) return false;
   png_read_info(png, info);
   if (samples != PngSamples::as_stored) {

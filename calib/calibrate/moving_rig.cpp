@@ -112,8 +112,10 @@ void add_slight_drift(Calibration& result, const Drift& drift) {
   const MotionInTime motions(result.refined, {.unknowns = result.unknowns});
   const Vector6d shift = motions.shift_of_camera(times_of(result), {}, drift.camera) * drift.motion;
   const Matrix6d more = shift * shift.transpose();
+  const bool matters = shift.dot(result.covariance.ldlt().solve(shift)) > 1;  // a deviation
   result.covariance += more;
   result.repeatable += more;
+  if (!matters) return;
   char text[320];
   std::snprintf(
       text, sizeof text,

@@ -205,8 +205,8 @@ std::optional<Target> shown_tags(const GreyImage& image, const Target& stated, c
     Target other = stated;
     other.dictionary = family;
     TagDetector detector(family, grid);
-    const std::vector<Tag> tags = grid ? detector.detect_grid(image, stated.columns * stated.rows)
-                                       : detector.detect(image);
+    const std::vector<Tag> tags =
+        grid ? detector.detect_grid(image, stated.columns * stated.rows) : detector.detect(image);
     if (!grid && !tags.empty() && stated.first_id >= 0) other.first_id = tags.front().id;
     std::string reason;
     std::size_t count = chosen(tags, other, rectifier, reason).size();

@@ -203,8 +203,7 @@ std::optional<Target> shown_markers(const GreyImage& image, const Target& stated
           find_markers(image, dictionary_of(family + (original ? "ORIGINAL" : "1000")), repeated);
       if (markers.size() <= most.size()) continue;
       most = std::move(markers);
-      best.dictionary =
-          original ? family + "ORIGINAL" : dictionary_of_family(family, most.rbegin()->first);
+      best.dictionary = original ? family + "ORIGINAL" : dictionary_of_family(family, most.rbegin()->first);
     }
   if (most.size() < least) return std::nullopt;
   if (stated.kind != TargetKind::charuco) {

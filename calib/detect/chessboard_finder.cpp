@@ -178,8 +178,8 @@ Grid grid_of(const GreyImage& image, const Target& target, Corners corners) {
   return grid;
 }
 
-/// The classic search takes up to 20 s where it fails, as it does on boards that a wide lens bends: it is asked
-/// only where sectors are not enough.
+/// The classic search takes up to 20 s where it fails, as it does on boards that a wide lens bends: it is
+/// asked only where sectors are not enough.
 Board find_board(const GreyImage& image, const Target& target, Search search) {
   Corners sectors = find_sectors(image, target), classic;
   const bool exhausted = search == Search::quick || sectors.empty();
@@ -217,7 +217,7 @@ Finder chessboard_finder(const Target& target, const Rectifier& rectifier, Searc
       return static_cast<double>(board.fitted.points.size()) >= kLeastShare * static_cast<double>(count);
     };
     fit(image, rectifier, board);
-    if (!enough() && !board.exhausted) {
+    if (board.fitted.points.size() < count && !board.exhausted) {
       add_classic(image, target, board);
       fit(image, rectifier, board);
     }

@@ -42,8 +42,8 @@ Finder chessboard_finder(const Target& target, const Rectifier& rectifier, Searc
 Finder aruco_finder(const Target& target, const Rectifier& rectifier);  ///< aruco and aruco_grid
 Finder charuco_finder(const Target& target, const Rectifier& rectifier);
 Finder apriltag_finder(const Target& target, const Rectifier& rectifier);  ///< apriltag and aprilgrid
-/// The stated target with the counts, dictionary or ids of the markers that a picture shows; empty where it shows
-/// none, or those stated.
+/// The stated target with the counts, dictionary or ids of the markers that a picture shows; empty where it
+/// shows none, or those stated.
 std::optional<Target> shown_markers(const GreyImage& image, const Target& stated, const Rectifier& rectifier);
 std::optional<Target> shown_tags(const GreyImage& image, const Target& stated, const Rectifier& rectifier);
 Finder circle_finder(const Target& target, const Rectifier& rectifier);

@@ -30,8 +30,8 @@ HandEyePoses park(const std::vector<PoseLoop>& loops);
 /// by least squares.
 HandEyePoses shah(const std::vector<PoseLoop>& loops);
 
-/// As Park and Martin's for turns of nearly half a circle, whose logarithms have either sign: of both signs of each
-/// motion's the solution that closes best, its translations by least squares. Of three views.
+/// As Park and Martin's for turns of nearly half a circle, whose logarithms have either sign: of both signs
+/// of each motion's the solution that closes best, its translations by least squares. Of three views.
 HandEyePoses half_turns(const std::vector<PoseLoop>& loops);
 
 /// How far Z^-1 G X C is from the identity.

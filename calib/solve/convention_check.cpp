@@ -129,13 +129,15 @@ bool are_pairs(const std::vector<Observation>& observations) {
                       [](const Observation& observation) { return observation.pixels.cols() > 0; });
 }
 
-/// No camera sees what is behind it: such poses of pairs are T_target_camera. They are the same equations as the
-/// robot's poses inverted, X and Z exchanged.
+/// No camera sees what is behind it: such poses of pairs are T_target_camera. They are the same equations as
+/// the robot's poses inverted, X and Z exchanged.
 bool targets_behind(const std::vector<Observation>& observations) {
   if (!are_pairs(observations)) return false;
-  const auto behind = std::count_if(observations.begin(), observations.end(), [](const Observation& observation) {
-    return !observation.T_camera_target.empty() && observation.T_camera_target.front().translation().z() < 0;
-  });
+  const auto behind =
+      std::count_if(observations.begin(), observations.end(), [](const Observation& observation) {
+        return !observation.T_camera_target.empty() &&
+               observation.T_camera_target.front().translation().z() < 0;
+      });
   return 2 * static_cast<std::size_t>(behind) > observations.size();
 }
 
@@ -148,8 +150,9 @@ void name_setup(Setup stated, bool pairs, const RobustSeed& found, std::string& 
   const bool camera_rides = camera < target;
   if (camera_rides != stated_in_hand)
     sentence =
-        std::string(stated_in_hand ? "the setup is eye-to-hand, not eye-in-hand (or the poses are T_gripper_base"
-                                   : "the setup is eye-in-hand, not eye-to-hand (or the poses are T_gripper_base") +
+        std::string(stated_in_hand
+                        ? "the setup is eye-to-hand, not eye-in-hand (or the poses are T_gripper_base"
+                        : "the setup is eye-in-hand, not eye-to-hand (or the poses are T_gripper_base") +
         (pairs ? ", or those of the target T_target_camera)" : ")");
   else
     sentence =
@@ -205,10 +208,11 @@ std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observa
   const Poses& poses = as_stated.T_base_gripper;
   std::vector<Reading> readings;
   if (targets_behind(observations)) {
-    readings.push_back(with(
-        "the target's poses are inverted: they are T_target_camera where T_camera_target is expected, and put "
-        "it behind the camera",
-        poses));
+    readings.push_back(
+        with("the target's poses are inverted: they are T_target_camera where T_camera_target is expected, "
+             "and put "
+             "it behind the camera",
+             poses));
     readings.back().target_inverted = true;
   } else {
     readings.push_back(with("", inverted(poses)));  // named by what it finds

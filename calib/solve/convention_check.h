@@ -20,8 +20,9 @@ struct Reading {
 
 /// Readings of the same numbers under the conventions that people mix up: the other setup, inverted poses,
 /// both, millimetres and inches for metres, pairing off by one or two or in reverse, quaternions w x y z for
-/// x y z w, poses of the target inverted where no picture gave them, and, where the file gave angles, all other readings of them (rotation_from_angles), degrees for
-/// radians and radians for degrees. angles: as the file gave them [rad], one a view, or none.
+/// x y z w, poses of the target inverted where no picture gave them, and, where the file gave angles, all
+/// other readings of them (rotation_from_angles), degrees for radians and radians for degrees. angles: as the
+/// file gave them [rad], one a view, or none.
 std::vector<Reading> alternative_readings(Setup setup, const std::vector<Observation>& observations,
                                           const std::vector<Eigen::Vector3d>& angles = {});
 

@@ -21,9 +21,9 @@ constexpr double kUsualPixels = 0.2, kUsualRotation = 0.1 * M_PI / 180, kUsualTr
 LinearModel linear_model(const Bundle& bundle, const NoiseLevels& noise, const BundleSettings& settings) {
   LinearModel model = linearize(bundle, noise, settings);
   if (settings.unknowns.corrections && bundle.poses.size() < kFewPoses * bundle.bases.size())
-    model.noise = {to_components(uniform_noise(bundle, kUsualPixels, kUsualRotation, kUsualTranslation,
-                                               kUsualDepth)),
-                   1};
+    model.noise = {
+        to_components(uniform_noise(bundle, kUsualPixels, kUsualRotation, kUsualTranslation, kUsualDepth)),
+        1};
   return model;
 }
 

@@ -50,9 +50,9 @@ Eigen::MatrixXd hessian_of(const LinearModel& model, const std::vector<double>& 
     std::vector<double> up = sigmas, down = sigmas;
     up[static_cast<std::size_t>(c)] *= std::exp(kStep);
     down[static_cast<std::size_t>(c)] *= std::exp(-kStep);
-    hessian.col(c) =
-        (gradient_of(model, solve_linear(model, up), up) - gradient_of(model, solve_linear(model, down), down)) /
-        (2 * kStep);
+    hessian.col(c) = (gradient_of(model, solve_linear(model, up), up) -
+                      gradient_of(model, solve_linear(model, down), down)) /
+                     (2 * kStep);
   }
   return 0.5 * (hessian + hessian.transpose());
 }

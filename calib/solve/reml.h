@@ -12,7 +12,8 @@ struct GramBlock {
   Eigen::MatrixXd gram;  ///< [J_d J_s r_0]^T [J_d J_s r_0]
 };
 
-/// What is known of standard deviations beforehand: log-normal about `usual`, `spread` of the logarithm; 0: nothing.
+/// What is known of standard deviations beforehand: log-normal about `usual`, `spread` of the logarithm; 0:
+/// nothing.
 struct NoisePrior {
   std::vector<double> usual = {};  ///< of each component
   double spread = 0;
@@ -59,8 +60,9 @@ VarianceComponents estimate_variance_components(const LinearModel& model, const 
 /// Kenward and Roger 1997 give in closed form.
 Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComponents& components);
 
-/// Student's distribution of six numbers has longer tails than the normal one of its covariance: the factor by
-/// which that has to grow for chi-square's 99 % region to hold 99 % of it. dof: degrees of freedom, above 2.
+/// Student's distribution of six numbers has longer tails than the normal one of its covariance: the factor
+/// by which that has to grow for chi-square's 99 % region to hold 99 % of it. dof: degrees of freedom,
+/// above 2.
 double tail_growth(double dof);
 
 }  // namespace flash::calib

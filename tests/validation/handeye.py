@@ -86,7 +86,7 @@ def two_arms(runs, data):
     poses = [pose for name in ARMS for pose in read_tum(data / name / "poses.tum")]
     workspace = [sum(pose[k] for pose in poses) / len(poses) for k in range(3)]
     files = [runs.out / f"{name}.json" for name in ARMS]
-    at = ["--workspace", *(f"{x:.4f}" for x in workspace)]
+    at = ["--workspace=" + ",".join(f"{x:.4f}" for x in workspace)]
     return {"workspace": workspace,
             "each by itself": runs.run("arms_composed", "register", *files, *at, "--without-images"),
             "jointly": runs.run("arms_joint", "register", *files, *at)}

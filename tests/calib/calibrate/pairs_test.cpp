@@ -4,8 +4,8 @@
 #include <Eigen/Cholesky>
 
 #include "calib/calibrate/calibrate_pairs.h"
-#include "tests/data/temporary_folder.h"
 #include "tests/calib/hand_eye_scene.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
 namespace {
@@ -21,8 +21,8 @@ std::vector<Observation> pairs_of(const HandEyeScene& scene) {
   return pairs;
 }
 
-/// Robot and target as they truly stand, but for noise of 0.05 deg and 0.5 mm, at gripper poses of turns by half a
-/// circle about three axes.
+/// Robot and target as they truly stand, but for noise of 0.05 deg and 0.5 mm, at gripper poses of turns by
+/// half a circle about three axes.
 HandEyeScene half_turns_scene() {
   HandEyeScene scene = protocol_scene(Mount::eye_in_hand, 0, 0, 3);
   std::mt19937 random(4);
@@ -30,9 +30,11 @@ HandEyeScene half_turns_scene() {
   std::uniform_real_distribution<double> uniform(-0.15, 0.15);
   const Eigen::Isometry3d first = scene.true_poses.front();
   for (std::size_t i = 0; i < scene.observations.size(); ++i) {
-    const Eigen::Vector3d axis = i % 4 == 0 ? Eigen::Vector3d::Zero().eval()
-                                            : Eigen::Vector3d::Unit(static_cast<Eigen::Index>(i % 4) - 1).eval();
-    const Eigen::Isometry3d pose = first * make_pose({uniform(random), uniform(random), uniform(random)}, M_PI * axis);
+    const Eigen::Vector3d axis = i % 4 == 0
+                                     ? Eigen::Vector3d::Zero().eval()
+                                     : Eigen::Vector3d::Unit(static_cast<Eigen::Index>(i % 4) - 1).eval();
+    const Eigen::Isometry3d pose =
+        first * make_pose({uniform(random), uniform(random), uniform(random)}, M_PI * axis);
     Vector6d noise;
     for (Eigen::Index k = 0; k < 6; ++k) noise[k] = (k < 3 ? 5e-4 : 0.05 * M_PI / 180) * normal(random);
     scene.observations[i].T_base_gripper = moved(pose, noise);

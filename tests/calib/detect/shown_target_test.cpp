@@ -15,16 +15,15 @@ struct Case {
 class ShownTargets : public testing::TestWithParam<Case> {};
 INSTANTIATE_TEST_SUITE_P(
     Detect, ShownTargets,
-    testing::Values(Case{"charuco:7x5:0.03:0.022:DICT_5X5_100", "charuco:5x7:0.03:0.022:DICT_5X5_100",
-                         "--target charuco:7x5:0.03:0.022:DICT_5X5_100"},
-                    Case{"charuco:7x5:0.03:0.022:DICT_5X5_100", "charuco:5x7:0.03:0.022:DICT_4X4_50",
-                         "--target charuco:7x5:0.03:0.022:DICT_5X5_50"},
-                    Case{"aruco:DICT_4X4_50:7:0.09", "aruco:DICT_4X4_50:0:0.09",
-                         "--target aruco:DICT_4X4_50:7:0.09"},
-                    Case{"aruco:DICT_6X6_250:3:0.09", "aruco:DICT_4X4_50:3:0.09",
-                         "--target aruco:DICT_6X6_50:3:0.09"},
-                    Case{"apriltag:36h11:4:0.09", "apriltag:36h11:0:0.09", "--target apriltag:36h11:4:0.09"},
-                    Case{"apriltag:36h11:0:0.09", "apriltag:25h9:0:0.09", "--target apriltag:36h11:0:0.09"}));
+    testing::Values(
+        Case{"charuco:7x5:0.03:0.022:DICT_5X5_100", "charuco:5x7:0.03:0.022:DICT_5X5_100",
+             "--target charuco:7x5:0.03:0.022:DICT_5X5_100"},
+        Case{"charuco:7x5:0.03:0.022:DICT_5X5_100", "charuco:5x7:0.03:0.022:DICT_4X4_50",
+             "--target charuco:7x5:0.03:0.022:DICT_5X5_50"},
+        Case{"aruco:DICT_4X4_50:7:0.09", "aruco:DICT_4X4_50:0:0.09", "--target aruco:DICT_4X4_50:7:0.09"},
+        Case{"aruco:DICT_6X6_250:3:0.09", "aruco:DICT_4X4_50:3:0.09", "--target aruco:DICT_6X6_50:3:0.09"},
+        Case{"apriltag:36h11:4:0.09", "apriltag:36h11:0:0.09", "--target apriltag:36h11:4:0.09"},
+        Case{"apriltag:36h11:0:0.09", "apriltag:25h9:0:0.09", "--target apriltag:36h11:0:0.09"}));
 
 TEST_P(ShownTargets, AreOfferedAsTheyAre) {
   const data::TemporaryFolder folder;
@@ -36,8 +35,7 @@ TEST_P(ShownTargets, AreOfferedAsTheyAre) {
   write_rendered_set(settings, folder / "set");
   const Dataset dataset = load_dataset(folder / "set");
   EXPECT_NO_THROW(detect(dataset, parse_target(GetParam().shown)));
-  const std::string said =
-      data::input_error_of([&] { detect(dataset, parse_target(GetParam().stated)); });
+  const std::string said = data::input_error_of([&] { detect(dataset, parse_target(GetParam().stated)); });
   EXPECT_NE(said.find(GetParam().offered), std::string::npos) << said;
 }
 
