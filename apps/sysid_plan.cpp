@@ -17,7 +17,6 @@
 #include "data/text.h"
 #include "data/writable.h"
 #include "sysid/design/rank_experiments.h"
-#include "sysid/design/scratch_folder.h"
 #include "sysid/design/usual_ranges.h"
 #include "sysid/design/virtual_experiment.h"
 #include "sysid/infer/posterior.h"
@@ -151,12 +150,11 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     sysid::check_job(replays, static_cast<double>(batch), sysid::estimate_batch(replays, batch));
     experiments.push_back(sysid::plan_experiment(recording.name, replays, settings, kept));
   }
-  const sysid::ScratchFolder scratch;
   for (const char* kind : sysid::virtual_experiments) {
     say(options.common, std::string("simulating ") + kind);
-    const sysid::Replay made = sysid::virtual_experiment(
-        kind, recordings.front(), material,
-        {replay.solver, threads, options.common.seed, replay.clamp_slopes}, scratch.path() + '/' + kind);
+    const sysid::Replay made =
+        sysid::virtual_experiment(kind, recordings.front(), material,
+                                  {replay.solver, threads, options.common.seed, replay.clamp_slopes});
     experiments.push_back(sysid::plan_experiment(kind, {made}, settings, kept));
   }
   std::stable_sort(experiments.begin(), experiments.end(),

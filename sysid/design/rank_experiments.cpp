@@ -5,7 +5,6 @@
 
 #include "data/error.h"
 #include "data/procedural_mesh.h"
-#include "sysid/design/scratch_folder.h"
 #include "sysid/design/virtual_experiment.h"
 #include "sysid/replay/half_cell.h"
 
@@ -48,13 +47,11 @@ std::vector<PlannedExperiment> rank_experiments(const std::vector<Replay>& repla
   const Replay& first = replays.front();
   const data::Recording sheet = with_few_vertices(first.recording);
   const data::SheetMaterial material = candidate_at(settings.at, settings.grid).material;
-  const ScratchFolder scratch;
   for (const char* const kind : virtual_experiments)
     add(kind, [&] {
       return virtual_experiment(
           kind, sheet, material,
-          {first.settings.solver, first.settings.threads, 1, first.settings.clamp_slopes},
-          scratch.path() + '/' + kind);
+          {first.settings.solver, first.settings.threads, 1, first.settings.clamp_slopes});
     });
   std::stable_sort(experiments.begin(), experiments.end(),
                    [](const auto& one, const auto& other) { return one.bits > other.bits; });

@@ -1,11 +1,32 @@
 #include "sysid/design/virtual_experiment.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
 
 namespace flash::sysid {
 namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of its own, which nobody else can read; removed with all that is in it.
+struct ScratchFolder {
+  ScratchFolder() {
+    if (mkdtemp(path.data()) == nullptr) throw std::system_error(errno, std::generic_category(), path);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  ~ScratchFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+  std::string path = (fs::temp_directory_path() / "flash-plan-XXXXXX").string();
+};
 
 constexpr double kMotion = 2.0;  // of the gripper [s]
 
@@ -28,8 +49,7 @@ std::vector<SynthCamera> two_cameras(const Eigen::Vector3d& target, double size)
 }  // namespace
 
 Replay virtual_experiment(const std::string& kind, const data::Recording& like,
-                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings,
-                          const std::string& folder) {
+                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings) {
   const Eigen::Vector3d low = like.mesh.vertices.colwise().minCoeff(),
                         high = like.mesh.vertices.colwise().maxCoeff();
   const double size = (high - low).maxCoeff();
@@ -51,8 +71,9 @@ Replay virtual_experiment(const std::string& kind, const data::Recording& like,
   replay.solver = settings.solver;
   replay.threads = settings.threads;
   replay.clamp_slopes = settings.clamp_slopes;
-  save_synthetic(made, folder);
-  data::Recording recording = data::load_recording(folder);
+  const ScratchFolder scratch;  // after the simulation, so that it stands for a moment only
+  save_synthetic(made, scratch.path);
+  data::Recording recording = data::load_recording(scratch.path);
   recording.nuisance = like.nuisance;
   return make_replay(recording, replay);
 }

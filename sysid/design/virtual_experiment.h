@@ -22,10 +22,9 @@ struct VirtualExperimentSettings {
 
 /// The experiment `kind` with the sheet of the recording `like`, simulated and seen by two cameras without
 /// noise, as a recording made ready; forces are recorded where the sheet is pulled. Registration is as
-/// unknown as that of `like`. Its files are written to `folder`; they are needed as long as it is made ready
-/// on other meshes. Throws data::InputError on an unknown kind.
+/// unknown as that of `like`. Its files stand in a folder of their own and are gone afterwards. Throws
+/// data::InputError on an unknown kind, std::system_error where there is no place for the folder.
 Replay virtual_experiment(const std::string& kind, const data::Recording& like,
-                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings,
-                          const std::string& folder);
+                          const data::SheetMaterial& material, const VirtualExperimentSettings& settings);
 
 }  // namespace flash::sysid

@@ -15,10 +15,7 @@ using Change = std::function<void(ReplaySettings&)>;
 Replay changed(const Replay& replay, const Change& change) {
   ReplaySettings settings = replay.settings;
   change(settings);
-  Replay result = make_replay(replay.recording, settings, replay.plan);
-  for (std::size_t k = 0; k < replay.observations.size(); ++k)
-    result.observations[k].weight = replay.observations[k].weight;
-  return result;
+  return make_replay(replay, settings, replay.plan);
 }
 
 const std::vector<std::pair<std::string, Change>> kFinerSteps = {

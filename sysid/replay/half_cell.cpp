@@ -19,10 +19,7 @@ std::optional<Replay> on_half_the_cell(const Replay& replay) {
   ReplaySettings settings = replay.settings;
   settings.mesh = scaled_cell(replay.recording.mesh_spec, 0.5);
   if (settings.mesh.empty() || !replay.recording.start_mesh.empty()) return std::nullopt;
-  Replay finer = make_replay(replay.recording, settings);
-  for (std::size_t k = 0; k < replay.observations.size(); ++k)
-    finer.observations[k].weight = replay.observations[k].weight;
-  return finer;
+  return make_replay(replay, settings);
 }
 
 }  // namespace flash::sysid

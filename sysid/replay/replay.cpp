@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "data/error.h"
@@ -99,8 +100,11 @@ int steps_in(double duration, double step) {
                          data::format_short(1.01 * duration / data::max_steps) + " s");
 }
 
-Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
-                   std::shared_ptr<const sim::SheetPlan> plan) {
+namespace {
+
+/// `observe`: adds what was observed, once the sheet is there.
+Replay assemble(const data::Recording& recording, const ReplaySettings& settings,
+                std::shared_ptr<const sim::SheetPlan> plan, const std::function<void(Replay&)>& observe) {
   Replay replay;
   replay.recording = recording;
   replay.settings = settings;
@@ -111,21 +115,7 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
   // Marks are named by vertices of the recording's own mesh.
   replay.queries =
       std::make_shared<const SheetDistance>(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
-  for (const data::Keyframe& keyframe : data::load_keyframes(recording, replay.notices)) {
-    Observation observation{.t = keyframe.time,
-                            .points = keyframe.cloud,
-                            .contour = keyframe.contour,
-                            .markers = keyframe.markers,
-                            .force = keyframe.force};
-    for (const int vertex : keyframe.marker_vertices)
-      observation.marks.push_back(replay.queries->nearest(recording.mesh.vertices.row(vertex).transpose()));
-    const bool weighs =
-        keyframe.time >= settings.score_from && keyframe.time <= settings.score_to &&
-        (keyframe.cloud.rows() >= settings.min_points || keyframe.contour.rows() >= settings.min_points ||
-         keyframe.markers.rows() > 0 || keyframe.force);
-    observation.weight = weighs ? 1 : 0;
-    replay.observations.push_back(std::move(observation));
-  }
+  observe(replay);
   check_window(replay);
 
   replay.beginning = replay.observations.front().t;
@@ -155,6 +145,44 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
     replay.pivot = data::pose_at(trajectory_of(recording, grasp), grasp.from).translation();
   }
   return replay;
+}
+
+}  // namespace
+
+Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
+                   std::shared_ptr<const sim::SheetPlan> plan) {
+  return assemble(recording, settings, std::move(plan), [&](Replay& replay) {
+    for (const data::Keyframe& keyframe : data::load_keyframes(recording, replay.notices)) {
+      Observation observation{.t = keyframe.time,
+                              .points = keyframe.cloud,
+                              .contour = keyframe.contour,
+                              .markers = keyframe.markers,
+                              .force = keyframe.force};
+      for (const int vertex : keyframe.marker_vertices)
+        observation.marks.push_back(replay.queries->nearest(recording.mesh.vertices.row(vertex).transpose()));
+      const bool weighs =
+          keyframe.time >= settings.score_from && keyframe.time <= settings.score_to &&
+          (keyframe.cloud.rows() >= settings.min_points || keyframe.contour.rows() >= settings.min_points ||
+           keyframe.markers.rows() > 0 || keyframe.force);
+      observation.weight = weighs ? 1 : 0;
+      replay.observations.push_back(std::move(observation));
+    }
+  });
+}
+
+Replay make_replay(const Replay& replay, const ReplaySettings& settings,
+                   std::shared_ptr<const sim::SheetPlan> plan) {
+  return assemble(replay.recording, settings, std::move(plan), [&](Replay& made) {
+    made.observations = replay.observations;
+    const data::TriangleMesh& mesh = replay.recording.mesh;
+    for (Observation& observation : made.observations)
+      for (SurfacePoint& mark : observation.marks) {
+        Eigen::Vector3d rest = Eigen::Vector3d::Zero();
+        for (int k = 0; k < 3; ++k)
+          rest += mark.barycentric[k] * mesh.vertices.row(mesh.triangles(mark.triangle, k)).transpose();
+        mark = made.queries->nearest(rest);
+      }
+  });
 }
 
 sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate) {

@@ -87,6 +87,11 @@ int steps_in(double duration, double step);
 Replay make_replay(const data::Recording& recording, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan = nullptr);
 
+/// The recording of a replay under other settings. What was observed is taken over with its weights; no file
+/// is read but that of another mesh.
+Replay make_replay(const Replay& replay, const ReplaySettings& settings,
+                   std::shared_ptr<const sim::SheetPlan> plan = nullptr);
+
 /// The simulated world of one candidate, before its first step.
 sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate);
 

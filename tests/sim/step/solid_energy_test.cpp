@@ -133,7 +133,9 @@ TEST(SolidEnergy, AHomogeneousStrainBalancesWithin) {
       add_solid_gradient(*plan, sheet.bodies[0], solid_of({.constitutive = model}),
                          sheet.rest.vertices * F.transpose(), gradient);
       for (Eigen::Index i = 0; i < gradient.rows(); ++i)
-        if (sheet.vertex_area[i] == 0) EXPECT_LT(gradient.row(i).norm(), 1e-13 * gradient.norm());
+        if (sheet.vertex_area[i] == 0) {
+          EXPECT_LT(gradient.row(i).norm(), 1e-13 * gradient.norm());
+        }
     }
   }
 }

@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include "data/procedural_mesh.h"
-#include "sysid/design/scratch_folder.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::sysid {
@@ -29,12 +28,11 @@ data::Recording some_recording() {
 
 class VirtualExperiment : public testing::TestWithParam<const char*> {};
 
-TEST_P(VirtualExperiment, BeginsWithTheSheetOnTheTableAndWritesToItsFolder) {
-  const data::TemporaryFolder folder;
-  const Replay replay = virtual_experiment(GetParam(), some_recording(), towel(), {}, folder / "made");
+TEST_P(VirtualExperiment, BeginsWithTheSheetOnTheTableAndLeavesNoFiles) {
+  const Replay replay = virtual_experiment(GetParam(), some_recording(), towel(), {});
   EXPECT_EQ(replay.recording.kind, GetParam());
   EXPECT_LE(replay.observations.back().t, longest_virtual_experiment);
-  EXPECT_EQ(replay.recording.source, folder / "made" + "/recording.json");
+  EXPECT_FALSE(std::filesystem::exists(replay.recording.source));
   const data::Points& first = replay.observations.front().points;
   ASSERT_GT(first.rows(), 100);
   // Without noise all points are on it; clouds keep floats, 1e-7 of a length below 1 m.
@@ -46,19 +44,8 @@ TEST_P(VirtualExperiment, BeginsWithTheSheetOnTheTableAndWritesToItsFolder) {
 INSTANTIATE_TEST_SUITE_P(All, VirtualExperiment, testing::ValuesIn(virtual_experiments));
 
 TEST(VirtualExperiments, OfAnUnknownKindIsRefused) {
-  EXPECT_EQ(data::input_error_of([] { virtual_experiment("fold", some_recording(), towel(), {}, "none"); }),
+  EXPECT_EQ(data::input_error_of([] { virtual_experiment("fold", some_recording(), towel(), {}); }),
             "--kind: found fold, expected corner_lift, hang, drag, bar_pull or bias_pull");
-}
-
-TEST(ScratchFolder, IsGoneWithAllThatIsInIt) {
-  std::string path;
-  {
-    const ScratchFolder folder;
-    path = folder.path();
-    EXPECT_TRUE(std::filesystem::create_directories(path + "/below"));
-    EXPECT_EQ(std::filesystem::status(path).permissions(), std::filesystem::perms::owner_all);
-  }
-  EXPECT_FALSE(std::filesystem::exists(path));
 }
 
 }  // namespace

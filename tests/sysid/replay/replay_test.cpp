@@ -283,5 +283,35 @@ TEST(Replay, AClampThatHoldsTheSlopeConvergesWithTheSquareOfTheCell) {
   }
 }
 
+// Files are not read again: they may be gone.
+TEST(Replay, UnderOtherSettingsIsThatOfItsFilesWithoutThem) {
+  const data::TemporaryFolder folder;
+  Replay replay = short_lift(folder, "sheet:0.2x0.05:0.025");
+  ReplaySettings settings = replay.settings;
+  settings.mesh = "sheet:0.2x0.05:0.0125";
+  settings.solver.time_step *= 0.5;
+  const Replay read = make_replay(data::load_recording(folder / "lift"), settings);
+  replay.observations[3].weight = 0.5;
+  SurfacePoint mark;  // the middle of an edge from the corner
+  mark.triangle = 0;
+  mark.barycentric = {0.5, 0.5, 0};
+  replay.observations[3].marks = {mark};
+  std::filesystem::remove_all(folder / "lift");
+  const Replay made = make_replay(replay, settings);
+  EXPECT_EQ(made.sheet().rest.vertices, read.sheet().rest.vertices);
+  EXPECT_EQ(made.steps, read.steps);
+  EXPECT_EQ(made.start, read.start);
+  ASSERT_EQ(made.observations.size(), read.observations.size());
+  for (std::size_t k = 0; k < read.observations.size(); ++k) {
+    EXPECT_EQ(made.observations[k].t, read.observations[k].t);
+    EXPECT_EQ(made.observations[k].points, read.observations[k].points);
+    EXPECT_EQ(made.observations[k].weight, k == 3 ? 0.5 : read.observations[k].weight);
+  }
+  const data::TriangleMesh& coarse = replay.recording.mesh;
+  const Eigen::RowVector3d middle =
+      0.5 * (coarse.vertices.row(coarse.triangles(0, 0)) + coarse.vertices.row(coarse.triangles(0, 1)));
+  EXPECT_LT((made.observations[3].marks[0].position.transpose() - middle).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace flash::sysid

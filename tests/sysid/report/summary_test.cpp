@@ -30,6 +30,26 @@ TEST(Summary, ComesBackFromItsFileAsItWas) {
   EXPECT_EQ(loaded.fixed.at("friction").source, "measured");
 }
 
+TEST(Summary, KeepsWhatToRecordNext) {
+  const data::TemporaryFolder folder;
+  Summary summary = example_summary();
+  summary.next_experiments = {
+      {"bar_pull", 1.5, {{"poisson", 0.1}, {"bending", 0.2}}, {{"poisson", 0.05}, {"bending", 0.19}}}};
+  save_summary(summary, folder / "summary.json");
+  const Summary loaded = load_summary(folder / "summary.json");
+  ASSERT_EQ(loaded.next_experiments.size(), 1u);
+  EXPECT_EQ(loaded.next_experiments[0].name, "bar_pull");
+  EXPECT_EQ(loaded.next_experiments[0].bits, 1.5);
+  EXPECT_EQ(loaded.next_experiments[0].spread_before.at("bending"), 0.2);
+  EXPECT_EQ(loaded.next_experiments[0].spread.at("poisson"), 0.05);
+  summary.next_experiments[0].spread.erase("bending");
+  save_summary(summary, folder / "summary.json");
+  EXPECT_NE(data::input_error_of([&] {
+              load_summary(folder / "summary.json");
+            }).find("next_experiments.bar_pull.bending"),
+            std::string::npos);
+}
+
 TEST(Summary, HasTheFieldsOfItsSchema) {
   const nlohmann::json json = nlohmann::json::parse(summary_text(example_summary()));
   EXPECT_EQ(json["schema"], "flash-sysid-summary/2");
