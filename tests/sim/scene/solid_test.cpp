@@ -13,6 +13,17 @@ namespace {
 
 const Eigen::Vector3d size(0.3, 0.2, 0.1);
 
+/// Volume within the outer faces, which look outward (divergence theorem).
+double enclosed_volume(const Sheet& solid) {
+  double volume = 0;
+  for (Eigen::Index f = 0; f < solid.solid_surface.rows(); ++f) {
+    Eigen::Matrix3d corners;
+    for (int k = 0; k < 3; ++k) corners.col(k) = solid.rest.vertices.row(solid.solid_surface(f, k));
+    volume += corners.determinant() / 6;
+  }
+  return volume;
+}
+
 TEST(SolidMesh, VolumeAndSurfaceOfABoxGoToItsVertices) {
   const Sheet box = make_solid(data::tet_box(size, {6, 4, 2}));
   EXPECT_NEAR(box.vertex_volume.sum(), size.prod(), 1e-15);
@@ -23,14 +34,7 @@ TEST(SolidMesh, VolumeAndSurfaceOfABoxGoToItsVertices) {
     const bool within = (x > 1e-9).all() && (x < size.array() - 1e-9).all();
     EXPECT_EQ(box.vertex_area[i] == 0, within);
   }
-  // Outer faces look outward: their volume is that of the box (divergence theorem).
-  double volume = 0;
-  for (Eigen::Index f = 0; f < box.solid_surface.rows(); ++f) {
-    Eigen::Matrix3d corners;
-    for (int k = 0; k < 3; ++k) corners.col(k) = box.rest.vertices.row(box.solid_surface(f, k));
-    volume += corners.determinant() / 6;
-  }
-  EXPECT_NEAR(volume, size.prod(), 1e-15);
+  EXPECT_NEAR(enclosed_volume(box), size.prod(), 1e-15);
 }
 
 TEST(SolidMesh, QuadraticElementsHaveVerticesInTheMiddleOfTheirEdges) {
@@ -51,13 +55,7 @@ TEST(SolidMesh, QuadraticElementsHaveVerticesInTheMiddleOfTheirEdges) {
   EXPECT_GT(box.vertex_volume.minCoeff(), 0);
   EXPECT_LT((box.rest.vertices.transpose() * box.vertex_volume - 0.5 * size.prod() * size).norm(), 1e-15);
   EXPECT_NEAR(box.vertex_area.sum(), 2 * (0.3 * 0.2 + 0.2 * 0.1 + 0.1 * 0.3), 1e-14);
-  double volume = 0;
-  for (Eigen::Index f = 0; f < box.solid_surface.rows(); ++f) {
-    Eigen::Matrix3d corners;
-    for (int k = 0; k < 3; ++k) corners.col(k) = box.rest.vertices.row(box.solid_surface(f, k));
-    volume += corners.determinant() / 6;
-  }
-  EXPECT_NEAR(volume, size.prod(), 1e-15);
+  EXPECT_NEAR(enclosed_volume(box), size.prod(), 1e-15);
 }
 
 TEST(SolidMesh, WhatHoldsBothEndsOfAnEdgeHoldsItsMiddle) {
