@@ -1,6 +1,7 @@
 #include "sim/cuda/layout/sheet_layout.h"
 
 #include <algorithm>
+#include <numeric>
 
 namespace flash::sim::cuda {
 namespace {
@@ -90,20 +91,36 @@ void add_block_rows(const SheetPlan& plan, const std::vector<int>& position, She
 }
 
 void add_scalar_rows(const BendingOperator& bending, const std::vector<int>& position, SheetLayout& layout) {
+  constexpr int lanes_each = 4, lanes = lanes_each * bundle_groups;
   const RowGroups& stiffness = bending.stiffness;
-  for (const auto& group : stiffness.rows)
-    for (const int row : group) layout.group_rows.push_back(row < 0 ? -1 : position[row]);
-  layout.group_starts = {0};
-  for (std::size_t group = 0; group < stiffness.rows.size(); ++group) {
-    for (int k = stiffness.starts[group]; k < stiffness.starts[group + 1]; ++k) {
-      layout.group_columns.push_back(position[stiffness.columns[k]]);
-      layout.group_values.insert(layout.group_values.end(), stiffness.values.begin() + 4L * k,
-                                 stiffness.values.begin() + 4L * (k + 1));
-    }
+  const int group_count = static_cast<int>(stiffness.rows.size());
+  const auto length = [&](int group) { return stiffness.starts[group + 1] - stiffness.starts[group]; };
+  // Those of a bundle are about as long.
+  std::vector<int> groups(group_count);
+  std::iota(groups.begin(), groups.end(), 0);
+  std::stable_sort(groups.begin(), groups.end(), [&](int a, int b) { return length(a) > length(b); });
+  layout.bundle_starts = {0};
+  for (int first = 0; first < group_count; first += bundle_groups) {
+    const int start = layout.bundle_starts.back(), longest = length(groups[first]),
+              padding = lanes_each * steps_together,
+              end = start + (longest + padding - 1) / padding * steps_together;
+    layout.bundle_starts.push_back(end);
     // Zeros times any vertex.
-    while (layout.group_columns.size() % group_padding != 0) layout.group_columns.push_back(0);
-    layout.group_values.resize(4 * layout.group_columns.size(), 0.0);
-    layout.group_starts.push_back(static_cast<int>(layout.group_columns.size()));
+    layout.step_columns.resize(static_cast<std::size_t>(lanes) * end, 0);
+    layout.step_values.resize(4L * lanes * end, 0.0);
+    for (int own = 0; own < bundle_groups; ++own) {
+      const int group = first + own < group_count ? groups[first + own] : -1;
+      for (int k = 0; k < 4; ++k) {
+        const int row = group < 0 ? -1 : stiffness.rows[group][k];
+        layout.group_rows.push_back(row < 0 ? -1 : position[row]);
+      }
+      for (int k = 0; group >= 0 && k < length(group); ++k) {
+        const int from = stiffness.starts[group] + k,
+                  to = lanes * (start + k / lanes_each) + lanes_each * own + k % lanes_each;
+        layout.step_columns[to] = position[stiffness.columns[from]];
+        std::copy_n(stiffness.values.begin() + 4L * from, 4, layout.step_values.begin() + 4L * to);
+      }
+    }
   }
   layout.stand_in = bending.stand_in;
 }
