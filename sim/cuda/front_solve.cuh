@@ -48,7 +48,8 @@ class ChunkStream {
         depth_(tables.solve_depth),
         first_(chip_address(chip) + warp() * depth_ * Slot::size),
         end_(first_ + depth_ * Slot::size),
-        free_(first_) {
+        free_(first_),
+        policy_(leaves_first()) {
 #pragma unroll
     for (int k = 0; k < width; ++k) what_[k] = next_[chunk_words * k];
     for (int k = width; k < depth_; k += width) send();
@@ -84,10 +85,11 @@ class ChunkStream {
       const bool two_rows = what.y != 0, two_columns = what.z & 1;
 #pragma unroll
       for (int p = 0; p < parts; ++p) {
-        copy_to_chip<16>(to + p * part, upper + p * part);
-        if (two_columns) copy_to_chip<16>(to + tile + p * part, upper + tile + p * part);
-        if (two_rows) copy_to_chip<16>(to + 2 * tile + p * part, lower + p * part);
-        if (two_rows && two_columns) copy_to_chip<16>(to + 3 * tile + p * part, lower + tile + p * part);
+        copy_to_chip(to + p * part, upper + p * part, policy_);
+        if (two_columns) copy_to_chip(to + tile + p * part, upper + tile + p * part, policy_);
+        if (two_rows) copy_to_chip(to + 2 * tile + p * part, lower + p * part, policy_);
+        if (two_rows && two_columns)
+          copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, policy_);
       }
       copy_to_chip<8>(slot + Slot::input_table + 8 * lane(), gathers_ + what.w);
       if (what.z >= 0) copy_to_chip<8>(slot + Slot::result_table + 8 * lane(), gathers_ + (what.z >> 1));
@@ -108,6 +110,7 @@ class ChunkStream {
   int4 what_[width];  ///< the first numbers of the chunks that are sent next
   int depth_;
   unsigned first_, end_, free_;
+  CachePolicy policy_;  ///< a factor does not stay in the cache from one solve to the next
 };
 
 /// The inputs of a chunk in half precision.
