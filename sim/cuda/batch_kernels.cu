@@ -54,14 +54,15 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
   float* chip = shared_memory<float>();
   float* shares = batch.shares + 3L * share_step<false> * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    write_shares<false>(batch.sheet, batch.environments[e], {}, places_of(batch, e), Preconditioner, shares, chip);
+    write_shares<false>(batch.sheet, batch.environments[e], {}, places_of(batch, e), Preconditioner, shares,
+                        chip);
     __syncthreads();
     if constexpr (Preconditioner)
       assemble_blocks<false>(batch.sheet, batch.environments[e], {}, {}, shares,
-                      batch.blocks + 9L * batch.sheet.block_count * e, chip);
+                             batch.blocks + 9L * batch.sheet.block_count * e, chip);
     else
       assemble_block_rows<false>(batch.sheet, batch.environments[e], shares,
-                          batch.block_rows + batch.block_row_size * e, chip);
+                                 batch.block_rows + batch.block_row_size * e, chip);
     __syncthreads();
   }
 }

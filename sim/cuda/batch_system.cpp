@@ -78,33 +78,15 @@ struct BatchSystem::Memory {
     residuals = DeviceArray<float>(team_count * 3 * size);
     images = DeviceArray<float>(team_count * 3 * size);
     searches = DeviceArray<Four<float>>(team_count * size);
-    numbers = {plan.fronts,
-               plan.sheet,
-               count,
-               layout.size,
-               environments.data(),
-               positions.data(),
-               vectors.data(),
-               restrictions.data(),
-               restriction_counts.data(),
-               restriction_of.data(),
-               results.data(),
-               changes.data(),
-               gradients.data(),
-               energies.data(),
-               static_cast<long>(row_size),
-               block_rows.data(),
-               blocks.data(),
-               factors.data(),
-               positive.data(),
-               solves.data(),
-               triangle_gradients.data(),
-               shares.data(),
-               updates.data(),
-               solved.data(),
-               residuals.data(),
-               images.data(),
-               searches.data()};
+    numbers = {plan.fronts,           plan.sheet,          count,
+               layout.size,           environments.data(), positions.data(),
+               vectors.data(),        restrictions.data(), restriction_counts.data(),
+               restriction_of.data(), results.data(),      changes.data(),
+               gradients.data(),      energies.data(),     static_cast<long>(row_size),
+               block_rows.data(),     blocks.data(),       factors.data(),
+               positive.data(),       solves.data(),       triangle_gradients.data(),
+               shares.data(),         updates.data(),      solved.data(),
+               residuals.data(),      images.data(),       searches.data()};
     check(cudaStreamCreate(&stream));
   }
   ~Memory() {

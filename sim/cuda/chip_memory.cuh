@@ -27,7 +27,8 @@ __device__ inline void copy_to_chip(unsigned to, const void* from, [[maybe_unuse
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
   *static_cast<int4*>(__cvta_shared_to_generic(to)) = *static_cast<const int4*>(from);
 #else
-  asm volatile("cp.async.cg.shared.global.L2::cache_hint [%0], [%1], 16, %2;" ::"r"(to), "l"(from), "l"(policy)
+  asm volatile("cp.async.cg.shared.global.L2::cache_hint [%0], [%1], 16, %2;" ::"r"(to), "l"(from),
+               "l"(policy)
                : "memory");
 #endif
 }

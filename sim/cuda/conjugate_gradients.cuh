@@ -94,8 +94,7 @@ __device__ inline Numbers3 free_part(const Restrictions& restrictions, int verte
 /// and solve_memory.
 template <int parts>
 __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
-                                   const LinearProblem& problem, const LinearVectors& v,
-                                   float* direction,
+                                   const LinearProblem& problem, const LinearVectors& v, float* direction,
                                    float* change, float* partial, char* chip) {
   constexpr int most = 20;
   const int size = sheet.size;
@@ -173,8 +172,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     // The residual has free parts alone, so that those of what the factor gives need not be taken for this.
     float products = 0;
     for_own_vertices(
-        size,
-        [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },
+        size, [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },
         [&](int, float own) { products += own; });
     const float along = sum_over_team(products, partial);
     const float kept = iteration == 1 ? 0 : along / previous;
@@ -186,7 +184,9 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
           const Numbers3 own = free_part(restrictions, i, numbers_at(preconditioned, i));
           return iteration == 1 ? own : scaled_sum(own, kept, {last.x, last.y, last.z});
         },
-        [&](int i, const Numbers3& next) { v.search[i] = v.near[i] = {next.x, next.y, next.z, 0}; });
+        [&](int i, const Numbers3& next) {
+          v.search[i] = v.near[i] = {next.x, next.y, next.z, 0};
+        });
     __syncthreads();
     v.clock.count(ReplayPhase::directions);
     products = multiply_search();

@@ -29,8 +29,8 @@ __host__ __device__ constexpr int solve_memory(int depth) {
   return team_warps * depth * ChunkSlot<parts>::size;
 }
 
-/// Chunks that a warp works on side by side, where it has `depth` of them on chip. Each waits for numbers most
-/// of the time; with two a warp waits for both at once.
+/// Chunks that a warp works on side by side, where it has `depth` of them on chip. Each waits for numbers
+/// most of the time; with two a warp waits for both at once.
 __host__ __device__ constexpr int chunks_side_by_side(int depth) {
   return depth >= 2 * chunks_together ? chunks_together : 1;
 }
@@ -88,8 +88,7 @@ class ChunkStream {
         copy_to_chip(to + p * part, upper + p * part, policy_);
         if (two_columns) copy_to_chip(to + tile + p * part, upper + tile + p * part, policy_);
         if (two_rows) copy_to_chip(to + 2 * tile + p * part, lower + p * part, policy_);
-        if (two_rows && two_columns)
-          copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, policy_);
+        if (two_rows && two_columns) copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, policy_);
       }
       copy_to_chip<8>(slot + Slot::input_table + 8 * lane(), gathers_ + what.w);
       if (what.z >= 0) copy_to_chip<8>(slot + Slot::result_table + 8 * lane(), gathers_ + (what.z >> 1));
@@ -167,8 +166,7 @@ __device__ int run_chunks(unsigned first_slot, float* vector, float (&sums)[4]) 
     const HalfPair pair(scale.to * inputs[k]);
     const unsigned word = word_of(pair.high, pair.low);
 #pragma unroll
-    for (int half = 0; half < 2; ++half)
-      rights[k].halves[half] = right_inputs(word, half * solve_tile_width);
+    for (int half = 0; half < 2; ++half) rights[k].halves[half] = right_inputs(word, half * solve_tile_width);
     rights[k].scale = scale.back;
   }
 #pragma unroll

@@ -30,8 +30,8 @@ __host__ __device__ inline int hessian_memory_with_shares(int triangles) {
 /// Hessian without negative eigenvalues. `chip`: hessian_memory, where the shares are not on chip.
 template <bool on_chip>
 __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                    const StepStart& start, const Point* positions, bool positive,
-                                    float* shares, float* chip) {
+                             const StepStart& start, const Point* positions, bool positive, float* shares,
+                             float* chip) {
   constexpr int block_numbers = share_step<on_chip>, fours = 3 * share_step<false> / 4;
   float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
   for (int first = 32 * warp(); first < tables.triangle_count; first += team_threads) {
@@ -176,7 +176,7 @@ __device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumb
 /// `chip`: nine numbers a thread, through which a warp, that has a slice, writes.
 template <bool on_chip>
 __device__ void assemble_block_rows(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                           const float* shares, float* rows, float* chip) {
+                                    const float* shares, float* rows, float* chip) {
   static_assert(slice_size == 32);
   float* own_chip = chip + slice_numbers * warp();
   const auto write = [&](int slot, const Block& block) {
@@ -235,8 +235,8 @@ inline __device__ void restrict_block(const SheetTables& tables, const Restricti
 /// numbers a thread, through which a warp writes its blocks one after the other.
 template <bool on_chip>
 __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                       const Restrictions& restrictions, const HingeMatrix& hinges,
-                                       const float* shares, float* blocks, float* chip) {
+                                const Restrictions& restrictions, const HingeMatrix& hinges,
+                                const float* shares, float* blocks, float* chip) {
   float* own_chip = chip + 9 * 32 * warp();
   for (int first = 32 * warp(); first < tables.block_count; first += team_threads) {
     const int b = min(first + lane(), tables.block_count - 1);

@@ -37,8 +37,8 @@ Lifts run_lifts(const std::shared_ptr<const SheetPlan>& plan, int environments, 
   environment.holds = corner_lift(rest, steps, settings.time_step);
   environment.positions = rest;
   environment.velocities = data::Points::Zero(rest.rows(), 3);
-  BatchReplay replay(plan, std::vector<ReplayEnvironment>(static_cast<std::size_t>(environments), environment),
-                     settings);
+  BatchReplay replay(
+      plan, std::vector<ReplayEnvironment>(static_cast<std::size_t>(environments), environment), settings);
   const auto start = std::chrono::steady_clock::now();
   replay.advance(steps);
   replay.synchronize();

@@ -93,7 +93,8 @@ void add_block_rows(const SheetPlan& plan, const std::vector<int>& position, She
 
 /// Columns of two groups of scalar rows by steps: four of each in a step, -1 where there are no more. Eight
 /// lanes read from on-chip memory at once, sixteen bytes each, without waiting where places differ modulo 8.
-/// So in each step come first the remainders of which most columns are left, each once where that is possible.
+/// So in each step come first the remainders of which most columns are left, each once where that is
+/// possible.
 std::vector<std::array<int, 8>> spread_over_banks(const std::array<std::vector<int>, 2>& places) {
   constexpr int banks = 8, each = 4;
   std::array<std::array<std::vector<int>, banks>, 2> left;  // numbers of columns by remainder

@@ -37,7 +37,7 @@ struct SheetLayout {
   std::vector<int> bundle_starts;   ///< of each bundle, in steps, and their end
   std::vector<int> step_columns;    ///< one a lane and step
   std::vector<double> step_values;  ///< four likewise, of the rows of the lane's group
-  std::vector<double> stand_in;  ///< one number a block
+  std::vector<double> stand_in;     ///< one number a block
 
   // Hinges; without them where the model is another. Each array by hinge.
   int hinge_count = 0;
