@@ -148,6 +148,8 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     result.iterations += double(c.iterations) / total;
     result.solves += double(c.solves) / total;
     result.factorizations += double(c.factorizations) / total;
+    if (benchmark.steps > 0)
+      result.iterations_max = std::max(result.iterations_max, double(c.iterations) / benchmark.steps);
     converged += double(c.converged);
     result.residual_max = data::worst(result.residual_max, c.residual_max);
   }

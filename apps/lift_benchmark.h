@@ -41,6 +41,7 @@ struct LiftBenchmarkResult {
   double converged_share = 0;    ///< of environment-steps
   double residual_max = 0;
   double iterations = 0;                  ///< Newton's, a step
+  double iterations_max = 0;              ///< of the material that takes most, a step
   double solves = 0, factorizations = 0;  ///< a step
   std::vector<BenchmarkPhase>
       phases;  ///< of the CPU: their sum leaves contact, line search and the rest of step_milliseconds

@@ -47,6 +47,7 @@ int bench(BenchOptions options) {
                                    {"wall_seconds", result.wall_seconds},
                                    {"step_ms", result.step_milliseconds},
                                    {"iterations", result.iterations},
+                                   {"iterations_max", result.iterations_max},
                                    {"converged_share", result.converged_share},
                                    {"solves", result.solves},
                                    {"factorizations", result.factorizations},
@@ -63,17 +64,20 @@ int bench(BenchOptions options) {
                 result.vertices, benchmark.environments, benchmark.steps, result.wall_seconds,
                 result.step_milliseconds);
     std::printf(
-        "converged %.2f %% of the steps, worst residual %.2g; a step %.2f Newton iterations, %.2f solves, "
-        "%.2f factorizations\n",
-        100 * result.converged_share, result.residual_max, result.iterations, result.solves,
-        result.factorizations);
+        "converged %.2f %% of the steps, worst residual %.2g; a step %.2f Newton iterations (%.2f of the "
+        "material that takes most), %.2f solves, %.2f factorizations\n",
+        100 * result.converged_share, result.residual_max, result.iterations, result.iterations_max,
+        result.solves, result.factorizations);
     return exit_done;
   }
   std::printf("%d vertices, %d environments, %d steps, %d threads, kernels for %s: %.1f s\n", result.vertices,
               benchmark.environments, benchmark.steps, benchmark.threads, sim::to_string(benchmark.level),
               result.wall_seconds);
-  std::printf("converged %.2f %% of the steps, worst residual %.2g, %.2f Newton iterations a step\n",
-              100 * result.converged_share, result.residual_max, result.iterations);
+  std::printf(
+      "converged %.2f %% of the steps, worst residual %.2g, %.2f Newton iterations a step (%.2f of the "
+      "material "
+      "that takes most)\n",
+      100 * result.converged_share, result.residual_max, result.iterations, result.iterations_max);
   std::printf("%-21s %9s %10s %10s\n", "time a step, 1 thread", "calls", "ms a call", "ms");
   for (const sim::BenchmarkPhase& phase : result.phases)
     std::printf("%-20s %10.2f %10.4f %10.3f\n", phase.name.c_str(), phase.calls_per_step,

@@ -52,16 +52,17 @@ template <bool Preconditioner>
 __global__ void __launch_bounds__(team_threads, resident_teams_each)
     assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
   float* chip = shared_memory<float>();
-  float* shares = batch.shares + 3L * share_numbers * batch.sheet.triangle_count * blockIdx.x;
+  float* shares = batch.shares + 3L * share_step<false> * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    write_shares(batch.sheet, batch.environments[e], {}, places_of(batch, e), Preconditioner, shares, chip);
+    write_shares<false>(batch.sheet, batch.environments[e], {}, places_of(batch, e), Preconditioner, shares,
+                        chip);
     __syncthreads();
     if constexpr (Preconditioner)
-      assemble_blocks(batch.sheet, batch.environments[e], {}, {}, shares,
-                      batch.blocks + 9L * batch.sheet.block_count * e, chip);
+      assemble_blocks<false>(batch.sheet, batch.environments[e], {}, {}, shares,
+                             batch.blocks + 9L * batch.sheet.block_count * e, chip);
     else
-      assemble_block_rows(batch.sheet, batch.environments[e], shares,
-                          batch.block_rows + batch.block_row_size * e, chip);
+      assemble_block_rows<false>(batch.sheet, batch.environments[e], shares,
+                                 batch.block_rows + batch.block_row_size * e, chip);
     __syncthreads();
   }
 }
@@ -119,7 +120,8 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
         {},
         factor_of<parts>(batch, e),
         vector_of(batch, e),
-        {batch.restrictions + static_cast<long>(batch.restrictions_each) * e, batch.restriction_counts[e]},
+        {batch.restrictions + static_cast<long>(batch.restrictions_each) * e, batch.restriction_counts[e],
+         batch.restriction_of + static_cast<long>(batch.restrictions_each) * e},
         tolerance};
     const int solves = conjugate_gradients<parts>(
         batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),

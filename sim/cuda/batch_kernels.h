@@ -19,7 +19,7 @@ struct BatchNumbers {
   const Point* positions;
   const float* vectors;
   const VertexRestriction* restrictions;
-  const int* restriction_counts;
+  const int *restriction_counts, *restriction_of;
   float *results, *changes;
   double* gradients;
   ElasticEnergies* energies;

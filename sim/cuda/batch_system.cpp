@@ -34,7 +34,7 @@ struct BatchSystem::Memory {
   DeviceArray<VertexRestriction> restrictions;
   DeviceArray<double> gradients, triangle_gradients;
   DeviceArray<ElasticEnergies> energies;
-  DeviceArray<int> restriction_counts, positive, solves;
+  DeviceArray<int> restriction_counts, restriction_of, positive, solves;
   DeviceArray<float> shares, updates, solved, residuals, images;
   DeviceArray<Four<float>> searches;
   int teams;
@@ -68,6 +68,7 @@ struct BatchSystem::Memory {
     check(cudaMemset(factors.data(), 0, environment_count * factor_size * sizeof(__half)));
     restrictions = DeviceArray<VertexRestriction>(environment_count * size);
     restriction_counts = DeviceArray<int>(environment_count);
+    restriction_of = DeviceArray<int>(environment_count * size);
     positive = DeviceArray<int>(environment_count);
     solves = DeviceArray<int>(environment_count);
     triangle_gradients = DeviceArray<double>(team_count * 9 * triangles);
@@ -77,32 +78,15 @@ struct BatchSystem::Memory {
     residuals = DeviceArray<float>(team_count * 3 * size);
     images = DeviceArray<float>(team_count * 3 * size);
     searches = DeviceArray<Four<float>>(team_count * size);
-    numbers = {plan.fronts,
-               plan.sheet,
-               count,
-               layout.size,
-               environments.data(),
-               positions.data(),
-               vectors.data(),
-               restrictions.data(),
-               restriction_counts.data(),
-               results.data(),
-               changes.data(),
-               gradients.data(),
-               energies.data(),
-               static_cast<long>(row_size),
-               block_rows.data(),
-               blocks.data(),
-               factors.data(),
-               positive.data(),
-               solves.data(),
-               triangle_gradients.data(),
-               shares.data(),
-               updates.data(),
-               solved.data(),
-               residuals.data(),
-               images.data(),
-               searches.data()};
+    numbers = {plan.fronts,           plan.sheet,          count,
+               layout.size,           environments.data(), positions.data(),
+               vectors.data(),        restrictions.data(), restriction_counts.data(),
+               restriction_of.data(), results.data(),      changes.data(),
+               gradients.data(),      energies.data(),     static_cast<long>(row_size),
+               block_rows.data(),     blocks.data(),       factors.data(),
+               positive.data(),       solves.data(),       triangle_gradients.data(),
+               shares.data(),         updates.data(),      solved.data(),
+               residuals.data(),      images.data(),       searches.data()};
     check(cudaStreamCreate(&stream));
   }
   ~Memory() {
@@ -162,10 +146,13 @@ void BatchSystem::set_vector(int environment, const data::Points& vector) {
 void BatchSystem::set_restrictions(int environment, const std::vector<VertexRestriction>& restrictions) {
   if (restrictions.size() > memory_->layout.order.size())
     throw std::invalid_argument("set_restrictions: more than vertices");
+  const size_t size = memory_->layout.order.size(), first = static_cast<size_t>(environment) * size;
   const int count = static_cast<int>(restrictions.size());
+  std::vector<int> restriction_of(size, -1);
+  for (int k = 0; k < count; ++k) restriction_of[static_cast<size_t>(restrictions[k].place)] = k;
   synchronize();
-  memory_->restrictions.write(static_cast<size_t>(environment) * memory_->layout.order.size(),
-                              restrictions.data(), restrictions.size());
+  memory_->restrictions.write(first, restrictions.data(), restrictions.size());
+  memory_->restriction_of.write(first, restriction_of.data(), size);
   memory_->restriction_counts.write(static_cast<size_t>(environment), &count, 1);
 }
 

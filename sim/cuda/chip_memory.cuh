@@ -10,6 +10,29 @@ __device__ inline unsigned chip_address(const void* on_chip) {
   return static_cast<unsigned>(__cvta_generic_to_shared(on_chip));
 }
 
+/// How the second-level cache is to treat what is read.
+using CachePolicy = unsigned long long;
+
+/// What is read with it leaves the cache first: numbers of which others are read before they come again.
+__device__ inline CachePolicy leaves_first() {
+  CachePolicy policy = 0;
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 800
+  asm("createpolicy.fractional.L2::evict_first.b64 %0, 1.0;" : "=l"(policy));
+#endif
+  return policy;
+}
+
+/// Copies 16 bytes in the background, to be waited for with wait_for_copies.
+__device__ inline void copy_to_chip(unsigned to, const void* from, [[maybe_unused]] CachePolicy policy) {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+  *static_cast<int4*>(__cvta_shared_to_generic(to)) = *static_cast<const int4*>(from);
+#else
+  asm volatile("cp.async.cg.shared.global.L2::cache_hint [%0], [%1], 16, %2;" ::"r"(to), "l"(from),
+               "l"(policy)
+               : "memory");
+#endif
+}
+
 /// Copies 4, 8 or 16 bytes in the background, to be waited for with wait_for_copies.
 template <int bytes>
 __device__ inline void copy_to_chip(unsigned to, const void* from) {

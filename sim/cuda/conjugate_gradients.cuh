@@ -1,13 +1,14 @@
 #pragma once
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/front_solve.cuh"
+#include "sim/cuda/own_vertices.cuh"
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_product.cuh"
 
 namespace flash::sim::cuda {
 
-// Conjugate gradients of one environment, as NewtonMatrix::solve of the CPU. A thread owns the numbers i,
-// i + team_threads, ... of each vector.
+// Conjugate gradients of one environment, as NewtonMatrix::solve of the CPU. A thread owns the vertices i,
+// i + team_threads, ... of each vector; a few of them are on their way at a time.
 
 /// The linear problem of an environment.
 struct LinearProblem {
@@ -52,6 +53,41 @@ __device__ inline void restrict_to_free(const Restrictions& restrictions, float*
   __syncthreads();
 }
 
+/// Three numbers of a vertex.
+struct Numbers3 {
+  float x, y, z;
+};
+
+struct NumbersPair {
+  Numbers3 first, second;
+};
+
+__device__ inline Numbers3 numbers_at(const float* vector, int vertex) {
+  const float* own = vector + 3 * vertex;
+  return {own[0], own[1], own[2]};
+}
+__device__ inline void put(const Numbers3& v, float* vector, int vertex) {
+  float* own = vector + 3 * vertex;
+  own[0] = v.x;
+  own[1] = v.y;
+  own[2] = v.z;
+}
+__device__ inline Numbers3 scaled_sum(const Numbers3& a, float scale, const Numbers3& b) {
+  return {a.x + scale * b.x, a.y + scale * b.y, a.z + scale * b.z};
+}
+__device__ inline float product(const Numbers3& a, const Numbers3& b) {
+  return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+/// What of a vertex may move freely.
+__device__ inline Numbers3 free_part(const Restrictions& restrictions, int vertex, const Numbers3& v) {
+  const int at = restrictions.count == 0 ? -1 : restrictions.of_place[vertex];
+  if (at < 0) return v;
+  const float* free = restrictions.list[at].free;
+  return {free[0] * v.x + free[3] * v.y + free[6] * v.z, free[1] * v.x + free[4] * v.y + free[7] * v.z,
+          free[2] * v.x + free[5] * v.y + free[8] * v.z};
+}
+
 /// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
 /// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
 /// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, a number a warp
@@ -61,51 +97,71 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
                                    const LinearProblem& problem, const LinearVectors& v, float* direction,
                                    float* change, float* partial, char* chip) {
   constexpr int most = 20;
-  const int size = 3 * sheet.size, first = static_cast<int>(threadIdx.x);
-  float* search = reinterpret_cast<float*>(v.search);
-  float* preconditioned = v.solved + size;
-  const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
-  const auto restricted = [&](float* x) { restrict_to_free(problem.restrictions, x); };
-  for (int i = first; i < size; i += team_threads) {
-    v.residual[i] = -problem.gradient[i];
-    direction[i] = change[i] = search[slot(i)] = 0;
-  }
-  __syncthreads();
-  int moved = 0;
-  for (int k = first; k < problem.restrictions.count; k += team_threads) {
-    const VertexRestriction& restriction = problem.restrictions.list[k];
-    for (int c = 0; c < 3; ++c) {
-      moved += restriction.correction[c] != 0;
-      direction[3 * restriction.place + c] = search[4 * restriction.place + c] = restriction.correction[c];
-    }
-  }
-  // The copy is of the thread's own numbers.
-  const auto copy_search = [&] {
-    if (v.near == v.search) return;
-    for (int i = first; i < size; i += team_threads)
-      reinterpret_cast<float*>(v.near)[slot(i)] = search[slot(i)];
+  const int size = sheet.size;
+  float *residual = v.residual, *preconditioned = v.solved + 3 * size;
+  const Restrictions& restrictions = problem.restrictions;
+  const auto multiply_search = [&] {
+    return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
   };
-  if (sum_over_team(static_cast<float>(moved), partial) > 0) {
-    copy_search();
+  // The right-hand side, and where the restrictions have the solution start.
+  int moved = 0;
+  for_own_vertices(
+      size,
+      [&](int i) {
+        const int at = restrictions.count == 0 ? -1 : restrictions.of_place[i];
+        const float* correction = at < 0 ? nullptr : restrictions.list[at].correction;
+        const Numbers3 start = at < 0 ? Numbers3{} : Numbers3{correction[0], correction[1], correction[2]};
+        return NumbersPair{numbers_at(problem.gradient, i), start};
+      },
+      [&](int i, const NumbersPair& from) {
+        const auto& [gradient, start] = from;
+        moved |= start.x != 0 || start.y != 0 || start.z != 0;
+        put({-gradient.x, -gradient.y, -gradient.z}, residual, i);
+        put(start, direction, i);
+        put({}, change, i);
+        v.search[i] = v.near[i] = {start.x, start.y, start.z, 0};
+      });
+  const bool starts_elsewhere = __syncthreads_or(moved) != 0;
+  if (starts_elsewhere) {
+    multiply_search();
     __syncthreads();
-    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
-    for (int i = first; i < size; i += team_threads) {
-      v.residual[i] -= v.image[i];
-      change[i] += v.image[i];
-    }
+    for_own_vertices(
+        size, [&](int i) { return numbers_at(v.image, i); },
+        [&](int i, const Numbers3& own) { put(own, change, i); });
   }
-  // The residual's norm; it becomes the next right-hand side of the factor.
-  const auto take_residual = [&] {
-    restricted(v.residual);
+  // The norm of the residual, of which `step` times the image is taken off. What the restrictions leave
+  // becomes the next right-hand side of the factor.
+  const auto take_residual = [&](float step) {
     float squares = 0;
-    for (int i = first; i < size; i += team_threads) {
-      const float own = v.residual[i];
-      preconditioned[i] = own;
-      squares += own * own;
-    }
+    for_own_vertices(
+        size,
+        [&](int i) {
+          const Numbers3 own = numbers_at(residual, i);
+          const Numbers3 left = step == 0 ? own : scaled_sum(own, -step, numbers_at(v.image, i));
+          return free_part(restrictions, i, left);
+        },
+        [&](int i, const Numbers3& left) {
+          put(left, residual, i);
+          put(left, preconditioned, i);
+          squares += product(left, left);
+        });
     return sqrtf(sum_over_team(squares, partial));
   };
-  float norm = take_residual(), previous = 0;
+  // Goes a step along the search direction, the image with it.
+  const auto go = [&](float step) {
+    for_own_vertices(
+        size,
+        [&](int i) {
+          const Four<float> along = v.near[i];
+          return NumbersPair{scaled_sum(numbers_at(direction, i), step, {along.x, along.y, along.z}),
+                             scaled_sum(numbers_at(change, i), step, numbers_at(v.image, i))};
+        },
+        [&](int i, const NumbersPair& next) {
+          put(next.first, direction, i);
+          put(next.second, change, i);
+        });
+  };
+  float norm = take_residual(starts_elsewhere ? 1.0f : 0.0f), previous = 0;
   const float target = fmaxf(0.1f * norm, problem.tolerance);
   int iteration = 0;
   while (norm > target && iteration < most) {
@@ -113,34 +169,35 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     v.clock.count(ReplayPhase::directions);
     solve<parts>(fronts, problem.factor, v, chip);
     v.clock.count(ReplayPhase::solves);
-    restricted(preconditioned);
-    float product = 0;
-    for (int i = first; i < size; i += team_threads) product += v.residual[i] * preconditioned[i];
-    const float along = sum_over_team(product, partial);
+    // The residual has free parts alone, so that those of what the factor gives need not be taken for this.
+    float products = 0;
+    for_own_vertices(
+        size, [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },
+        [&](int, float own) { products += own; });
+    const float along = sum_over_team(products, partial);
     const float kept = iteration == 1 ? 0 : along / previous;
     previous = along;
-    float* near = reinterpret_cast<float*>(v.near);
-    for (int i = first; i < size; i += team_threads) {
-      const float own = preconditioned[i] + (iteration == 1 ? 0 : kept * search[slot(i)]);
-      search[slot(i)] = own;
-      near[slot(i)] = own;
-    }
+    for_own_vertices(
+        size,
+        [&](int i) {
+          const Four<float> last = v.search[i];
+          const Numbers3 own = free_part(restrictions, i, numbers_at(preconditioned, i));
+          return iteration == 1 ? own : scaled_sum(own, kept, {last.x, last.y, last.z});
+        },
+        [&](int i, const Numbers3& next) {
+          v.search[i] = v.near[i] = {next.x, next.y, next.z, 0};
+        });
     __syncthreads();
     v.clock.count(ReplayPhase::directions);
-    product = multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
-    const float curvature = sum_over_team(product, partial);
+    products = multiply_search();
+    const float curvature = sum_over_team(products, partial);
     v.clock.count(ReplayPhase::products);
     // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
     if (curvature <= 0 && iteration > 1) break;
     const float step = curvature > 0 ? along / curvature : 1;
-    for (int i = first; i < size; i += team_threads) {
-      const float image = step * v.image[i];
-      direction[i] += step * near[slot(i)];
-      change[i] += image;
-      v.residual[i] -= image;
-    }
+    go(step);
     if (curvature <= 0) break;
-    norm = take_residual();
+    norm = take_residual(step);
   }
   __syncthreads();
   return iteration;

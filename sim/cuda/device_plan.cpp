@@ -13,6 +13,22 @@ FrontSettings fitting_fronts(FrontSettings settings) {
   return settings;
 }
 
+namespace {
+
+/// The four numbers of the lanes of a step: two of each lane, then the other two. So what a warp reads at
+/// once, sixteen bytes a lane, lies together.
+std::vector<double> by_halves(const std::vector<double>& steps) {
+  constexpr std::size_t lanes = 4 * bundle_groups;
+  std::vector<double> halves(steps.size());
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    const std::size_t step = k / (4 * lanes), lane = k / 4 % lanes, number = k % 4;
+    halves[4 * lanes * step + 2 * lanes * (number / 2) + 2 * lane + number % 2] = steps[k];
+  }
+  return halves;
+}
+
+}  // namespace
+
 template <typename Number>
 const Number* DevicePlan::upload(const std::vector<Number>& numbers,
                                  std::vector<DeviceArray<Number>>& arrays) {
@@ -41,7 +57,7 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.size = layout.size;
   sheet.triangle_count = layout.triangle_count;
   sheet.block_count = layout.block_count;
-  sheet.group_count = static_cast<int>(layout.group_rows.size()) / 4;
+  sheet.bundle_count = static_cast<int>(layout.bundle_starts.size()) - 1;
   sheet.triangle_vertices = upload(layout.triangle_vertices, ints_);
   sheet.gradients = upload(layout.gradients, doubles_);
   sheet.areas = upload(layout.areas, doubles_);
@@ -54,11 +70,11 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.slice_starts = upload(layout.slice_starts, ints_);
   sheet.slice_columns = upload(layout.slice_columns, ints_);
   sheet.group_rows = upload(layout.group_rows, ints_);
-  sheet.group_starts = upload(layout.group_starts, ints_);
-  sheet.group_columns = upload(layout.group_columns, ints_);
-  sheet.group_values = upload(layout.group_values, doubles_);
-  sheet.single_group_values =
-      upload(std::vector<float>(layout.group_values.begin(), layout.group_values.end()), floats_);
+  sheet.bundle_starts = upload(layout.bundle_starts, ints_);
+  sheet.step_columns = upload(layout.step_columns, ints_);
+  sheet.step_values = upload(by_halves(layout.step_values), doubles_);
+  sheet.single_step_values =
+      upload(std::vector<float>(layout.step_values.begin(), layout.step_values.end()), floats_);
   sheet.stand_in = upload(std::vector<float>(layout.stand_in.begin(), layout.stand_in.end()), floats_);
   sheet.vertex_area = upload(layout.vertex_area, doubles_);
   sheet.edge_count = static_cast<int>(layout.edge_lengths.size());

@@ -16,6 +16,11 @@ __host__ __device__ inline int gradient_memory(int size, bool places_on_chip) {
   return static_cast<int>(sizeof(double)) * (most_sums * team_warps + (places_on_chip ? 3 * size : 0));
 }
 
+/// Bytes of what the triangles give.
+__host__ __device__ inline int gradient_share_memory(int triangles) {
+  return 9 * static_cast<int>(sizeof(double)) * triangles;
+}
+
 /// What elements give to their vertices: nine numbers a triangle, twelve a hinge.
 struct GradientShares {
   double *triangles, *hinges;
@@ -58,10 +63,22 @@ __device__ double add_up_gradient(const SheetTables& tables, const Places& place
     bending += dot(bent, p);
     Triple sum = {0, 0, 0};
     if (tables.hinge_count > 0) sum = hinge_gradient_of(tables, vertex, hinge_shares);
-#pragma unroll 6
-    for (int k = tables.corner_starts[vertex]; k < tables.corner_starts[vertex + 1]; ++k) {
-      const double* share = shares + tables.corners[k];
-      sum = sum + Triple{share[0], share[tables.triangle_count], share[2 * tables.triangle_count]};
+    // Most vertices have no more corners than this; what they read is on its way together.
+    constexpr int together = 6;
+    const int end = tables.corner_starts[vertex + 1];
+    for (int first = tables.corner_starts[vertex]; first < end; first += together) {
+      int corners[together];
+      Triple own[together];
+#pragma unroll
+      for (int k = 0; k < together; ++k) corners[k] = tables.corners[min(first + k, end - 1)];
+#pragma unroll
+      for (int k = 0; k < together; ++k) {
+        const double* share = shares + corners[k];
+        own[k] = {share[0], share[tables.triangle_count], share[2 * tables.triangle_count]};
+      }
+#pragma unroll
+      for (int k = 0; k < together; ++k)
+        if (first + k < end) sum = sum + own[k];
     }
     own[0] = bent.x + sum.x;
     own[1] = bent.y + sum.y;
@@ -94,7 +111,7 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
     }
     __syncthreads();
   }
-  multiply_scalar_rows(tables, tables.group_values, place, [&](int row, int c, double sum) {
+  multiply_scalar_rows(tables, tables.step_values, place, [&](int row, int c, double sum) {
     gradient[3 * row + c] = environment.rigidity * sum;
   });
   const double membrane = triangle_gradients(tables, environment, place, shares.triangles);

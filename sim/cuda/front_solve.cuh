@@ -9,7 +9,7 @@ namespace flash::sim::cuda {
 // forward its own numbers b become [y; u] = W b, u passed up; backward x = W^T [y; x_below]. So the operator
 // is F^T F whatever the rounding of W: symmetric and positive definite, as conjugate gradients need it. One
 // barrier a level each way; the factor is read twice. It comes from memory by chunks of four tiles, the next
-// few of each warp on their way to the chip while it works on one. Tensor cores multiply the factor's half
+// few of each warp on their way to the chip while it works on others. Tensor cores multiply the factor's half
 // precision by inputs in two parts of it, so that what is rounded is the factor alone.
 
 /// A chunk on chip: tiles, where inputs come from, where results go, and the chunk itself [bytes].
@@ -29,8 +29,14 @@ __host__ __device__ constexpr int solve_memory(int depth) {
   return team_warps * depth * ChunkSlot<parts>::size;
 }
 
-/// The chunks of a warp, on their way to the chip.
-template <int parts>
+/// Chunks that a warp works on side by side, where it has `depth` of them on chip. Each waits for numbers
+/// most of the time; with two a warp waits for both at once.
+__host__ __device__ constexpr int chunks_side_by_side(int depth) {
+  return depth >= 2 * chunks_together ? chunks_together : 1;
+}
+
+/// The chunks of a warp, on their way to the chip, `width` at a time.
+template <int parts, int width>
 class ChunkStream {
  public:
   using Slot = ChunkSlot<parts>;
@@ -39,21 +45,23 @@ class ChunkStream {
       : gathers_(tables.gathers + lane()),
         factor_(reinterpret_cast<const char*>(factor) + 16 * lane()),
         next_(reinterpret_cast<const int4*>(tables.chunks + tables.chunk_starts[warp()])),
-        what_(*next_),
         depth_(tables.solve_depth),
         first_(chip_address(chip) + warp() * depth_ * Slot::size),
         end_(first_ + depth_ * Slot::size),
-        free_(first_) {
-    for (int k = 1; k < depth_; ++k) send();
+        free_(first_),
+        policy_(leaves_first()) {
+#pragma unroll
+    for (int k = 0; k < width; ++k) what_[k] = next_[chunk_words * k];
+    for (int k = width; k < depth_; k += width) send();
   }
 
-  /// Where the next chunk is on chip until the next call.
+  /// Where the next `width` chunks are on chip until the next call, one behind the other.
   __device__ unsigned take() {
     __syncwarp();
     send();
-    if (depth_ == 4)
+    if (depth_ == 4 * width)
       wait_for_copies<3>();
-    else if (depth_ == 2)
+    else if (depth_ == 2 * width)
       wait_for_copies<1>();
     else
       wait_for_copies<0>();
@@ -62,103 +70,156 @@ class ChunkStream {
   }
 
  private:
-  /// Sends the next chunk to the slot that is free, and frees the one after it. Behind the last chunk of a
+  static constexpr int chunk_words = sizeof(SolveChunk) / sizeof(int4);
+
+  /// Sends the next chunks to the slots that are free, and frees those after them. Behind the last chunk of a
   /// warp stand some without numbers.
   __device__ void send() {
     constexpr int tile = solve_tile_bytes<parts>, part = solve_tile_bytes<half_parts>;
-    const unsigned to = free_ + 16 * lane();
-    const char* upper = factor_ + static_cast<long>(what_.x) * tile;
-    const char* lower = upper + static_cast<long>(what_.y) * tile;
-    const bool two_rows = what_.y != 0, two_columns = what_.z & 1;
 #pragma unroll
-    for (int p = 0; p < parts; ++p) {
-      copy_to_chip<16>(to + p * part, upper + p * part);
-      if (two_columns) copy_to_chip<16>(to + tile + p * part, upper + tile + p * part);
-      if (two_rows) copy_to_chip<16>(to + 2 * tile + p * part, lower + p * part);
-      if (two_rows && two_columns) copy_to_chip<16>(to + 3 * tile + p * part, lower + tile + p * part);
+    for (int k = 0; k < width; ++k) {
+      const int4 what = what_[k];
+      const unsigned slot = free_ + k * Slot::size, to = slot + 16 * lane();
+      const char* upper = factor_ + static_cast<long>(what.x) * tile;
+      const char* lower = upper + static_cast<long>(what.y) * tile;
+      const bool two_rows = what.y != 0, two_columns = what.z & 1;
+#pragma unroll
+      for (int p = 0; p < parts; ++p) {
+        copy_to_chip(to + p * part, upper + p * part, policy_);
+        if (two_columns) copy_to_chip(to + tile + p * part, upper + tile + p * part, policy_);
+        if (two_rows) copy_to_chip(to + 2 * tile + p * part, lower + p * part, policy_);
+        if (two_rows && two_columns) copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, policy_);
+      }
+      copy_to_chip<8>(slot + Slot::input_table + 8 * lane(), gathers_ + what.w);
+      if (what.z >= 0) copy_to_chip<8>(slot + Slot::result_table + 8 * lane(), gathers_ + (what.z >> 1));
+      if (lane() < Slot::chunk_bytes / 16)
+        copy_to_chip<16>(to + Slot::chunk, next_ + chunk_words * k + 1 + lane());
     }
-    copy_to_chip<8>(free_ + Slot::input_table + 8 * lane(), gathers_ + what_.w);
-    if (what_.z >= 0) copy_to_chip<8>(free_ + Slot::result_table + 8 * lane(), gathers_ + (what_.z >> 1));
-    if (lane() < Slot::chunk_bytes / 16) copy_to_chip<16>(to + Slot::chunk, next_ + 1 + lane());
     end_copies();
-    next_ += sizeof(SolveChunk) / sizeof(int4);
-    what_ = *next_;
-    free_ += Slot::size;
+    next_ += chunk_words * width;
+#pragma unroll
+    for (int k = 0; k < width; ++k) what_[k] = next_[chunk_words * k];
+    free_ += width * Slot::size;
     if (free_ == end_) free_ = first_;
   }
 
   const Gather* gathers_;
   const char* factor_;
   const int4* next_;
-  int4 what_;  ///< the first numbers of the chunk that is sent next
+  int4 what_[width];  ///< the first numbers of the chunks that are sent next
   int depth_;
   unsigned first_, end_, free_;
+  CachePolicy policy_;  ///< a factor does not stay in the cache from one solve to the next
 };
 
-/// Multiplies by the chunk at `slot`. `sums`: of the chunks of the task so far, of the rows lane() / 4 + 8 k;
-/// zero at first. Returns SolveChunk::flags.
+/// The inputs of a chunk in half precision.
+struct ChunkInputs {
+  RightInputs halves[2];
+  float scale;  ///< of products with them
+};
+
+/// Writes the results of a task, whose chunks added up to `sums`.
 template <int parts, bool backward>
-__device__ int run_chunk(unsigned slot, float* vector, float (&sums)[4]) {
+__device__ void finish_task(unsigned slot, int own_at, const float (&sums)[4], float* vector) {
   using Slot = ChunkSlot<parts>;
-  const int4 chunk = load_int4(slot + Slot::chunk);
-  const int flags = chunk.x, inputs = chunk.y, right_at = chunk.z;
-  if (inputs == 0) return flags;
-  const int2 from = load_int2(slot + Slot::input_table + 8 * lane());
-  float input = vector[from.x];
-  if (!backward) input += vector[from.y] + vector[right_at + lane()];
-  if (lane() >= inputs) input = 0;
-  const HalfScale scale(largest_of_warp(fabsf(input)));
-  const HalfPair pair(scale.to * input);
-  const unsigned word = word_of(pair.high, pair.low);
-
-  // Of results that there are none of, products are anything.
-  float products[2][4] = {};
-  const auto add = [&](int input_half) {
-    const RightInputs right = right_inputs(word, input_half * solve_tile_width);
-#pragma unroll
-    for (int i = 0; i < 2; ++i)
-#pragma unroll
-      for (int part = 0; part < parts; ++part) {
-        const int tile = backward ? 2 * input_half + i : 2 * i + input_half;
-        add_tile_product(products[i],
-                         load_solve_tile<backward>(slot + tile * solve_tile_bytes<parts> +
-                                                   part * solve_tile_bytes<half_parts>),
-                         right);
-      }
-  };
-  add(0);
-  if (inputs > solve_tile_width) add(1);
-#pragma unroll
-  for (int k = 0; k < 4; ++k)
-    sums[k] += scale.back * (products[k / 2][k % 2 * 2] + products[k / 2][k % 2 * 2 + 1]);
-
-  if (flags & SolveChunk::ends) {
-    // Four lanes have the same four rows; each keeps one.
-    const int t = lane() % 4, row = 8 * t + lane() / 4;
-    const float result = t < 2 ? (t == 0 ? sums[0] : sums[1]) : (t == 2 ? sums[2] : sums[3]);
-    const int own_at = chunk.w;
-    const int4 end = load_int4(slot + Slot::chunk + 16);
-    if (row < end.x) {
-      vector[own_at + row] = result;
-    } else if (!backward && row >= end.z && row < end.w) {
-      const int2 passed = load_int2(slot + Slot::result_table + 8 * row);
-      vector[end.y + row] = result + vector[passed.x] + vector[passed.y];
-    }
-#pragma unroll
-    for (float& sum : sums) sum = 0;
+  // Four lanes have the same four rows; each keeps one.
+  const int t = lane() % 4, row = 8 * t + lane() / 4;
+  const float result = t < 2 ? (t == 0 ? sums[0] : sums[1]) : (t == 2 ? sums[2] : sums[3]);
+  const int4 end = load_int4(slot + Slot::chunk + 16);
+  if (row < end.x) {
+    vector[own_at + row] = result;
+  } else if (!backward && row >= end.z && row < end.w) {
+    const int2 passed = load_int2(slot + Slot::result_table + 8 * row);
+    vector[end.y + row] = result + vector[passed.x] + vector[passed.y];
   }
-  return flags;
+}
+
+/// Multiplies by the `width` chunks from `first_slot` on, none of which needs what another gives. `sums`: of
+/// the chunks of the task so far, of the rows lane() / 4 + 8 k; zero at first. Returns the SolveChunk::flags
+/// of the last one.
+template <int parts, bool backward, int width>
+__device__ int run_chunks(unsigned first_slot, float* vector, float (&sums)[4]) {
+  using Slot = ChunkSlot<parts>;
+  const auto slot = [&](int k) { return first_slot + k * Slot::size; };
+  int4 chunks[width];
+#pragma unroll
+  for (int k = 0; k < width; ++k) chunks[k] = load_int4(slot(k) + Slot::chunk);
+  int2 from[width];
+#pragma unroll
+  for (int k = 0; k < width; ++k) from[k] = load_int2(slot(k) + Slot::input_table + 8 * lane());
+  float inputs[width];
+#pragma unroll
+  for (int k = 0; k < width; ++k) {
+    inputs[k] = vector[from[k].x];
+    if (!backward) inputs[k] += vector[from[k].y] + vector[chunks[k].z + lane()];
+  }
+#pragma unroll
+  for (int k = 0; k < width; ++k)
+    if (lane() >= chunks[k].y) inputs[k] = 0;
+  float largest[width];
+#pragma unroll
+  for (int k = 0; k < width; ++k) largest[k] = largest_of_warp(fabsf(inputs[k]));
+  ChunkInputs rights[width];
+#pragma unroll
+  for (int k = 0; k < width; ++k) {
+    const HalfScale scale(largest[k]);
+    const HalfPair pair(scale.to * inputs[k]);
+    const unsigned word = word_of(pair.high, pair.low);
+#pragma unroll
+    for (int half = 0; half < 2; ++half) rights[k].halves[half] = right_inputs(word, half * solve_tile_width);
+    rights[k].scale = scale.back;
+  }
+#pragma unroll
+  for (int k = 0; k < width; ++k) {
+    const int flags = chunks[k].x, input_count = chunks[k].y;
+    if (input_count == 0) continue;
+    // Of results that there are none of, products are anything.
+    float products[2][4] = {};
+    const auto add = [&](int input_half) {
+#pragma unroll
+      for (int i = 0; i < 2; ++i)
+#pragma unroll
+        for (int part = 0; part < parts; ++part) {
+          const int tile = backward ? 2 * input_half + i : 2 * i + input_half;
+          add_tile_product(products[i],
+                           load_solve_tile<backward>(slot(k) + tile * solve_tile_bytes<parts> +
+                                                     part * solve_tile_bytes<half_parts>),
+                           rights[k].halves[input_half]);
+        }
+    };
+    add(0);
+    if (input_count > solve_tile_width) add(1);
+#pragma unroll
+    for (int r = 0; r < 4; ++r)
+      sums[r] += rights[k].scale * (products[r / 2][r % 2 * 2] + products[r / 2][r % 2 * 2 + 1]);
+    if (flags & SolveChunk::ends) {
+      finish_task<parts, backward>(slot(k), chunks[k].w, sums, vector);
+#pragma unroll
+      for (float& sum : sums) sum = 0;
+    }
+  }
+  return chunks[width - 1].x;
 }
 
 /// All heights upwards, or downwards.
-template <int parts, bool backward>
-__device__ void run_levels(int count, ChunkStream<parts>& stream, float* vector) {
+template <int parts, bool backward, int width>
+__device__ void run_levels(int count, ChunkStream<parts, width>& stream, float* vector) {
   float sums[4] = {};
   for (int level = 0; level < count; ++level) {
     __syncthreads();
-    while (!(run_chunk<parts, backward>(stream.take(), vector, sums) & SolveChunk::ends_level)) {
+    while (!(run_chunks<parts, backward, width>(stream.take(), vector, sums) & SolveChunk::ends_level)) {
     }
   }
+}
+
+template <int parts, int width>
+__device__ void run_both_ways(const FrontTables& tables, const __half* factor, float* vector,
+                              const char* chip) {
+  ChunkStream<parts, width> stream(tables, factor, chip);
+  if (threadIdx.x == 0) vector[6 * tables.size] = 0;
+  run_levels<parts, false>(tables.level_count, stream, vector);
+  run_levels<parts, true>(tables.level_count, stream, vector);
+  wait_for_copies<0>();
 }
 
 /// x <- (L L^T)^-1 x, x behind the first 3 a vertex of `vector`, whose layout is that of solve_chunk.h.
@@ -168,11 +229,10 @@ __device__ void solve(const FrontTables& tables, const __half* factor, float* ve
 #ifdef __CUDA_ARCH__
   if (on_chip) __builtin_assume(__isShared(vector));
 #endif
-  ChunkStream<parts> stream(tables, factor, chip);
-  if (threadIdx.x == 0) vector[6 * tables.size] = 0;
-  run_levels<parts, false>(tables.level_count, stream, vector);
-  run_levels<parts, true>(tables.level_count, stream, vector);
-  wait_for_copies<0>();
+  if (chunks_side_by_side(tables.solve_depth) == chunks_together)
+    run_both_ways<parts, chunks_together>(tables, factor, vector, chip);
+  else
+    run_both_ways<parts, 1>(tables, factor, vector, chip);
   __syncthreads();
 }
 

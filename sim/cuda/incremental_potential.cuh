@@ -101,7 +101,7 @@ __device__ inline double add_turned_damping(const SheetTables& tables, const Ste
   __syncthreads();
   const double rigidity = step.numbers.damping_share * step.numbers.rigidity;
   multiply_scalar_rows(
-      tables, tables.group_values, [&](int vertex) { return triple(memory.bent[vertex]); },
+      tables, tables.step_values, [&](int vertex) { return triple(memory.bent[vertex]); },
       [&](int row, int c, double sum) { memory.damped[3 * row + c] = rigidity * sum; });
   __syncthreads();
   double totals[4] = {};
@@ -191,18 +191,19 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
 }
 
 /// Fills in an iterate from its positions. `line`: contacts of the iterate from which a line leads here, null
-/// without.
+/// without. `triangle_shares`: for what triangles give to the gradient.
 template <bool places_on_chip>
 __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProblem& step,
-                                      const TeamMemory& memory, const ContactSet* line, Iterate& at) {
+                                      const TeamMemory& memory, double* triangle_shares,
+                                      const ContactSet* line, Iterate& at) {
   double* partial = shared_memory<double>();
   double* force = at.force;
   const Point* positions = at.positions;
   __syncthreads();
   at.elastic = elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, positions, force,
-                                                {memory.triangle_gradients, memory.hinge_gradients}, partial);
+                                                {triangle_shares, memory.hinge_gradients}, partial);
   double damping = at.elastic.damping;
-  if (step.damped_since.metrics != nullptr && tables.group_count > 0)
+  if (step.damped_since.metrics != nullptr && tables.bundle_count > 0)
     damping += add_turned_damping(tables, step, memory, positions, force, partial);
   const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
   // Potential, squared residuals, friction, friction along the line, squared rounding.

@@ -13,18 +13,26 @@ namespace flash::sim::cuda {
 // the rest in single. It writes its three blocks off the diagonal; since a move of the whole sheet costs
 // nothing, blocks on the diagonal are what the others of their row lack to zero. Then a thread takes a row.
 
-/// Numbers from one block to the next: column after column, and three unused.
-inline constexpr int share_numbers = 12;
+/// Numbers from one block of a triangle to the next: column after column, and in memory three unused, so that
+/// a block is read by fours. On chip an odd number from one triangle to the next spreads them over the banks.
+template <bool on_chip>
+inline constexpr int share_step = on_chip ? 9 : 12;
 
 /// Through these on chip a warp writes what its lanes have one after the other.
-inline constexpr int hessian_memory = team_threads * 3 * share_numbers;
+inline constexpr int hessian_memory = team_threads * 3 * share_step<false>;
+
+/// On-chip numbers of a matrix whose triangles' shares are there too, behind nine numbers a thread.
+__host__ __device__ inline int hessian_memory_with_shares(int triangles) {
+  return 9 * team_threads + 3 * share_step<true> * triangles;
+}
 
 /// The blocks (1,0), (2,0), (2,1) of each triangle, with its damping since `start`. `positive`: of the
-/// Hessian without negative eigenvalues. `chip`: hessian_memory.
-inline __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                    const StepStart& start, const Point* positions, bool positive,
-                                    float* shares, float* chip) {
-  constexpr int fours = 3 * share_numbers / 4;
+/// Hessian without negative eigenvalues. `chip`: hessian_memory, where the shares are not on chip.
+template <bool on_chip>
+__device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers& environment,
+                             const StepStart& start, const Point* positions, bool positive, float* shares,
+                             float* chip) {
+  constexpr int block_numbers = share_step<on_chip>, fours = 3 * share_step<false> / 4;
   float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
   for (int first = 32 * warp(); first < tables.triangle_count; first += team_threads) {
     const int t = min(first + lane(), tables.triangle_count - 1);
@@ -52,7 +60,7 @@ inline __device__ void write_shares(const SheetTables& tables, const Environment
       const float ones = i[0] * j[0], twos = i[1] * j[1], rising = i[0] * j[1], falling = i[1] * j[0];
       const float uu = ones * p11 + twos * m, vv = ones * m + twos * p22, nn = ones * bend1 + twos * bend2,
                   uv = rising * p12 + falling * k, vu = rising * k + falling * p12;
-      float numbers[share_numbers] = {};
+      float numbers[block_numbers] = {};
 #pragma unroll
       for (int column = 0; column < 3; ++column) {
         const float on_u = uu * u[column] + uv * v[column], on_v = vu * u[column] + vv * v[column],
@@ -61,11 +69,18 @@ inline __device__ void write_shares(const SheetTables& tables, const Environment
         for (int row = 0; row < 3; ++row)
           numbers[3 * column + row] = on_u * u[row] + on_v * v[row] + on_n * n[row];
       }
+      if constexpr (on_chip) {
+        // Lanes beyond the last triangle write what it has.
 #pragma unroll
-      for (int k = 0; k < share_numbers / 4; ++k)
-        own_chip[fours * lane() + share_numbers / 4 * b + k] = {numbers[4 * k], numbers[4 * k + 1],
-                                                                numbers[4 * k + 2], numbers[4 * k + 3]};
+        for (int e = 0; e < block_numbers; ++e) shares[block_numbers * (3 * t + b) + e] = numbers[e];
+      } else {
+#pragma unroll
+        for (int k = 0; k < block_numbers / 4; ++k)
+          own_chip[fours * lane() + block_numbers / 4 * b + k] = {numbers[4 * k], numbers[4 * k + 1],
+                                                                  numbers[4 * k + 2], numbers[4 * k + 3]};
+      }
     }
+    if constexpr (on_chip) continue;
     __syncwarp();
     const int count = fours * min(32, tables.triangle_count - first);
     float4* to = reinterpret_cast<float4*>(shares) + fours * first;
@@ -76,7 +91,7 @@ inline __device__ void write_shares(const SheetTables& tables, const Environment
   __syncthreads();
   add_damping_shares(
       tables, environment, start.metrics, [&](int vertex) { return triple(positions[vertex]); }, positive,
-      share_numbers, shares);
+      block_numbers, shares);
 }
 
 /// Three by three numbers, column after column.
@@ -85,16 +100,25 @@ struct Block {
 };
 
 /// What the triangles at an edge give.
-inline __device__ Block sum_of_shares(const EdgeSources& sources, const float* shares) {
+template <bool on_chip>
+__device__ Block sum_of_shares(const EdgeSources& sources, const float* shares) {
   const auto share = [&](int source) {
-    float4 fours[3] = {};
-    if (source >= 0) {
-      const float4* from = reinterpret_cast<const float4*>(shares) + share_numbers / 4 * source;
+    if constexpr (on_chip) {
+      Block block;
 #pragma unroll
-      for (int k = 0; k < 3; ++k) fours[k] = from[k];
+      for (int e = 0; e < 9; ++e)
+        block.numbers[e] = source >= 0 ? shares[share_step<true> * source + e] : 0.0f;
+      return block;
+    } else {
+      float4 fours[3] = {};
+      if (source >= 0) {
+        const float4* from = reinterpret_cast<const float4*>(shares) + share_step<false> / 4 * source;
+#pragma unroll
+        for (int k = 0; k < 3; ++k) fours[k] = from[k];
+      }
+      return Block{{fours[0].x, fours[0].y, fours[0].z, fours[0].w, fours[1].x, fours[1].y, fours[1].z,
+                    fours[1].w, fours[2].x}};
     }
-    return Block{{fours[0].x, fours[0].y, fours[0].z, fours[0].w, fours[1].x, fours[1].y, fours[1].z,
-                  fours[1].w, fours[2].x}};
   };
   Block sum = share(sources.first);
   const Block other = share(sources.second);
@@ -105,24 +129,33 @@ inline __device__ Block sum_of_shares(const EdgeSources& sources, const float* s
 
 /// Goes through the blocks of a row off its diagonal, work(slot, block), and returns that on it with the
 /// inertia. `slot`: in SheetTables::slice_columns.
-template <typename Work>
+template <bool on_chip, typename Work>
 __device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumbers& environment, int vertex,
                                 const float* shares, const Work& work) {
   const int slice = vertex / slice_size, end = tables.slice_starts[slice + 1];
   Block diagonal = {};
-#pragma unroll 2
-  for (int k = tables.slice_starts[slice] + 1; k < end; ++k) {
-    const int slot = k * slice_size + vertex % slice_size;
-    const EdgeSources sources = tables.slice_sources[slot];
-    Block block = sum_of_shares(sources, shares);
-    if (sources.turned) {
-      const Block as_stored = block;
+  // What so many blocks read is on its way together.
+  constexpr int together = 2;
+  for (int first = tables.slice_starts[slice] + 1; first < end; first += together) {
+    EdgeSources sources[together];
+    Block blocks[together];
 #pragma unroll
-      for (int e = 0; e < 9; ++e) block.numbers[e] = as_stored.numbers[e % 3 * 3 + e / 3];
+    for (int k = 0; k < together; ++k)
+      sources[k] = tables.slice_sources[min(first + k, end - 1) * slice_size + vertex % slice_size];
+#pragma unroll
+    for (int k = 0; k < together; ++k) blocks[k] = sum_of_shares<on_chip>(sources[k], shares);
+#pragma unroll
+    for (int k = 0; k < together; ++k) {
+      if (first + k >= end) break;
+      Block block = blocks[k];
+      if (sources[k].turned) {
+#pragma unroll
+        for (int e = 0; e < 9; ++e) block.numbers[e] = blocks[k].numbers[e % 3 * 3 + e / 3];
+      }
+#pragma unroll
+      for (int e = 0; e < 9; ++e) diagonal.numbers[e] -= block.numbers[e];
+      work((first + k) * slice_size + vertex % slice_size, block);
     }
-#pragma unroll
-    for (int e = 0; e < 9; ++e) diagonal.numbers[e] -= block.numbers[e];
-    work(slot, block);
   }
   const float inertia =
       static_cast<float>(environment.inertia_density * tables.vertex_area[min(vertex, tables.size - 1)]);
@@ -141,8 +174,9 @@ __device__ Block go_through_row(const SheetTables& tables, const EnvironmentNumb
 
 /// The Hessian of membrane and inertia as block rows (sheet_product.cuh). Hinges apart, these are all blocks.
 /// `chip`: nine numbers a thread, through which a warp, that has a slice, writes.
-inline __device__ void assemble_block_rows(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                           const float* shares, float* rows, float* chip) {
+template <bool on_chip>
+__device__ void assemble_block_rows(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                    const float* shares, float* rows, float* chip) {
   static_assert(slice_size == 32);
   float* own_chip = chip + slice_numbers * warp();
   const auto write = [&](int slot, const Block& block) {
@@ -156,7 +190,7 @@ inline __device__ void assemble_block_rows(const SheetTables& tables, const Envi
   };
   for (int slice = warp(); slice_size * slice < tables.size; slice += team_warps) {
     const int vertex = slice_size * slice + lane();
-    const Block diagonal = go_through_row(tables, environment, vertex, shares, write);
+    const Block diagonal = go_through_row<on_chip>(tables, environment, vertex, shares, write);
     write(tables.slice_starts[slice] * slice_size, diagonal);
   }
 }
@@ -199,15 +233,16 @@ inline __device__ void restrict_block(const SheetTables& tables, const Restricti
 
 /// The same with bending or the stand-in for it, as blocks of the pattern: what is factorized. `chip`: nine
 /// numbers a thread, through which a warp writes its blocks one after the other.
-inline __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                       const Restrictions& restrictions, const HingeMatrix& hinges,
-                                       const float* shares, float* blocks, float* chip) {
+template <bool on_chip>
+__device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                const Restrictions& restrictions, const HingeMatrix& hinges,
+                                const float* shares, float* blocks, float* chip) {
   float* own_chip = chip + 9 * 32 * warp();
   for (int first = 32 * warp(); first < tables.block_count; first += team_threads) {
     const int b = min(first + lane(), tables.block_count - 1);
-    Block block = b < tables.size
-                      ? go_through_row(tables, environment, tables.block_rows[b], shares, [](int, Block) {})
-                      : sum_of_shares(tables.pair_sources[b - tables.size], shares);
+    Block block = b < tables.size ? go_through_row<on_chip>(tables, environment, tables.block_rows[b], shares,
+                                                            [](int, const Block&) {})
+                                  : sum_of_shares<on_chip>(tables.pair_sources[b - tables.size], shares);
     if (tables.stand_in != nullptr) {
       const float bending = static_cast<float>(environment.effective_rigidity()) * tables.stand_in[b];
       for (int e = 0; e < 9; e += 4) block.numbers[e] += bending;

@@ -25,18 +25,28 @@ __device__ inline void count_phase(const TeamMemory& memory, ReplayPhase phase) 
 
 __device__ inline void evaluate(const Work& w, const StepProblem& step, const ContactSet* line, Iterate& at) {
   count_phase(w.memory, ReplayPhase::rest);
+  const int shares_at = w.replay.gradient_shares_at;
+  double* shares = shares_at < 0 ? w.memory.triangle_gradients
+                                 : reinterpret_cast<double*>(shared_memory<char>() + shares_at);
   if (w.replay.places_on_chip)
-    evaluate<true>(w.replay.sheet, step, w.memory, line, at);
+    evaluate<true>(w.replay.sheet, step, w.memory, shares, line, at);
   else
-    evaluate<false>(w.replay.sheet, step, w.memory, line, at);
+    evaluate<false>(w.replay.sheet, step, w.memory, shares, line, at);
   count_phase(w.memory, ReplayPhase::evaluation);
 }
 
+/// What triangles give to a matrix: on chip behind nine numbers a thread, or in memory.
+template <bool on_chip>
+__device__ float* matrix_shares(const Work& w) {
+  return on_chip ? shared_memory<float>() + 9 * team_threads : w.memory.shares;
+}
+
 /// The parts of the Hessian at the iterate, from which a matrix is put together.
-__device__ inline void write_parts(const Work& w, const StepProblem& step, bool positive) {
+template <bool shares_on_chip>
+__device__ void write_parts(const Work& w, const StepProblem& step, bool positive) {
   const SheetTables& tables = w.replay.sheet;
-  write_shares(tables, step.numbers, step.damped_since, w.now.positions, positive, w.memory.shares,
-               shared_memory<float>());
+  write_shares<shares_on_chip>(tables, step.numbers, step.damped_since, w.now.positions, positive,
+                               matrix_shares<shares_on_chip>(w), shared_memory<float>());
   if (tables.hinge_count > 0)
     write_hinge_matrix(tables, step.numbers.effective_rigidity(),
                        [&](int vertex) { return triple(w.now.positions[vertex]); },
@@ -58,11 +68,22 @@ __device__ inline HingeMatrix hinges_of(const Work& w) {
   return {w.memory.hinge_matrix, w.memory.hinge_products};
 }
 
+/// act(std::bool_constant<whether what triangles give to a matrix fits on chip>).
+template <typename Act>
+__device__ void where_shares_are(const Work& w, const Act& act) {
+  if (w.replay.matrix_shares_on_chip)
+    act(std::true_type{});
+  else
+    act(std::false_type{});
+}
+
 /// Assembles the Hessian at the iterate: exact, or `positive`.
 __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& step, bool positive) {
-  write_parts(w, step, positive);
-  assemble_block_rows(w.replay.sheet, step.numbers, w.memory.shares, w.memory.block_rows,
-                      shared_memory<float>());
+  where_shares_are(w, [&](auto on_chip) {
+    write_parts<on_chip>(w, step, positive);
+    assemble_block_rows<on_chip>(w.replay.sheet, step.numbers, matrix_shares<on_chip>(w), w.memory.block_rows,
+                                 shared_memory<float>());
+  });
   __syncthreads();
   count_phase(w.memory, ReplayPhase::matrix);
 }
@@ -71,9 +92,11 @@ __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& s
 __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
   float* chip = shared_memory<float>();
   restrict_by(w, w.now.contacts, false, step);
-  write_parts(w, step, true);
-  assemble_blocks(w.replay.sheet, step.numbers, step.restrictions, hinges_of(w), w.memory.shares,
-                  w.memory.blocks, chip);
+  where_shares_are(w, [&](auto on_chip) {
+    write_parts<on_chip>(w, step, true);
+    assemble_blocks<on_chip>(w.replay.sheet, step.numbers, step.restrictions, hinges_of(w),
+                             matrix_shares<on_chip>(w), w.memory.blocks, chip);
+  });
   count_phase(w.memory, ReplayPhase::preconditioner);
   const bool positive =
       factorize<half_parts>(w.replay.fronts, w.memory.blocks, w.memory.updates, w.memory.factor, chip);

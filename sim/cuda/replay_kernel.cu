@@ -116,7 +116,11 @@ void place_on_chip(ReplayNumbers& numbers) {
   const long vector = number * fronts.vector_size + 16;
   for (const int depth : {1, 2, chunks_ahead})
     if (linear_bytes_of(depth) + vector <= room) fronts.solve_depth = depth;
-  numbers.places_on_chip = gradient_memory(fronts.size, true) <= room;
+  const int near = gradient_memory(fronts.size, true), triangles = numbers.sheet.triangle_count;
+  numbers.places_on_chip = near <= room;
+  numbers.gradient_shares_at = near + gradient_share_memory(triangles) <= room ? near : -1;
+  numbers.matrix_shares_on_chip =
+      static_cast<int>(sizeof(float)) * hessian_memory_with_shares(triangles) <= room;
   int used = linear_bytes_of(fronts.solve_depth);
   const auto place = [&](long bytes) {
     if (used + bytes > room) return -1;

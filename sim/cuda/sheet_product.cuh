@@ -1,10 +1,21 @@
 #pragma once
 #include "sim/cuda/four.h"
 #include "sim/cuda/hinges.cuh"
+#include "sim/cuda/layout/edge_sources.h"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/cuda/team.cuh"
 
 namespace flash::sim::cuda {
+
+/// The four numbers that a lane has of a step.
+__device__ inline Four<float> step_values_at(const float* values, int step) {
+  return reinterpret_cast<const Four<float>*>(values)[32L * step + lane()];
+}
+__device__ inline Four<double> step_values_at(const double* values, int step) {
+  const double2* of_step = reinterpret_cast<const double2*>(values) + 64L * step;
+  const double2 first = of_step[lane()], second = of_step[32 + lane()];
+  return {first.x, first.y, second.x, second.y};
+}
 
 /// S x over the vertices: x(vertex) has x, y and z, and write(row, c, number) takes coordinate c of a row. S,
 /// shared by all environments, comes from the second-level cache; four lanes share the columns of a group of
@@ -12,22 +23,30 @@ namespace flash::sim::cuda {
 template <typename Number, typename Places, typename Write>
 __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* values, const Places& x,
                                      const Write& write) {
-  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size && tables.group_count == 0;
+  static_assert(4 * bundle_groups == 32);
+  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size && tables.bundle_count == 0;
        i += team_threads)
     write(i / 3, i % 3, Number{});
-  const int part = lane() % 4;
-  // Whole warps stay in the loop: their lanes exchange sums.
-  for (int first = 8 * warp(); first < tables.group_count; first += 8 * team_warps) {
-    const int wanted = first + lane() / 4, group = min(wanted, tables.group_count - 1);
-    const int end = tables.group_starts[group + 1];
+  for (int bundle = warp(); bundle < tables.bundle_count; bundle += team_warps) {
+    const int start = tables.bundle_starts[bundle], end = tables.bundle_starts[bundle + 1];
     Number sums[4][3] = {};
-    for (int first_column = tables.group_starts[group] + part; first_column < end;
-         first_column += group_padding) {
+    int columns[steps_together];
 #pragma unroll
-      for (int k = first_column; k < first_column + group_padding; k += 4) {
-        const auto vertex = x(tables.group_columns[k]);
-        const Four<Number> value = reinterpret_cast<const Four<Number>*>(values)[k];
-        const Number rows[4] = {value.x, value.y, value.z, value.w};
+    for (int k = 0; k < steps_together; ++k) columns[k] = tables.step_columns[32 * (start + k) + lane()];
+    for (int step = start; step < end; step += steps_together) {
+      Four<Number> own[steps_together];
+      int next[steps_together];
+#pragma unroll
+      for (int k = 0; k < steps_together; ++k) own[k] = step_values_at(values, step + k);
+      // Those of the last steps are not used.
+      const int after = min(step + steps_together, end - steps_together);
+#pragma unroll
+      for (int k = 0; k < steps_together; ++k) next[k] = tables.step_columns[32 * (after + k) + lane()];
+#pragma unroll
+      for (int k = 0; k < steps_together; ++k) {
+        const auto vertex = x(columns[k]);
+        columns[k] = next[k];
+        const Number rows[4] = {own[k].x, own[k].y, own[k].z, own[k].w};
 #pragma unroll
         for (int row = 0; row < 4; ++row) {
           sums[row][0] += rows[row] * vertex.x;
@@ -44,10 +63,10 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
         Number sum = sums[row][c];
         sum += __shfl_xor_sync(0xffffffffu, sum, 1);
         sum += __shfl_xor_sync(0xffffffffu, sum, 2);
-        if (row == part) own[c] = sum;
+        if (row == lane() % 4) own[c] = sum;
       }
-    const int row = tables.group_rows[4 * group + part];
-    if (row >= 0 && wanted < tables.group_count)
+    const int row = tables.group_rows[32 * bundle + lane()];
+    if (row >= 0)
       for (int c = 0; c < 3; ++c) write(row, c, own[c]);
   }
 }
@@ -55,15 +74,29 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
 /// y += B x, B the block rows of one environment: a thread a scalar row. Returns the thread's part of x.y.
 inline __device__ float add_block_rows(const SheetTables& tables, const float* blocks,
                                        const HingeMatrix& hinges, const Four<float>* x, float* y) {
+  // The blocks of most rows are no more than this, and are on their way together.
+  constexpr int together = 8;
   float product = 0;
   for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size; i += team_threads) {
     const int slice = i / (3 * slice_size), row = i - slice * 3 * slice_size, vertex = row / 3;
+    const int start = tables.slice_starts[slice], end = tables.slice_starts[slice + 1];
     float sum = y[i];
-#pragma unroll 4
-    for (int k = tables.slice_starts[slice]; k < tables.slice_starts[slice + 1]; ++k) {
-      const Four<float> from = x[tables.slice_columns[k * slice_size + vertex]];
-      const float* column = blocks + static_cast<long>(k) * slice_numbers + row;
-      sum += column[0] * from.x + column[3 * slice_size] * from.y + column[6 * slice_size] * from.z;
+    for (int first = start; first < end; first += together) {
+      int columns[together];
+      float numbers[together][3];
+#pragma unroll
+      for (int k = 0; k < together; ++k) {
+        const bool there = first + k < end;
+        const float* column = blocks + static_cast<long>(first + k) * slice_numbers + row;
+        columns[k] = there ? tables.slice_columns[(first + k) * slice_size + vertex] : 0;
+#pragma unroll
+        for (int c = 0; c < 3; ++c) numbers[k][c] = there ? column[3 * slice_size * c] : 0.0f;
+      }
+#pragma unroll
+      for (int k = 0; k < together; ++k) {
+        const Four<float> from = x[columns[k]];
+        sum += numbers[k][0] * from.x + numbers[k][1] * from.y + numbers[k][2] * from.z;
+      }
     }
     if (hinges.gradients != nullptr) sum += hinge_row(tables, hinges, i);
     y[i] = sum;
@@ -78,7 +111,7 @@ inline __device__ float multiply(const SheetTables& tables, const float* blocks,
                                  const HingeMatrix& hinges, const Four<float>* x, float* y) {
   if (hinges.gradients != nullptr) multiply_hinges(tables, hinges, x);
   multiply_scalar_rows(
-      tables, tables.single_group_values, [&](int vertex) { return x[vertex]; },
+      tables, tables.single_step_values, [&](int vertex) { return x[vertex]; },
       [&](int row, int c, float sum) { y[3 * row + c] = scale * sum; });
   __syncthreads();
   return add_block_rows(tables, blocks, hinges, x, y);

@@ -5,16 +5,16 @@ namespace flash::sim::cuda {
 
 /// A SheetLayout in the memory of a device.
 struct SheetTables {
-  int size, triangle_count, block_count, group_count;
+  int size, triangle_count, block_count, bundle_count;
   const int* triangle_vertices;
   const double *gradients, *areas;
   const int *corner_starts, *corners;
   const EdgeSources *pair_sources, *slice_sources;
   const int *block_rows, *block_columns;
   const int *slice_starts, *slice_columns;
-  const int *group_rows, *group_starts, *group_columns;
-  const double* group_values;
-  const float *single_group_values, *stand_in;
+  const int *group_rows, *bundle_starts, *step_columns;
+  const double* step_values;  ///< of a step, the first two numbers of each lane and then the others
+  const float *single_step_values, *stand_in;
   const double* vertex_area;
   int edge_count;  ///< the first pairs
   const double* edge_lengths;

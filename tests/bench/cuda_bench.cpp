@@ -31,7 +31,7 @@ std::vector<Part> parts_of(const Towel& towel, FactorPrecision precision) {
                triangles = layout.triangle_count, entries = static_cast<double>(fronts.factor_entries),
                blocks = static_cast<double>(layout.block_count),
                edge_blocks = 2.0 * static_cast<double>(towel.plan->edge_count) + vertices,
-               columns = static_cast<double>(layout.group_columns.size());
+               columns = static_cast<double>(layout.step_columns.size());
   const double scalar_flops = 24 * columns, block_flops = 18 * edge_blocks;
   // Flops of a triangle counted in its formulas: 300 for a gradient, 900 for a Hessian; twice as dear in
   // double precision.

@@ -7,36 +7,21 @@
 #include <random>
 #include <string>
 
-#include "sim/cuda/batch_replay.h"
 #include "sim/cuda/batch_system.h"
 #include "sim/cuda/layout/sheet_layout.h"
+#include "tests/bench/corner_lift.h"
 #include "tests/bench/device_bench.h"
 #include "tests/bench/towel.h"
 
 namespace flash::sim::cuda {
 namespace {
 
-/// The vertices within 2 cm of a corner rise 0.25 m in 1.5 s, by minimum jerk.
-std::shared_ptr<const HoldMotion> lift(const data::Points& rest, int steps, double time_step) {
-  auto motion = std::make_shared<HoldMotion>(static_cast<std::size_t>(steps));
-  const Eigen::RowVector3d corner = rest.colwise().minCoeff();
-  for (int k = 0; k < steps; ++k) {
-    const double s = std::min(1.0, (k + 1) * time_step / 1.5);
-    const Eigen::Vector3d way(0, 0, 0.25 * s * s * s * (10 + s * (6 * s - 15)));
-    for (int i = 0; i < rest.rows(); ++i)
-      if ((rest.row(i) - corner).norm() <= 0.02)
-        (*motion)[static_cast<std::size_t>(k)].push_back(
-            {i, {true, true, true}, rest.row(i).transpose() + way});
-  }
-  return motion;
-}
-
 /// E t from 10 to 300 N/m and D from 1e-5 to 1e-4 N m, drawn evenly in their logarithms.
 std::vector<ReplayEnvironment> lifts(const Towel& towel, int count, int steps, double time_step, bool table) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> share(0, 1);
   const data::Points& rest = towel.plan->sheet.rest.vertices;
-  const auto motion = lift(rest, steps, time_step);
+  const auto motion = corner_lift(rest, steps, time_step);
   std::vector<ReplayEnvironment> environments;
   for (int e = 0; e < count; ++e) {
     ReplayEnvironment environment;
@@ -72,7 +57,7 @@ Floor floor_of(const Towel& towel, double iterations, double factorizations, dou
                entries = static_cast<double>(fronts.factor_entries),
                blocks = static_cast<double>(layout.block_count),
                edge_blocks = 2.0 * static_cast<double>(towel.plan->edge_count) + vertices,
-               scalar_flops = 24 * static_cast<double>(layout.group_columns.size());
+               scalar_flops = 24 * static_cast<double>(layout.step_columns.size());
   Floor floor;
   floor.add(iterations + 1, 32 * vertices + 24 * vertices, 2 * (300 * triangles + scalar_flops));
   floor.add(iterations, 32 * vertices + 36 * edge_blocks, 2 * 900 * triangles);

@@ -5,8 +5,11 @@ namespace flash::sim::cuda {
 /// Vertices of a slice of block rows.
 inline constexpr int slice_size = 32;
 
-/// Columns of a group of scalar rows are as many as a multiple of this: four lanes take four each at a time.
-inline constexpr int group_padding = 16;
+/// Groups of four scalar rows that a warp goes through side by side, four lanes each: a bundle.
+inline constexpr int bundle_groups = 8;
+
+/// The steps of a bundle are as many as a multiple of this: what so many read is on its way together.
+inline constexpr int steps_together = 4;
 
 /// Numbers of one block for each vertex of a slice: three columns of three rows for each of them.
 inline constexpr int slice_numbers = 9 * slice_size;

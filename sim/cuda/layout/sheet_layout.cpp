@@ -1,6 +1,8 @@
 #include "sim/cuda/layout/sheet_layout.h"
 
 #include <algorithm>
+#include <array>
+#include <numeric>
 
 namespace flash::sim::cuda {
 namespace {
@@ -89,21 +91,78 @@ void add_block_rows(const SheetPlan& plan, const std::vector<int>& position, She
   }
 }
 
-void add_scalar_rows(const BendingOperator& bending, const std::vector<int>& position, SheetLayout& layout) {
-  const RowGroups& stiffness = bending.stiffness;
-  for (const auto& group : stiffness.rows)
-    for (const int row : group) layout.group_rows.push_back(row < 0 ? -1 : position[row]);
-  layout.group_starts = {0};
-  for (std::size_t group = 0; group < stiffness.rows.size(); ++group) {
-    for (int k = stiffness.starts[group]; k < stiffness.starts[group + 1]; ++k) {
-      layout.group_columns.push_back(position[stiffness.columns[k]]);
-      layout.group_values.insert(layout.group_values.end(), stiffness.values.begin() + 4L * k,
-                                 stiffness.values.begin() + 4L * (k + 1));
+/// Columns of two groups of scalar rows by steps: four of each in a step, -1 where there are no more. Eight
+/// lanes read from on-chip memory at once, sixteen bytes each, without waiting where places differ modulo 8.
+/// So in each step come first the remainders of which most columns are left, each once where that is
+/// possible.
+std::vector<std::array<int, 8>> spread_over_banks(const std::array<std::vector<int>, 2>& places) {
+  constexpr int banks = 8, each = 4;
+  std::array<std::array<std::vector<int>, banks>, 2> left;  // numbers of columns by remainder
+  for (int g = 0; g < 2; ++g)
+    for (int k = static_cast<int>(places[g].size()); k-- > 0;) left[g][places[g][k] % banks].push_back(k);
+  std::vector<std::array<int, 8>> steps((std::max(places[0].size(), places[1].size()) + each - 1) / each);
+  for (std::array<int, 8>& step : steps) {
+    std::array<bool, banks> used = {};
+    for (int lane = 0; lane < banks; ++lane) {
+      auto& own = left[lane / each];
+      const auto worth = [&](int bank) {
+        return own[bank].empty() ? -1 : static_cast<int>(own[bank].size()) + (used[bank] ? 0 : 1 << 20);
+      };
+      int best = 0;
+      for (int bank = 1; bank < banks; ++bank)
+        if (worth(bank) > worth(best)) best = bank;
+      step[lane] = -1;
+      if (own[best].empty()) continue;
+      step[lane] = own[best].back();
+      own[best].pop_back();
+      used[best] = true;
     }
+  }
+  return steps;
+}
+
+void add_scalar_rows(const BendingOperator& bending, const std::vector<int>& position, SheetLayout& layout) {
+  constexpr int lanes_each = 4, lanes = lanes_each * bundle_groups;
+  const RowGroups& stiffness = bending.stiffness;
+  const int group_count = static_cast<int>(stiffness.rows.size());
+  const auto length = [&](int group) { return stiffness.starts[group + 1] - stiffness.starts[group]; };
+  // Those of a bundle are about as long.
+  std::vector<int> groups(group_count);
+  std::iota(groups.begin(), groups.end(), 0);
+  std::stable_sort(groups.begin(), groups.end(), [&](int a, int b) { return length(a) > length(b); });
+  groups.resize((groups.size() + bundle_groups - 1) / bundle_groups * bundle_groups, -1);
+  for (const int group : groups)
+    for (int k = 0; k < 4; ++k) {
+      const int row = group < 0 ? -1 : stiffness.rows[group][k];
+      layout.group_rows.push_back(row < 0 ? -1 : position[row]);
+    }
+  layout.bundle_starts = {0};
+  for (std::size_t first = 0; first < groups.size(); first += bundle_groups) {
+    constexpr int padding = lanes_each * steps_together;
+    const int start = layout.bundle_starts.back(), longest = length(groups[first]),
+              end = start + (longest + padding - 1) / padding * steps_together;
+    layout.bundle_starts.push_back(end);
     // Zeros times any vertex.
-    while (layout.group_columns.size() % group_padding != 0) layout.group_columns.push_back(0);
-    layout.group_values.resize(4 * layout.group_columns.size(), 0.0);
-    layout.group_starts.push_back(static_cast<int>(layout.group_columns.size()));
+    layout.step_columns.resize(static_cast<std::size_t>(lanes) * end, 0);
+    layout.step_values.resize(4L * lanes * end, 0.0);
+    for (int own = 0; own < bundle_groups; own += 2) {
+      std::array<std::vector<int>, 2> places;
+      for (int g = 0; g < 2; ++g)
+        if (const int group = groups[first + own + g]; group >= 0)
+          for (int k = stiffness.starts[group]; k < stiffness.starts[group + 1]; ++k)
+            places[g].push_back(position[stiffness.columns[k]]);
+      int to = lanes * start + lanes_each * own;
+      for (const std::array<int, 8>& step : spread_over_banks(places)) {
+        for (int lane = 0; lane < 8; ++lane) {
+          const int g = lane / lanes_each, k = step[lane];
+          if (k < 0) continue;
+          const int from = stiffness.starts[groups[first + own + g]] + k;
+          layout.step_columns[to + lane] = places[g][k];
+          std::copy_n(stiffness.values.begin() + 4L * from, 4, layout.step_values.begin() + 4L * (to + lane));
+        }
+        to += lanes;
+      }
+    }
   }
   layout.stand_in = bending.stand_in;
 }

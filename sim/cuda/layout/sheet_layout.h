@@ -31,10 +31,13 @@ struct SheetLayout {
   std::vector<int> slice_columns;          ///< slice_size a block; the vertex itself where there is none
   std::vector<EdgeSources> slice_sources;  ///< likewise, none on the diagonal
 
-  // The scalar rows, four at a time: as in RowGroups. Empty for hinges.
-  std::vector<int> group_rows, group_starts, group_columns;
-  std::vector<double> group_values;
-  std::vector<double> stand_in;  ///< one number a block
+  // The scalar rows, four at a time as in RowGroups, and bundle_groups of them side by side. In a step a lane
+  // of a warp takes a column of a group, whose four lanes share its columns. Empty for hinges.
+  std::vector<int> group_rows;      ///< four of each group, bundle after bundle; -1 where there is none
+  std::vector<int> bundle_starts;   ///< of each bundle, in steps, and their end
+  std::vector<int> step_columns;    ///< one a lane and step
+  std::vector<double> step_values;  ///< four likewise, of the rows of the lane's group
+  std::vector<double> stand_in;     ///< one number a block
 
   // Hinges; without them where the model is another. Each array by hinge.
   int hinge_count = 0;

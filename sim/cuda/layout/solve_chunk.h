@@ -38,6 +38,9 @@ constexpr int chunk_columns(bool two, int result_table) { return 2 * result_tabl
 /// Chunks of a warp on chip at most; as many without numbers stand behind its last.
 inline constexpr int chunks_ahead = 4;
 
+/// Chunks that a warp works on side by side at most. A level has a multiple of so many of each warp.
+inline constexpr int chunks_together = 2;
+
 /// Two numbers of the vector that are added up; FrontPlan::nothing_passed for none.
 struct alignas(8) Gather {
   int first, second;

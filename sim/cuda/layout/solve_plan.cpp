@@ -87,7 +87,7 @@ void add_level(const Cut& cut, Shares& warps) {
   Shares shares = share_out(cut(chunk_width)), narrow = share_out(cut(solve_tile_width));
   if (longest(narrow) < longest(shares)) shares = std::move(narrow);
   for (std::size_t w = 0; w < warps.size(); ++w) {
-    if (shares[w].empty()) shares[w].emplace_back();
+    while (shares[w].empty() || shares[w].size() % chunks_together != 0) shares[w].emplace_back();
     shares[w].back().flags |= SolveChunk::ends_level;
     warps[w].insert(warps[w].end(), shares[w].begin(), shares[w].end());
   }
