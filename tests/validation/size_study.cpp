@@ -1,5 +1,6 @@
-// Whether a calibration that knows the size of its target to 0.3 % states its uncertainty truly, over seeded
-// scenes: robots whose poses are noisy, and arms whose kinematic model is wrong. SCENES FIRST_SEED
+// Whether a calibration that knows the size of its target as a ruler tells it states its uncertainty truly,
+// over seeded scenes: robots whose poses are noisy, and arms whose kinematic model is wrong. SCENES
+// FIRST_SEED
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdio>
@@ -41,10 +42,11 @@ void study(Setup setup, bool wrong_kinematics, int scenes, unsigned first_seed) 
   settings.folds = 2;
   int inside = 0, solved = 0;
   Vector6d squares = Vector6d::Zero(), variances = Vector6d::Zero();
+  const double size_sd = usual_size_sd(protocol_points(setup));
   for (int i = 0; i < scenes; ++i) {
     const unsigned seed = first_seed + static_cast<unsigned>(i);
     std::mt19937 random(seed);
-    const double size = 1 + kPrintSd * std::normal_distribution<double>()(random);
+    const double size = 1 + size_sd * std::normal_distribution<double>()(random);
     const HandEyeScene scene = scene_of(setup, wrong_kinematics, size, seed);
     const Calibration result = calibrate(setup, scene.camera, scene.points, grid_symmetries(scene.points),
                                          scene.observations, settings);
