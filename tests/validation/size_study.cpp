@@ -1,6 +1,9 @@
-// Whether a calibration that knows the size of its target as a ruler tells it states its uncertainty truly,
-// over seeded scenes: robots whose poses are noisy, and arms whose kinematic model is wrong. SCENES
-// FIRST_SEED KIND, where KIND is one of the rows, as "eye-to-hand white noise"; or all of them.
+// Whether a calibration that knows the size of its target as a ruler tells it, and its lens to 0.5 %, states
+// its uncertainty truly, over seeded scenes: robots whose poses are noisy, and arms whose kinematic model is
+// wrong.
+//   size_study [SCENES [FIRST_SEED [KIND [exact-lens]]]]
+// KIND is one of the rows, as "eye-to-hand white noise", or empty: all. exact-lens: the lens is as stated,
+// which the calibration does not know.
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdio>
@@ -14,8 +17,21 @@
 namespace flash::calib {
 namespace {
 
-/// The scene seen with a print that is `size` times as large as stated.
-HandEyeScene printed(HandEyeScene scene, double size) {
+/// Focal lengths and centre as stated of a lens that has those of `camera`: off by what usual_lens_prior
+/// expects.
+data::CameraIntrinsics stated_lens(data::CameraIntrinsics camera, std::mt19937& random) {
+  constexpr double kShare = 0.005;
+  std::normal_distribution<double> normal;
+  const double half_diagonal = 0.5 * std::hypot(camera.width, camera.height);
+  for (double* length : {&camera.fx, &camera.fy}) *length *= 1 + kShare * normal(random);
+  for (double* centre : {&camera.cx, &camera.cy}) *centre += kShare * half_diagonal * normal(random);
+  return camera;
+}
+
+/// The scene with a print that is `size` times as large as stated, and a lens that is not quite as stated.
+HandEyeScene stated(HandEyeScene scene, double size, bool lens_as_stated, unsigned seed) {
+  std::mt19937 random(seed + 1'000'000'000);
+  if (!lens_as_stated) scene.camera = stated_lens(scene.camera, random);
   scene.points /= size;
   for (Observation& o : scene.observations)
     o.T_camera_target = {
@@ -23,25 +39,26 @@ HandEyeScene printed(HandEyeScene scene, double size) {
   return scene;
 }
 
-HandEyeScene scene_of(Setup setup, bool wrong_kinematics, double size, unsigned seed) {
+HandEyeScene scene_of(Setup setup, bool wrong_kinematics, bool lens_as_stated, double size, unsigned seed) {
   SceneSettings settings = protocol_settings(setup);
   const Eigen::Matrix3Xd points = size * protocol_points(setup);
   if (!wrong_kinematics) {
     settings.robot_deg = 0.05;
     settings.robot_mm = 0.5;
-    return printed(make_scene(settings, points, seed), size);
+    return stated(make_scene(settings, points, seed), size, lens_as_stated, seed);
   }
   settings.robot_deg = 0.005;  // how well such an arm repeats
   settings.robot_mm = 0.03;
   const double reach = setup == Setup::eye_in_hand ? 0.4 : 0.6;
-  return printed(make_arm_scene(settings, {.zero_deg = 0.1, .length_mm = 0.5}, reach, points, seed), size);
+  return stated(make_arm_scene(settings, {.zero_deg = 0.1, .length_mm = 0.5}, reach, points, seed), size,
+                lens_as_stated, seed);
 }
 
 std::string kind(Setup setup, bool wrong_kinematics) {
   return to_string(setup) + std::string(wrong_kinematics ? " wrong kinematics" : " white noise");
 }
 
-void study(Setup setup, bool wrong_kinematics, int scenes, unsigned first_seed) {
+void study(Setup setup, bool wrong_kinematics, bool lens_as_stated, int scenes, unsigned first_seed) {
   constexpr double kChiSquare95 = 12.592;
   CalibrateSettings settings;
   settings.folds = 2;
@@ -52,7 +69,7 @@ void study(Setup setup, bool wrong_kinematics, int scenes, unsigned first_seed) 
     const unsigned seed = first_seed + static_cast<unsigned>(i);
     std::mt19937 random(seed);
     const double size = 1 + size_sd * std::normal_distribution<double>()(random);
-    const HandEyeScene scene = scene_of(setup, wrong_kinematics, size, seed);
+    const HandEyeScene scene = scene_of(setup, wrong_kinematics, lens_as_stated, size, seed);
     const Calibration result = calibrate(setup, scene.camera, scene.points, grid_symmetries(scene.points),
                                          scene.observations, settings);
     const Vector6d error = motion_between(result.poses.X, scene.truth.X);
@@ -81,9 +98,10 @@ int main(int argc, char** argv) {
   // Settings were chosen on seeds below 80,000.
   const unsigned first_seed = argc > 2 ? static_cast<unsigned>(std::atoi(argv[2])) : 100001;
   const std::string only = argc > 3 ? argv[3] : "";
+  const bool lens_as_stated = argc > 4 && std::string(argv[4]) == "exact-lens";
   using flash::calib::Setup;
   for (const Setup setup : {Setup::eye_in_hand, Setup::eye_to_hand})
     for (const bool wrong_kinematics : {false, true})
       if (only.empty() || only == flash::calib::kind(setup, wrong_kinematics))
-        flash::calib::study(setup, wrong_kinematics, scenes, first_seed);
+        flash::calib::study(setup, wrong_kinematics, lens_as_stated, scenes, first_seed);
 }
