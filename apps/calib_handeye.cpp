@@ -35,7 +35,7 @@ struct HandEyeOptions {
   calib::Use use = calib::Use::workspace;
   bool time_offset = false;
   calib::LensKnowledge lens = calib::LensKnowledge::near;
-  double target_size_sd = calib::kPrintSd;
+  std::optional<double> target_size_sd = {};
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2, camera_info;
   std::string out, report;

@@ -56,12 +56,12 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");
 }
 
-void add_target_size_options(CLI::App& verb, double& sd) {
+void add_target_size_options(CLI::App& verb, std::optional<double>& sd) {
   CLI::Option* known = verb.add_option("--target-size-sd", sd,
                                        "How well the size of the target is known, one standard deviation as "
-                                       "a share of it; 0: as stated")
-                           ->check(number_between(0, 1))
-                           ->capture_default_str();
+                                       "a share of it; 0: as stated. Else 0.3 %, and a ruler that is read "
+                                       "to a millimetre across its longer side")
+                           ->check(number_between(0, 1));
   verb.add_option_function<std::string>(
           "--target-size",
           [&sd](const std::string& name) {

@@ -33,7 +33,7 @@ struct RegisterOptions {
   double depth_scale = 0.001;
   bool without_images = false, no_depth = false;
   calib::LensKnowledge lens = calib::LensKnowledge::near;
-  double target_size_sd = calib::kPrintSd;
+  std::optional<double> target_size_sd = {};
   std::string out;
 };
 

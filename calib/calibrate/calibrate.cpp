@@ -152,7 +152,8 @@ double centre_rms(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_
 
 /// The lens is taken as stated where it is one for all that the answer relates: what is wrong in it then
 /// drops out. Each arm has a print of its own.
-CalibrateSettings for_use(CalibrateSettings settings) {
+CalibrateSettings for_use(CalibrateSettings settings, const Eigen::Matrix3Xd& points) {
+  if (!settings.target_size_sd) settings.target_size_sd = usual_size_sd(points);
   if (settings.use == Use::two_arms && settings.lens == LensKnowledge::near)
     settings.lens = LensKnowledge::stated;
   return settings;
@@ -161,7 +162,8 @@ CalibrateSettings for_use(CalibrateSettings settings) {
 Priors priors_of(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                  const CalibrateSettings& settings) {
   Priors priors{.warp_sd = {usual_warp_sd(points)}};
-  if (settings.target_size_sd > 0) priors.scale_sd = settings.target_size_sd;
+  const double size_sd = *settings.target_size_sd;
+  if (size_sd > 0 && std::isfinite(size_sd)) priors.scale_sd = {size_sd};
   if (settings.lens == LensKnowledge::near) priors.lenses = {lens_prior(camera, settings.lens_covariance)};
   return priors;
 }
@@ -350,13 +352,13 @@ namespace {
 Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                   const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
                   const CalibrateSettings& given) {
-  const CalibrateSettings settings = for_use(given);
+  const CalibrateSettings settings = for_use(given, points);
   Calibration result;
   result.setup = setup;
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
 
   RefineSettings refine_settings = settings.refine;
-  refine_settings.bundle.unknowns.scales = settings.target_size_sd > 0;
+  refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0;
   refine_settings.bundle.unknowns.warps = true;
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   refine_settings.bundle.unknowns.joint_zeros = observations.front().joint_motions.cols() > 0;
@@ -367,7 +369,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   SizedRefinement sized = refine_sizes(std::move(result.refined), refine_settings);
   result.refined = std::move(sized.refined);
   result.size = sized.sizes.front();
-  if (std::isinf(settings.target_size_sd) && !result.size->wanted)
+  if (std::isinf(*settings.target_size_sd) && !result.size->wanted)
     throw data::InputError(
         "the data do not tell the size of the target: the robot moves too little; leave --target-size solved "
         "out, or add views farther apart");

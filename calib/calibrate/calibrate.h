@@ -29,8 +29,9 @@ struct CalibrateSettings {
   double surprise = 35;   ///< squared size of a correction over that of most views, 6 degrees of freedom
   int folds = 10;         ///< of the held-out residuals
   std::vector<ClosedForm> closed_forms = calib::closed_forms();  ///< of the comparison table
-  /// Of the target's size over the stated one, before a picture is taken; 0: as stated; infinity: not known.
-  double target_size_sd = kPrintSd;
+  /// Of the target's size over the stated one, before a picture is taken; 0: as stated; infinity: not known;
+  /// none: usual_size_sd.
+  std::optional<double> target_size_sd = {};
   LensKnowledge lens = LensKnowledge::near;
   LensCovariance lens_covariance = LensCovariance::Zero();  ///< as it was stated; zero: nothing was
   int threads = 1;  ///< of held-out residuals and splits; 0: one a processor

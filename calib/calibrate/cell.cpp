@@ -126,6 +126,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   bundle.intrinsics.resize(cameras.size());
   bundle.priors.lenses.resize(cameras.size());
   bundle.priors.warp_sd.resize(layout.targets.size());
+  bundle.priors.scale_sd.resize(layout.targets.size());
   std::map<std::pair<std::size_t, double>, int> pose_of;
   for (const CellMember& given : members) {
     if (given.setup != bundle.setup)
@@ -146,6 +147,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
     bundle.priors.lenses[camera] =
         member.lens.parts.empty() ? usual_lens_prior(member.intrinsics) : member.lens;
     bundle.priors.warp_sd[target] = usual_warp_sd(member.points);
+    bundle.priors.scale_sd[target] = usual_size_sd(member.points);
     for (std::size_t i = 0; i < member.observations.size(); ++i) {
       const Observation& observation = member.observations[i];
       const auto [entry, fresh] =
@@ -176,23 +178,27 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
 
 Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& given) {
   Cell cell{.joint = true};
-  const double target_size_sd = given.target_size_sd;
+  const bool as_stated = given.target_size_sd == 0.0;
+  const bool unknown_sizes = given.target_size_sd && std::isinf(*given.target_size_sd);
   RefineSettings settings = given.refine;
-  settings.bundle.unknowns.scales = target_size_sd > 0;
+  settings.bundle.unknowns.scales = !as_stated;
   settings.bundle.unknowns.warps = true;
   settings.bundle.unknowns.intrinsics = given.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   Bundle start = cell_bundle(members, &cell.notices);
   settings.bundle.unknowns.joint_zeros = !start.joint_zeros.empty();
   if (given.lens == LensKnowledge::unknown) start.priors.lenses.clear();
-  if (target_size_sd > 0) start.priors.scale_sd = target_size_sd;
+  if (as_stated || unknown_sizes)
+    start.priors.scale_sd.clear();
+  else if (given.target_size_sd)
+    start.priors.scale_sd.assign(start.targets.size(), *given.target_size_sd);
   const SizedRefinement sized = refine_sizes(refine(std::move(start), settings), settings);
   const Refinement& refined = sized.refined;
   const SystematicUncertainty& systematic = sized.systematic;
   cell.sizes = sized.sizes;
-  cell.usable = !sized.disputed || target_size_sd == 0;
+  cell.usable = !sized.disputed || as_stated;
   const bool told = std::all_of(cell.sizes.begin(), cell.sizes.end(),
                                 [](const TargetSize& size) { return size.wanted.has_value(); });
-  if (std::isinf(target_size_sd) && !told)
+  if (unknown_sizes && !told)
     throw data::InputError(
         "the data do not tell the size of the targets: the robots move too little; leave --target-size "
         "solved out, or add views farther apart");

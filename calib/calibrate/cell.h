@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -58,7 +59,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
 
 struct CellSettings {
   RefineSettings refine;
-  double target_size_sd = kPrintSd;  ///< as in CalibrateSettings
+  std::optional<double> target_size_sd = {};  ///< as in CalibrateSettings
   LensKnowledge lens = LensKnowledge::near;
 };
 

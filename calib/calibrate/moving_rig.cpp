@@ -107,15 +107,15 @@ void add_drift(Calibration& result, const Drift& drift) {
 }
 
 /// A drift that is no larger than what an arm may do is not taken out: it may as well be the robot's. The
-/// answer is then of the middle of the recording, and the stated deviations hold where it went from there.
-void add_slight_drift(Calibration& result, const Drift& drift) {
-  const MotionInTime motions(result.refined, {.unknowns = result.unknowns});
-  const Vector6d shift = motions.shift_of_camera(times_of(result), {}, drift.camera) * drift.motion;
-  const Matrix6d more = shift * shift.transpose();
-  const bool matters = shift.dot(result.covariance.ldlt().solve(shift)) > 1;  // a deviation
-  result.covariance += more;
-  result.repeatable += more;
-  if (!matters) return;
+/// answer is then of the middle of the recording, and the stated deviations hold where it went from there. It
+/// is told where it is all but certain, and moves the answer by as much as is stated anyway.
+void add_slow_drift(Calibration& result, double rival) {
+  constexpr double kCertain = 0.95;
+  const SlowDrift drift = slow_drift(result.refined, {.unknowns = result.unknowns}, times_of(result), rival);
+  const double grown = result.covariance.ldlt().solve(drift.covariance).trace();
+  result.covariance += drift.covariance;
+  result.repeatable += drift.covariance;
+  if (drift.probability < kCertain || grown < 1) return;
   char text[320];
   std::snprintf(
       text, sizeof text,
@@ -175,12 +175,13 @@ Calibration calibrate_moving(const std::vector<Observation>& all, const StillSol
   const double rival = whole.pose_errors->gain;
   const std::optional<Knock> knock = find_knock(whole.refined, {.unknowns = whole.unknowns}, rival);
   const std::optional<Drift> drift = drift_of(whole, rival);
-  if (drift && (!knock || drift->gain > knock->second)) {
-    if (beyond_usual(whole.refined.bundle, drift->motion)) return solve_drifting(whole, *drift, all, solve);
-    add_slight_drift(whole, *drift);
+  const bool drifts = drift && (!knock || drift->gain > knock->second);
+  if (drifts && beyond_usual(whole.refined.bundle, drift->motion))
+    return solve_drifting(whole, *drift, all, solve);
+  if (drifts || !knock) {
+    add_slow_drift(whole, rival);
     return whole;
   }
-  if (!knock) return whole;
   const auto first = static_cast<std::size_t>(whole.used[knock->pose]);
   const std::size_t after = whole.used.size() - knock->pose;
   // What holds now counts, unless it is hardly known.

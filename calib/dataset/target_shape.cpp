@@ -1,8 +1,16 @@
 #include "calib/dataset/target_shape.h"
 
+#include <cmath>
 #include <cstdio>
 
 namespace flash::calib {
+namespace {
+
+double longer_side(const Eigen::Matrix3Xd& target_points) {
+  return (target_points.rowwise().maxCoeff() - target_points.rowwise().minCoeff()).maxCoeff();
+}
+
+}  // namespace
 
 Eigen::Matrix2Xd target_bows(const Eigen::Matrix3Xd& target_points) {
   const Eigen::Array3d low = target_points.rowwise().minCoeff(), high = target_points.rowwise().maxCoeff();
@@ -11,9 +19,14 @@ Eigen::Matrix2Xd target_bows(const Eigen::Matrix3Xd& target_points) {
   return 1 - ((target_points.topRows<2>().array().colwise() - middle).colwise() / half).square();
 }
 
+double usual_size_sd(const Eigen::Matrix3Xd& target_points) {
+  const double ruler = 1e-3 / std::sqrt(12.0);  // [m], of what is rounded to a millimetre
+  return std::hypot(kPrintSd, ruler / longer_side(target_points));
+}
+
 double usual_warp_sd(const Eigen::Matrix3Xd& target_points) {
   constexpr double kShare = 0.003;  // paper on a board; glass and metal are flatter by far
-  return kShare * (target_points.rowwise().maxCoeff() - target_points.rowwise().minCoeff()).maxCoeff();
+  return kShare * longer_side(target_points);
 }
 
 Eigen::Matrix3Xd shaped(Eigen::Matrix3Xd points, const Eigen::Matrix2Xd& bows, const TargetShape& shape) {

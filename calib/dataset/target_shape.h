@@ -14,7 +14,14 @@ struct TargetShape {
 /// along x and y. The warp [m] is by how much the middle stands behind the ends. Returns the factors of both.
 Eigen::Matrix2Xd target_bows(const Eigen::Matrix3Xd& target_points);
 
-/// What prints are usually off: 0.3 % of the longer side [m].
+/// How well printers keep to a size, as a share.
+constexpr double kPrintSd = 0.003;
+
+/// How well the size of a print is known where nothing better is stated, as a share: a printer's, and a ruler
+/// across its longer side, read to a millimetre.
+double usual_size_sd(const Eigen::Matrix3Xd& target_points);
+
+/// By how much prints usually bend: 0.3 % of the longer side [m].
 double usual_warp_sd(const Eigen::Matrix3Xd& target_points);
 
 /// Where points with these bows are, in the target frame.

@@ -186,6 +186,41 @@ bool recount(Target& board, const Markers& markers, const Rectifier& rectifier) 
   return false;
 }
 
+/// Whether a grid with these counts holds all markers seen.
+bool holds_grid(const Target& grid, const Markers& markers, const Rectifier& rectifier) {
+  constexpr double kTolerance = 4;  // as of a ChArUco board
+  const Eigen::Matrix3Xd points = target_points(grid);
+  std::vector<Eigen::Vector2d> plane, pixels;
+  for (const auto& [id, quad] : markers)
+    for (int i = 0; i < 4; ++i) {
+      const Eigen::Index point = 4 * (id - grid.first_id) + i;
+      if (point < 0 || point >= points.cols()) return false;
+      plane.emplace_back(points.col(point).head<2>());
+      pixels.push_back(rectifier.rectified(quad[static_cast<std::size_t>(i)]));
+    }
+  const Eigen::Matrix3d H = homography(plane, pixels, kTolerance);
+  int agreeing = 0;
+  for (std::size_t i = 0; i < plane.size(); ++i)
+    agreeing += !H.isZero() && (apply(H, plane[i]) - pixels[i]).norm() < kTolerance;
+  return 10 * agreeing >= 9 * static_cast<int>(plane.size());
+}
+
+/// Counts of a grid by where its markers lie: as stated, exchanged, or others.
+bool recount_grid(Target& grid, const Markers& markers, const Rectifier& rectifier) {
+  constexpr int kMost = 20;
+  const int first = markers.begin()->first, last = markers.rbegin()->first;
+  if (first < grid.first_id || last >= grid.first_id + grid.columns * grid.rows) grid.first_id = first;
+  if (holds_grid(grid, markers, rectifier)) return true;
+  std::swap(grid.columns, grid.rows);
+  if (holds_grid(grid, markers, rectifier)) return true;
+  for (int columns = 1; columns <= kMost; ++columns) {
+    grid.columns = columns;
+    grid.rows = (last - grid.first_id + columns) / columns;
+    if (holds_grid(grid, markers, rectifier)) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 std::optional<Target> shown_markers(const GreyImage& image, const Target& stated,
@@ -206,12 +241,10 @@ std::optional<Target> shown_markers(const GreyImage& image, const Target& stated
       best.dictionary = original ? family + "ORIGINAL" : dictionary_of_family(family, most.rbegin()->first);
     }
   if (most.size() < least) return std::nullopt;
-  if (stated.kind != TargetKind::charuco) {
-    if (single && most.size() > 1) return std::nullopt;
-    if (stated.first_id >= 0) best.first_id = most.begin()->first;
-  } else if (!recount(best, most, rectifier)) {
-    return std::nullopt;
-  }
+  if (single && most.size() > 1) return std::nullopt;
+  if (single && stated.first_id >= 0) best.first_id = most.begin()->first;
+  if (stated.kind == TargetKind::charuco && !recount(best, most, rectifier)) return std::nullopt;
+  if (stated.kind == TargetKind::aruco_grid && !recount_grid(best, most, rectifier)) return std::nullopt;
   return to_words(best) == to_words(stated) ? std::nullopt : std::optional(best);
 }
 

@@ -78,9 +78,9 @@ void put_in_order(const GreyImage& image, Grid& grid) {
 
 /// On a picture made small: the corners are only seeds, and what takes long on a large one is what is not
 /// found.
-Corners find_classic(const GreyImage& image, const Target& target) {
-  const double scale = std::min(1.0, static_cast<double>(kSearchWidth) / image.width);
-  cv::Mat picture = as_mat(image);
+Corners find_classic(const GreyImage& image, const Target& target, const cv::Rect& part) {
+  const double scale = std::min(1.0, static_cast<double>(kSearchWidth) / part.width);
+  cv::Mat picture = as_mat(image)(part);
   if (scale < 1) cv::resize(picture, picture, {}, scale, scale, cv::INTER_AREA);
   std::vector<cv::Point2f> corners;
   if (!cv::findChessboardCorners(picture, {target.columns, target.rows}, corners,
@@ -88,8 +88,24 @@ Corners find_classic(const GreyImage& image, const Target& target) {
     return {};
   Corners places;
   for (const Eigen::Vector2d& corner : to_eigen(corners))
-    places.emplace_back((corner.array() + 0.5) / scale - 0.5);
+    places.emplace_back((corner.array() + 0.5) / scale - 0.5 + Eigen::Array2d(part.x, part.y));
   return places;
+}
+
+cv::Rect whole_of(const GreyImage& image) { return {0, 0, image.width, image.height}; }
+
+/// Where a board stands, with two of its squares about it.
+cv::Rect surroundings(const GreyImage& image, const Grid& board) {
+  Eigen::AlignedBox2d box;
+  double square = 0;
+  for (int r = 0; r < board.rows; ++r)
+    for (int c = 0; c < board.columns; ++c) {
+      box.extend(board.at(c, r));
+      square = std::max({square, board.step(c, r, true).norm(), board.step(c, r, false).norm()});
+    }
+  const Eigen::Vector2i low = (box.min().array() - 2 * square).cast<int>(),
+                        size = (box.sizes().array() + 4 * square).cast<int>();
+  return cv::Rect(low.x(), low.y(), size.x(), size.y()) & whole_of(image);
 }
 
 Corners find_sectors(const GreyImage& image, const Target& target, int flags = 0) {
@@ -178,13 +194,13 @@ Grid grid_of(const GreyImage& image, const Target& target, Corners corners) {
   return grid;
 }
 
-/// The classic search takes up to 20 s where it fails, as it does on boards that a wide lens bends: it is
-/// asked only where sectors are not enough.
+/// The classic search takes up to 20 s where it fails, as it does on boards that a wide lens bends: the whole
+/// picture is searched only where sectors find nothing.
 Board find_board(const GreyImage& image, const Target& target, Search search) {
   Corners sectors = find_sectors(image, target), classic;
   const bool exhausted = search == Search::quick || sectors.empty();
   if (search == Search::thorough && sectors.empty()) {
-    classic = find_classic(image, target);
+    classic = find_classic(image, target, whole_of(image));
     if (classic.empty()) sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
   }
   Board board{.grids = {}, .by_sectors = !sectors.empty(), .exhausted = exhausted};
@@ -193,9 +209,9 @@ Board find_board(const GreyImage& image, const Target& target, Search search) {
   return board;
 }
 
-/// The classic search's corners before those of the sectors.
+/// The classic search's corners before those of the sectors, looked for where these are.
 void add_classic(const GreyImage& image, const Target& target, Board& board) {
-  Corners classic = find_classic(image, target);
+  Corners classic = find_classic(image, target, surroundings(image, board.grids.back()));
   if (classic.empty()) return;
   board.grids.insert(board.grids.begin(), grid_of(image, target, std::move(classic)));
   ++board.seed;

@@ -38,7 +38,7 @@ constexpr double kUsualJointZero = 0.1 * M_PI / 180;
 
 /// What is known before a picture is taken: normal distributions about what is stated.
 struct Priors {
-  double scale_sd = std::numeric_limits<double>::infinity();  ///< of each target's scale; infinity: nothing
+  std::vector<double> scale_sd = {};  ///< of each target's scale; empty: nothing
   /// Of each target: full standard deviation of the scale that the pictures tell, over that of noise alone.
   /// The prior weighs as much more against residuals that are taken for noise. Empty: 1.
   std::vector<double> caution = {};
@@ -47,9 +47,14 @@ struct Priors {
   double joint_zero_sd = kUsualJointZero;  ///< of each joint's zero [rad]
 };
 
+/// Of a target's scale; infinity where nothing is known.
+inline double known_scale_sd(const Priors& priors, std::size_t target) {
+  return priors.scale_sd.empty() ? std::numeric_limits<double>::infinity() : priors.scale_sd[target];
+}
+
 /// The standard deviation that the prior of a target's scale has among residuals of noise.
 inline double prior_scale_sd(const Priors& priors, std::size_t target) {
-  return priors.scale_sd / (priors.caution.empty() ? 1 : priors.caution[target]);
+  return known_scale_sd(priors, target) / (priors.caution.empty() ? 1 : priors.caution[target]);
 }
 
 /// Everything that is known and looked for. One hand-eye calibration has one camera, arm and target; several

@@ -77,4 +77,30 @@ std::optional<Drift> find_drift(const Refinement& refined, const BundleSettings&
   return best;
 }
 
+SlowDrift slow_drift(const Refinement& refined, const BundleSettings& settings,
+                     const std::vector<double>& shape, double rival) {
+  SlowDrift drift;
+  if (!MotionInTime::applies(refined.bundle, settings) || refined.bundle.poses.size() < 2 * kLeastViews)
+    return drift;
+  const MotionInTime motions(refined, settings);
+  double odds = 0, best = 0;
+  for (const bool camera : {true, false}) {
+    const MotionInTime::Fit fit = motions.fit({shape}, camera);
+    const double fall = fit.fall - std::max(0.0, rival);
+    const double size = std::max(0.0, fall / 6 - 1);  // variance of the motion over that of its estimate
+    const double kept = size / (1 + size);
+    // Beyond that no evidence makes a difference, and odds would not be numbers.
+    const double evidence =
+        std::exp(std::min(100.0, 0.5 * fall * kept)) * std::pow(1 + size, -3) / (2 * kOdds);
+    const Vector6d shift = kept * motions.shift_of_camera(shape, {}, camera) * fit.motion;
+    drift.covariance += evidence * (shift * shift.transpose() + kept * motions.growth(shape, camera));
+    odds += evidence;
+    if (evidence > best) drift.motion = fit.motion;
+    best = std::max(best, evidence);
+  }
+  drift.covariance /= 1 + odds;
+  drift.probability = odds / (1 + odds);
+  return drift;
+}
+
 }  // namespace flash::calib

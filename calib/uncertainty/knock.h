@@ -32,9 +32,23 @@ struct Drift {
   double gain = 0;       ///< as that of a knock
 };
 
-/// Judged as a knock is, however small. shape: where each pose stands in time, -1 for the first view to 0 for
+/// Judged as a knock is. shape: where each pose stands in time, -1 for the first view to 0 for
 /// the last.
 std::optional<Drift> find_drift(const Refinement& refined, const BundleSettings& settings,
                                 const std::vector<double>& shape, double rival);
+
+/// What a motion that took all the time, and is not solved for, may have done to the answer.
+struct SlowDrift {
+  double probability = 0;                  ///< that there was one
+  Vector6d motion = Vector6d::Zero();      ///< the likeliest, as Drift's
+  Matrix6d covariance = Matrix6d::Zero();  ///< of X, against where it stands at the last view
+};
+
+/// Before any view is seen, camera and target each have moved once in 40 recordings, by a motion that is
+/// normal in the metric of its own information, of the size that explains the views best (Zellner 1986,
+/// George and Foster 2000). So what is added grows with the evidence from nothing on, and no threshold
+/// decides.
+SlowDrift slow_drift(const Refinement& refined, const BundleSettings& settings,
+                     const std::vector<double>& shape, double rival);
 
 }  // namespace flash::calib

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "calib/solve/linearization.h"
 
@@ -11,20 +12,15 @@ namespace {
 constexpr double kUsualError = 0.1 * M_PI / 180;  // of arms in use, shared by neighbouring views
 constexpr double kOnceInHundred = 16.812;         // chi-square, 6 degrees of freedom
 
-/// Of each pose, [d_shared residual]^T [d_shared residual] with its own correction eliminated.
-std::vector<Eigen::MatrixXd> reduced_grams(const LinearModel& model, const std::vector<double>& sigmas) {
-  const Eigen::Index d = model.own, s = model.shared;
-  std::vector<Eigen::MatrixXd> joint(static_cast<std::size_t>(model.groups),
-                                     Eigen::MatrixXd::Zero(d + s + 1, d + s + 1));
-  for (const GramBlock& block : model.blocks)
-    joint[static_cast<std::size_t>(block.group)] +=
-        std::pow(sigmas[static_cast<std::size_t>(block.component)], -2) * block.gram;
-  for (Eigen::MatrixXd& gram : joint) {
-    const Eigen::LDLT<Eigen::MatrixXd> own(gram.topLeftCorner(d, d));
-    const Eigen::MatrixXd cross = gram.topRightCorner(d, s + 1);
-    gram = (gram.bottomRightCorner(s + 1, s + 1) - cross.transpose() * own.solve(cross)).eval();
-  }
-  return joint;
+/// A robot whose errors were taken to be larger than they are beside a motion has smaller ones by steps of
+/// this factor, down to a tenth.
+constexpr double kShare = 0.75;
+constexpr int kLowestShare = 8;
+
+/// By how much a parabola through three values at equal distances falls below the middle one, the least.
+double below(double before, double least, double after) {
+  const double left = before - least, right = after - least;
+  return 0.125 * (left - right) * (left - right) / std::max(left + right, 1e-300);
 }
 
 }  // namespace
@@ -41,62 +37,126 @@ bool MotionInTime::applies(const Bundle& bundle, const BundleSettings& settings)
   return settings.unknowns.corrections && bundle.bases.size() == 1 && bundle.cameras.size() == 1;
 }
 
-MotionInTime::MotionInTime(const Refinement& refined, const BundleSettings& settings) {
+/// Of each pose [d_shared residual]^T [d_shared residual], its own correction eliminated.
+MotionInTime::Level::Level(const LinearModel& model, const std::vector<double>& sigmas)
+    : grams(static_cast<std::size_t>(model.groups)) {
+  const Eigen::Index d = model.own, s = model.shared;
+  for (Eigen::MatrixXd& gram : grams) gram.setZero(d + s + 1, d + s + 1);
+  for (const GramBlock& block : model.blocks) {
+    const double sigma = sigmas[static_cast<std::size_t>(block.component)];
+    grams[static_cast<std::size_t>(block.group)] += block.gram / (sigma * sigma);
+    deviance += 2 * block.count * std::log(sigma);
+  }
+  all = Eigen::MatrixXd::Zero(s + 1, s + 1);
+  if (model.prior.size() > 0) all = model.prior;
+  for (Eigen::MatrixXd& gram : grams) {
+    const Eigen::LDLT<Eigen::MatrixXd> own(gram.topLeftCorner(d, d));
+    deviance += own.vectorD().array().abs().max(1e-300).log().sum();
+    const Eigen::MatrixXd cross = gram.topRightCorner(d, s + 1);
+    gram = (gram.bottomRightCorner(s + 1, s + 1) - cross.transpose() * own.solve(cross)).eval();
+    all += gram;
+  }
+  shared.compute(all.topLeftCorner(s, s));
+  deviance += all(s, s) - all.col(s).head(s).dot(shared.solve(all.col(s).head(s)));
+}
+
+MotionInTime::MotionInTime(const Refinement& refined, const BundleSettings& settings)
+    : model_(linearize(refined.bundle, refined.noise, settings)), noise_(refined.noise) {
   const Bundle& bundle = refined.bundle;
-  const LinearModel model = linearize(bundle, refined.noise, settings);
-  const std::vector<double> sigmas = to_components(refined.noise);
-  grams_ = reduced_grams(model, sigmas);
-  all_ = model.prior;
-  for (const Eigen::MatrixXd& gram : grams_) all_ += gram;
-  shared_.compute(all_.topLeftCorner(model.shared, model.shared));
-  // What the robot's errors amount to, in their own noise.
-  const LinearSolution solution = solve_linear(model, sigmas);
-  const auto rotation =
-      static_cast<Eigen::Index>(2 * bundle.cameras.size());  // corners and depths come first
-  for (const Eigen::Index component : {rotation, rotation + 1})
-    squares_ += solution.squares[component] * std::pow(sigmas[static_cast<std::size_t>(component)], -2);
+  still_ = least_deviance([](const Level& level) { return level.deviance; }).second;
   const SharedColumns columns = shared_columns(bundle, settings.unknowns);
   camera_column_ = columns.cameras.front();
   target_column_ = columns.targets.front();
   numbers_ = 6 * static_cast<double>(bundle.poses.size());
 }
 
-MotionInTime::Joint MotionInTime::joint(const std::vector<std::vector<double>>& shapes, bool camera) const {
-  const Eigen::Index s = all_.rows() - 1, count = 6 * static_cast<Eigen::Index>(shapes.size());
+const MotionInTime::Level& MotionInTime::level(const Shares& shares) const {
+  const auto known = levels_.find(shares);
+  if (known != levels_.end()) return known->second;
+  NoiseLevels noise = noise_;
+  for (double& sigma : noise.rotation) sigma *= std::pow(kShare, shares.first);
+  for (double& sigma : noise.translation) sigma *= std::pow(kShare, shares.second);
+  return levels_.emplace(shares, Level(model_, to_components(noise))).first->second;
+}
+
+std::pair<MotionInTime::Shares, double> MotionInTime::least_deviance(
+    const std::function<double(const Level&)>& deviance) const {
+  std::map<Shares, double> known;
+  const auto at = [&](const Shares& shares) {
+    if (std::min(shares.first, shares.second) < 0 || std::max(shares.first, shares.second) > kLowestShare)
+      return std::numeric_limits<double>::infinity();
+    const auto entry = known.try_emplace(shares, 0);
+    if (entry.second) entry.first->second = deviance(level(shares));
+    return entry.first->second;
+  };
+  const auto moved = [](Shares shares, int axis, int step) {
+    (axis == 0 ? shares.first : shares.second) += step;
+    return shares;
+  };
+  Shares least{0, 0};
+  for (bool better = true; better;) {
+    better = false;
+    for (const int axis : {0, 1})
+      for (const int step : {1, -1})
+        while (at(moved(least, axis, step)) < at(least)) {
+          least = moved(least, axis, step);
+          better = true;
+        }
+  }
+  double fall = 0;  // between the shares that were tried
+  for (const int axis : {0, 1}) {
+    const double before = at(moved(least, axis, -1)), after = at(moved(least, axis, 1));
+    if (std::isfinite(before + after)) fall += below(before, at(least), after);
+  }
+  return {least, at(least) - fall};
+}
+
+MotionInTime::Joint MotionInTime::joint(const Level& level, const std::vector<std::vector<double>>& shapes,
+                                        bool camera) const {
+  const Eigen::Index s = level.all.rows() - 1, count = 6 * static_cast<Eigen::Index>(shapes.size());
   const int column = camera ? camera_column_ : target_column_;
   Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(s + 1, count), own = Eigen::MatrixXd::Zero(count, count);
   for (std::size_t a = 0; a < shapes.size(); ++a) {
     const Eigen::Index at = 6 * static_cast<Eigen::Index>(a);
-    for (std::size_t i = 0; i < grams_.size(); ++i) {
+    for (std::size_t i = 0; i < level.grams.size(); ++i) {
       if (shapes[a][i] == 0) continue;
-      cross.middleCols<6>(at) += shapes[a][i] * grams_[i].middleCols<6>(column);
+      cross.middleCols<6>(at) += shapes[a][i] * level.grams[i].middleCols<6>(column);
       for (std::size_t b = 0; b < shapes.size(); ++b)
         own.block<6, 6>(at, 6 * static_cast<Eigen::Index>(b)) +=
-            shapes[a][i] * shapes[b][i] * grams_[i].block<6, 6>(column, column);
+            shapes[a][i] * shapes[b][i] * level.grams[i].block<6, 6>(column, column);
     }
   }
   Joint joint;
   joint.cross = cross.topRows(s);
-  joint.pull = cross.row(s).transpose() - joint.cross.transpose() * shared_.solve(all_.col(s).head(s));
-  joint.information = own - joint.cross.transpose() * shared_.solve(joint.cross);
+  joint.pull =
+      cross.row(s).transpose() - joint.cross.transpose() * level.shared.solve(level.all.col(s).head(s));
+  joint.information = own - joint.cross.transpose() * level.shared.solve(joint.cross);
   return joint;
 }
 
 MotionInTime::Fit MotionInTime::fit(const std::vector<std::vector<double>>& shapes, bool camera) const {
-  const Joint motions = joint(shapes, camera);
-  Fit fit;
-  fit.motion = -motions.information.ldlt().solve(motions.pull);
-  const double left = std::max(1 + fit.motion.dot(motions.pull) / squares_, 1e-3);
-  fit.fall = -numbers_ * std::log(left);
-  return fit;
+  const auto motion_at = [&](const Level& level, double& fall) -> Eigen::VectorXd {
+    const Joint solved = joint(level, shapes, camera);
+    const Eigen::VectorXd motion = -solved.information.ldlt().solve(solved.pull);
+    fall = -motion.dot(solved.pull);
+    return motion;
+  };
+  double fall = 0;
+  const auto [shares, least] = least_deviance([&](const Level& level) {
+    motion_at(level, fall);
+    return level.deviance - fall;
+  });
+  return {motion_at(level(shares), fall), still_ - least};
 }
 
 Matrix6d MotionInTime::shift_of_camera(const std::vector<double>& shape, const std::vector<double>& solved,
                                        bool camera) const {
-  if (solved.empty()) return shared_.solve(joint({shape}, camera).cross).middleRows(camera_column_, 6);
-  const Joint both = joint({solved, shape}, camera);
-  const Eigen::MatrixXd by_solved = shared_.solve(both.cross.leftCols<6>());
-  const Eigen::MatrixXd by_shape = shared_.solve(both.cross.rightCols<6>());
+  const Level& as_found = level({0, 0});
+  if (solved.empty())
+    return as_found.shared.solve(joint(as_found, {shape}, camera).cross).middleRows(camera_column_, 6);
+  const Joint both = joint(as_found, {solved, shape}, camera);
+  const Eigen::MatrixXd by_solved = as_found.shared.solve(both.cross.leftCols<6>());
+  const Eigen::MatrixXd by_shape = as_found.shared.solve(both.cross.rightCols<6>());
   // Of the motion that is solved for, in place of the one that took place.
   const Eigen::MatrixXd taken =
       both.information.topLeftCorner<6, 6>().ldlt().solve(both.information.topRightCorner<6, 6>());
@@ -104,8 +164,9 @@ Matrix6d MotionInTime::shift_of_camera(const std::vector<double>& shape, const s
 }
 
 Matrix6d MotionInTime::growth(const std::vector<double>& shape, bool camera) const {
-  const Joint motion = joint({shape}, camera);
-  const Eigen::MatrixXd gain = shared_.solve(motion.cross).middleRows(camera_column_, 6);
+  const Level& as_found = level({0, 0});
+  const Joint motion = joint(as_found, {shape}, camera);
+  const Eigen::MatrixXd gain = as_found.shared.solve(motion.cross).middleRows(camera_column_, 6);
   return gain * motion.information.ldlt().solve(Eigen::MatrixXd::Identity(6, 6)) * gain.transpose();
 }
 

@@ -1,16 +1,19 @@
 #pragma once
 #include <Eigen/Cholesky>
-#include <optional>
+#include <functional>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "calib/solve/errors_in_variables.h"
+#include "calib/solve/reml.h"
 
 namespace flash::calib {
 
 /// What a solution's views say of a camera or a target that did not stand still: at pose i its frame stood
 /// moved by shape[i] * motion, (dt, dtheta) [m, rad], from where the solution has it. The motion's six
-/// unknowns are added to the linearised solution; its likelihood is that of robot errors that become as much
-/// smaller.
+/// unknowns are added to the linearised solution. Its likelihood is the largest over how much smaller the
+/// robot's errors become beside it. Where the robot has next to none, corners alone have to tell it.
 class MotionInTime {
  public:
   /// Corrections are unknowns, and there is one arm and one camera; see `applies`.
@@ -34,18 +37,32 @@ class MotionInTime {
   double numbers() const { return numbers_; }  ///< that the robot's errors are told by
 
  private:
+  /// How many steps smaller than estimated the robot's errors are, in rotation and in translation.
+  using Shares = std::pair<int, int>;
+  /// The linearised solution at such noise.
+  struct Level {
+    Level(const LinearModel& model, const std::vector<double>& sigmas);
+    std::vector<Eigen::MatrixXd> grams;
+    Eigen::MatrixXd all;  ///< their sum, and what is known beforehand
+    Eigen::LDLT<Eigen::MatrixXd> shared;
+    double deviance = 0;  ///< -2 log likelihood without a motion, up to a constant
+  };
   struct Joint {
     Eigen::MatrixXd cross;        ///< of shared unknowns and motions
     Eigen::MatrixXd information;  ///< of motions, shared unknowns eliminated
     Eigen::VectorXd pull;
   };
-  Joint joint(const std::vector<std::vector<double>>& shapes, bool camera) const;
+  const Level& level(const Shares& shares) const;
+  /// Where the deviance is least, and how large it is.
+  std::pair<Shares, double> least_deviance(const std::function<double(const Level&)>& deviance) const;
+  Joint joint(const Level& level, const std::vector<std::vector<double>>& shapes, bool camera) const;
 
-  std::vector<Eigen::MatrixXd> grams_;  ///< of each pose: [shared residual], its correction eliminated
-  Eigen::MatrixXd all_;
-  Eigen::LDLT<Eigen::MatrixXd> shared_;
+  LinearModel model_;
+  NoiseLevels noise_;
+  mutable std::map<Shares, Level> levels_;  ///< those that were asked for
+  double still_ = 0;                        ///< the least deviance without a motion
   int camera_column_ = 0, target_column_ = 0;
-  double squares_ = 0, numbers_ = 0;
+  double numbers_ = 0;
 };
 
 /// More than what the errors of an arm in use that two halves of a recording do not share put between them:

@@ -49,8 +49,9 @@ SystematicUncertainty systematic_uncertainty(const Refinement& refined, const Bu
     // The prior counts for what it is, however much it weighs in the solution.
     const double weight = std::pow(prior_scale_sd(bundle.priors, target), -2);
     const Eigen::VectorXd gain = weight * shared.solve(Eigen::VectorXd::Unit(s, column));
-    if (std::isfinite(bundle.priors.scale_sd))
-      result.covariance += (std::pow(bundle.priors.scale_sd, 2) - 1 / weight) * gain * gain.transpose();
+    const double known = known_scale_sd(bundle.priors, target);
+    if (std::isfinite(known))
+      result.covariance += (std::pow(known, 2) - 1 / weight) * gain * gain.transpose();
     constexpr double kUnknown = 1e-2;  // a size known to a factor of ten: pictures may tell nothing of it
     Eigen::MatrixXd alone = data;
     for (const int other : columns.scales) alone(other, other) += kUnknown;

@@ -31,7 +31,7 @@ std::optional<Refinement> without_prior(Refinement refined, RefineSettings setti
   settings.estimate_pivots = false;
   settings.noise = refined.noise;
   settings.bundle.unknowns.scales = true;
-  refined.bundle.priors.scale_sd = std::numeric_limits<double>::infinity();
+  refined.bundle.priors.scale_sd.clear();
   const std::vector<int> columns = shared_columns(refined.bundle, settings.bundle.unknowns).scales;
   // A size that is badly wrong reads as noise of the robot until it is free: first only what cannot be
   // solved.
@@ -56,7 +56,7 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
   const PoseErrorModel errors = fit_pose_errors(refined, settings.bundle);
   SizedRefinement result{std::move(refined), {}, {}};
   result.systematic = systematic_uncertainty(result.refined, settings.bundle, errors);
-  if (unknown && std::isfinite(result.refined.bundle.priors.scale_sd)) {
+  if (unknown && !result.refined.bundle.priors.scale_sd.empty()) {
     RefineSettings again = settings;
     again.estimate_pivots = false;
     again.noise = result.refined.noise;
@@ -73,7 +73,7 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
     TargetSize& size = result.sizes.emplace_back();
     const int column = columns[target];
     size.estimate = bundle.scales[target];
-    size.prior_sd = unknown ? bundle.priors.scale_sd : 0;
+    size.prior_sd = unknown ? known_scale_sd(bundle.priors, target) : 0;
     if (unknown) size.sd = std::sqrt(result.systematic.covariance(column, column));
     if (free)
       size.wanted = {free->bundle.scales[target],

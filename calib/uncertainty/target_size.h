@@ -7,10 +7,6 @@
 
 namespace flash::calib {
 
-/// How well the size of a print is known where nothing better is stated, as a share: of printers, and of
-/// rulers across a whole sheet.
-constexpr double kPrintSd = 0.003;
-
 /// Over the stated one, what a solution looks for: one that starts farther off tends to zero or infinity.
 constexpr bool measurable_size(double size) { return size > 0.5 && size < 2; }
 

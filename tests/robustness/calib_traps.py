@@ -5,11 +5,16 @@ sentence that names the cause."""
 import argparse
 import json
 import math
+import os
 import pathlib
+import pty
 import random
+import re
 import shutil
+import subprocess
 import sys
 import tempfile
+import threading
 
 import program
 
@@ -175,6 +180,12 @@ def all_pictures_cut(folder):
     return []
 
 
+def without_target(folder):
+    setup = json.loads((folder / "target.json").read_text())["setup"]
+    (folder / "target.json").unlink()
+    return ["--setup", setup]
+
+
 def option(*words):
     return lambda folder: list(words)
 
@@ -225,6 +236,10 @@ def traps():
         yield Trap(f"{other}: millimetres", sound, poses_changed(millimetres), 2, "millimetres")
         yield Trap(f"{other}: squares 8 % too small", sound, option("--target", "chessboard:9x6:0.02315"), 3,
                    "the estimated size of the target is 1.0")
+        yield Trap(f"{other}: squares 25 % too small", sound, option("--target", "chessboard:9x6:0.02"), 3,
+                   "the estimated size of the target is 1.2")
+        yield Trap(f"{other}: squares 2 % too large", sound, option("--target", "chessboard:9x6:0.0255"), 0,
+                   "the estimated size of the target is 0.98", used=16)
         yield Trap(f"{other}: three views", sound, first_views(3), 2, "3 of 3 views", "at least 4")
         yield Trap(f"{other}: 30 % outliers", sound, poses_changed(some_jolted), 0, "5 of 16 views were not used",
                    used=11)
@@ -232,8 +247,10 @@ def traps():
                    "6 of 22 views were not used", used=16)
         yield Trap(f"{other}: a picture cut off", sound, cut_picture, 0, "004.png: not used", used=15)
     yield Trap("no intrinsics", "in_hand", without_intrinsics, 2, "flash-calib intrinsics")
+    yield Trap("no target", "in_hand", without_target, 2, "names no target", "--target chessboard:9x6:0.025")
     yield Trap("half a target", "in_hand", option("--target", "chessboard:9x6"), 2, "chessboard:COLUMNSxROWS:SQUARE")
-    yield Trap("a knock half-way", "in_hand", poses_changed(knocked), 0, "the camera moved by", "before 008.png", used=8)
+    yield Trap("a knock half-way", "in_hand", poses_changed(knocked), 0, "the camera moved by", "before 008.png",
+               ", ".join(f"{i:03d}.png" for i in range(8)) + ": not used: before the knock at 008.png", used=8)
     yield Trap("a slow slip", "in_hand", poses_changed(drifting), 3, "the camera moved all the time, by", used=16)
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
     yield Trap("a misspelt setup", "in_hand", option("--setup", "eye-in-hnad"), 2, "--setup", "eye-in-hand,eye-to-hand")
@@ -291,6 +308,49 @@ def complaint(trap, calib, work):
     return f"off by {off:.1f} standard deviations" if off > SIGMAS else ""
 
 
+def solved_before_a_terminal(calib, work):
+    """What a terminal sees of a calibration: stdout, and stderr with all its returns."""
+    terminal, ours = pty.openpty()
+    with subprocess.Popen([calib, "handeye", work / "in_hand", "--force", "-o", work / "camera.json"], text=True,
+                          stdout=subprocess.PIPE, stderr=ours) as running:
+        os.close(ours)
+        seen = []
+        reader = threading.Thread(target=lambda: seen.extend(iter(lambda: read_terminal(terminal), b"")))
+        reader.start()
+        stdout = running.stdout.read()
+        reader.join()
+    os.close(terminal)
+    return stdout, b"".join(seen).decode()
+
+
+def read_terminal(terminal):
+    try:
+        return os.read(terminal, 4096)
+    except OSError:  # its other end is closed
+        return b""
+
+
+def wrongly_told(calib, work):
+    """What is wrong with what a calibration tells on its way and at its end."""
+    stdout, terminal = solved_before_a_terminal(calib, work)
+    for line in ("looking for the target", "16 of 16 pictures", "solving"):
+        if f"\r{line}\033[K" not in terminal:
+            yield f"a terminal is not told {line!r}: {terminal!r}"
+    if not terminal.endswith("\r\033[K"):
+        yield f"the line of progress is left behind: {terminal!r}"
+    focal = re.search(r"focal lengths ([\d.]+) \+- ([\d.]+), ([\d.]+) \+- ([\d.]+) px", stdout)
+    if not focal:
+        yield f"no focal lengths: {stdout}"
+    for length, sd in zip(focal.groups()[::2], focal.groups()[1::2]) if focal else ():
+        if len(length.partition(".")[2]) != len(sd.partition(".")[2]):
+            yield f"a focal length and its deviation end at different digits: {length} +- {sd}"
+        if len(sd.replace(".", "").lstrip("0")) < 2:
+            yield f"a deviation of a focal length of less than two digits: {sd}"
+    piped = program.call(calib, "handeye", work / "in_hand", "--force", "-o", work / "camera.json")
+    if "\r" in piped.stderr or "solving" in piped.stderr:
+        yield f"progress where there is no terminal: {piped.stderr!r}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--calib", required=True, help="the program flash-calib")
@@ -302,12 +362,16 @@ def main():
         draw(options.draw, work)
         chosen = [trap for trap in traps() if options.only in trap.name]
         failed = 0
+        for wrong in () if options.only else wrongly_told(options.calib, work):
+            failed += 1
+            print(wrong, flush=True)
+        failed_to_tell = failed
         for trap in chosen:
             wrong = complaint(trap, options.calib, work)
             failed += bool(wrong)
             if wrong:
                 print(f"{trap.name}: {wrong}", flush=True)
-        print(f"{len(chosen) - failed} of {len(chosen)} traps handled, or refused in one sentence that names the cause")
+        print(f"{len(chosen) - failed + failed_to_tell} of {len(chosen)} traps handled, or refused in one sentence that names the cause")
     sys.exit(1 if failed else 0)
 
 

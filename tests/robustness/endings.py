@@ -117,7 +117,9 @@ def refusals(sim, sysid, calib):
         ([*grid, "--bending", "1e-4,2e-4", "--hold", "foo=1"], ["--hold foo", "unknown parameter"]),
         ([*grid, "--bending", "1e-5:1e-3:3", "--grasp-depth", "0.01:0.03:2"], ["--grasp-depth", "pinch"]),
         *([] if calib is None else [
-            ([calib, "detect", ".", "--depth-scale", "nan", "--target", "chessboard:9x6:0.025"], ["--depth-scale"]),
+            *[([calib, verb, ".", "--depth-scale", scale, "--target", "chessboard:9x6:0.025"],
+               ["--depth-scale", f'found "{scale}"', "from 1e-09 to 10"])
+              for verb in ("detect", "handeye", "plan") for scale in ("nan", "1e300", "0")],
             ([calib, "register", "left.json", "right.json", "--without-images"], ["right.json", "exit_code", "one axis"]),
             ([calib, "validate", ".", "--extrinsics", "right.json"], ["right.json", "exit_code", "one axis", "--force"]),
             ([calib, "handeye", ".", "--setups", "eye-in-hand"], ["--setups: unknown option", 'did you mean "--setup"']),

@@ -64,7 +64,7 @@ void study_arms(bool wrong_kinematics, double lens_sd, int scenes, unsigned firs
     std::map<std::string, std::vector<Eigen::Isometry3d>> X;
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();  // of what the second arm holds, in its base
     for (unsigned arm = 0; arm < 2; ++arm) {
-      const double size = 1 + kPrintSd * std::normal_distribution<double>()(random);
+      const double size = 1 + usual_size_sd(points) * std::normal_distribution<double>()(random);
       HandEyeScene scene = scene_of(Setup::eye_to_hand, size * points, wrong_kinematics,
                                     first_seed + 2 * static_cast<unsigned>(i) + arm);
       scene.points = points;

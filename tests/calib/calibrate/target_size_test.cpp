@@ -110,7 +110,7 @@ TEST_P(TargetSizes, SizeFarOffIsNamedAndRefusedUnlessItIsStatedToBeRight) {
 // The linearised prior against differences of its residual, (s - 1) / sd.
 TEST(SizePrior, StandsInTheLinearModelAsItsResidualDoes) {
   Bundle bundle = seeded_bundle(scene_of(Setup::eye_in_hand, 1, 25));
-  bundle.priors.scale_sd = 0.004;
+  bundle.priors.scale_sd = {0.004};
   bundle.priors.caution = {2.0};
   bundle.scales = {1.01};
   BundleSettings settings;

@@ -43,7 +43,7 @@ TEST(Use, TwoArmsTakeTheLensAsStatedAndSolveForThePrint) {
   const Calibration result = solved(scene, Use::two_arms);
   EXPECT_EQ(to_vector(result.refined.bundle.intrinsics.front()), to_vector(scene.camera));
   EXPECT_TRUE(result.unknowns.scales);
-  EXPECT_EQ(result.size->prior_sd, kPrintSd);
+  EXPECT_EQ(result.size->prior_sd, usual_size_sd(scene.points));
   ASSERT_TRUE(result.use.value);
   EXPECT_GT(*result.use.value, 0);
   for (const ComparedMethod& method : result.comparison)
