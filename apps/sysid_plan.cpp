@@ -62,8 +62,13 @@ void take_search(const std::string& folder, sysid::PlanSettings& settings) {
   for (const auto& [name, fixed] : summary.fixed)
     if (fixed.source == "measured") settings.grid.fixed.push_back({name, {fixed.value}, false});
   std::vector<sysid::Misfit> misfits;
-  for (const sysid::SummaryRecording& recording : summary.recordings) misfits.push_back(recording.misfit);
-  settings.known = {sysid::covariance_of_draws(searched, summary.samples), sysid::expected_misfit(misfits)};
+  double duration = 0;
+  for (const sysid::SummaryRecording& recording : summary.recordings) {
+    misfits.push_back(recording.misfit);
+    duration += sysid::duration_of(recording) / static_cast<double>(summary.recordings.size());
+  }
+  settings.known = {sysid::covariance_of_draws(searched, summary.samples), sysid::expected_misfit(misfits),
+                    duration};
 }
 
 // The parameters that a plan tells of.

@@ -123,7 +123,7 @@ std::vector<sysid::NextExperiment> next_experiments(const Search& search, const 
   settings.grid.axes = sysid::in_own_coordinates(settings.grid.axes);
   settings.at = answer.values;
   settings.known = {sysid::covariance_of_draws(settings.grid.axes, answer.samples),
-                    sysid::expected_misfit(answer.misfits)};
+                    sysid::expected_misfit(answer.misfits), sysid::mean_duration(search.replays)};
   const sysid::MotionStore store(search.settings.rollouts);
   const auto spreads = [&](const std::vector<double>& of) {
     std::map<std::string, double> named;

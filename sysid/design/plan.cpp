@@ -141,6 +141,20 @@ std::vector<double> spread_before(const PlanSettings& settings) {
   return {spreads.begin(), spreads.end()};
 }
 
+double mean_duration(const std::vector<Replay>& replays) {
+  double sum = 0;
+  for (const Replay& replay : replays) {
+    double first = INFINITY, last = -INFINITY;
+    for (const Observation& observation : replay.observations) {
+      if (observation.weight <= 0) continue;
+      first = std::min(first, observation.t);
+      last = std::max(last, observation.t);
+    }
+    sum += std::max(0.0, last - first);
+  }
+  return sum / static_cast<double>(replays.size());
+}
+
 Misfit expected_misfit(const std::vector<Misfit>& misfits) {
   Misfit expected;
   const auto count = static_cast<double>(misfits.size());
@@ -191,8 +205,11 @@ PlannedExperiment plan_experiment(const std::string& name, const std::vector<Rep
     if (store != nullptr)
       errors = errors_of_solution(replays[r], places, sensitivity.motions[r],
                                   candidate_at(asked.at, asked.grid), *store);
+    Misfit misfit = settings.known->misfit;
+    if (settings.known->duration > 0)
+      misfit.reach_time *= mean_duration({replays[r]}) / settings.known->duration;
     information += information_of(replays[r], places, part(sensitivity.parameters),
-                                  part(sensitivity.nuisance), errors, asked, settings.known->misfit);
+                                  part(sensitivity.nuisance), errors, asked, misfit);
     row += places.rows();
   }
   return planned(name, before, information);

@@ -21,6 +21,9 @@ struct PlannedExperiment {
 struct KnownSoFar {
   Eigen::MatrixXd covariance;  ///< of the searched parameters, in the coordinates of their axes
   Misfit misfit;               ///< noise and discrepancy to reckon with
+  /// Of the recordings that the misfit is of, first to last keyframe, mean [s]. The discrepancy of another
+  /// recording reaches over the same share of its own, as in the prior of DiscrepancyModel; 0: over as long.
+  double duration = 0;
 };
 
 struct PlanSettings {
@@ -47,6 +50,9 @@ std::vector<double> spread_of_ranges(const std::vector<Axis>& axes);
 
 /// Spread of each parameter before any experiment: by what is known, else by its range.
 std::vector<double> spread_before(const PlanSettings& settings);
+
+/// From the first to the last keyframe that counts, mean of the recordings [s].
+double mean_duration(const std::vector<Replay>& replays);
 
 /// The error to reckon with in another recording: the mean squares of noise and discrepancy, the mean
 /// reaches.

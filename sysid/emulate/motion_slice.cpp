@@ -8,13 +8,6 @@ void MotionSlice::take(const MotionInterpolant& whole) {
   whole_ = &whole;
   parent_ = nullptr;
   held_ = 0;
-  rows_.clear();
-  Eigen::Index first = 0;
-  for (const data::Points& positions : layout().positions) {
-    rows_.emplace_back(first, positions.size());
-    first += positions.size();
-  }
-  rows_.emplace_back(first, whole.points_->rows() - first);
 }
 
 void MotionSlice::hold(const MotionSlice& parent, double value) {
@@ -29,7 +22,7 @@ void MotionSlice::hold(const MotionSlice& parent, double value) {
 }
 
 MotionSlice::Block MotionSlice::step(std::size_t i) const {
-  if (parent_ == nullptr) return whole_->points_->middleRows(rows_[i].first, rows_[i].second);
+  if (parent_ == nullptr) return whole_->points_->middleRows(whole_->rows_[i].first, whole_->rows_[i].second);
   Step& step = steps_[i];
   if (step.done.load(std::memory_order_acquire)) return step.numbers;
   const std::scoped_lock lock(step.being_done);
@@ -42,7 +35,11 @@ MotionSlice::Block MotionSlice::step(std::size_t i) const {
     const Eigen::Map<const Eigen::MatrixXd, 0, Eigen::OuterStride<>> along(
         from.data() + j * from.outerStride(), from.rows(), weights_.size(),
         Eigen::OuterStride<>(columns * from.outerStride()));
-    step.numbers.col(j).noalias() = along * weights_.transpose();
+    auto to = step.numbers.col(j);
+    if (weights_.size() == 3)  // as many values an axis as most searches have: in one pass
+      to = weights_[0] * along.col(0) + weights_[1] * along.col(1) + weights_[2] * along.col(2);
+    else
+      to.noalias() = along * weights_.transpose();
   }
   step.done.store(true, std::memory_order_release);
   return step.numbers;

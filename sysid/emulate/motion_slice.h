@@ -38,9 +38,8 @@ class MotionSlice {
 
   const MotionInterpolant* whole_ = nullptr;
   const MotionSlice* parent_ = nullptr;
-  std::size_t held_ = 0;                                     // axes
-  Eigen::RowVectorXd weights_;                               // of the axis held last
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> rows_;  // of each step: first and count; of no parent
+  std::size_t held_ = 0;        // axes
+  Eigen::RowVectorXd weights_;  // of the axis held last
   mutable std::vector<Step> steps_;
 };
 

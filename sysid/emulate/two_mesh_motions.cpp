@@ -1,5 +1,6 @@
 #include "sysid/emulate/two_mesh_motions.h"
 
+#include "data/parallel.h"
 #include "sysid/replay/half_cell.h"
 #include "sysid/replay/surface_distance.h"
 
@@ -81,19 +82,30 @@ Eigen::SparseMatrix<double> prolongation(const data::TriangleMesh& from, const d
   return matrix;
 }
 
-std::vector<Motion> TwoMeshMotions::at_points(const std::vector<std::vector<double>>& points,
-                                              double share) const {
-  std::vector<Motion> motions = coarse_.at_points(points);
-  if (!difference_) return motions;
-  for (Motion& motion : motions) motion = prolonged(motion, *prolongation_);
-  if (share == 0) return motions;
-  const std::vector<Motion> differences = difference_->at_points(points);
-  for (std::size_t i = 0; i < motions.size(); ++i) add(motions[i], share, differences[i]);
+std::vector<Motion> TwoMeshMotions::at_points(const std::vector<std::vector<double>>& points, double share,
+                                              int threads) const {
+  if (!difference_) return coarse_.at_points(points, threads);
+  const Eigen::MatrixXd of_coarse = coarse_.weights(points), of_difference = difference_->weights(points);
+  std::vector<Motion> motions(points.size(), difference_->without_numbers());
+  const std::size_t last = motions.front().positions.size();
+  data::for_each_in_parallel(last + 1, threads, [&](std::size_t step) {
+    Eigen::MatrixXd numbers = coarse_.numbers(step, of_coarse);
+    if (step < last && numbers.rows() > 0) {
+      Eigen::MatrixXd finer(3 * prolongation_->rows(), numbers.cols());
+      for (Eigen::Index i = 0; i < numbers.cols(); ++i)
+        Eigen::Map<data::Points>(finer.col(i).data(), prolongation_->rows(), 3) =
+            *prolongation_ * Eigen::Map<const data::Points>(numbers.col(i).data(), numbers.rows() / 3, 3);
+      numbers = std::move(finer);
+    }
+    if (share != 0 && numbers.rows() > 0) numbers += share * difference_->numbers(step, of_difference);
+    for (std::size_t i = 0; i < points.size(); ++i)
+      set_step(motions[i], step, numbers.col(static_cast<Eigen::Index>(i)));
+  });
   return motions;
 }
 
-Motion TwoMeshMotions::at(const std::vector<double>& values, double share) const {
-  return std::move(at_points({values}, share).front());
+Motion TwoMeshMotions::at(const std::vector<double>& values, double share, int threads) const {
+  return std::move(at_points({values}, share, threads).front());
 }
 
 Motion TwoMeshMotions::on_its_mesh(const Motion& motion) const {
@@ -103,7 +115,7 @@ Motion TwoMeshMotions::on_its_mesh(const Motion& motion) const {
 MotionsAt motions_of(const std::vector<ModelledReplay>& models, double share) {
   return [&models, share](std::size_t r, const std::vector<std::vector<double>>& values) {
     std::vector<ReplayResult> results(values.size());
-    std::vector<Motion> motions = models[r].model.at_points(values, share);
+    std::vector<Motion> motions = models[r].model.at_points(values, share, models[r].replay.settings.threads);
     for (std::size_t i = 0; i < values.size(); ++i) {
       results[i].motion = std::move(motions[i]);
       results[i].converged = results[i].finite = true;
@@ -142,14 +154,9 @@ std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Motion
   const auto matrix = std::make_shared<const Eigen::SparseMatrix<double>>(
       prolongation(replay.recording.mesh, fine->recording.mesh));
   const std::vector<std::vector<double>> points = cartesian_product(axes);
-  constexpr std::size_t kAtOnce = 8;  // of the motions that stand in memory beside the differences
-  for (std::size_t first = 0; first < points.size(); first += kAtOnce) {
-    const auto from = points.begin() + static_cast<std::ptrdiff_t>(first),
-               to = points.begin() + static_cast<std::ptrdiff_t>(std::min(first + kAtOnce, points.size()));
-    const std::vector<Motion> own = motions.at_points({from, to});
-    for (std::size_t i = 0; i < own.size(); ++i)
-      add((*differences)[first + i], -1, prolonged(own[i], *matrix));
-  }
+  data::for_each_in_parallel(points.size(), replay.settings.threads, [&](std::size_t i) {
+    add((*differences)[i], -1, prolonged(motions.at(points[i]), *matrix));
+  });
   return ModelledReplay{std::move(*fine),
                         TwoMeshMotions(motions, MotionInterpolant(axes, *differences), matrix)};
 }

@@ -39,9 +39,10 @@ class TwoMeshMotions {
         difference_(std::move(difference)),
         prolongation_(std::move(prolongation)) {}
 
-  /// The motion at `values`, one an axis, or motions at several points.
-  Motion at(const std::vector<double>& values, double share) const;
-  std::vector<Motion> at_points(const std::vector<std::vector<double>>& points, double share) const;
+  /// The motion at `values`, one an axis, or motions at several points; the steps on up to `threads` threads.
+  Motion at(const std::vector<double>& values, double share, int threads = 1) const;
+  std::vector<Motion> at_points(const std::vector<std::vector<double>>& points, double share,
+                                int threads = 1) const;
 
   /// A motion of the search's mesh on the mesh of the model.
   Motion on_its_mesh(const Motion& motion) const;

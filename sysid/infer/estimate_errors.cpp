@@ -88,24 +88,31 @@ std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emu
                                                      const std::vector<double>& values, bool finer,
                                                      std::vector<ReplayResult>& own) {
   const ReplayCandidate candidate = candidate_at(values, task.grid);
-  std::vector<ReplayResult> simulated = motions_at(emulator, values, emulator.share);
-  const std::vector<ReplayResult> own_model = motions_at(emulator, values, own_mesh),
-                                  finer_model = motions_at(emulator, values, finer_mesh);
   own.clear();
-  for (std::size_t r = 0; r < task.replays.size(); ++r) {
-    own.push_back(task.store.run(task.replays[r], candidate));
+  for (const Replay& replay : task.replays) {
+    own.push_back(task.store.run(replay, candidate));
     task.tell_motion();
     if (!own.back().finite) return std::nullopt;
-    const double share = finer ? emulator.share : 0;
+  }
+  // Where both meshes are simulated the emulator is not asked: x = (1 - share) own + share finer.
+  std::vector<ReplayResult> simulated = finer ? own : motions_at(emulator, values, emulator.share);
+  const std::vector<ReplayResult> modelled =
+      finer ? std::vector<ReplayResult>() : motions_at(emulator, values, own_mesh);
+  for (std::size_t r = 0; r < own.size(); ++r) {
     Motion& motion = simulated[r].motion;
-    add(motion, 1 - share, emulator.models[r].model.on_its_mesh(own.back().motion));
-    add(motion, share - 1, own_model[r].motion);
-    if (share == 0) continue;
+    const Motion on_model = emulator.models[r].model.on_its_mesh(own[r].motion);
+    if (!finer) {
+      add(motion, 1, on_model);
+      add(motion, -1, modelled[r].motion);
+      continue;
+    }
+    motion = on_model;
+    if (emulator.share == own_mesh) continue;
     const ReplayResult there = task.store.run(emulator.models[r].replay, candidate);
     task.tell_motion();
     if (!there.finite) return std::nullopt;
-    add(motion, share, there.motion);
-    add(motion, -share, finer_model[r].motion);
+    add(motion, emulator.share, there.motion);
+    add(motion, -emulator.share, on_model);
   }
   return simulated;
 }

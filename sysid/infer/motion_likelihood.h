@@ -57,8 +57,11 @@ class MotionLikelihood {
     std::vector<SheetShifts> errors;  ///< one standard deviation of each known error
     std::vector<SheetShifts> bends;   ///< of each, its square; empty where there is none
     SheetShifts correction;
-    Nuisance nuisance;                                    ///< of the reference
-    Eigen::VectorXd scale;                                ///< of each row: by its stated error
+    std::vector<SheetShapes>
+        shapes;                      ///< of each keyframe: the correction, all errors and the bends there are
+    std::vector<Eigen::Index> bent;  ///< the errors that bend, in that order
+    Nuisance nuisance;               ///< of the reference
+    Eigen::VectorXd scale;           ///< of each row: by its stated error
     Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by what the registration moves each row
     Eigen::MatrixXd slopes, curves;                       ///< by what each known error does, and its square
     std::optional<LinearObservations> near;               ///< of the reference
@@ -73,7 +76,7 @@ class MotionLikelihood {
   static bool is_read(const Recording& recording, const Motion& motion, double time_offset);
   static Registration registration_of(const Recording& recording, const Nuisance& nuisance);
   /// By what the sheet is moved before distances are taken.
-  static SheetShifts shifts_at(const Recording& recording, const Nuisance& nuisance);
+  static void set_shifts(const Recording& recording, const Nuisance& nuisance, SheetShifts& shifts);
   /// The likeliest nuisance of a motion, by Gauss and Newton, and its -2 log likelihood.
   static std::pair<Nuisance, double> fit_nuisance(
       const Recording& recording, const Nuisance& start,

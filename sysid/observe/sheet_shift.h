@@ -18,4 +18,17 @@ using SheetShifts = std::vector<SheetShift>;
 /// a += share b; an empty a is zero.
 void add(SheetShifts& a, double share, const SheetShifts& b);
 
+/// Several ways to move a sheet and the force on it at one keyframe, a column each.
+struct SheetShapes {
+  /// Rows: x, y and z of one vertex after the other [m].
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> positions;
+  Eigen::Matrix3Xd force;  ///< [N]
+};
+
+/// One a keyframe; shifts that are empty are zero columns. Empty where all are.
+std::vector<SheetShapes> side_by_side(const std::vector<SheetShifts>& shifts);
+
+/// Their sum, each by its size.
+void mix(const std::vector<SheetShapes>& shapes, const Eigen::VectorXd& sizes, SheetShifts& sum);
+
 }  // namespace flash::sysid

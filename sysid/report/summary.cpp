@@ -1,5 +1,6 @@
 #include "sysid/report/summary.h"
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -306,6 +307,16 @@ void check_values(const Summary& summary, const std::string& path) {
 }
 
 }  // namespace
+
+double duration_of(const SummaryRecording& recording) {
+  double first = INFINITY, last = -INFINITY;
+  for (const SummaryFrame& frame : recording.frames) {
+    if (frame.weight <= 0) continue;
+    first = std::min(first, frame.t);
+    last = std::max(last, frame.t);
+  }
+  return std::max(0.0, last - first);
+}
 
 bool model_fits(const Misfit& misfit) {
   constexpr double kTold = 1e-5;  // [m]

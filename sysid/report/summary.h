@@ -38,6 +38,9 @@ struct SummaryRecording {
   std::vector<SummaryFrame> frames;
 };
 
+/// From the first to the last keyframe that counts [s].
+double duration_of(const SummaryRecording& recording);
+
 /// What one more recording is expected to tell beside those at hand.
 struct NextExperiment {
   std::string name;  ///< "bar_pull", or "lift again"

@@ -54,6 +54,23 @@ TEST(RankExperiments, ProposesWhatTellsTheParameterThatIsNotKnown) {
   EXPECT_NEAR(bending[0].bits, std::log2(1 / bending[0].spread[1]), 0.02);
 }
 
+// What reaches over half a recording of twice the length reaches over the whole of this one's.
+TEST(RankExperiments, ADiscrepancyReachesOverTheSameShareOfARecording) {
+  const data::TemporaryFolder folder;
+  const Replay lift = short_lift(folder);
+  const MotionStore store(folder / "motions");
+  const auto spread = [&](double reach, double duration) {
+    PlanSettings settings = settings_of(1, 1);
+    settings.known->misfit.reach_time = reach;
+    settings.known->duration = duration;
+    return plan_experiment("again", {lift}, settings, &store).spread[1];
+  };
+  const double own = mean_duration({lift});
+  ASSERT_GT(own, 0);
+  EXPECT_DOUBLE_EQ(spread(own, 2 * own), spread(own / 2, 0));
+  EXPECT_NE(spread(own, 2 * own), spread(own, own));
+}
+
 // A discrepancy of centimetres leaves little to be told.
 TEST(RankExperiments, ALargerMisfitPromisesLess) {
   const data::TemporaryFolder folder;

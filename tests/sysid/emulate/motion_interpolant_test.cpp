@@ -35,18 +35,6 @@ TEST(MotionInterpolant, IsExactForMotionsCubicInTheCoordinates) {
   }
 }
 
-TEST(MotionInterpolant, AddsAShareOfAMotion) {
-  const std::vector<Axis> axes = {parse_axis("friction", "0.1,0.3,0.5"), parse_axis("poisson", "0,0.2,0.4")};
-  std::vector<Motion> motions;
-  for (const std::vector<double>& p : cartesian_product(axes))
-    motions.push_back({0, 0.1, {data::Points::Constant(2, 3, p[0] + p[1] * p[1])}, {{p[0], p[1], 1}}});
-  const MotionInterpolant interpolant(axes, motions);
-  Motion motion{0, 0.1, {data::Points::Constant(2, 3, 1)}, {{1, 1, 1}}};
-  interpolant.add_to(motion, {0.2, 0.3}, -2);
-  EXPECT_LT((motion.positions[0].array() - (1 - 2 * (0.2 + 0.09))).matrix().norm(), 1e-12);
-  EXPECT_LT((motion.forces[0] - Eigen::Vector3d(0.6, 0.4, -1)).norm(), 1e-12);
-}
-
 struct Lift {
   data::TemporaryFolder folder;
   Replay replay = short_lift(folder, "sheet:0.2x0.05:0.0125");
