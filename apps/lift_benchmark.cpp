@@ -45,10 +45,8 @@ data::Trajectory lift_of(const Eigen::Vector3d& corner) {
   return trajectory;
 }
 
-Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
-                             const std::shared_ptr<const Schedule>& schedule, int index) {
-  Environment environment;
-  data::SheetMaterial& material = environment.materials[0];
+data::SheetMaterial lift_material(const LiftBenchmark& benchmark, int index) {
+  data::SheetMaterial material;
   material.membrane_stiffness = between(benchmark.membrane_stiffness_min, benchmark.membrane_stiffness_max,
                                         (index + 0.5) / benchmark.environments);
   material.bending_rigidity =
@@ -56,6 +54,13 @@ Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
   material.poissons_ratio = benchmark.poissons_ratio;
   material.areal_density = benchmark.areal_density;
   material.friction = benchmark.friction;
+  return material;
+}
+
+Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
+                             const std::shared_ptr<const Schedule>& schedule, int index) {
+  Environment environment;
+  environment.materials[0] = lift_material(benchmark, index);
   environment.obstacles.push_back({Plane{}});
   environment.state.positions = sheet.rest.vertices;
   environment.state.velocities = data::Points::Zero(sheet.rest.vertices.rows(), 3);
@@ -148,12 +153,18 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
     result.iterations += double(c.iterations) / total;
     result.solves += double(c.solves) / total;
     result.factorizations += double(c.factorizations) / total;
-    if (benchmark.steps > 0)
-      result.iterations_max = std::max(result.iterations_max, double(c.iterations) / benchmark.steps);
     converged += double(c.converged);
     result.residual_max = data::worst(result.residual_max, c.residual_max);
   }
   result.converged_share = converged / total;
+  const auto slowest = std::max_element(counts.begin(), counts.end(), [](const Counts& a, const Counts& b) {
+    return a.iterations < b.iterations;
+  });
+  const data::SheetMaterial slowest_material =
+      lift_material(benchmark, static_cast<int>(slowest - counts.begin()));
+  result.iterations_max = double(slowest->iterations) / std::max(1, benchmark.steps);
+  result.slowest_membrane_stiffness = slowest_material.membrane_stiffness;
+  result.slowest_bending_rigidity = slowest_material.bending_rigidity;
   if (benchmark.device == Device::cuda) {
     result.step_milliseconds = 1e3 * result.wall_seconds / benchmark.steps;
     return result;

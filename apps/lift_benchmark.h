@@ -41,7 +41,9 @@ struct LiftBenchmarkResult {
   double converged_share = 0;    ///< of environment-steps
   double residual_max = 0;
   double iterations = 0;                  ///< Newton's, a step
-  double iterations_max = 0;              ///< of the material that takes most, a step
+  double iterations_max = 0;              ///< a step of the material that takes most
+  double slowest_membrane_stiffness = 0;  ///< E t of that material [N/m]
+  double slowest_bending_rigidity = 0;    ///< D of it [N m]
   double solves = 0, factorizations = 0;  ///< a step
   std::vector<BenchmarkPhase>
       phases;  ///< of the CPU: their sum leaves contact, line search and the rest of step_milliseconds

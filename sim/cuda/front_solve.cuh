@@ -147,15 +147,13 @@ __device__ int run_chunks(unsigned first_slot, float* vector, float (&sums)[4]) 
   int2 from[width];
 #pragma unroll
   for (int k = 0; k < width; ++k) from[k] = load_int2(slot(k) + Slot::input_table + 8 * lane());
-  float inputs[width];
-#pragma unroll
-  for (int k = 0; k < width; ++k) {
-    inputs[k] = vector[from[k].x];
-    if (!backward) inputs[k] += vector[from[k].y] + vector[chunks[k].z + lane()];
-  }
+  float inputs[width] = {};
 #pragma unroll
   for (int k = 0; k < width; ++k)
-    if (lane() >= chunks[k].y) inputs[k] = 0;
+    if (lane() < chunks[k].y) {
+      inputs[k] = vector[from[k].x];
+      if (!backward) inputs[k] += vector[from[k].y] + vector[chunks[k].z + lane()];
+    }
   float largest[width];
 #pragma unroll
   for (int k = 0; k < width; ++k) largest[k] = largest_of_warp(fabsf(inputs[k]));

@@ -36,11 +36,11 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
       if (!error.bend.empty())
         add(recording.bends.back(), size * size, shifts_of(error.bend, r, replay, fit.time_offset));
     }
-    std::vector<SheetShifts> shapes = {recording.correction};
-    shapes.insert(shapes.end(), recording.errors.begin(), recording.errors.end());
+    std::vector<const SheetShifts*> shapes = {&recording.correction};
+    for (const SheetShifts& error : recording.errors) shapes.push_back(&error);
     for (std::size_t e = 0; e < errors.size(); ++e) {
       if (recording.bends[e].empty()) continue;
-      shapes.push_back(recording.bends[e]);
+      shapes.push_back(&recording.bends[e]);
       recording.bent.push_back(static_cast<Eigen::Index>(e));
     }
     recording.shapes = side_by_side(shapes);
@@ -56,6 +56,9 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                                return reference[r].motion;
                              }).first;
     }
+    // From here on their shapes side by side do.
+    recording.errors = recording.bends = {};
+    recording.correction = {};
   });
 }
 
@@ -127,8 +130,9 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     const std::function<const Motion&(double time_offset)>& motion_at) {
   constexpr int kSteps = 6;
   // Of the noise: what a step moves rows by. Over four parameters, with steps without end and six seeds of
-  // draws each, Poisson's mean standard deviation is 0.033 at a tenth, 0.028 at a hundredth, 0.030 at a
-  // thousandth; seeds differ by 0.001. A tenth errs on the wide side and takes less than half of the steps.
+  // draws each, Poisson's mean standard deviation is 0.033 at a tenth, 0.031 at 0.03, 0.028 at a hundredth,
+  // 0.030 at a thousandth; seeds differ by 0.001. A tenth errs on the wide side and takes less than half of
+  // the steps.
   constexpr double kSame = 0.1;
   Nuisance at = start;
   ResidualLikelihood::Fit fit;

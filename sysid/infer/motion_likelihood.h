@@ -54,14 +54,15 @@ class MotionLikelihood {
     Replay replay;
     Objective objective;
     Registered bounds;
-    std::vector<SheetShifts> errors;  ///< one standard deviation of each known error
-    std::vector<SheetShifts> bends;   ///< of each, its square; empty where there is none
+    // While the likelihood is made: one standard deviation of each known error, and its square where it
+    // bends.
+    std::vector<SheetShifts> errors, bends;
     SheetShifts correction;
-    std::vector<SheetShapes>
-        shapes;                      ///< of each keyframe: the correction, all errors and the bends there are
-    std::vector<Eigen::Index> bent;  ///< the errors that bend, in that order
-    Nuisance nuisance;               ///< of the reference
-    Eigen::VectorXd scale;           ///< of each row: by its stated error
+    /// Of each keyframe: the correction, all errors and the bends there are.
+    std::vector<SheetShapes> shapes;
+    std::vector<Eigen::Index> bent;                       ///< the errors that bend, in that order
+    Nuisance nuisance;                                    ///< of the reference
+    Eigen::VectorXd scale;                                ///< of each row: by its stated error
     Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by what the registration moves each row
     Eigen::MatrixXd slopes, curves;                       ///< by what each known error does, and its square
     std::optional<LinearObservations> near;               ///< of the reference

@@ -19,16 +19,18 @@ void add(SheetShifts& a, double share, const SheetShifts& b) {
   }
 }
 
-std::vector<SheetShapes> side_by_side(const std::vector<SheetShifts>& shifts) {
-  const auto any = std::find_if(shifts.begin(), shifts.end(), [](const auto& each) { return !each.empty(); });
+std::vector<SheetShapes> side_by_side(const std::vector<const SheetShifts*>& shifts) {
+  const auto any =
+      std::find_if(shifts.begin(), shifts.end(), [](const SheetShifts* each) { return !each->empty(); });
   if (any == shifts.end()) return {};
   const auto columns = static_cast<Eigen::Index>(shifts.size());
-  std::vector<SheetShapes> shapes(any->size());
+  const SheetShifts& first = **any;
+  std::vector<SheetShapes> shapes(first.size());
   for (std::size_t k = 0; k < shapes.size(); ++k) {
-    shapes[k].positions.setZero((*any)[k].positions.size(), columns);
+    shapes[k].positions.setZero(first[k].positions.size(), columns);
     shapes[k].force.setZero(3, columns);
     for (Eigen::Index c = 0; c < columns; ++c) {
-      const SheetShifts& each = shifts[static_cast<std::size_t>(c)];
+      const SheetShifts& each = *shifts[static_cast<std::size_t>(c)];
       if (each.empty()) continue;
       shapes[k].positions.col(c) =
           Eigen::Map<const Eigen::VectorXd>(each[k].positions.data(), each[k].positions.size());

@@ -68,12 +68,38 @@ Floor floor_of(const Towel& towel, double iterations, double factorizations, dou
   return floor;
 }
 
+/// The environment with the most iterations.
+struct Slowest {
+  std::size_t environment = 0;
+  double iterations = 0, substeps = 0;  ///< a step
+  int most = 0, at_step = 0;            ///< iterations of the step that has most
+};
+
+Slowest slowest_of(const BatchReplay& replay) {
+  Slowest slowest;
+  for (int e = 0; e < replay.size(); ++e) {
+    Slowest own;
+    own.environment = static_cast<std::size_t>(e);
+    const std::vector<ReplayStep> steps = replay.stats(e);
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      own.iterations += steps[k].iterations / double(steps.size());
+      own.substeps += steps[k].substeps / double(steps.size());
+      if (steps[k].iterations <= own.most) continue;
+      own.most = steps[k].iterations;
+      own.at_step = static_cast<int>(k);
+    }
+    if (own.iterations > slowest.iterations) slowest = own;
+  }
+  return slowest;
+}
+
 void time_replay(const Towel& towel, int environments, int steps, int stale_factor_solves, bool table) {
   ReplaySettings settings;
   settings.stale_factor_solves = stale_factor_solves;
   settings.steps = steps;
   settings.kept_steps = {steps};
-  BatchReplay replay(towel.plan, lifts(towel, environments, steps, settings.time_step, table), settings);
+  const std::vector<ReplayEnvironment> all = lifts(towel, environments, steps, settings.time_step, table);
+  BatchReplay replay(towel.plan, all, settings);
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   replay.advance(steps);
@@ -88,6 +114,7 @@ void time_replay(const Towel& towel, int environments, int steps, int stale_fact
       substeps += step.substeps;
       converged += step.converged;
     }
+  const auto slowest = slowest_of(replay);
   const double count = static_cast<double>(environments) * steps;
   const Floor floor = floor_of(towel, iterations / count, factorizations / count, solves / count);
   const double each = seconds / environments;
@@ -100,7 +127,11 @@ void time_replay(const Towel& towel, int environments, int steps, int stale_fact
       "         share of evaluation, matrix, preconditioner, factorization, solves, products, directions, "
       "contact, rest:");
   for (const double share : replay.phases()) std::printf(" %.3f", share);
-  std::printf("\n");
+  std::printf(
+      "\n         slowest: E t %.4g N/m, D %.3g N m: %.2f iterations a step, %d in step %d, %.3f substeps\n",
+      all[slowest.environment].material.membrane_stiffness,
+      all[slowest.environment].material.bending_rigidity, slowest.iterations, slowest.most, slowest.at_step,
+      slowest.substeps);
   std::fflush(stdout);
 }
 
