@@ -28,7 +28,8 @@ __device__ __noinline__ void project_vertices(const SheetTables& tables, const S
     Triple place = point;
     if (contacts != nullptr && contacts->listed[i] != 0) {
       read_touches(*contacts, i, obstacles.count, touches);
-      place = feasible_place(obstacles, start, read(contacts->contacts, i), touches, point, room);
+      place = feasible_place(obstacles, start, triple(step.bristles[i]), read(contacts->contacts, i), touches,
+                             point, room);
     } else if (!(clearance_of(obstacles, start, point) >= 0)) {
       place = projected_out(obstacles, start, nullptr, point, room);
     }
@@ -42,49 +43,6 @@ __device__ inline void project_to_feasible(const SheetTables& tables, const Step
                                            const ContactSet* contacts, Point* positions) {
   if (step.obstacles.count == 0) return;
   for_obstacles_of(step, [&](auto most) { project_vertices<most>(tables, step, contacts, positions); });
-}
-
-template <int most>
-__device__ __noinline__ void take_back_slips(const SheetTables& tables, const StepProblem& step,
-                                             const Point* slid, Point* positions) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  SurfaceRoom<most> room;
-  VertexTouch touches[most];
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
-    positions[i] = slid[i];
-    if (step.held_axes[i] != 0) continue;
-    const Triple start = triple(step.start[i]), place = triple(slid[i]);
-    if (clearance_of(obstacles, start, place) > touching_gap) continue;
-    const Triple starting = starting_place(obstacles, start, place, touches, room);
-    positions[i] = {starting.x, starting.y, starting.z, 0};
-  }
-  __syncthreads();
-}
-
-/// Writes where vertices may start the search for the end of the step. `slid`: feasible, where their speeds
-/// take them.
-__device__ inline void write_starting_places(const SheetTables& tables, const StepProblem& step,
-                                             const Point* slid, Point* positions) {
-  for_obstacles_of(step, [&](auto most) { take_back_slips<most>(tables, step, slid, positions); });
-}
-
-/// Takes vertices that friction does not hold where they have not slipped back to where they `slid`, or
-/// `all` once there is one. Returns whether there is one, to all.
-__device__ inline bool let_slide(const SheetTables& tables, const StepProblem& step,
-                                 const ContactSet& contacts, const Point* slid, bool all, Point* positions) {
-  const auto differ = [](const Point& a, const Point& b) { return a.x != b.x || a.y != b.y || a.z != b.z; };
-  bool any = false;
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
-    if (step.held_axes[i] != 0 || contacts.listed[i] == 0 || !differ(positions[i], slid[i])) continue;
-    if (read(contacts.contacts, i).freedom != Freedom::slip) continue;
-    positions[i] = slid[i];
-    any = true;
-  }
-  const bool found = __syncthreads_or(any) != 0;
-  if (found && all)
-    for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) positions[i] = slid[i];
-  __syncthreads();
-  return found;
 }
 
 /// Copies what holds the vertices at an iterate.
@@ -180,7 +138,7 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
           release(obstacles, force + way_at(change, i), contact, touches, room)) {
         const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
         for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
-      } else if (contact.freedom == Freedom::stick || !hold(obstacles, way, reach, contact, touches)) {
+      } else if (!hold(obstacles, way, reach, contact, touches)) {
         // That the surface would have had to pull is noted of vertices that stay as they are, too.
         write_touches(touches, contacts, i, obstacles.count);
         continue;
@@ -210,19 +168,35 @@ __device__ inline bool exchange_contacts(const SheetTables& tables, const StepPr
   });
 }
 
+/// The bristles of the vertices at the end of a step, as in State.
+__device__ inline void write_bristles(const SheetTables& tables, const StepProblem& step,
+                                      const ContactSet& contacts, Point* bristles) {
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    Triple bristle{};
+    if (step.obstacles.count > 0 && step.held_axes[i] == 0 && contacts.listed[i] != 0) {
+      VertexTouch touches[most_obstacles];
+      read_touches(contacts, i, step.obstacles.count, touches);
+      bristle = bristles_at_end(step.obstacles, read(contacts.contacts, i), touches);
+    }
+    bristles[i] = {bristle.x, bristle.y, bristle.z, 0};
+  }
+}
+
 /// What a step says of its contacts.
 struct ContactEnd {
   double complementarity;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
   double penetration;      ///< deepest vertex below a surface [m]
   double start_depth;      ///< deepest that started inside an obstacle [m]
   double work;             ///< of the obstacles on the sheet [J]
+  double bristles;         ///< energy that those of friction started with [J]
 };
 
 template <int most>
 __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, const StepProblem& step,
                                                   const Iterate& end, double* partial) {
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  double complementarity = 0, penetration = 0, start_depth = 0, work[1] = {};
+  double complementarity = 0, penetration = 0, start_depth = 0, sums[2] = {};
+  double &work = sums[0], &bristles = sums[1];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     const Triple start = triple(step.start[i]), point = triple(end.positions[i]);
     const int axes = step.held_axes[i];
@@ -239,21 +213,24 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
       if (axes == 0) start_depth = worse_of(start_depth, -distance_at_start(obstacles.obstacles[k], start));
     }
     if (axes != 0 || end.contacts.listed[i] == 0) continue;
+    const Triple bristle = triple(step.bristles[i]);
+    bristles +=
+        0.5 * read(end.contacts.contacts, i).friction_bound * bristle_length(step.h) * dot(bristle, bristle);
     for (int k = 0; k < obstacles.count; ++k) {
       const VertexTouch touch = read(end.contacts.touches, i, k);
       if (!touch.holds) continue;
       complementarity = worse_of(complementarity, touch.gap);
       const Triple force = touch.normal_force * touch.normal + touch.friction;
       // The obstacle pushes out a vertex that starts inside, even where it stands still.
-      work[0] += touch.starts_inside ? fmax(0.0, dot(force, point - start)) : dot(force, touch.surface_moved);
+      work += touch.starts_inside ? fmax(0.0, dot(force, point - start)) : dot(force, touch.surface_moved);
     }
   }
-  sum_over_team(work, partial);
+  sum_over_team(sums, partial);
   complementarity = worst_over_team(complementarity, partial);
   penetration = worst_over_team(penetration, partial);
   start_depth = worst_over_team(start_depth, partial);
   __syncthreads();
-  return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, work[0]};
+  return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, work, bristles};
 }
 
 __device__ inline ContactEnd judge_contacts(const SheetTables& tables, const StepProblem& step,

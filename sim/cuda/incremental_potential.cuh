@@ -13,9 +13,10 @@ namespace flash::sim::cuda {
 /// One step of an environment as a problem.
 struct StepProblem {
   const ReplayMaterial* material;
-  double h;                                 ///< [s]
-  EnvironmentNumbers numbers;               ///< of this h
-  const Point *start, *velocities, *loads;  ///< `loads` null without
+  double h;                                    ///< [s]
+  EnvironmentNumbers numbers;                  ///< of this h
+  const Point *start, *velocities, *bristles;  ///< as in State
+  const Point* loads;                          ///< null without
   Restrictions restrictions;
   const int* held_axes;  ///< by place: bits 1, 2 and 4 for x, y and z
   int held_count;        ///< the first so many restrictions are of held vertices
@@ -171,7 +172,8 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   ContactResponse response = {};
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
-    response.line_friction = friction_potential_of(obstacles, start, point, read(line->contacts, i), touches);
+    response.line_friction = friction_potential_of(obstacles, start, triple(step.bristles[i]), point,
+                                                   read(line->contacts, i), touches);
   }
   const double clearance = clearance_of(obstacles, start, point);
   contacts.clearance[i] = clearance;
@@ -179,13 +181,14 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   if (clearance > touching_gap) return response;
   find_touches(obstacles, start, point, touches);
   SurfaceRoom<most> room;
-  const VertexContact contact = decide_contact(obstacles, start, point, force, touches, room);
+  const Triple bristles = triple(step.bristles[i]);
+  const VertexContact contact = decide_contact(obstacles, start, bristles, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
   write(contact, contacts.contacts, i);
   write_touches(touches, contacts, i, obstacles.count);
   contacts.listed[i] = 1;
   response.reaction = contact.reaction;
-  response.friction = friction_potential_of(obstacles, start, point, contact, touches);
+  response.friction = friction_potential_of(obstacles, start, bristles, point, contact, touches);
   response.rounding = epsilon * norm(point) * norm(contact.slip_stiffness);
   return response;
 }
