@@ -28,8 +28,8 @@ __device__ __noinline__ void project_vertices(const SheetTables& tables, const S
     Triple place = point;
     if (contacts != nullptr && contacts->listed[i] != 0) {
       read_touches(*contacts, i, obstacles.count, touches);
-      place = feasible_place(obstacles, start, triple(step.bristles[i]), read(contacts->contacts, i), touches,
-                             point, room);
+      place = feasible_place(obstacles, start, triple(step.bristles[i]),
+                             read_contact(*contacts, i, obstacles, touches), touches, point, room);
     } else if (!(clearance_of(obstacles, start, point) >= 0)) {
       place = projected_out(obstacles, start, nullptr, point, room);
     }
@@ -57,21 +57,19 @@ __device__ inline void copy_contacts(const SheetTables& tables, const StepProble
   }
 }
 
-/// Fills in what may not move freely: held vertices, and those that `contacts` hold. Their order does not
-/// matter. `left`: null, or the matrices of sim/cuda/generalized_residuals.cuh. `count`: on chip.
-__device__ inline void gather_restrictions(const SheetTables& tables, StepProblem& step,
-                                           const ContactSet& contacts, VertexRestriction* list, int* of_place,
-                                           float* left, int* count) {
-  if (step.obstacles.count == 0) return;
-  __syncthreads();
-  if (threadIdx.x == 0) *count = step.held_count;
-  for (int k = static_cast<int>(threadIdx.x); k < step.held_count && left != nullptr; k += team_threads)
-    for (int e = 0; e < 9; ++e) left[9 * k + e] = list[k].free[e];
-  __syncthreads();
+template <int most>
+__device__ void gather_contacts(const SheetTables& tables, const StepProblem& step,
+                                const ContactSet& contacts, VertexRestriction* list, int* of_place,
+                                float* left, int* count) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  VertexTouch touches[most];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     if (step.held_axes[i] != 0) continue;
     VertexContact contact;
-    if (contacts.listed[i] != 0) contact = read(contacts.contacts, i);
+    if (contacts.listed[i] != 0) {
+      read_touches(contacts, i, obstacles.count, touches);
+      contact = read_contact(contacts, i, obstacles, touches);
+    }
     if (contact.freedom == Freedom::free) {
       of_place[i] = -1;
       continue;
@@ -85,35 +83,70 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
     list[at] = restriction;
     of_place[i] = at;
     if (left == nullptr) continue;
-    VertexTouch touches[most_obstacles];
-    read_touches(contacts, i, step.obstacles.count, touches);
     for (int c = 0; c < 3; ++c) {
-      const Triple coupling = friction_coupling(step.obstacles, contact, touches, c);
+      const Triple coupling = friction_coupling(obstacles, contact, touches, c);
       for (int r = 0; r < 3; ++r)
         left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
     }
   }
+}
+
+/// Fills in what may not move freely: held vertices, and those that `contacts` hold. Their order does not
+/// matter. `left`: null, or the matrices of sim/cuda/generalized_residuals.cuh. `count`: on chip.
+__device__ inline void gather_restrictions(const SheetTables& tables, StepProblem& step,
+                                           const ContactSet& contacts, VertexRestriction* list, int* of_place,
+                                           float* left, int* count) {
+  if (step.obstacles.count == 0) return;
+  __syncthreads();
+  if (threadIdx.x == 0) *count = step.held_count;
+  for (int k = static_cast<int>(threadIdx.x); k < step.held_count && left != nullptr; k += team_threads)
+    for (int e = 0; e < 9; ++e) left[9 * k + e] = list[k].free[e];
+  __syncthreads();
+  for_obstacles_of(
+      step, [&](auto most) { gather_contacts<most>(tables, step, contacts, list, of_place, left, count); });
   __syncthreads();
   step.restrictions.count = *count;
   __syncthreads();
 }
 
-/// What contact adds to the diagonal blocks: the stiffness of friction, whose force turns with the slip; with
-/// `curved` that of round surfaces, on which the normal force turns.
-__device__ inline void write_own_blocks(const SheetTables& tables, const StepProblem& step,
-                                        const ContactSet& contacts, bool curved, float* blocks) {
+/// Second derivative of the gap to a surface that holds a vertex at `point` [1/m].
+__device__ inline Symmetric3 curvature_at(const ObstacleStep<double>& obstacles, int k, const Triple& start,
+                                          const Triple& point) {
+  const ObstacleShape shape = obstacles.obstacles[k].shape;
+  if (shape == ObstacleShape::plane || shape == ObstacleShape::box) return {};
+  VertexTouch touch;
+  const SurfaceGap<double> gap = gap_in_step(obstacles, k, start, point);
+  touch.normal = gap.normal;
+  touch.curvature_direction = gap.curvature_direction;
+  touch.ball_curvature = gap.ball_curvature;
+  return curvature_of(touch);
+}
+
+template <int most>
+__device__ __noinline__ void write_blocks_of_contacts(const SheetTables& tables, const StepProblem& step,
+                                                      const Iterate& now, bool curved, float* blocks) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  VertexTouch touches[most];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     Symmetric3 sum;
-    if (step.held_axes[i] == 0 && contacts.listed[i] != 0) {
-      const VertexContact contact = read(contacts.contacts, i);
-      if (contact.freedom == Freedom::slip) sum = restricted(contact.slip_stiffness, contact.free);
-      for (int k = 0; k < step.obstacles.count && curved; ++k) {
-        const VertexTouch touch = read(contacts.touches, i, k);
-        if (touch.holds) sum = sum - touch.normal_force * curvature_of(touch);
-      }
+    if (step.held_axes[i] == 0 && now.contacts.listed[i] != 0) {
+      read_touches(now.contacts, i, obstacles.count, touches);
+      sum = restricted(slip_stiffness_of(obstacles, touches), along_surfaces(obstacles.count, touches));
+      for (int k = 0; k < obstacles.count && curved; ++k)
+        if (touches[k].holds)
+          sum = sum - touches[k].normal_force *
+                          curvature_at(obstacles, k, triple(step.start[i]), triple(now.positions[i]));
     }
     for (int e = 0; e < 9; ++e) blocks[9 * i + e] = static_cast<float>(sum.at(e % 3, e / 3));
   }
+}
+
+/// What contact adds to the diagonal blocks: the stiffness of friction, whose force turns with the slip; with
+/// `curved` that of round surfaces, on which the normal force turns.
+__device__ inline void write_own_blocks(const SheetTables& tables, const StepProblem& step,
+                                        const Iterate& now, bool curved, float* blocks) {
+  for_obstacles_of(step,
+                   [&](auto most) { write_blocks_of_contacts<most>(tables, step, now, curved, blocks); });
 }
 
 template <int most>
@@ -131,16 +164,16 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
     const Triple way = way_at(direction, i);
     VertexContact contact;
     if (contacts.listed[i] != 0) {
-      contact = read(contacts.contacts, i);
       read_touches(contacts, i, obstacles.count, touches);
+      contact = read_contact(contacts, i, obstacles, touches);
       const Triple force = force_at(now.force, i);
       if (!stuck && contact.freedom != Freedom::free &&
           release(obstacles, force + way_at(change, i), contact, touches, room)) {
         const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
         for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
       } else if (!hold(obstacles, way, reach, contact, touches)) {
-        // That the surface would have had to pull is noted of vertices that stay as they are, too.
-        write_touches(touches, contacts, i, obstacles.count);
+        // Of several surfaces the forces change all the same.
+        if (most > 1) write_contact(contact, touches, obstacles.count, contacts, i);
         continue;
       }
     } else {
@@ -150,8 +183,7 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
       if (!hold(obstacles, way, reach, contact, touches)) continue;
       contacts.listed[i] = 1;
     }
-    write(contact, contacts.contacts, i);
-    write_touches(touches, contacts, i, obstacles.count);
+    write_contact(contact, touches, obstacles.count, contacts, i);
     any = true;
   }
   return __syncthreads_or(any) != 0;
@@ -168,18 +200,27 @@ __device__ inline bool exchange_contacts(const SheetTables& tables, const StepPr
   });
 }
 
-/// The bristles of the vertices at the end of a step, as in State.
-__device__ inline void write_bristles(const SheetTables& tables, const StepProblem& step,
-                                      const ContactSet& contacts, Point* bristles) {
+template <int most>
+__device__ __noinline__ void write_bristles_of_contacts(const SheetTables& tables, const StepProblem& step,
+                                                        const ContactSet& contacts, Point* bristles) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  VertexTouch touches[most];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     Triple bristle{};
-    if (step.obstacles.count > 0 && step.held_axes[i] == 0 && contacts.listed[i] != 0) {
-      VertexTouch touches[most_obstacles];
-      read_touches(contacts, i, step.obstacles.count, touches);
-      bristle = bristles_at_end(step.obstacles, read(contacts.contacts, i), touches);
+    if (step.held_axes[i] == 0 && contacts.listed[i] != 0) {
+      read_touches(contacts, i, obstacles.count, touches);
+      bristle = bristles_at_end(obstacles, read_contact(contacts, i, obstacles, touches), touches);
     }
     bristles[i] = {bristle.x, bristle.y, bristle.z, 0};
   }
+}
+
+/// The bristles of the vertices at the end of a step, as in State. Without obstacles they stay straight.
+__device__ inline void write_bristles(const SheetTables& tables, const StepProblem& step,
+                                      const ContactSet& contacts, Point* bristles) {
+  if (step.obstacles.count == 0) return;
+  for_obstacles_of(step,
+                   [&](auto most) { write_bristles_of_contacts<most>(tables, step, contacts, bristles); });
 }
 
 /// What a step says of its contacts.
@@ -195,6 +236,7 @@ template <int most>
 __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, const StepProblem& step,
                                                   const Iterate& end, double* partial) {
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  VertexTouch touches[most];
   double complementarity = 0, penetration = 0, start_depth = 0, sums[2] = {};
   double &work = sums[0], &bristles = sums[1];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
@@ -213,16 +255,18 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
       if (axes == 0) start_depth = worse_of(start_depth, -distance_at_start(obstacles.obstacles[k], start));
     }
     if (axes != 0 || end.contacts.listed[i] == 0) continue;
+    read_touches(end.contacts, i, obstacles.count, touches);
     const Triple bristle = triple(step.bristles[i]);
-    bristles +=
-        0.5 * read(end.contacts.contacts, i).friction_bound * bristle_length(step.h) * dot(bristle, bristle);
+    bristles += 0.5 * friction_bound_of(obstacles, touches) * bristle_length(step.h) * dot(bristle, bristle);
     for (int k = 0; k < obstacles.count; ++k) {
-      const VertexTouch touch = read(end.contacts.touches, i, k);
+      const VertexTouch& touch = touches[k];
       if (!touch.holds) continue;
       complementarity = worse_of(complementarity, touch.gap);
-      const Triple force = touch.normal_force * touch.normal + touch.friction;
+      const Triple friction = -(obstacles.obstacles[k].friction * touch.normal_force) * touch.slip_direction,
+                   force = touch.normal_force * touch.normal + friction;
       // The obstacle pushes out a vertex that starts inside, even where it stands still.
-      work += touch.starts_inside ? fmax(0.0, dot(force, point - start)) : dot(force, touch.surface_moved);
+      work += touch.starts_inside ? fmax(0.0, dot(force, point - start))
+                                  : dot(force, gap_in_step(obstacles, k, start, point).surface_moved);
     }
   }
   sum_over_team(sums, partial);

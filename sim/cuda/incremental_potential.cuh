@@ -153,11 +153,18 @@ __device__ auto for_obstacles_of(const StepProblem& step, const Act& act) {
 }
 
 __device__ inline void read_touches(const ContactSet& contacts, int i, int count, VertexTouch* touches) {
-  for (int k = 0; k < count; ++k) touches[k] = read(contacts.touches, i, k);
+  for (int k = 0; k < count; ++k) touches[k] = touch_of(read(contacts.touches, i, k));
 }
-__device__ inline void write_touches(const VertexTouch* touches, const ContactSet& contacts, int i,
-                                     int count) {
-  for (int k = 0; k < count; ++k) write(touches[k], contacts.touches, i, k);
+/// What holds a vertex that is listed, as contact_of says. `touches`: what read_touches gave.
+__device__ inline VertexContact read_contact(const ContactSet& contacts, int i,
+                                             const ObstacleStep<double>& obstacles,
+                                             const VertexTouch* touches) {
+  return contact_of(obstacles, read(contacts.contacts, i), touches);
+}
+__device__ inline void write_contact(const VertexContact& contact, const VertexTouch* touches, int count,
+                                     const ContactSet& contacts, int i) {
+  write(record_of(contact), contacts.contacts, i);
+  for (int k = 0; k < count; ++k) write(record_of(touches[k]), contacts.touches, i, k);
 }
 
 /// Decides what the obstacles do to vertex i, which needs `force`.
@@ -173,7 +180,7 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
     response.line_friction = friction_potential_of(obstacles, start, triple(step.bristles[i]), point,
-                                                   read(line->contacts, i), touches);
+                                                   read_contact(*line, i, obstacles, touches), touches);
   }
   const double clearance = clearance_of(obstacles, start, point);
   contacts.clearance[i] = clearance;
@@ -184,8 +191,7 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   const Triple bristles = triple(step.bristles[i]);
   const VertexContact contact = decide_contact(obstacles, start, bristles, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
-  write(contact, contacts.contacts, i);
-  write_touches(touches, contacts, i, obstacles.count);
+  write_contact(contact, touches, obstacles.count, contacts, i);
   contacts.listed[i] = 1;
   response.reaction = contact.reaction;
   response.friction = friction_potential_of(obstacles, start, bristles, point, contact, touches);

@@ -1,6 +1,7 @@
 #pragma once
 #include <cuda_fp16.h>
 
+#include "sim/cuda/contact_records.h"
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/four.h"
 #include "sim/cuda/front_tables.h"
@@ -8,7 +9,6 @@
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/cuda/vertex_records.h"
-#include "sim/law/vertex_contact.h"
 
 namespace flash::sim::cuda {
 
@@ -42,8 +42,8 @@ struct FramePose {
 /// What obstacles do to the vertices at an iterate, by place.
 struct ContactSet {
   int* listed;                            ///< whether `contacts` and `touches` say anything of a vertex
-  VertexRecords<VertexContact> contacts;  ///< only of those
-  VertexRecords<VertexTouch> touches;     ///< only of those: a layer for each obstacle
+  VertexRecords<ContactRecord> contacts;  ///< only of those
+  VertexRecords<TouchRecord> touches;     ///< only of those: a layer for each obstacle
   double* clearance;                      ///< distance to the nearest obstacle [m]
 };
 

@@ -12,8 +12,7 @@ struct VertexContact {
   Vector3<double> reaction{};        ///< force on the vertex, always admissible [N]
   Vector3<double> slip_direction{};  ///< free part of the slip, divided by its length
   Symmetric3 free = identity3();     ///< projector on the directions it may move in
-  Symmetric3
-      slip_stiffness{};  ///< how friction turns with the slip: sum of mu lambda_n / |slip| across it [N/m]
+  Symmetric3 slip_stiffness{};       ///< how friction changes with the slip [N/m]
 };
 
 /// Friction as bristles that bend before they slide (Haessig and Friedland 1991), solved by return mapping
@@ -73,6 +72,31 @@ FLASH_HOST_DEVICE inline Vector3<double> slip_against(const ObstacleStep<double>
   return (dot(edge, against) / squared) * edge;
 }
 
+/// Sum of mu lambda_n over the surfaces that hold a vertex [N].
+FLASH_HOST_DEVICE inline double friction_bound_of(const ObstacleStep<double>& step,
+                                                  const VertexTouch* touches) {
+  double bound = 0;
+  for (int k = 0; k < step.count; ++k)
+    if (touches[k].holds) bound += step.obstacles[k].friction * touches[k].normal_force;
+  return bound;
+}
+
+/// How the friction of a vertex changes with its slip at the normal forces of its touches [N/m].
+FLASH_HOST_DEVICE inline Symmetric3 slip_stiffness_of(const ObstacleStep<double>& step,
+                                                      const VertexTouch* touches) {
+  Symmetric3 stiffness;
+  for (int k = 0; k < step.count; ++k) {
+    const VertexTouch& touch = touches[k];
+    if (!touch.holds) continue;
+    Symmetric3 turns = identity3() - square(touch.normal);
+    if (touch.slip > bristle_length(step.time_step)) turns = turns - square(touch.slip_direction);
+    stiffness = stiffness + (step.obstacles[k].friction * touch.normal_force /
+                             friction_length(touch.slip, step.time_step)) *
+                                turns;
+  }
+  return stiffness;
+}
+
 /// Decides what holds a vertex that needs `needed` from outside to obey its equation of motion [N], from its
 /// touches; fills in their forces and slips. On a surface it is held while it needs a push. Friction is
 /// against the slip: in proportion to it up to bristle_length, of the size of its bound beyond. Of several
@@ -98,13 +122,14 @@ FLASH_HOST_DEVICE inline VertexContact decide_contact(
   int held = 0;
   for (int k = 0; k < step.count; ++k) {
     if (!touches[k].holds) continue;
-    contact.friction_bound += step.obstacles[k].friction * touches[k].normal_force;
     contact.slip_direction = touches[k].slip_direction;
     ++held;
   }
   if (held == 0) return contact;
 
   contact.freedom = Freedom::slip;
+  contact.friction_bound = friction_bound_of(step, touches);
+  contact.slip_stiffness = slip_stiffness_of(step, touches);
   contact.free = along_surfaces(step.count, touches);
   if (held > 1) {
     const Vector3<double> slip = slip_against(step, start, bristles, point, touches);
@@ -113,13 +138,8 @@ FLASH_HOST_DEVICE inline VertexContact decide_contact(
   for (int k = 0; k < step.count; ++k) {
     VertexTouch& touch = touches[k];
     if (!touch.holds) continue;
-    const double own_bound = step.obstacles[k].friction * touch.normal_force;
-    touch.friction = -own_bound * touch.slip_direction;
+    touch.friction = -(step.obstacles[k].friction * touch.normal_force) * touch.slip_direction;
     contact.reaction = contact.reaction + touch.normal_force * touch.normal + touch.friction;
-    Symmetric3 turns = identity3() - square(touch.normal);
-    if (touch.slip > bristle_length(step.time_step)) turns = turns - square(touch.slip_direction);
-    contact.slip_stiffness =
-        contact.slip_stiffness + (own_bound / friction_length(touch.slip, step.time_step)) * turns;
   }
   return contact;
 }
@@ -140,16 +160,17 @@ FLASH_HOST_DEVICE inline double friction_potential_of(
   return potential;
 }
 
-/// The deflection of a vertex's bristles at the end of a step, as in State: against its friction, over the
-/// bound of it.
+/// The deflection of a vertex's bristles at the end of a step, as in State; of several surfaces their mean,
+/// weighted by mu lambda_n.
 FLASH_HOST_DEVICE inline Vector3<double> bristles_at_end(const ObstacleStep<double>& step,
                                                          const VertexContact& contact,
                                                          const VertexTouch* touches) {
   if (!(contact.friction_bound > 0)) return {};
-  Vector3<double> friction{};
+  Vector3<double> sum{};
   for (int k = 0; k < step.count; ++k)
-    if (touches[k].holds) friction = friction + touches[k].friction;
-  return (-1 / contact.friction_bound) * friction;
+    if (touches[k].holds)
+      sum = sum + (step.obstacles[k].friction * touches[k].normal_force) * touches[k].slip_direction;
+  return (1 / contact.friction_bound) * sum;
 }
 
 /// How the friction force of a slipping vertex changes with the force on it: the sum of mu_k d_k l_k^T, where
