@@ -119,6 +119,7 @@ void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, const
                    replay.kept_positions(in_replay, static_cast<int>(index)));
     state.positions = replay.positions(in_replay);
     state.velocities = replay.velocities(in_replay);
+    state.bristles = replay.bristles(in_replay);
     state.held = std::move(held[k]);
   });
 }

@@ -55,6 +55,7 @@ void check(const SheetPlan& plan, const std::vector<ReplayEnvironment>& environm
   for (const ReplayEnvironment& e : environments) {
     require(e.positions.rows() == size && e.velocities.rows() == size,
             "every environment needs a position and a velocity for each vertex");
+    require(e.bristles.rows() == 0 || e.bristles.rows() == size, "bristles for each vertex, or none");
     require(e.holds == nullptr || std::ssize(*e.holds) >= settings.steps - settings.first_step,
             "what is held has to be given for each step");
     require(e.hold_count == environments.front().hold_count, "all environments need as many holds");
@@ -192,8 +193,8 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
               static_cast<int>(size)};
     };
     for (ContactSet& contacts : m.contacts)
-      contacts = {arena.take<int>(size), records.operator()<VertexContact>(1),
-                  records.operator()<VertexTouch>(obstacles), arena.take<double>(size)};
+      contacts = {arena.take<int>(size), records.operator()<ContactRecord>(1),
+                  records.operator()<TouchRecord>(obstacles), arena.take<double>(size)};
     m.obstacles = arena.take<MovingObstacle<double>>(obstacles);
     m.own_blocks = arena.take<float>(9 * size);
     m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),
@@ -216,7 +217,7 @@ struct BatchReplay::Memory {
   int* stop = nullptr;  ///< of the host, read by the device
 
   DeviceArray<ReplayMaterial> materials;
-  DeviceArray<Point> positions, velocities, loads;
+  DeviceArray<Point> positions, velocities, bristles, loads;
   DeviceArray<int> hold_starts, kept_index, order, steps;
   DeviceArray<HeldPlace> holds;
   DeviceArray<PlacedObstacle> obstacles;
@@ -271,8 +272,7 @@ struct BatchReplay::Memory {
     numbers.most_obstacles_each = most_obstacles_each;
     numbers.poses = poses.data();
     numbers.exit_speed = settings.exit_speed;
-    numbers.positions = positions.data();
-    numbers.velocities = velocities.data();
+    numbers.states = {positions.data(), velocities.data(), bristles.data()};
     numbers.stats = stats.data();
     numbers.hold_count = environments.front().hold_count;
     hold_forces = DeviceArray<double>(3 * stats.size() * static_cast<std::size_t>(numbers.hold_count));
@@ -292,7 +292,7 @@ struct BatchReplay::Memory {
   std::size_t size() const { return layout.order.size(); }
 
   void upload_state(const std::vector<ReplayEnvironment>& environments) {
-    std::vector<Point> x, v, forces;
+    std::vector<Point> x, v, b, forces;
     const bool loaded = std::any_of(environments.begin(), environments.end(),
                                     [](const ReplayEnvironment& e) { return !e.loads.empty(); });
     for (const ReplayEnvironment& e : environments) {
@@ -304,11 +304,13 @@ struct BatchReplay::Memory {
         };
         x.push_back(point(e.positions));
         v.push_back(point(e.velocities));
+        b.push_back(e.bristles.rows() == 0 ? Point{} : point(e.bristles));
         if (loaded) forces.push_back(point(load));
       }
     }
     positions = DeviceArray<Point>(x);
     velocities = DeviceArray<Point>(v);
+    bristles = DeviceArray<Point>(b);
     loads = DeviceArray<Point>(forces);
     order = DeviceArray<int>(layout.order);
   }
@@ -428,6 +430,9 @@ Points BatchReplay::positions(int environment) const {
 }
 Points BatchReplay::velocities(int environment) const {
   return memory_->points(memory_->velocities, environment);
+}
+Points BatchReplay::bristles(int environment) const {
+  return memory_->points(memory_->bristles, environment);
 }
 
 Points BatchReplay::kept_positions(int environment, int index) const {

@@ -38,6 +38,7 @@ struct ReplayEnvironment {
   std::shared_ptr<const Schedule> schedule;  ///< of the frames that obstacles name; none: all at rest
   double time = 0;                           ///< at which it stands [s]
   data::Points positions, velocities;        ///< [m], [m/s]
+  data::Points bristles = {};                ///< as in State
 };
 
 struct ReplaySettings {
@@ -90,6 +91,7 @@ class BatchReplay {
 
   data::Points positions(int environment) const;   ///< [m]
   data::Points velocities(int environment) const;  ///< [m/s]
+  data::Points bristles(int environment) const;    ///< as in State
   data::Points kept_positions(int environment, int index) const;
   /// Forces of the holds on the sheet, mean over each step: steps from first_step on x holds x 3 [N].
   std::vector<double> hold_forces(int environment) const;

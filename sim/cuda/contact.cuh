@@ -28,7 +28,8 @@ __device__ __noinline__ void project_vertices(const SheetTables& tables, const S
     Triple place = point;
     if (contacts != nullptr && contacts->listed[i] != 0) {
       read_touches(*contacts, i, obstacles.count, touches);
-      place = feasible_place(obstacles, start, read(contacts->contacts, i), touches, point, room);
+      place = feasible_place(obstacles, start, triple(step.bristles[i]),
+                             read_contact(*contacts, i, obstacles, touches), touches, point, room);
     } else if (!(clearance_of(obstacles, start, point) >= 0)) {
       place = projected_out(obstacles, start, nullptr, point, room);
     }
@@ -44,49 +45,6 @@ __device__ inline void project_to_feasible(const SheetTables& tables, const Step
   for_obstacles_of(step, [&](auto most) { project_vertices<most>(tables, step, contacts, positions); });
 }
 
-template <int most>
-__device__ __noinline__ void take_back_slips(const SheetTables& tables, const StepProblem& step,
-                                             const Point* slid, Point* positions) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  SurfaceRoom<most> room;
-  VertexTouch touches[most];
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
-    positions[i] = slid[i];
-    if (step.held_axes[i] != 0) continue;
-    const Triple start = triple(step.start[i]), place = triple(slid[i]);
-    if (clearance_of(obstacles, start, place) > touching_gap) continue;
-    const Triple starting = starting_place(obstacles, start, place, touches, room);
-    positions[i] = {starting.x, starting.y, starting.z, 0};
-  }
-  __syncthreads();
-}
-
-/// Writes where vertices may start the search for the end of the step. `slid`: feasible, where their speeds
-/// take them.
-__device__ inline void write_starting_places(const SheetTables& tables, const StepProblem& step,
-                                             const Point* slid, Point* positions) {
-  for_obstacles_of(step, [&](auto most) { take_back_slips<most>(tables, step, slid, positions); });
-}
-
-/// Takes vertices that friction does not hold where they have not slipped back to where they `slid`, or
-/// `all` once there is one. Returns whether there is one, to all.
-__device__ inline bool let_slide(const SheetTables& tables, const StepProblem& step,
-                                 const ContactSet& contacts, const Point* slid, bool all, Point* positions) {
-  const auto differ = [](const Point& a, const Point& b) { return a.x != b.x || a.y != b.y || a.z != b.z; };
-  bool any = false;
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
-    if (step.held_axes[i] != 0 || contacts.listed[i] == 0 || !differ(positions[i], slid[i])) continue;
-    if (read(contacts.contacts, i).freedom != Freedom::slip) continue;
-    positions[i] = slid[i];
-    any = true;
-  }
-  const bool found = __syncthreads_or(any) != 0;
-  if (found && all)
-    for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) positions[i] = slid[i];
-  __syncthreads();
-  return found;
-}
-
 /// Copies what holds the vertices at an iterate.
 __device__ inline void copy_contacts(const SheetTables& tables, const StepProblem& step,
                                      const ContactSet& from, const ContactSet& to) {
@@ -96,6 +54,40 @@ __device__ inline void copy_contacts(const SheetTables& tables, const StepProble
     if (listed == 0) continue;
     write(read(from.contacts, i), to.contacts, i);
     for (int k = 0; k < step.obstacles.count; ++k) write(read(from.touches, i, k), to.touches, i, k);
+  }
+}
+
+template <int most>
+__device__ void gather_contacts(const SheetTables& tables, const StepProblem& step,
+                                const ContactSet& contacts, VertexRestriction* list, int* of_place,
+                                float* left, int* count) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  VertexTouch touches[most];
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    if (step.held_axes[i] != 0) continue;
+    VertexContact contact;
+    if (contacts.listed[i] != 0) {
+      read_touches(contacts, i, obstacles.count, touches);
+      contact = read_contact(contacts, i, obstacles, touches);
+    }
+    if (contact.freedom == Freedom::free) {
+      of_place[i] = -1;
+      continue;
+    }
+    VertexRestriction restriction = {i, {}, {}};
+    for (int c = 0; c < 3; ++c) {
+      for (int r = 0; r < 3; ++r) restriction.free[3 * c + r] = static_cast<float>(contact.free.at(r, c));
+      restriction.correction[c] = static_cast<float>(contact.correction[c]);
+    }
+    const int at = atomicAdd(count, 1);
+    list[at] = restriction;
+    of_place[i] = at;
+    if (left == nullptr) continue;
+    for (int c = 0; c < 3; ++c) {
+      const Triple coupling = friction_coupling(obstacles, contact, touches, c);
+      for (int r = 0; r < 3; ++r)
+        left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
+    }
   }
 }
 
@@ -110,52 +102,51 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
   for (int k = static_cast<int>(threadIdx.x); k < step.held_count && left != nullptr; k += team_threads)
     for (int e = 0; e < 9; ++e) left[9 * k + e] = list[k].free[e];
   __syncthreads();
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
-    if (step.held_axes[i] != 0) continue;
-    VertexContact contact;
-    if (contacts.listed[i] != 0) contact = read(contacts.contacts, i);
-    if (contact.freedom == Freedom::free) {
-      of_place[i] = -1;
-      continue;
-    }
-    VertexRestriction restriction = {i, {}, {}};
-    for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 3; ++r) restriction.free[3 * c + r] = static_cast<float>(contact.free.at(r, c));
-      restriction.correction[c] = static_cast<float>(contact.correction[c]);
-    }
-    const int at = atomicAdd(count, 1);
-    list[at] = restriction;
-    of_place[i] = at;
-    if (left == nullptr) continue;
-    VertexTouch touches[most_obstacles];
-    read_touches(contacts, i, step.obstacles.count, touches);
-    for (int c = 0; c < 3; ++c) {
-      const Triple coupling = friction_coupling(step.obstacles, contact, touches, c);
-      for (int r = 0; r < 3; ++r)
-        left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
-    }
-  }
+  for_obstacles_of(
+      step, [&](auto most) { gather_contacts<most>(tables, step, contacts, list, of_place, left, count); });
   __syncthreads();
   step.restrictions.count = *count;
   __syncthreads();
 }
 
-/// What contact adds to the diagonal blocks: the stiffness of friction, whose force turns with the slip; with
-/// `curved` that of round surfaces, on which the normal force turns.
-__device__ inline void write_own_blocks(const SheetTables& tables, const StepProblem& step,
-                                        const ContactSet& contacts, bool curved, float* blocks) {
+/// Second derivative of the gap to a surface that holds a vertex at `point` [1/m].
+__device__ inline Symmetric3 curvature_at(const ObstacleStep<double>& obstacles, int k, const Triple& start,
+                                          const Triple& point) {
+  const ObstacleShape shape = obstacles.obstacles[k].shape;
+  if (shape == ObstacleShape::plane || shape == ObstacleShape::box) return {};
+  VertexTouch touch;
+  const SurfaceGap<double> gap = gap_in_step(obstacles, k, start, point);
+  touch.normal = gap.normal;
+  touch.curvature_direction = gap.curvature_direction;
+  touch.ball_curvature = gap.ball_curvature;
+  return curvature_of(touch);
+}
+
+template <int most>
+__device__ __noinline__ void write_blocks_of_contacts(const SheetTables& tables, const StepProblem& step,
+                                                      const Iterate& now, bool curved, float* blocks) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  VertexTouch touches[most];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     Symmetric3 sum;
-    if (step.held_axes[i] == 0 && contacts.listed[i] != 0) {
-      const VertexContact contact = read(contacts.contacts, i);
-      if (contact.freedom == Freedom::slip) sum = restricted(contact.slip_stiffness, contact.free);
-      for (int k = 0; k < step.obstacles.count && curved; ++k) {
-        const VertexTouch touch = read(contacts.touches, i, k);
-        if (touch.holds) sum = sum - touch.normal_force * curvature_of(touch);
-      }
+    if (step.held_axes[i] == 0 && now.contacts.listed[i] != 0) {
+      read_touches(now.contacts, i, obstacles.count, touches);
+      sum = restricted(slip_stiffness_of(obstacles, touches), along_surfaces(obstacles.count, touches));
+      for (int k = 0; k < obstacles.count && curved; ++k)
+        if (touches[k].holds)
+          sum = sum - touches[k].normal_force *
+                          curvature_at(obstacles, k, triple(step.start[i]), triple(now.positions[i]));
     }
     for (int e = 0; e < 9; ++e) blocks[9 * i + e] = static_cast<float>(sum.at(e % 3, e / 3));
   }
+}
+
+/// What contact adds to the diagonal blocks: the stiffness of friction, whose force turns with the slip; with
+/// `curved` that of round surfaces, on which the normal force turns.
+__device__ inline void write_own_blocks(const SheetTables& tables, const StepProblem& step,
+                                        const Iterate& now, bool curved, float* blocks) {
+  for_obstacles_of(step,
+                   [&](auto most) { write_blocks_of_contacts<most>(tables, step, now, curved, blocks); });
 }
 
 template <int most>
@@ -173,16 +164,16 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
     const Triple way = way_at(direction, i);
     VertexContact contact;
     if (contacts.listed[i] != 0) {
-      contact = read(contacts.contacts, i);
       read_touches(contacts, i, obstacles.count, touches);
+      contact = read_contact(contacts, i, obstacles, touches);
       const Triple force = force_at(now.force, i);
       if (!stuck && contact.freedom != Freedom::free &&
           release(obstacles, force + way_at(change, i), contact, touches, room)) {
         const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
         for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
-      } else if (contact.freedom == Freedom::stick || !hold(obstacles, way, reach, contact, touches)) {
-        // That the surface would have had to pull is noted of vertices that stay as they are, too.
-        write_touches(touches, contacts, i, obstacles.count);
+      } else if (!hold(obstacles, way, reach, contact, touches)) {
+        // Of several surfaces the forces change all the same.
+        if (most > 1) write_contact(contact, touches, obstacles.count, contacts, i);
         continue;
       }
     } else {
@@ -192,8 +183,7 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
       if (!hold(obstacles, way, reach, contact, touches)) continue;
       contacts.listed[i] = 1;
     }
-    write(contact, contacts.contacts, i);
-    write_touches(touches, contacts, i, obstacles.count);
+    write_contact(contact, touches, obstacles.count, contacts, i);
     any = true;
   }
   return __syncthreads_or(any) != 0;
@@ -210,19 +200,45 @@ __device__ inline bool exchange_contacts(const SheetTables& tables, const StepPr
   });
 }
 
+template <int most>
+__device__ __noinline__ void write_bristles_of_contacts(const SheetTables& tables, const StepProblem& step,
+                                                        const ContactSet& contacts, Point* bristles) {
+  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  VertexTouch touches[most];
+  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+    Triple bristle{};
+    if (step.held_axes[i] == 0 && contacts.listed[i] != 0) {
+      read_touches(contacts, i, obstacles.count, touches);
+      bristle = bristles_at_end(obstacles, read_contact(contacts, i, obstacles, touches), touches);
+    }
+    bristles[i] = {bristle.x, bristle.y, bristle.z, 0};
+  }
+}
+
+/// The bristles of the vertices at the end of a step, as in State. Without obstacles they stay straight.
+__device__ inline void write_bristles(const SheetTables& tables, const StepProblem& step,
+                                      const ContactSet& contacts, Point* bristles) {
+  if (step.obstacles.count == 0) return;
+  for_obstacles_of(step,
+                   [&](auto most) { write_bristles_of_contacts<most>(tables, step, contacts, bristles); });
+}
+
 /// What a step says of its contacts.
 struct ContactEnd {
   double complementarity;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
   double penetration;      ///< deepest vertex below a surface [m]
   double start_depth;      ///< deepest that started inside an obstacle [m]
   double work;             ///< of the obstacles on the sheet [J]
+  double bristles;         ///< energy that those of friction started with [J]
 };
 
 template <int most>
 __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, const StepProblem& step,
                                                   const Iterate& end, double* partial) {
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  double complementarity = 0, penetration = 0, start_depth = 0, work[1] = {};
+  VertexTouch touches[most];
+  double complementarity = 0, penetration = 0, start_depth = 0, sums[2] = {};
+  double &work = sums[0], &bristles = sums[1];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
     const Triple start = triple(step.start[i]), point = triple(end.positions[i]);
     const int axes = step.held_axes[i];
@@ -239,21 +255,26 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
       if (axes == 0) start_depth = worse_of(start_depth, -distance_at_start(obstacles.obstacles[k], start));
     }
     if (axes != 0 || end.contacts.listed[i] == 0) continue;
+    read_touches(end.contacts, i, obstacles.count, touches);
+    const Triple bristle = triple(step.bristles[i]);
+    bristles += 0.5 * friction_bound_of(obstacles, touches) * bristle_length(step.h) * dot(bristle, bristle);
     for (int k = 0; k < obstacles.count; ++k) {
-      const VertexTouch touch = read(end.contacts.touches, i, k);
+      const VertexTouch& touch = touches[k];
       if (!touch.holds) continue;
       complementarity = worse_of(complementarity, touch.gap);
-      const Triple force = touch.normal_force * touch.normal + touch.friction;
+      const Triple friction = -(obstacles.obstacles[k].friction * touch.normal_force) * touch.slip_direction,
+                   force = touch.normal_force * touch.normal + friction;
       // The obstacle pushes out a vertex that starts inside, even where it stands still.
-      work[0] += touch.starts_inside ? fmax(0.0, dot(force, point - start)) : dot(force, touch.surface_moved);
+      work += touch.starts_inside ? fmax(0.0, dot(force, point - start))
+                                  : dot(force, gap_in_step(obstacles, k, start, point).surface_moved);
     }
   }
-  sum_over_team(work, partial);
+  sum_over_team(sums, partial);
   complementarity = worst_over_team(complementarity, partial);
   penetration = worst_over_team(penetration, partial);
   start_depth = worst_over_team(start_depth, partial);
   __syncthreads();
-  return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, work[0]};
+  return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, work, bristles};
 }
 
 __device__ inline ContactEnd judge_contacts(const SheetTables& tables, const StepProblem& step,

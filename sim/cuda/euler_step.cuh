@@ -135,7 +135,7 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
       sums[kinetic_at_start] + stored_at_start + fmax(0.0, sums[falls]) + fmax(0.0, sums[work]);
   const double rounding = 1e-9 * sums[mass_sum] * material.weight_factor +
                           1e-14 * material.membrane_stiffness * sums[mass_sum] / material.areal_density;
-  const double allowed = energy_tolerance * there + sums[unbalanced] + rounding;
+  const double allowed = energy_tolerance * there + sums[unbalanced] + contact.bristles + rounding;
   const bool finite = isfinite(sums[kinetic]);
   const bool complementary = contact.complementarity <= gap_tolerance;
   if (!(gain <= allowed) || !complementary) return {false, finite, contact.penetration, contact.start_depth};
@@ -173,23 +173,6 @@ __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const S
   step.numbers.own_blocks = w.memory.own_blocks;
 }
 
-/// From where speeds take the vertices, w.now, to where the search for the end of the step starts: without
-/// slip where it would be small and friction holds them so. Evaluates it.
-__device__ __noinline__ void start_search(Work& w, const StepProblem& step) {
-  const SheetTables& tables = w.replay.sheet;
-  project_to_feasible(tables, step, nullptr, w.now.positions);
-  if (step.obstacles.count == 0) return evaluate(w, step, nullptr, w.now);
-  __syncthreads();
-  swap_iterates(w.now, w.trial);
-  const Point* slid = w.trial.positions;
-  write_starting_places(tables, step, slid, w.now.positions);
-  evaluate(w, step, nullptr, w.now);
-  for (int round = 1; round <= sticking_rounds; ++round) {
-    if (!let_slide(tables, step, w.now.contacts, slid, round == sticking_rounds, w.now.positions)) return;
-    evaluate(w, step, nullptr, w.now);
-  }
-}
-
 struct PartEnd {
   StepEnd end;
   bool solved;  ///< as well as halves would be
@@ -200,7 +183,8 @@ __device__ __noinline__ PartEnd solve_part(Work& w, StepProblem& step, const Ste
                                            ReplayStats& stats) {
   constexpr double rounding_tolerance = 1e-6;
   predict(w, step, motion, share);
-  start_search(w, step);
+  project_to_feasible(w.replay.sheet, step, nullptr, w.now.positions);
+  evaluate(w, step, nullptr, w.now);
   iterate_to_balance(w, step, stats);
   const double tolerance = w.replay.tolerance;
   const StepEnd end = judge_end(w, step);
@@ -231,7 +215,7 @@ __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, cons
 /// The part of a step from the share `begin` to `end` of it, as a whole. The state advances where it is
 /// solved or this is the `last_try`. Returns whether it is solved.
 __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, double begin, double end,
-                         Point* positions, Point* velocities, ReplayStats& stats, bool last_try) {
+                         const SheetState& state, ReplayStats& stats, bool last_try) {
   begin_damping(w, step);
   begin_obstacles(w, step, motion, begin, end);
   PartEnd part = solve_part(w, step, motion, end, stats);
@@ -248,11 +232,13 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   stats.penetration = worse_of(stats.penetration, judged.penetration);
   stats.converged = judged.sound && balanced(step, w.now, w.replay.tolerance);
   for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
-    const Triple moved = triple(w.now.positions[i]) - triple(positions[i]), speed = (1 / step.h) * moved;
-    velocities[i] = {judged.finite ? speed.x : 0, judged.finite ? speed.y : 0, judged.finite ? speed.z : 0,
-                     0};
-    if (judged.finite) positions[i] = w.now.positions[i];
+    const Triple moved = triple(w.now.positions[i]) - triple(state.positions[i]),
+                 speed = (1 / step.h) * moved;
+    state.velocities[i] = {judged.finite ? speed.x : 0, judged.finite ? speed.y : 0,
+                           judged.finite ? speed.z : 0, 0};
+    if (judged.finite) state.positions[i] = w.now.positions[i];
   }
+  if (judged.finite) write_bristles(w.replay.sheet, step, w.now.contacts, state.bristles);
   if (judged.finite) step.at_start = w.now.elastic;
   __syncthreads();
   return solved;
@@ -260,11 +246,11 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
 
 /// One time step, in halves where it cannot be solved as a whole, so often as `halvings` says. Once a half
 /// has failed the other is not divided any more.
-__device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion& motion, Point* positions,
-                                    Point* velocities) {
+__device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion& motion,
+                                    const SheetState& state) {
   constexpr int most_halvings = 16;
   ReplayStats stats = {};
-  begin_holds(w, motion, positions);
+  begin_holds(w, motion, state.positions);
   // Of each part of a part, from the whole step on: halves that it may be divided into still.
   int halvings[most_halvings + 1], level = 0;
   unsigned second = 0, first_converged = 0;  // a bit a level
@@ -274,8 +260,7 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion
     const double length = 1.0 / (1 << level);
     step.h = length * w.replay.time_step;
     const bool last_try = halvings[level] == 0;
-    const bool solved =
-        try_step(w, step, motion, begin, begin + length, positions, velocities, stats, last_try);
+    const bool solved = try_step(w, step, motion, begin, begin + length, state, stats, last_try);
     if (!solved && !last_try) {
       halvings[level + 1] = halvings[level] - 1;
       ++level;

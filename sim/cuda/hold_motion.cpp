@@ -81,6 +81,7 @@ ReplayEnvironment replay_environment(const Environment& environment,
   replay.time = environment.state.time;
   replay.positions = environment.state.positions;
   replay.velocities = environment.state.velocities;
+  replay.bristles = environment.state.bristles;
   return replay;
 }
 

@@ -13,9 +13,10 @@ namespace flash::sim::cuda {
 /// One step of an environment as a problem.
 struct StepProblem {
   const ReplayMaterial* material;
-  double h;                                 ///< [s]
-  EnvironmentNumbers numbers;               ///< of this h
-  const Point *start, *velocities, *loads;  ///< `loads` null without
+  double h;                                    ///< [s]
+  EnvironmentNumbers numbers;                  ///< of this h
+  const Point *start, *velocities, *bristles;  ///< as in State
+  const Point* loads;                          ///< null without
   Restrictions restrictions;
   const int* held_axes;  ///< by place: bits 1, 2 and 4 for x, y and z
   int held_count;        ///< the first so many restrictions are of held vertices
@@ -152,11 +153,18 @@ __device__ auto for_obstacles_of(const StepProblem& step, const Act& act) {
 }
 
 __device__ inline void read_touches(const ContactSet& contacts, int i, int count, VertexTouch* touches) {
-  for (int k = 0; k < count; ++k) touches[k] = read(contacts.touches, i, k);
+  for (int k = 0; k < count; ++k) touches[k] = touch_of(read(contacts.touches, i, k));
 }
-__device__ inline void write_touches(const VertexTouch* touches, const ContactSet& contacts, int i,
-                                     int count) {
-  for (int k = 0; k < count; ++k) write(touches[k], contacts.touches, i, k);
+/// What holds a vertex that is listed, as contact_of says. `touches`: what read_touches gave.
+__device__ inline VertexContact read_contact(const ContactSet& contacts, int i,
+                                             const ObstacleStep<double>& obstacles,
+                                             const VertexTouch* touches) {
+  return contact_of(obstacles, read(contacts.contacts, i), touches);
+}
+__device__ inline void write_contact(const VertexContact& contact, const VertexTouch* touches, int count,
+                                     const ContactSet& contacts, int i) {
+  write(record_of(contact), contacts.contacts, i);
+  for (int k = 0; k < count; ++k) write(record_of(touches[k]), contacts.touches, i, k);
 }
 
 /// Decides what the obstacles do to vertex i, which needs `force`.
@@ -171,7 +179,8 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   ContactResponse response = {};
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
-    response.line_friction = friction_potential_of(obstacles, start, point, read(line->contacts, i), touches);
+    response.line_friction = friction_potential_of(obstacles, start, triple(step.bristles[i]), point,
+                                                   read_contact(*line, i, obstacles, touches), touches);
   }
   const double clearance = clearance_of(obstacles, start, point);
   contacts.clearance[i] = clearance;
@@ -179,13 +188,13 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   if (clearance > touching_gap) return response;
   find_touches(obstacles, start, point, touches);
   SurfaceRoom<most> room;
-  const VertexContact contact = decide_contact(obstacles, start, point, force, touches, room);
+  const Triple bristles = triple(step.bristles[i]);
+  const VertexContact contact = decide_contact(obstacles, start, bristles, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
-  write(contact, contacts.contacts, i);
-  write_touches(touches, contacts, i, obstacles.count);
+  write_contact(contact, touches, obstacles.count, contacts, i);
   contacts.listed[i] = 1;
   response.reaction = contact.reaction;
-  response.friction = friction_potential_of(obstacles, start, point, contact, touches);
+  response.friction = friction_potential_of(obstacles, start, bristles, point, contact, touches);
   response.rounding = epsilon * norm(point) * norm(contact.slip_stiffness);
   return response;
 }

@@ -51,8 +51,7 @@ __device__ void write_parts(const Work& w, const StepProblem& step, bool positiv
     write_hinge_matrix(tables, step.numbers.effective_rigidity(),
                        [&](int vertex) { return triple(w.now.positions[vertex]); },
                        {w.memory.hinge_matrix, w.memory.hinge_products});
-  if (step.obstacles.count > 0)
-    write_own_blocks(tables, step, w.now.contacts, !positive, w.memory.own_blocks);
+  if (step.obstacles.count > 0) write_own_blocks(tables, step, w.now, !positive, w.memory.own_blocks);
   __syncthreads();
 }
 

@@ -23,8 +23,7 @@ __device__ void keep(const ReplayNumbers& replay, const Point* positions, double
 /// Takes an environment from its step `first` up to `end`.
 __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, int e, int first, int end) {
   const int size = replay.sheet.size;
-  Point *positions = replay.positions + static_cast<long>(size) * e,
-        *velocities = replay.velocities + static_cast<long>(size) * e;
+  const SheetState state = replay.states.of(e, size);
   const ReplayMaterial& material = replay.materials[e];
   const auto iterate = [&](int k) {
     Iterate at = {};
@@ -39,8 +38,9 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
   StepProblem step = {&material,
                       replay.time_step,
                       {},
-                      positions,
-                      velocities,
+                      state.positions,
+                      state.velocities,
+                      state.bristles,
                       replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
                       {memory.restrictions, 0, memory.restriction_of},
                       memory.held_axes,
@@ -50,7 +50,8 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
                       {}};
   // The energy that it starts with.
   Iterate& now = w.now;
-  for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads) now.positions[i] = positions[i];
+  for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
+    now.positions[i] = state.positions[i];
   step.numbers = {material.law, material.lame, material.rigidity, 0};
   evaluate(w, step, nullptr, now);
   step.at_start = now.elastic;
@@ -68,12 +69,13 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
         material.several,
         replay.poses + row * replay.frames};
     step.restrictions.count = step.held_count = motion.held_count;
-    const ReplayStats stats = advance_step(w, step, motion, positions, velocities);
+    const ReplayStats stats = advance_step(w, step, motion, state);
     const long place = at - replay.stats_begin;
     if (threadIdx.x == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
     const int kept = replay.kept_index[place];
     if (kept >= 0)
-      keep(replay, positions, replay.kept + 3L * size * (static_cast<long>(replay.kept_count) * e + kept));
+      keep(replay, state.positions,
+           replay.kept + 3L * size * (static_cast<long>(replay.kept_count) * e + kept));
   }
 }
 

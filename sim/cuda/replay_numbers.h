@@ -1,6 +1,7 @@
 #pragma once
 #include <cuda_fp16.h>
 
+#include "sim/cuda/contact_records.h"
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/four.h"
 #include "sim/cuda/front_tables.h"
@@ -8,7 +9,6 @@
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_tables.h"
 #include "sim/cuda/vertex_records.h"
-#include "sim/law/vertex_contact.h"
 
 namespace flash::sim::cuda {
 
@@ -42,8 +42,8 @@ struct FramePose {
 /// What obstacles do to the vertices at an iterate, by place.
 struct ContactSet {
   int* listed;                            ///< whether `contacts` and `touches` say anything of a vertex
-  VertexRecords<VertexContact> contacts;  ///< only of those
-  VertexRecords<VertexTouch> touches;     ///< only of those: a layer for each obstacle
+  VertexRecords<ContactRecord> contacts;  ///< only of those
+  VertexRecords<TouchRecord> touches;     ///< only of those: a layer for each obstacle
   double* clearance;                      ///< distance to the nearest obstacle [m]
 };
 
@@ -106,6 +106,15 @@ struct TeamMemory {
   long long* clocks;    ///< ticks of the processor spent in each phase
 };
 
+/// State of one environment, or of one behind the other.
+struct SheetState {
+  Point *positions, *velocities, *bristles;
+
+  __host__ __device__ SheetState of(long environment, int size) const {
+    return {positions + environment * size, velocities + environment * size, bristles + environment * size};
+  }
+};
+
 /// The environments that no team works on.
 struct WaitingEnvironments {
   int* steps;  ///< where each of them stands; -1: a team works on it, or it is at its end
@@ -138,8 +147,8 @@ struct ReplayNumbers {
   int most_obstacles_each;
   const FramePose* poses;  ///< of each motion and step, `frames` each
   int frames;
-  double exit_speed;              ///< [m/s]
-  Point *positions, *velocities;  ///< state of each environment
+  double exit_speed;  ///< [m/s]
+  SheetState states;  ///< of each environment
   ReplayStats* stats;
   double* hold_forces;  ///< environments x steps x holds x 3, from stats_begin on, zero at first [N]
   int hold_count;

@@ -62,57 +62,32 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<d
 template <typename Room>
 FLASH_CALLED_ON_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<double>& step,
                                                             const Vector3<double>& start,
+                                                            const Vector3<double>& bristles,
                                                             const VertexTouch* touches, Vector3<double> place,
                                                             Room& room) {
   constexpr int rounds = 10;
-  Vector3<double> slip = slip_against(step, start, place, touches);
+  Vector3<double> slip = slip_against(step, start, bristles, place, touches);
   // The way back leaves a round surface: the vertex is projected on it, and the slip taken back again.
   for (int round = 0; round < rounds && norm(slip) > resting_slip; ++round) {
     place = projected_out(step, start, touches, place - slip, room);
-    slip = slip_against(step, start, place, touches);
+    slip = slip_against(step, start, bristles, place, touches);
   }
   return place;
 }
 
-/// Where a vertex may start the search for its place at the end of a step, its speed having taken it to the
-/// feasible `place`. One that would hardly slip may start without slip, where it is decided afresh whether it
-/// sticks: the smooth start of sliding would let it creep on. Any other starts at `place`. `touches`: room
-/// for as many as there are obstacles.
-template <typename Room>
-FLASH_HOST_DEVICE inline Vector3<double> starting_place(const ObstacleStep<double>& step,
-                                                        const Vector3<double>& start,
-                                                        const Vector3<double>& place, VertexTouch* touches,
-                                                        Room& room) {
-  // A vertex creeps on by more only where it needs all but 1 / 1800 of what friction can hold.
-  constexpr double smoothings = 30;
-  find_touches(step, start, place, touches);
-  double longest = 0;
-  for (int k = 0; k < step.count; ++k) {
-    VertexTouch& touch = touches[k];
-    touch.holds = touch.touches();
-    if (touch.holds)
-      longest = larger_of(longest, norm(along_plane(touch.normal, place - start - touch.surface_moved)));
-  }
-  if (longest <= resting_slip || longest > smoothings * slip_smoothing(step.time_step)) return place;
-  return stopped_place(step, start, touches, place, room);
-}
-
-/// Rounds in which vertices that friction does not hold where they have not slipped go back to where their
-/// speed takes them. If others follow beyond them, all do: that front would run through the sheet row by row.
-inline constexpr int sticking_rounds = 2;
-
 /// The feasible place nearest to a trial `point` of a vertex, by its contact in the linear problem. A slip
 /// that turned against its direction is stopped at no slip, where it has to decide again.
 template <typename Room>
-FLASH_HOST_DEVICE inline Vector3<double> feasible_place(const ObstacleStep<double>& step,
-                                                        const Vector3<double>& start,
-                                                        const VertexContact& contact,
-                                                        const VertexTouch* touches,
-                                                        const Vector3<double>& point, Room& room) {
+FLASH_HOST_DEVICE inline Vector3<double> feasible_place(
+    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& bristles,
+    const VertexContact& contact, const VertexTouch* touches, const Vector3<double>& point, Room& room) {
+  constexpr double sliding = 0.999;  // squared length of the direction of what slides
   const Vector3<double> place = projected_out(step, start, touches, point, room);
-  if (contact.freedom != Freedom::slip) return place;
-  const Vector3<double> slip = slip_against(step, start, place, touches);
-  return dot(slip, contact.slip_direction) >= 0 ? place : stopped_place(step, start, touches, place, room);
+  if (contact.freedom != Freedom::slip || dot(contact.slip_direction, contact.slip_direction) < sliding)
+    return place;
+  const Vector3<double> slip = slip_against(step, start, bristles, place, touches);
+  return dot(slip, contact.slip_direction) >= 0 ? place
+                                                : stopped_place(step, start, bristles, touches, place, room);
 }
 
 }  // namespace FLASH_LEVEL

@@ -5,9 +5,8 @@ namespace flash::sim {
 /// What a vertex may do at the current iterate of a step.
 enum class Freedom {
   free,
-  held,   ///< some axes obey a hold
-  slip,   ///< on a surface, the friction force on the rim of its cone
-  stick,  ///< on a surface, at rest against it
+  held,  ///< some axes obey a hold
+  slip,  ///< along the surfaces that hold it
 };
 
 /// Gap up to which a vertex is on a surface: rounding of a projected position [m].

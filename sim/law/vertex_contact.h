@@ -12,30 +12,40 @@ struct VertexContact {
   Vector3<double> reaction{};        ///< force on the vertex, always admissible [N]
   Vector3<double> slip_direction{};  ///< free part of the slip, divided by its length
   Symmetric3 free = identity3();     ///< projector on the directions it may move in
-  Symmetric3
-      slip_stiffness{};  ///< how friction turns with the slip: sum of mu lambda_n / |slip| across it [N/m]
+  Symmetric3 slip_stiffness{};       ///< how friction changes with the slip [N/m]
 };
 
-/// Slip over a step of `time_step` [s] at which friction is 0.7 of its bound, for a smooth start of sliding
-/// [m]. It is that of an acceleration far below gravity, so that it is small beside any motion in the step.
-FLASH_HOST_DEVICE inline double slip_smoothing(double time_step) {
-  constexpr double acceleration = 1e-3;           // [m/s^2]
-  constexpr double longest = 1e-8;                // [m]
+/// Friction as bristles that bend before they slide (Haessig and Friedland 1991), solved by return mapping
+/// (Simo and Laursen 1992): a spring up to its bound. A vertex that comes to rest stays where it is, since
+/// the bristles keep their deflection from one step to the next.
+///
+/// Slip over which bristles bend before they slide [m]. It is small beside any motion in a step. A step is
+/// long beside their oscillation, which implicit Euler damps then: mu g / acceleration = (omega h)^2.
+FLASH_HOST_DEVICE inline double bristle_length(double time_step) {
+  constexpr double acceleration = 1e-2;           // [m/s^2]
+  constexpr double longest = 1e-6;                // [m]
   constexpr double shortest = 10 * resting_slip;  // above the rounding of positions [m]
   const double length = larger_of(shortest, acceleration * time_step * time_step);
   return length < longest ? length : longest;
 }
 
-/// Length of a slip over a step as friction takes it, smooth where it starts [m].
-FLASH_HOST_DEVICE inline double smooth_length(double length, double time_step) {
-  const double smoothing = slip_smoothing(time_step);
-  return square_root(length * length + smoothing * smoothing);
+/// What a slip is divided by to give friction as a share of its bound [m].
+FLASH_HOST_DEVICE inline double friction_length(double slip, double time_step) {
+  return larger_of(slip, bristle_length(time_step));
 }
 
-/// Displacement of a vertex since the start of the step along and against the surfaces that hold it [m].
-/// Where there are several, it is against their mean, weighted by mu lambda_n.
+/// Energy of friction whose bound is one newton: that of the bristles, and what sliding takes [J/N].
+FLASH_HOST_DEVICE inline double friction_energy(double slip, double time_step) {
+  const double length = bristle_length(time_step);
+  return slip <= length ? slip * slip / (2 * length) : slip - 0.5 * length;
+}
+
+/// Slip of a vertex along and against the surfaces that hold it [m]: the deflection of its bristles at the
+/// start of the step, and its displacement since. Where there are several surfaces, it is against their mean,
+/// weighted by mu lambda_n. `bristles`: as in State.
 FLASH_HOST_DEVICE inline Vector3<double> slip_against(const ObstacleStep<double>& step,
                                                       const Vector3<double>& start,
+                                                      const Vector3<double>& bristles,
                                                       const Vector3<double>& point,
                                                       const VertexTouch* touches) {
   constexpr double least_weight = 1e-300;  // surfaces without friction count alike
@@ -51,7 +61,8 @@ FLASH_HOST_DEVICE inline Vector3<double> slip_against(const ObstacleStep<double>
     (held == 0 ? first : second) = gap.normal;
     ++held;
   }
-  const Vector3<double> against = point - start - (1 / weights) * moved;
+  const Vector3<double> against =
+      bristle_length(step.time_step) * bristles + point - start - (1 / weights) * moved;
   if (held == 1) return along_plane(first, against);
   if (held > 2) return {};
   const Vector3<double> edge = cross(first, second);
@@ -61,94 +72,105 @@ FLASH_HOST_DEVICE inline Vector3<double> slip_against(const ObstacleStep<double>
   return (dot(edge, against) / squared) * edge;
 }
 
+/// Sum of mu lambda_n over the surfaces that hold a vertex [N].
+FLASH_HOST_DEVICE inline double friction_bound_of(const ObstacleStep<double>& step,
+                                                  const VertexTouch* touches) {
+  double bound = 0;
+  for (int k = 0; k < step.count; ++k)
+    if (touches[k].holds) bound += step.obstacles[k].friction * touches[k].normal_force;
+  return bound;
+}
+
+/// How the friction of a vertex changes with its slip at the normal forces of its touches [N/m].
+FLASH_HOST_DEVICE inline Symmetric3 slip_stiffness_of(const ObstacleStep<double>& step,
+                                                      const VertexTouch* touches) {
+  Symmetric3 stiffness;
+  for (int k = 0; k < step.count; ++k) {
+    const VertexTouch& touch = touches[k];
+    if (!touch.holds) continue;
+    Symmetric3 turns = identity3() - square(touch.normal);
+    if (touch.slip > bristle_length(step.time_step)) turns = turns - square(touch.slip_direction);
+    stiffness = stiffness + (step.obstacles[k].friction * touch.normal_force /
+                             friction_length(touch.slip, step.time_step)) *
+                                turns;
+  }
+  return stiffness;
+}
+
 /// Decides what holds a vertex that needs `needed` from outside to obey its equation of motion [N], from its
-/// touches; fills in their forces and slips. On a surface it is held while it needs a push. It sticks where
-/// it has not slipped in this step and needs a friction force inside the cone. Else the force is on the rim,
-/// against the slip. Of several surfaces each rubs against its own slip, which enters the normal forces of
-/// the others. Between two the vertex moves along their edge alone, between three not at all.
+/// touches; fills in their forces and slips. On a surface it is held while it needs a push. Friction is
+/// against the slip: in proportion to it up to bristle_length, of the size of its bound beyond. Of several
+/// surfaces each rubs against its own slip, which enters the normal forces of the others. Between two the
+/// vertex moves along their edge alone, between three not at all.
 template <typename Room>
-FLASH_HOST_DEVICE inline VertexContact decide_contact(const ObstacleStep<double>& step,
-                                                      const Vector3<double>& start,
-                                                      const Vector3<double>& point,
-                                                      const Vector3<double>& needed, VertexTouch* touches,
-                                                      Room& room) {
+FLASH_HOST_DEVICE inline VertexContact decide_contact(
+    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& bristles,
+    const Vector3<double>& point, const Vector3<double>& needed, VertexTouch* touches, Room& room) {
   VertexContact contact;
   int touching = 0;
-  double longest = 0;
   for (int k = 0; k < step.count; ++k) {
     VertexTouch& touch = touches[k];
     if (!touch.touches()) continue;
     ++touching;
-    const Vector3<double> slip = along_plane(touch.normal, point - start - touch.surface_moved);
-    const double length = norm(slip);
-    longest = larger_of(longest, length);
-    touch.slip = smooth_length(length, step.time_step);
-    touch.slip_direction = (1 / touch.slip) * slip;
+    const Vector3<double> slip = along_plane(
+        touch.normal, bristle_length(step.time_step) * bristles + point - start - touch.surface_moved);
+    touch.slip = norm(slip);
+    touch.slip_direction = (1 / friction_length(touch.slip, step.time_step)) * slip;
   }
-  const bool slipped = longest > resting_slip;
   share_force(
-      step, needed, slipped && touching > 1, [](const VertexTouch& touch) { return touch.touches(); },
-      touches, room);
+      step, needed, touching > 1, [](const VertexTouch& touch) { return touch.touches(); }, touches, room);
   int held = 0;
   for (int k = 0; k < step.count; ++k) {
     if (!touches[k].holds) continue;
-    contact.friction_bound += step.obstacles[k].friction * touches[k].normal_force;
     contact.slip_direction = touches[k].slip_direction;
     ++held;
   }
   if (held == 0) return contact;
 
-  const double bound = contact.friction_bound;
-  const Symmetric3 along = along_surfaces(step.count, touches);
-  const Vector3<double> tangential = along * needed;
-  if (!slipped && norm(tangential) <= bound) {
-    contact.freedom = Freedom::stick;
-    contact.free = {};
-    contact.reaction = needed;
-    for (int k = 0; k < step.count; ++k)
-      if (touches[k].holds && bound > 0)
-        touches[k].friction = (step.obstacles[k].friction * touches[k].normal_force / bound) * tangential;
-    return contact;
-  }
   contact.freedom = Freedom::slip;
-  contact.free = along;
-  if (!slipped) {
-    contact.slip_direction = (-1 / norm(tangential)) * tangential;
-  } else if (held > 1) {
-    const Vector3<double> slip = slip_against(step, start, point, touches);
-    contact.slip_direction = (1 / smooth_length(norm(slip), step.time_step)) * slip;
+  contact.friction_bound = friction_bound_of(step, touches);
+  contact.slip_stiffness = slip_stiffness_of(step, touches);
+  contact.free = along_surfaces(step.count, touches);
+  if (held > 1) {
+    const Vector3<double> slip = slip_against(step, start, bristles, point, touches);
+    contact.slip_direction = (1 / friction_length(norm(slip), step.time_step)) * slip;
   }
   for (int k = 0; k < step.count; ++k) {
     VertexTouch& touch = touches[k];
     if (!touch.holds) continue;
-    const double own_bound = step.obstacles[k].friction * touch.normal_force;
-    const Vector3<double> direction = slipped ? touch.slip_direction : contact.slip_direction;
-    touch.friction = -own_bound * direction;
+    touch.friction = -(step.obstacles[k].friction * touch.normal_force) * touch.slip_direction;
     contact.reaction = contact.reaction + touch.normal_force * touch.normal + touch.friction;
-    if (slipped)
-      contact.slip_stiffness =
-          contact.slip_stiffness +
-          (own_bound / touch.slip) * (identity3() - square(touch.normal) - square(direction));
   }
   return contact;
 }
 
-/// sum mu lambda_n |slip| of a vertex at `point`, at the normal forces of its contact [J].
-FLASH_HOST_DEVICE inline double friction_potential_of(const ObstacleStep<double>& step,
-                                                      const Vector3<double>& start,
-                                                      const Vector3<double>& point,
-                                                      const VertexContact& contact,
-                                                      const VertexTouch* touches) {
+/// Energy of friction of a vertex at `point`, at the normal forces of its contact [J].
+FLASH_HOST_DEVICE inline double friction_potential_of(
+    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& bristles,
+    const Vector3<double>& point, const VertexContact& contact, const VertexTouch* touches) {
   if (contact.friction_bound == 0) return 0;
   double potential = 0;
   for (int k = 0; k < step.count; ++k) {
     if (!touches[k].holds) continue;
     const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
-    const double slip = norm(along_plane(gap.normal, point - start - gap.surface_moved));
-    potential += step.obstacles[k].friction * touches[k].normal_force *
-                 (is_zero(contact.slip_stiffness) ? slip : smooth_length(slip, step.time_step));
+    const double slip = norm(along_plane(
+        gap.normal, bristle_length(step.time_step) * bristles + point - start - gap.surface_moved));
+    potential += step.obstacles[k].friction * touches[k].normal_force * friction_energy(slip, step.time_step);
   }
   return potential;
+}
+
+/// The deflection of a vertex's bristles at the end of a step, as in State; of several surfaces their mean,
+/// weighted by mu lambda_n.
+FLASH_HOST_DEVICE inline Vector3<double> bristles_at_end(const ObstacleStep<double>& step,
+                                                         const VertexContact& contact,
+                                                         const VertexTouch* touches) {
+  if (!(contact.friction_bound > 0)) return {};
+  Vector3<double> sum{};
+  for (int k = 0; k < step.count; ++k)
+    if (touches[k].holds)
+      sum = sum + (step.obstacles[k].friction * touches[k].normal_force) * touches[k].slip_direction;
+  return (1 / contact.friction_bound) * sum;
 }
 
 /// How the friction force of a slipping vertex changes with the force on it: the sum of mu_k d_k l_k^T, where

@@ -14,12 +14,12 @@ struct VertexTouch {
   bool starts_inside = false;
   double gap = 0;           ///< [m]
   double normal_force = 0;  ///< lambda_n of an obstacle that holds [N]
-  double slip = 0;          ///< length of the slip against it in this step, as friction takes it [m]
+  double slip = 0;          ///< length of the slip against it, as slip_against says [m]
   Vector3<double> normal{};
   Vector3<double> curvature_direction{};  ///< as in SurfaceGap [m^-1/2]
   double ball_curvature = 0;              ///< as in SurfaceGap [1/m]
   Vector3<double> surface_moved{};        ///< motion of the surface over the step [m]
-  Vector3<double> slip_direction{};       ///< slip of the vertex on this surface over `slip`
+  Vector3<double> slip_direction{};       ///< the slip over its friction_length
   Vector3<double> friction{};             ///< friction force of the surface on the vertex [N]
 
   FLASH_HOST_DEVICE bool touches() const { return gap <= touching_gap; }

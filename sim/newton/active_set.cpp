@@ -40,9 +40,7 @@ void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, Bl
     for (const bool left : {true, false}) {
       const VertexConstraint* c = contacts.find(left ? row : column);
       if (c == nullptr || c->freedom == Freedom::free) continue;
-      if (c->freedom == Freedom::stick)
-        between.setZero();
-      else if (left)
+      if (left)
         between = matrix3d(c->free) * between;
       else
         between = between * matrix3d(c->free);
@@ -91,7 +89,7 @@ bool exchange_contacts(const Linearization& iterate, const Points& direction, co
     if (c.freedom != Freedom::free && release(view, vector3(force, i), c, touches, room)) {
       gradient.row(i) = c.freedom == Freedom::free ? iterate.force.row(i) : iterate.residual.row(i);
       any = true;
-    } else if (c.freedom != Freedom::stick && hold(view, vector3(direction, i), any_reach, c, touches)) {
+    } else if (hold(view, vector3(direction, i), any_reach, c, touches)) {
       any = true;
     }
   }
@@ -103,8 +101,7 @@ bool hold_touching(const Linearization& iterate, const Points& direction, Contac
   bool any = false;
   for (size_t k = contacts.held; k < contacts.constraints.size(); ++k) {
     VertexConstraint& c = contacts.constraints[k];
-    if (c.freedom != Freedom::stick)
-      any = hold(view, vector3(direction, c.vertex), touching_gap, c, contacts.touches_of(k).data()) || any;
+    any = hold(view, vector3(direction, c.vertex), touching_gap, c, contacts.touches_of(k).data()) || any;
   }
   return hold_free_vertices(iterate, direction, touching_gap, contacts) || any;
 }

@@ -31,26 +31,13 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWo
   return elastic;
 }
 
-/// Fills in w.now where the search for the end of the step starts: where speeds take the vertices, but
-/// without slip where it would be small and friction holds them so.
+/// Fills in w.now where the search for the end of the step starts: where speeds take the vertices.
 void start_search(const StepProblem& problem, NewtonWorkspace& w) {
   const State& start = problem.contacts.environment.state;
-  Points slid = start.positions + problem.contacts.time_step * start.velocities;
-  w.now.contacts = begin_step(problem.contacts, slid);
-  project_to_feasible(problem.contacts, w.now.contacts, slid);
-  w.now.positions = starting_positions(problem.contacts, w.now.contacts, slid);
+  w.now.positions = start.positions + problem.contacts.time_step * start.velocities;
+  w.now.contacts = begin_step(problem.contacts, w.now.positions);
+  project_to_feasible(problem.contacts, w.now.contacts, w.now.positions);
   problem.evaluate(w.now);
-  for (int round = 1; round <= sticking_rounds; ++round) {
-    bool any = false;
-    for (const VertexConstraint& c : w.now.contacts.constraints) {
-      if (c.freedom != Freedom::slip || w.now.positions.row(c.vertex) == slid.row(c.vertex)) continue;
-      w.now.positions.row(c.vertex) = slid.row(c.vertex);
-      any = true;
-    }
-    if (!any) return;
-    if (round == sticking_rounds) w.now.positions = slid;
-    problem.evaluate(w.now);
-  }
 }
 
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
@@ -96,6 +83,7 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
     return false;
   }
   environment.state.velocities = (w.now.positions - environment.state.positions) / h;
+  environment.state.bristles = bristles_at_end(problem.contacts, w.now.contacts);
   environment.state.positions = w.now.positions;
   return solved;
 }

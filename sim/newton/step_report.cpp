@@ -67,7 +67,7 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
   report.membrane = end.elastic.membrane;
   report.bending = end.elastic.bending;
   report.solid = end.elastic.solid;
-  double falls = 0, unbalanced = 0;
+  double falls = 0, unbalanced = 0, bristles = 0;
   bool start_is_feasible = report.start_penetration.depth == 0;
   for (int i = 0; i < mass.size(); ++i) {
     const Vector3d way = moved.row(i);
@@ -82,6 +82,8 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
       report.work += dot(c.reaction, way);
       start_is_feasible = start_is_feasible && is_zero(way - c.free * way);
     }
+    const Vector3<double> bristle = problem.contacts.bristles(c.vertex);
+    bristles += 0.5 * c.friction_bound * bristle_length(h) * dot(bristle, bristle);
     for (const VertexTouch& touch : end.contacts.touches_of(k)) {
       if (!touch.holds) continue;
       const Vector3<double> force = touch.normal_force * touch.normal + touch.friction;
@@ -106,10 +108,10 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
                     ? 1e-14 * law.solid->youngs_modulus * body_mass / law.solid->density
                     : 1e-14 * law.material.membrane_stiffness * body_mass / law.material.areal_density;
   }
-  if (!(gain <= energy_tolerance * there + unbalanced + rounding)) return false;
+  const double allowed = energy_tolerance * there + unbalanced + bristles + rounding;
+  if (!(gain <= allowed)) return false;
   if (!start_is_feasible) return true;
-  return end.incremental_potential <=
-         problem.potential.at_start(elastic_at_start) + energy_tolerance * there + unbalanced + rounding;
+  return end.incremental_potential <= problem.potential.at_start(elastic_at_start) + allowed;
 }
 
 void add_work(const StepReport& given_up, StepReport& report) {

@@ -32,6 +32,12 @@ struct ContactStep {
   /// Where vertex i is at the start of the step.
   Vector3<double> start(int i) const { return vector3(environment.state.positions, i); }
 
+  /// The bristles of vertex i at the start of the step, as in State.
+  Vector3<double> bristles(int i) const {
+    return environment.state.bristles.rows() == 0 ? Vector3<double>{}
+                                                  : vector3(environment.state.bristles, i);
+  }
+
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
   SurfaceGap<double> gap(int obstacle, const data::Points& positions, int i) const;
 
@@ -108,5 +114,8 @@ std::vector<Eigen::Matrix3d> friction_couplings(const ContactStep& step, const C
 /// sum mu lambda_n |slip| of the held vertices at frozen normal forces: the potential of friction over the
 /// step [J].
 double friction_potential(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
+
+/// The bristles of each vertex at the end of the step, as in State; zero where nothing holds it.
+data::Points bristles_at_end(const ContactStep& step, const ContactSet& contacts);
 
 }  // namespace flash::sim

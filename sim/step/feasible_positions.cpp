@@ -4,22 +4,6 @@
 
 namespace flash::sim {
 
-data::Points starting_positions(const ContactStep& step, const ContactSet& contacts,
-                                const data::Points& positions) {
-  std::vector<double> clearance;
-  find_clearance(step, positions, clearance);
-  ContactRoom room(step.obstacles.size());
-  std::vector<VertexTouch> touches(step.obstacles.size());
-  data::Points starting = positions;
-  for (int i = 0; i < positions.rows(); ++i) {
-    if (contacts.place[i] >= 0 || clearance[i] > touching_gap) continue;
-    const Vector3<double> place = vector3(positions, i);
-    starting.row(i) =
-        vector3d(starting_place(step.view(), step.start(i), place, touches.data(), room)).transpose();
-  }
-  return starting;
-}
-
 void project_to_feasible(const ContactStep& step, const ContactSet& contacts, data::Points& positions) {
   std::vector<double> clearance;
   find_clearance(step, positions, clearance);
@@ -34,8 +18,8 @@ void project_to_feasible(const ContactStep& step, const ContactSet& contacts, da
     } else {
       const VertexConstraint& constraint = contacts.constraints[k];
       if (constraint.freedom == Freedom::held) continue;
-      place = feasible_place(step.view_of(i), step.start(i), constraint, contacts.touches_of(k).data(), point,
-                             room);
+      place = feasible_place(step.view_of(i), step.start(i), step.bristles(i), constraint,
+                             contacts.touches_of(k).data(), point, room);
     }
     positions.row(i) = vector3d(place).transpose();
   }

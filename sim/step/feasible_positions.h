@@ -7,9 +7,4 @@ namespace flash::sim {
 /// that turned against its direction is stopped at no slip, where it has to decide again.
 void project_to_feasible(const ContactStep& step, const ContactSet& contacts, data::Points& positions);
 
-/// Where vertices may start the search for the end of the step, as starting_place says. `positions`:
-/// feasible, where their speeds take them. `contacts`: of the holds.
-data::Points starting_positions(const ContactStep& step, const ContactSet& contacts,
-                                const data::Points& positions);
-
 }  // namespace flash::sim

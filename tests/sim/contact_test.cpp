@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "sim/law/vertex_contact.h"
 #include "sim/step/moving_obstacles.h"
 #include "tests/sim/sheet_scene.h"
 
@@ -177,7 +178,9 @@ TEST(Contact, AMovingBoxCarriesTheSheet) {
   Solver solver(sheet, {.tolerance = 1e-8});
   for (int n = 0; n < 50; ++n) solver.step(environment);
   const double carried = environment.state.positions(0, 0) - sheet.rest.vertices(0, 0);
-  EXPECT_NEAR(carried, 0.5 * 0.5 * 0.5, 1e-9);  // it sticks: 50 steps of a slip below 1e-13
+  // It sticks, behind by what bends the bristles so far that they carry it.
+  const double share = 1 / (0.5 * 9.81);
+  EXPECT_NEAR(carried, 0.5 * 0.5 * 0.5 - share * bristle_length(0.01), 1e-9);
 }
 
 /// A sheet on a table and a box that stands on it, exactly, and moves towards it along x.

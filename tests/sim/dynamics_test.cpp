@@ -5,6 +5,7 @@
 
 #include "sim/batch.h"
 #include "tests/sim/sheet_scene.h"
+#include "tests/sim/sliding_mass.h"
 
 namespace flash::sim {
 namespace {
@@ -65,13 +66,18 @@ TEST_P(Incline, SticksBelowTheConeAndSlidesAboveIt) {
     for (int n = 0; n < steps; ++n) EXPECT_TRUE(solver.step(environment).converged);
     const data::Points moved = environment.state.positions - sheet.rest.vertices;
     if (offset < 0) {
-      EXPECT_EQ(moved.cwiseAbs().maxCoeff(), 0.0);
+      // Bristles bend by their length. The speed that is left then, length / h, is braked by the rest of
+      // friction.
+      const double longest = bristle_length(h), speed = longest / h,
+                   braking = g * (friction * std::cos(angle) - std::sin(angle));
+      EXPECT_LE(moved.cwiseAbs().maxCoeff(), longest + 0.5 * speed * speed / braking);
+      EXPECT_LE(environment.state.velocities.cwiseAbs().maxCoeff(), 1e-12);
     } else {
-      const double acceleration = g * (std::sin(angle) - friction * std::cos(angle));
-      const double expected = acceleration * h * h * steps * (steps + 1) / 2;
+      const double expected = slide_down(angle, friction, g, h, steps).place;
       const Eigen::VectorXd along = moved.col(0) * std::cos(direction) + moved.col(1) * std::sin(direction);
-      // Friction starts smoothly at a slip of 1e-8 m; the first step here slips 1e-6 m.
-      EXPECT_LT((along.array() - expected).abs().maxCoeff(), 1e-3 * expected);
+      // Of the weight 30 times the tolerance may be missing.
+      const double seconds = h * steps;
+      EXPECT_LT((along.array() - expected).abs().maxCoeff(), 0.5 * 3e-9 * g * seconds * seconds);
       EXPECT_EQ(moved.col(2).cwiseAbs().maxCoeff(), 0.0);
     }
   }
@@ -122,7 +128,7 @@ TEST(Dynamics, EachEnvironmentHasItsOwnFriction) {
   Batch batch(make_sheet_plan(sheet), environments, {.solver = {.tolerance = 1e-10}, .steps = 50});
   batch.advance(50);
   EXPECT_GT(batch.state(0).positions(0, 0) - sheet.rest.vertices(0, 0), 1e-4);
-  EXPECT_EQ(batch.state(1).positions(0, 0), sheet.rest.vertices(0, 0));
+  EXPECT_LE(batch.state(1).positions(0, 0) - sheet.rest.vertices(0, 0), 2 * bristle_length(0.01));
 }
 
 TEST(Dynamics, ASlidingSheetStopsAfterTheDiscreteDistance) {

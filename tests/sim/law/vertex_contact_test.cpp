@@ -9,30 +9,39 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
+const double longest = bristle_length(ContactWorld::time_step);  ///< slip in which bristles bend [m]
+
 /// A vertex of a world on its surfaces, with what decides of it.
 struct Decided {
   ObstacleStep<double> view;
-  Vector3<double> start, point, needed;
+  Vector3<double> start, bristles, point, needed;
   std::vector<VertexTouch> touches;
   VertexContact contact;
 
   Decided(const ContactStep& step, const data::Points& positions, const data::Points& force, int i)
-      : view(step.view()), start(step.start(i)), point(vector3(positions, i)), needed(vector3(force, i)) {
+      : view(step.view()),
+        start(step.start(i)),
+        bristles(step.bristles(i)),
+        point(vector3(positions, i)),
+        needed(vector3(force, i)) {
     decide();
   }
   void decide() {
     touches.assign(static_cast<std::size_t>(view.count), {});
     find_touches(view, start, point, touches.data());
     ContactRoom room(touches.size());
-    contact = decide_contact(view, start, point, needed, touches.data(), room);
+    contact = decide_contact(view, start, bristles, point, needed, touches.data(), room);
+  }
+  /// The slip against a surface.
+  Vector3<double> slip_on(const VertexTouch& touch) const {
+    return along_plane(touch.normal, longest * bristles + point - start - touch.surface_moved);
   }
   /// Longest slip against a surface that is touched.
   double slipped() const {
-    double longest = 0;
+    double most = 0;
     for (const VertexTouch& touch : touches)
-      if (touch.touches())
-        longest = std::max(longest, norm(along_plane(touch.normal, point - start - touch.surface_moved)));
-    return longest;
+      if (touch.touches()) most = std::max(most, norm(slip_on(touch)));
+    return most;
   }
   Vector3d friction() const {
     Vector3d sum = Vector3d::Zero();
@@ -47,6 +56,8 @@ void for_each_held(const Check& check) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
     ContactWorld world = mixed_world(seed);
+    std::mt19937 engine(seed);
+    world.environment.state.bristles = random_points(0.5, engine);
     const ContactStep step = world.step();
     ContactSet set = begin_step(step, world.positions);
     project_to_feasible(step, set, world.positions);
@@ -109,30 +120,21 @@ TEST(VertexContact, ObeysTheLawsOfSignoriniAndCoulomb) {
       EXPECT_LE(norm(touch.friction), own_bound + rounding);
       if (!touch.holds) continue;
       EXPECT_NEAR(norm(d.contact.free * touch.normal), 0, rounding);
-      const Vector3<double> slip = along_plane(touch.normal, d.point - d.start - touch.surface_moved);
-      if (d.contact.freedom == Freedom::slip && norm(slip) > 1e-6) {
-        // Against the slip, of its whole size but for the smooth start of sliding.
-        EXPECT_NEAR(dot(touch.friction, slip), -own_bound * norm(slip), 1e-4 * own_bound * norm(slip));
-      }
+      // A spring whose force is the bound at longest; beyond, of that size and against the slip.
+      const Vector3<double> slip = d.slip_on(touch);
+      const double length = std::max(norm(slip), longest);
+      EXPECT_LE(norm(touch.friction + (own_bound / length) * slip), rounding);
     }
     EXPECT_NEAR(d.contact.friction_bound, bound, rounding);
-    if (d.contact.freedom == Freedom::stick) {
-      ++sticking;
-      EXPECT_LE(d.slipped(), resting_slip);
-      EXPECT_NEAR(rest.norm(), 0, rounding);
-      EXPECT_EQ(norm(d.contact.free), 0);
-    } else {
-      ++slipping;
-      on_several += held > 1;
-      EXPECT_NEAR((vector3d(d.contact.reaction) - sum).norm(), 0, rounding);
-      if (d.slipped() > resting_slip) {
-        // No surface has to push more, and those that push, push what is needed.
-        for (const VertexTouch& touch : d.touches) {
-          const double left = vector3d(touch.normal).dot(rest);
-          EXPECT_LE(touch.touches() ? left : 0, rounding);
-          EXPECT_NEAR(touch.holds ? left : 0, 0, rounding);
-        }
-      }
+    EXPECT_EQ(d.contact.freedom, Freedom::slip);
+    EXPECT_NEAR((vector3d(d.contact.reaction) - sum).norm(), 0, rounding);
+    (d.slipped() <= longest ? sticking : slipping) += 1;
+    on_several += held > 1;
+    // No surface has to push more, and those that push, push what is needed.
+    for (const VertexTouch& touch : d.touches) {
+      const double left = vector3d(touch.normal).dot(rest);
+      EXPECT_LE(touch.touches() ? left : 0, rounding);
+      EXPECT_NEAR(touch.holds ? left : 0, 0, rounding);
     }
   });
   EXPECT_GT(sticking, 30);
@@ -144,8 +146,7 @@ TEST(VertexContact, FrictionFollowsTheForceAsItsCouplingSays) {
   constexpr double step = 1e-6;  // [N]; the law is linear in the force while the same surfaces hold
   int checked = 0;
   for_each_held([&](const Decided& d) {
-    if (d.contact.freedom != Freedom::slip || d.slipped() <= resting_slip || has_no_unique_force(d.touches))
-      return;
+    if (d.contact.freedom != Freedom::slip || has_no_unique_force(d.touches)) return;
     for (int axis = 0; axis < 3; ++axis) {
       Vector3d ends[2];
       bool same = true;
@@ -167,41 +168,65 @@ TEST(VertexContact, FrictionFollowsTheForceAsItsCouplingSays) {
 }
 
 TEST(VertexContact, FrictionOnAPlaneIsTheGradientOfItsPotential) {
-  constexpr double step = 1e-7;  // [m]
-  int checked = 0;
+  int sliding = 0, sticking = 0;
   for_each_held([&](const Decided& d) {
+    const double slip = d.slipped();
+    const bool slides = slip > 1e-4;
     if (d.view.count != 1 || d.view.obstacles[0].shape != ObstacleShape::plane || d.view.obstacles[0].moves ||
-        d.contact.freedom != Freedom::slip || d.slipped() < 1e-4)
+        (!slides && slip > 0.9 * longest))
       return;
     const auto potential = [&](const Vector3<double>& at) {
-      return friction_potential_of(d.view, d.start, at, d.contact, d.touches.data());
+      return friction_potential_of(d.view, d.start, d.bristles, at, d.contact, d.touches.data());
     };
+    // A spring's potential is of second order: its differences are exact.
+    const double first = slides ? 1e-7 : 0.05 * longest, second = slides ? 1e-5 : first;  // [m]
     const auto gradient = [&](const Vector3<double>& at) {
       Vector3d g;
       for (int axis = 0; axis < 3; ++axis) {
         Vector3<double> more = at, less = at;
-        more[axis] += step;
-        less[axis] -= step;
-        g[axis] = (potential(more) - potential(less)) / (2 * step);
+        more[axis] += first;
+        less[axis] -= first;
+        g[axis] = (potential(more) - potential(less)) / (2 * first);
       }
       return g;
     };
-    EXPECT_LE((gradient(d.point) + d.friction()).norm(), 1e-6 * d.contact.friction_bound + 1e-9);
+    const double bound = d.contact.friction_bound;
+    EXPECT_LE((gradient(d.point) + d.friction()).norm(), 1e-6 * bound + 1e-9);
     const Matrix3d stiffness = matrix3d(d.contact.slip_stiffness);
     Matrix3d differences;
     for (int axis = 0; axis < 3; ++axis) {
       Vector3<double> more = d.point, less = d.point;
-      more[axis] += 1e-5;
-      less[axis] -= 1e-5;
-      differences.col(axis) = (gradient(more) - gradient(less)) / 2e-5;
+      more[axis] += second;
+      less[axis] -= second;
+      differences.col(axis) = (gradient(more) - gradient(less)) / (2 * second);
     }
     // The third derivative is of the size bound / slip^3; rounding of the potential is divided by both steps.
-    const double slip = d.slipped();
     EXPECT_LE((differences - stiffness).norm(),
-              d.contact.friction_bound * 1e-10 / std::pow(slip, 3) + 1e-3 * stiffness.norm() + 1e-3);
-    ++checked;
+              (slides ? bound * 1e-10 / std::pow(slip, 3) : 0) + 1e-3 * stiffness.norm() + 1e-3);
+    (slides ? sliding : sticking) += 1;
   });
-  EXPECT_GT(checked, 100);
+  EXPECT_GT(sliding, 100);
+  EXPECT_GT(sticking, 10);
+}
+
+TEST(VertexContact, BristlesKeepTheFriction) {
+  for_each_held([&](const Decided& d) {
+    const Vector3<double> kept = bristles_at_end(d.view, d.contact, d.touches.data());
+    EXPECT_LE(norm(kept), 1 + 1e-12);
+    if (d.contact.friction_bound == 0) {
+      EXPECT_EQ(norm(kept), 0);
+      return;
+    }
+    EXPECT_LE((d.contact.friction_bound * vector3d(kept) + d.friction()).norm(), rounding);
+    if (d.view.count != 1) return;
+    // A step without motion from there on has the same friction.
+    Decided next = d;
+    next.bristles = kept;
+    next.start = d.point - d.touches[0].surface_moved;
+    next.decide();
+    if (next.contact.freedom == Freedom::free || d.touches[0].starts_inside) return;
+    EXPECT_LE((next.friction() - d.friction()).norm(), rounding + 1e-9 * d.contact.friction_bound);
+  });
 }
 
 }  // namespace
