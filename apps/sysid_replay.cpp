@@ -154,6 +154,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   std::vector<std::string> notices;
   const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
   const sysid::MaterialBase base = material_base(asset, replay.sheet(), notices, axes);
+  sysid::check_axes(axes, base);
   sysid::check_grasp_axes(axes, {replay});
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());

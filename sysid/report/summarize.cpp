@@ -79,7 +79,7 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
 }
 
 /// "lift: the model does not fit: ..."; empty where it fits.
-std::string warning_of_misfit(const SummaryRecording& recording) {
+std::string warning_of_misfit(const SummaryRecording& recording, const std::string& object) {
   const Misfit& misfit = recording.misfit;
   if (model_fits(misfit)) return "";
   const auto mm = [](double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; };
@@ -88,7 +88,7 @@ std::string warning_of_misfit(const SummaryRecording& recording) {
     worth = "; " + std::to_string(misfit.keyframes) + " keyframes are worth " +
             data::format_short(std::round(10 * misfit.worth) / 10);
   return recording.name + ": the model does not fit: apart from noise of " + mm(misfit.noise) +
-         " it misses the cloth by " + mm(misfit.size) +
+         " it misses the " + object + " by " + mm(misfit.size) +
          (misfit.explained > 0 ? " where repeatability explains " + mm(misfit.explained) : "") + worth +
          ". The intervals allow for it, but are those of a model that does not fit";
 }
@@ -262,8 +262,9 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
         summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
     if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
   }
+  const std::string object = settings.base.solid ? "object" : "cloth";
   for (const SummaryRecording& recording : summary.recordings)
-    if (const std::string warning = warning_of_misfit(recording); !warning.empty())
+    if (const std::string warning = warning_of_misfit(recording, object); !warning.empty())
       summary.warnings.push_back(warning);
   for (const std::string& warning : warnings_of(summary, estimate, results.candidates, replays, settings))
     summary.warnings.push_back(warning);
