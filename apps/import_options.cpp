@@ -77,8 +77,8 @@ data::Trajectory load_gripper(const std::string& path) {
 
 }  // namespace
 
-data::GraspSelection parse_grasp(const std::string& text) {
-  data::GraspSelection grasp;
+data::Selection parse_grasp(const std::string& text) {
+  data::Selection grasp;
   const std::size_t colon = std::min(text.find(':'), text.size());
   const std::string kind = text.substr(0, colon);
   std::vector<int> indices;

@@ -21,7 +21,7 @@ struct ImportOptions {
 
 /// "corner", "corner:I,J", "vertices:A,B,..." or "position": what is near the gripper. Throws
 /// data::InputError that names --grasp.
-data::GraspSelection parse_grasp(const std::string& text);
+data::Selection parse_grasp(const std::string& text);
 
 /// The box of the three ranges "LOW:HIGH". Throws data::InputError that names --crop-x, --crop-y or --crop-z.
 data::CropBox parse_crop(const std::array<std::string, 3>& ranges);

@@ -12,6 +12,7 @@
 #include "data/text.h"
 #include "data/writable.h"
 #include "sim/scene/sheet.h"
+#include "sim/scene/solid.h"
 #include "sysid/report/export_asset.h"
 #include "sysid/report/search_folder.h"
 
@@ -32,12 +33,17 @@ int run_export(const ExportOptions& options) {
   data::check_file_free(options.out, options.common.force);
   const data::Asset tuned = sysid::tuned_asset(base, summary);
   std::vector<std::string> notices;
-  const data::TriangleMesh mesh = data::load_asset_mesh(tuned);
-  const double area = sim::make_sheet(mesh).vertex_area.sum();
-  if (tuned.mesh != base.mesh)
-    say(options.common, "mesh and mass are those of the sheet in the recording, " + tuned.mesh + " (" +
-                            data::format_short(area * *tuned.areal_density) + " kg), not those of " +
-                            base.source);
+  const bool solid = tuned.element_type == data::ElementType::tetrahedron;
+  const double area = solid ? 0 : sim::make_sheet(data::load_asset_mesh(tuned)).vertex_area.sum();
+  if (tuned.mesh != base.mesh) {
+    const double mass =
+        solid ? *tuned.density * sim::make_solid(data::load_asset_tet_mesh(tuned), {}, tuned.element_order)
+                                     .vertex_volume.sum()
+              : area * *tuned.areal_density;
+    say(options.common, std::string("mesh and mass are those of the ") + (solid ? "solid" : "sheet") +
+                            " in the recording, " + tuned.mesh + " (" + data::format_short(mass) +
+                            " kg), not those of " + base.source);
+  }
   const auto format =
       options.format == "published" ? data::AssetFormat::published : data::AssetFormat::flash_1;
   data::save_asset(data::express_as(tuned, format, area, notices), options.out);

@@ -151,12 +151,14 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   const sysid::SearchFolder found = sysid::load_search_folder(options.start);
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recordings.front());
+  for (const data::Recording& recording : recordings) check_kind(asset, recording);
   Start start = start_of(options, found);
   sysid::GridSettings& grid = start.grid;
   const int threads = thread_count(options.common);
   grid.threads = threads;
   sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   replay.device = device;
+  replay.element_order = asset.element_order;
   if (replay.mesh.empty()) replay.mesh = mesh_of(found.summary);
   std::vector<sysid::Replay> replays;
   std::vector<std::string> names;
@@ -165,7 +167,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     names.push_back(recording.name);
   }
   std::vector<std::string> notices;
-  grid.base = material_base(asset, replays.front().sheet().rest, notices, held_axes(grid));
+  grid.base = material_base(asset, replays.front().sheet(), notices, held_axes(grid));
   // One store of motions for the search and what goes on from it.
   grid.rollouts =
       options.rollouts.empty() ? (fs::path(options.start) / "motions").string() : options.rollouts;

@@ -58,7 +58,7 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   add_holds(parse_holds(options.holds), settings);
   std::vector<sysid::Axis> all = settings.axes;
   all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
-  sysid::check_axes(all, base.material);
+  sysid::check_axes(all, base);
   return settings;
 }
 
@@ -112,15 +112,16 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   if (goes_on) order_as(sysid::load_grid_file(grid_file).recordings, recordings);
   const data::Asset asset = load_asset_for(options.asset, recordings.front());
+  for (const data::Recording& recording : recordings) check_kind(asset, recording);
   const int threads = thread_count(options.common);
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, threads);
   simulated.device = device;
+  simulated.element_order = asset.element_order;
   std::vector<sysid::Replay> replays = make_replays(recordings, simulated, options.common);
 
   std::vector<std::string> notices;
   const sysid::GridSettings settings = grid_settings(
-      options,
-      material_base(asset, replays.front().sheet().rest, notices, axes_of(parse_holds(options.holds))),
+      options, material_base(asset, replays.front().sheet(), notices, axes_of(parse_holds(options.holds))),
       threads);
   sysid::check_grasp_axes(settings.axes, replays);
   sysid::check_grasp_axes(settings.fixed, replays);

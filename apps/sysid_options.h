@@ -85,9 +85,13 @@ std::vector<data::Recording> load_recordings(const std::vector<std::string>& pat
 /// The asset named on the command line or, without one, by the recording.
 data::Asset load_asset_for(const std::string& path, const data::Recording& recording);
 
+/// Throws data::InputError where the recording is of a sheet and the asset of a solid, or the other way
+/// round.
+void check_kind(const data::Asset& asset, const data::Recording& recording);
+
 /// The asset's material; what was understood, with `fixed` in place of the asset's values, is appended to
 /// `notices`.
-sysid::MaterialBase material_base(const data::Asset& asset, const data::TriangleMesh& mesh,
+sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sheet,
                                   std::vector<std::string>& notices,
                                   const std::vector<sysid::Axis>& fixed = {});
 

@@ -123,12 +123,17 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   require_cpu(options.common);
   const int threads = thread_count(options.common);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
+  for (const data::Recording& recording : recordings)
+    if (recording.is_solid())
+      throw data::input_error(recording.source, "object.mesh",
+                              "found a solid, expected a sheet: plan knows experiments with sheets alone");
   const data::Asset asset = load_asset_for(options.asset, recordings.front());
+  check_kind(asset, recordings.front());
   const sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   if (!replay.mesh.empty()) recordings.front() = sysid::make_replay(recordings.front(), replay).recording;
   std::vector<std::string> notices;
   sysid::PlanSettings settings;
-  settings.grid.base = material_base(asset, recordings.front().mesh, notices);
+  settings.grid.base = material_base(asset, sim::make_sheet(recordings.front().mesh), notices);
   settings.grid.score = score_settings(options.replay);
   settings.error = options.error;
   settings.keyframes = options.keyframes;

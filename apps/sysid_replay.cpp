@@ -144,14 +144,17 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   const sim::Device device = choose_device(options.common);
   const data::Recording recording = data::load_recording(options.recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
+  check_kind(asset, recording);
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
   simulated.device = device;
+  simulated.element_order = asset.element_order;
   const sysid::Replay replay = sysid::make_replay(recording, simulated);
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;
   const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
-  const sysid::MaterialBase base = material_base(asset, replay.sheet().rest, notices, axes);
+  const sysid::MaterialBase base = material_base(asset, replay.sheet(), notices, axes);
+  sysid::check_axes(axes, base);
   sysid::check_grasp_axes(axes, {replay});
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());

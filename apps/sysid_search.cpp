@@ -68,7 +68,7 @@ void print_solver_check(const sysid::Summary& summary) {
 }
 
 void print_answer(const sysid::Summary& summary, const std::string& out) {
-  const bool has_thickness = summary.settings.count("thickness_m") > 0;
+  const bool has_thickness = sysid::young_is_in_pascal(summary);
   for (const sysid::ParameterFinding& finding : summary.parameters) {
     const sysid::ParameterLabel label = sysid::parameter_label(finding.name, has_thickness);
     std::printf("%-16s %s%s\n", finding.name.c_str(), value_text(finding, label.unit).c_str(),
@@ -115,7 +115,7 @@ std::vector<sysid::NextExperiment> next_experiments(const Search& search, const 
   const auto is_open = [](const sysid::ParameterFinding& finding) {
     return finding.values.size() > 1 && finding.identifiable != sysid::Identifiable::yes;
   };
-  if (!search.plan || answer.misfits.empty() ||
+  if (!search.plan || answer.misfits.empty() || search.settings.base.solid ||
       std::none_of(answer.parameters.begin(), answer.parameters.end(), is_open))
     return ranked;
   sysid::PlanSettings settings;

@@ -18,6 +18,7 @@
 #include "sim/newton/accepted.h"
 #include "sysid/capture/render_depth.h"
 #include "sysid/capture/synth.h"
+#include "sysid/capture/track_twin.h"
 
 namespace flash {
 namespace {
@@ -29,6 +30,8 @@ struct SynthOptions {
   sysid::SynthSettings synth;
   sim::SolverSettings solver;
   std::string asset;
+  std::string like;
+  double marker_noise = 0;  ///< [m]
   std::string mesh;
   std::vector<std::string> holds;
   std::vector<std::string> cameras;
@@ -86,9 +89,66 @@ Eigen::Vector3d vector_of(const std::vector<double>& numbers) {
   return Eigen::Map<const Eigen::Vector3d>(numbers.data());
 }
 
+std::string name_of_folder(const std::string& folder) {
+  const fs::path path = fs::path(folder).lexically_normal();
+  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
+}
+
+// The recording of a solid again, with the marker tracks that the asset gives it.
+int run_twin(const SynthOptions& options) {
+  const data::Recording recording = data::load_recording(options.like);
+  const data::Asset asset = data::load_asset(options.asset);
+  if (!recording.is_solid())
+    throw data::InputError("--like: found a sheet in " + recording.source +
+                           ", expected a solid with marker tracks; synth makes sheets with --kind");
+  check_kind(asset, recording);
+  sysid::ReplaySettings settings;
+  settings.solver = options.solver;
+  settings.solver.stop = &stop_on_signals();
+  settings.mesh = options.mesh;
+  settings.element_order = asset.element_order;
+  const sysid::Replay replay = sysid::make_replay(recording, settings);
+  std::vector<std::string> notices;
+  const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
+  const sysid::MaterialBase base = material_base(asset, replay.sheet(), notices, axes);
+  sysid::check_axes(axes, base);
+  std::vector<double> values;
+  for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
+  data::check_folder_free(options.out, options.common.force);
+  for (const std::string& notice : notices) say(options.common, notice);
+
+  const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
+  sysid::ReplayResult result;
+  sysid::run(replay, {candidate}, scored_steps(replay),
+             [&](std::size_t, sysid::ReplayResult made) { result = std::move(made); });
+  const data::MarkerTracks tracks =
+      sysid::simulated_tracks(replay, result.motion, options.marker_noise, options.common.seed);
+  end_after_signal();
+  sysid::save_track_twin(replay.recording, tracks, name_of_folder(options.out), options.out);
+  const std::string truth =
+      options.truth.empty() ? (fs::path(options.out) / "truth.json").string() : options.truth;
+  data::write_atomically(truth, sysid::truth_text(candidate, options.marker_noise, options.common.seed));
+  if (options.common.json) {
+    std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-synth/1"},
+                                        {"recording", options.out},
+                                        {"truth", truth},
+                                        {"keyframes", tracks.samples.size()},
+                                        {"points", 0},
+                                        {"unconverged_share", result.unconverged_share},
+                                        {"residual_max", result.residual_max}}
+                     .dump(2)
+              << '\n';
+  } else {
+    std::printf("%s: %zu times of %zu markers\n%s\n", options.out.c_str(), tracks.samples.size(),
+                tracks.names.size(), truth.c_str());
+  }
+  return sim::accepted(result.unconverged_share, result.residual_max) ? exit_done : exit_unusable;
+}
+
 int run_synth(SynthOptions options) {
   stop_on_signals();
   require_cpu(options.common);
+  if (!options.like.empty()) return run_twin(options);
   const data::Asset asset = data::load_asset(options.asset);
   const std::string mesh_spec = options.mesh.empty() ? asset.mesh : options.mesh;
   const data::TriangleMesh mesh = options.mesh.empty()            ? data::load_rest_mesh(asset)
@@ -96,7 +156,7 @@ int run_synth(SynthOptions options) {
                                                                   : data::load_triangle_mesh(mesh_spec);
   std::vector<std::string> notices;
   const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
-  const sysid::MaterialBase base = material_base(asset, mesh, notices, axes);
+  const sysid::MaterialBase base = material_base(asset, sim::make_sheet(mesh), notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());
   data::check_folder_free(options.out, options.common.force);
@@ -104,9 +164,7 @@ int run_synth(SynthOptions options) {
   for (const std::string& notice : notices) say(options.common, notice);
 
   sysid::SynthSettings& settings = options.synth;
-  settings.name = fs::path(options.out).lexically_normal().filename().string();
-  if (settings.name.empty())
-    settings.name = fs::path(options.out).lexically_normal().parent_path().filename().string();
+  settings.name = name_of_folder(options.out);
   settings.seed = options.common.seed;
   settings.cameras = make_cameras(options, mesh);
   if (!options.displacement.empty()) settings.displacement = vector_of(options.displacement);
@@ -161,6 +219,14 @@ void add_synth_verb(CLI::App& app, Action& action) {
   verb->add_option("--asset", options->asset, "File of the object")->required();
   verb->add_option("--kind", synth.kind, "What is done to the sheet")
       ->check(CLI::IsMember({"corner_lift", "hang", "drag", "bar_pull", "bias_pull"}))
+      ->capture_default_str();
+  CLI::Option* like =
+      verb->add_option("--like", options->like,
+                       "Recording of a solid that is made again, with the marker tracks of the asset");
+  verb->add_option("--marker-noise", options->marker_noise,
+                   "Standard deviation of each coordinate of a marker [m]")
+      ->check(number_from(0))
+      ->needs(like)
       ->capture_default_str();
   verb->add_option("--mesh", options->mesh, "Mesh in place of the asset's, as sheet:0.4x0.4:0.02");
   add_hold_option(*verb, options->holds, "A value in place of the asset's, as bending=1e-4");

@@ -47,8 +47,6 @@ auto value_in(const Names& names, const std::string& name, const std::string& so
   throw input_error(source, field, "found \"" + name + "\", expected one of " + expected);
 }
 
-bool is_made_on_the_spot(const std::string& mesh) { return is_mesh_spec(mesh) || is_tet_mesh_spec(mesh); }
-
 bool is_solid(Constitutive constitutive) {
   return constitutive == Constitutive::tet_arap || constitutive == Constitutive::tet_corotated ||
          constitutive == Constitutive::tet_neohookean || constitutive == Constitutive::tet_neohookean_log;

@@ -56,12 +56,14 @@ void check_scale(const Recording& recording, const Points& cloud, const std::str
                      " m across, expected metres in the base frame (millimetres read as metres?)");
 }
 
-void load_markers(const std::string& path, Eigen::Index vertices, Keyframe& keyframe) {
+void load_markers(const std::string& path, const Points& rest, Keyframe& keyframe) {
   const std::string text = read_file(path);
   LineReader lines(text);
   std::string_view line;
   if (!lines.next(line) || line != "vertex,x,y,z")
     throw input_error(path, "line 1", "expected the header vertex,x,y,z");
+  const Eigen::Index vertices = rest.rows();
+  std::vector<int> marked;
   std::vector<double> coordinates;
   while (lines.next(line)) {
     if (line.empty()) continue;
@@ -71,7 +73,7 @@ void load_markers(const std::string& path, Eigen::Index vertices, Keyframe& keyf
       throw input_error(path, "line " + std::to_string(lines.number()),
                         "found \"" + std::string(line) + "\", expected vertex,x,y,z with a vertex below " +
                             std::to_string(vertices));
-    keyframe.marker_vertices.push_back(static_cast<int>(*vertex));
+    marked.push_back(static_cast<int>(*vertex));
     for (std::size_t k = 1; k < 4; ++k) {
       const std::optional<double> value = parse_number(cells[k]);
       if (!value || !std::isfinite(*value))
@@ -82,6 +84,24 @@ void load_markers(const std::string& path, Eigen::Index vertices, Keyframe& keyf
   }
   keyframe.markers =
       Eigen::Map<Points>(coordinates.data(), static_cast<Eigen::Index>(coordinates.size() / 3), 3);
+  keyframe.marker_places = rest(marked, Eigen::all);
+}
+
+/// Adds those of one sample of the tracks that are on the object.
+void add_tracked(const RecordedMarkers& markers, const MarkerSample& sample, Keyframe& keyframe) {
+  const Eigen::Index before = keyframe.markers.rows();
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0; i < sample.markers.size(); ++i)
+    if (markers.at[static_cast<std::size_t>(sample.markers[i])]) rows.push_back(static_cast<Eigen::Index>(i));
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  keyframe.markers.conservativeResize(before + count, 3);
+  keyframe.marker_places.conservativeResize(before + count, 3);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index row = rows[static_cast<std::size_t>(i)];
+    const auto marker = static_cast<std::size_t>(sample.markers[static_cast<std::size_t>(row)]);
+    keyframe.markers.row(before + i) = sample.positions.row(row);
+    keyframe.marker_places.row(before + i) = markers.at[marker]->transpose();
+  }
 }
 
 /// `left_out` counts points that are not finite.
@@ -107,7 +127,10 @@ Keyframe load_keyframe(const Recording& recording, const RecordedKeyframe& recor
     check_scale(recording, contour, recorded.contour);
     keyframe.contour = inside(recording.crop, contour);
   }
-  if (!recorded.markers.empty()) load_markers(recorded.markers, recording.mesh.vertices.rows(), keyframe);
+  if (!recorded.markers.empty()) load_markers(recorded.markers, recording.mesh.vertices, keyframe);
+  if (recorded.sample >= 0)
+    add_tracked(recording.markers,
+                recording.markers.tracks.samples[static_cast<std::size_t>(recorded.sample)], keyframe);
   return keyframe;
 }
 
@@ -157,7 +180,9 @@ std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std
   if (empty.size() == keyframes.size())
     throw input_error(
         recording.source, "keyframes",
-        "no keyframe has a point inside the crop box, expected points in metres in the base frame");
+        recording.markers.tracks.samples.empty()
+            ? "no keyframe has a point inside the crop box, expected points in metres in the base frame"
+            : "nothing of the object was seen, expected markers that are not in markers.on_support");
   if (largest > 0 && largest < 0.005 * diagonal(recording.mesh.vertices))
     throw input_error(recording.source, "keyframes",
                       "the largest cloud is " + format_short(largest) + " m across, the sheet " +

@@ -46,6 +46,11 @@ TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source 
 bool is_tet_mesh_spec(const std::string& text);
 TetMesh parse_tet_mesh_spec(const std::string& spec, const std::string& source, const std::string& field);
 
+/// Whether a mesh is made from its name, so that it is no file.
+inline bool is_made_on_the_spot(const std::string& mesh) {
+  return is_mesh_spec(mesh) || is_tet_mesh_spec(mesh);
+}
+
 /// The name used in specs and files.
 const char* to_string(DiagonalPattern pattern);
 

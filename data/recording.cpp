@@ -13,6 +13,8 @@
 #include "data/json_reader.h"
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/recording_markers.h"
+#include "data/tet_faces.h"
 #include "data/text.h"
 
 namespace flash::data {
@@ -51,9 +53,8 @@ void read_object(const JsonObject& file, Recording& recording) {
   const JsonObject object = file.object("object");
   object.expect_fields({"mesh", "asset", "start", "note"});
   const std::string mesh = object.string("mesh");
-  recording.mesh_spec = is_mesh_spec(mesh) ? mesh : existing_file(object, "mesh", recording.source);
-  recording.mesh = is_mesh_spec(mesh) ? parse_mesh_spec(mesh, recording.source, object.name_of("mesh"))
-                                      : load_triangle_mesh(recording.mesh_spec);
+  load_object_mesh(is_made_on_the_spot(mesh) ? mesh : existing_file(object, "mesh", recording.source),
+                   recording.source, object.name_of("mesh"), recording);
   const double size = diagonal(recording.mesh.vertices);
   if (size > kLargestSize)
     throw object.error(
@@ -119,32 +120,6 @@ GraspShape read_shape(const JsonObject& grasp) {
   throw grasp.error("shape", "clamp, point or pinch");
 }
 
-GraspSelection read_selection(const JsonObject& grasp, Eigen::Index vertices) {
-  const JsonObject select = grasp.object("select");
-  select.expect_fields({"corner", "vertices", "position", "within"});
-  if (select.has("corner") + select.has("vertices") + select.has("position") != 1)
-    throw input_error(select.source(), grasp.name_of("select"),
-                      "expected exactly one of corner, vertices and position");
-  GraspSelection selection;
-  selection.within = select.positive("within", selection.within);
-  if (select.has("position")) selection.position = select.vector("position", 3);
-  if (select.has("corner")) {
-    const std::vector<int> corner = select.indices("corner");
-    if (corner.size() != 2 || corner[0] > 1 || corner[1] > 1)
-      throw select.error("corner", "[i, j], each 0 or 1");
-    selection.corner = {corner[0], corner[1]};
-  }
-  if (select.has("vertices")) {
-    selection.vertices = select.indices("vertices");
-    if (selection.vertices.empty()) throw select.error("vertices", "at least one index");
-    for (const int vertex : selection.vertices)
-      if (vertex >= vertices)
-        throw select.error("vertices",
-                           "indices below " + std::to_string(vertices) + ", the vertices of the mesh");
-  }
-  return selection;
-}
-
 void read_grasps(const JsonObject& file, Recording& recording) {
   for (const JsonObject& object : file.objects("grasps")) {
     object.expect_fields({"gripper", "from", "to", "select", "shape", "depth", "direction", "pitch", "note"});
@@ -168,6 +143,29 @@ void read_grasps(const JsonObject& file, Recording& recording) {
   }
 }
 
+void read_supports(const JsonObject& file, Recording& recording) {
+  const auto read = [&](const JsonObject& object) {
+    Selection select = read_selection(object, recording.mesh.vertices.rows());
+    if (select.position)
+      throw input_error(object.source(), object.name_of("select"), "expected corner, vertices or box");
+    return select;
+  };
+  for (const JsonObject& object : file.objects("supports")) {
+    object.expect_fields({"name", "from", "to", "select", "note"});
+    RecordedSupport support;
+    support.name = object.string("name", support.name);
+    support.from = object.number("from", -kInfinity);
+    support.to = object.number("to", kInfinity);
+    if (!(support.to > support.from)) throw object.error("to", "a time after from, or null");
+    support.select = read(object);
+    recording.supports.push_back(support);
+  }
+  for (const JsonObject& object : file.objects("loads")) {
+    object.expect_fields({"attached_mass", "select", "note"});
+    recording.loads.push_back({read(object), object.positive("attached_mass")});
+  }
+}
+
 void read_camera(const JsonObject& file, Recording& recording) {
   if (!file.has("camera")) return;
   const JsonObject object = file.object("camera");
@@ -179,20 +177,6 @@ void read_camera(const JsonObject& file, Recording& recording) {
   camera.depth_scale = object.positive("depth_scale", camera.depth_scale);
   camera.warnings = read_warnings(object);
   recording.camera = camera;
-}
-
-Eigen::Vector3d read_bound(const JsonObject& crop, const char* key, double open) {
-  Eigen::Vector3d bound = Eigen::Vector3d::Constant(open);
-  if (!crop.has(key)) return bound;
-  const nlohmann::json& list = crop.raw(key);
-  if (!list.is_array() || list.size() != 3) throw crop.error(key, "three numbers, null where open");
-  for (int axis = 0; axis < 3; ++axis) {
-    const nlohmann::json& value = list[static_cast<std::size_t>(axis)];
-    if (value.is_null()) continue;
-    if (!value.is_number()) throw crop.error(key, "three numbers, null where open");
-    bound[axis] = value.get<double>();
-  }
-  return bound;
 }
 
 void read_crop(const JsonObject& file, Recording& recording) {
@@ -230,6 +214,7 @@ void read_keyframes(const JsonObject& file, Recording& recording) {
       throw object.error("cloud", "cloud, depth, markers, contour or force");
     recording.keyframes.push_back(keyframe);
   }
+  add_tracked_keyframes(recording);
   if (recording.keyframes.empty()) throw file.error("keyframes", "at least one keyframe");
 }
 
@@ -291,6 +276,15 @@ void count_from_start(Recording& recording) {
                             "keyframes, which start at " + format_clock(first) + " s");
     recording.origin = std::min(recording.origin, grasp.from);
   }
+  for (std::size_t k = 0; k < recording.supports.size(); ++k) {
+    const double from = recording.supports[k].from;
+    if (std::isinf(from)) continue;
+    if (!(first - from <= kLongestRecording))
+      throw input_error(recording.source, "supports[" + std::to_string(k) + "].from",
+                        "found " + format_clock(from) + " s, expected a time by the clock of the " +
+                            "keyframes, which start at " + format_clock(first) + " s");
+    recording.origin = std::min(recording.origin, from);
+  }
   if (recording.origin == 0) return;
   // To the microsecond, which is what a double tells of the seconds since 1970.
   const auto shift = [&](double& time) { time = std::round(1e6 * (time - recording.origin)) / 1e6; };
@@ -300,6 +294,10 @@ void count_from_start(Recording& recording) {
   for (RecordedGrasp& grasp : recording.grasps) {
     shift(grasp.from);
     shift(grasp.to);
+  }
+  for (RecordedSupport& support : recording.supports) {
+    shift(support.from);
+    shift(support.to);
   }
 }
 
@@ -326,7 +324,34 @@ void check_grasps(const Recording& recording) {
   }
 }
 
+/// Each takes a vertex at least.
+void check_supports(const Recording& recording) {
+  for (std::size_t k = 0; k < recording.supports.size(); ++k)
+    select_vertices(recording, recording.supports[k].select, "supports[" + std::to_string(k) + "]");
+  for (std::size_t k = 0; k < recording.loads.size(); ++k)
+    select_vertices(recording, recording.loads[k].select, "loads[" + std::to_string(k) + "]");
+}
+
 }  // namespace
+
+void load_object_mesh(const std::string& mesh, const std::string& source, const std::string& field,
+                      Recording& recording) {
+  std::optional<TetMesh> solid;
+  const std::string extension = lower_extension(mesh);
+  if (is_tet_mesh_spec(mesh))
+    solid = parse_tet_mesh_spec(mesh, source, field);
+  else if (!is_mesh_spec(mesh) &&
+           (extension == ".tet" || (extension == ".vtk" && load_geometry(mesh).tetrahedra.rows() > 0)))
+    solid = load_tet_mesh(mesh);
+  recording.mesh_spec = mesh;
+  if (solid) {
+    recording.tetrahedra = std::move(solid->tetrahedra);
+    recording.mesh = {std::move(solid->vertices), outer_faces(recording.tetrahedra)};
+    return;
+  }
+  recording.tetrahedra.resize(0, 4);
+  recording.mesh = is_mesh_spec(mesh) ? parse_mesh_spec(mesh, source, field) : load_triangle_mesh(mesh);
+}
 
 const char* to_string(GraspShape shape) {
   switch (shape) {
@@ -348,7 +373,7 @@ Recording load_recording(const std::string& path) {
   const JsonObject file(json, recording.source);
   if (file.string("schema", "") != "flash-recording/1") throw file.error("schema", "\"flash-recording/1\"");
   file.expect_fields({"schema", "name", "kind", "note", "gravity", "object", "table", "trajectories",
-                      "grasps", "camera", "crop", "keyframes", "nuisance"});
+                      "grasps", "supports", "loads", "markers", "camera", "crop", "keyframes", "nuisance"});
   recording.name = file.string("name");
   if (std::any_of(recording.name.begin(), recording.name.end(),
                   [](unsigned char c) { return c < ' ' || c == 0x7f; }))
@@ -361,44 +386,48 @@ Recording load_recording(const std::string& path) {
   recording.gravity = file.vector3("gravity", recording.gravity);
   check_gravity(file, recording.gravity);
   read_object(file, recording);
+  read_markers(file, recording);
   read_table(file, recording);
   read_trajectories(file, recording);
   read_grasps(file, recording);
+  read_supports(file, recording);
   read_camera(file, recording);
   read_crop(file, recording);
   read_keyframes(file, recording);
   read_nuisance(file, recording);
   check_times(recording);
   count_from_start(recording);
+  if (!file.object("object").has("start") && !recording.markers.placed.empty())
+    place_object_by_markers(recording);
+  place_markers(recording);
   check_grasps(recording);
+  check_supports(recording);
   return recording;
 }
 
 std::vector<int> select_vertices(const Recording& recording, const RecordedGrasp& grasp) {
-  const GraspSelection& select = grasp.select;
-  if (!select.vertices.empty()) return select.vertices;
-  std::vector<int> selected;
-  const Points& rest = recording.mesh.vertices;
-  // A cell edge that equals `within` but for rounding counts as inside.
-  const double within = select.within * (1 + 1e-9);
-  if (select.corner) {
-    Eigen::Vector2d corner;
-    for (int axis = 0; axis < 2; ++axis)
-      corner[axis] = (*select.corner)[static_cast<std::size_t>(axis)] == 0 ? rest.col(axis).minCoeff()
-                                                                           : rest.col(axis).maxCoeff();
-    for (int v = 0; v < rest.rows(); ++v)
-      if ((rest.row(v).head<2>().transpose() - corner).cwiseAbs().maxCoeff() <= within) selected.push_back(v);
-  } else {
-    const Eigen::Vector3d at = pose_at(recording.trajectories.at(grasp.gripper), grasp.from) *
-                               select.position.value_or(Eigen::Vector3d::Zero());
-    for (int v = 0; v < rest.rows(); ++v)
-      if ((recording.start.row(v).transpose() - at).norm() <= within) selected.push_back(v);
-  }
+  const Selection& select = grasp.select;
+  Eigen::Vector3d at = Eigen::Vector3d::Zero();
+  if (select.vertices.empty() && !select.corner && !select.box)
+    at = pose_at(recording.trajectories.at(grasp.gripper), grasp.from) *
+         select.position.value_or(Eigen::Vector3d::Zero());
+  std::vector<int> selected = vertices_in(select, recording.mesh.vertices, recording.start, at);
+  if (selected.empty() && select.box)
+    throw input_error(recording.source, "grasps", "no vertex lies in select.box");
   if (selected.empty())
     throw input_error(recording.source, "grasps",
                       "no vertex lies within " + format_short(select.within) +
                           " m of the place that gripper " + grasp.gripper + " grasps");
   return selected;
+}
+
+std::vector<int> select_vertices(const Recording& recording, const Selection& select,
+                                 const std::string& field) {
+  std::vector<int> selected =
+      vertices_in(select, recording.mesh.vertices, recording.start, Eigen::Vector3d::Zero());
+  if (!selected.empty()) return selected;
+  throw input_error(recording.source, field + ".select",
+                    "no vertex of " + recording.mesh_spec + " lies there, expected one at least");
 }
 
 }  // namespace flash::data

@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "data/camera.h"
+#include "data/marker_tracks.h"
 #include "data/mesh.h"
+#include "data/selection.h"
 #include "data/trajectory.h"
 
 namespace flash::data {
@@ -16,25 +18,40 @@ namespace flash::data {
 /// How the patch sits in the fingers: flat, held in one point, or folded to a ridge.
 enum class GraspShape { clamp, point, pinch };
 
-/// Which vertices a gripper takes. Exactly one of corner, vertices and position is set.
-struct GraspSelection {
-  std::optional<std::array<int, 2>>
-      corner;  ///< of the rest sheet: (0, 0) is least x, least y; (1, 1) most x, most y
-  std::vector<int> vertices;
-  std::optional<Eigen::Vector3d> position;  ///< in the gripper frame at `from` [m]
-  double within = 0.02;  ///< largest |dx|, |dy| from the corner, or distance from the position [m]
-};
-
 struct RecordedGrasp {
   std::string gripper;                                  ///< name of a trajectory
   double from = 0.0;                                    ///< [s]
   double to = std::numeric_limits<double>::infinity();  ///< [s]
-  GraspSelection select;
+  Selection select;
   GraspShape shape = GraspShape::clamp;
   double depth = 0.01;  ///< pinch: height of the ridge [m]
   Eigen::Vector3d direction =
       Eigen::Vector3d::Zero();  ///< pinch: along the ridge, base frame; zero: the sheet's diagonal
   double pitch = 0.0;           ///< pinch: tilt of the ridge [rad]
+};
+
+/// Vertices that are held where they start.
+struct RecordedSupport {
+  std::string name = "support";
+  Selection select;                                        ///< by corner, vertices or box
+  double from = -std::numeric_limits<double>::infinity();  ///< the recording starts no later [s]
+  double to = std::numeric_limits<double>::infinity();     ///< [s]
+};
+
+/// A weight that hangs on the object, shared by the vertices evenly, and moves with it.
+struct RecordedLoad {
+  Selection select;            ///< by corner, vertices or box
+  double attached_mass = 0.0;  ///< [kg]
+};
+
+/// Markers that were tracked.
+struct RecordedMarkers {
+  std::string tracks_path, placed_path;           ///< resolved, empty where absent
+  MarkerTracks tracks;                            ///< as seen
+  std::map<std::string, Eigen::Vector3d> placed;  ///< where they are on the object at rest [m]
+  std::vector<std::string> on_support;            ///< stay where they are: they tell the object's pose alone
+  std::vector<std::optional<Eigen::Vector3d>>
+      at;  ///< of each that is scored: on the object at rest, or beside it [m]
 };
 
 /// Axis-aligned, base frame; open sides are infinite [m].
@@ -52,6 +69,7 @@ struct RecordedKeyframe {
   std::string cloud;                     ///< base frame [m]
   std::string depth, mask;               ///< camera frame
   std::string markers;                   ///< CSV: vertex,x,y,z of tracked marks, base frame [m]
+  int sample = -1;                       ///< of the marker tracks; -1: none
   std::string contour;                   ///< observed outline as a cloud, base frame [m]
   std::optional<Eigen::Vector3d> force;  ///< gripper on sheet [N]
 };
@@ -77,14 +95,15 @@ struct RecordedCamera {
 struct Recording {
   std::string source;  ///< path of recording.json
   std::string name;
-  double origin = 0;  ///< time by the file's clock at which the recording starts: its first grasp or
-                      ///< keyframe. Every time below counts from there [s]
+  double origin = 0;  ///< time by the file's clock at which the recording starts: its first grasp, support
+                      ///< or keyframe. Every time below counts from there, but for those of marker tracks [s]
   std::string kind =
       "free";  ///< documents only: corner_lift, hang, bar_pull, bias_pull, drag, cantilever, free
-  Eigen::Vector3d gravity{0, 0, -9.81};                                ///< [m/s^2]
-  std::string mesh_spec;                                               ///< "sheet:..." or resolved path
-  TriangleMesh mesh;                                                   ///< rest shape, object frame [m]
-  std::string asset;                                                   ///< resolved path, or empty
+  Eigen::Vector3d gravity{0, 0, -9.81};  ///< [m/s^2]
+  std::string mesh_spec;                 ///< "sheet:..." or resolved path
+  TriangleMesh mesh;      ///< rest shape, object frame [m]; of a solid all vertices and the outer faces
+  Tetrahedra tetrahedra;  ///< of a solid; empty: a sheet
+  std::string asset;      ///< resolved path, or empty
   Eigen::Isometry3d base_from_object = Eigen::Isometry3d::Identity();  ///< T_base_object at the start
   std::string start_mesh;  ///< resolved path of start positions, or empty
   Points start;            ///< positions at the start, base frame [m], one row a vertex
@@ -94,12 +113,17 @@ struct Recording {
   std::map<std::string, Trajectory> trajectories;           ///< T_base_gripper by name
   std::map<std::string, std::string> trajectory_paths;      ///< resolved
   std::vector<RecordedGrasp> grasps;
+  std::vector<RecordedSupport> supports;
+  std::vector<RecordedLoad> loads;
+  RecordedMarkers markers;
   std::optional<RecordedCamera> camera;
   CropBox crop;
   std::vector<RecordedKeyframe> keyframes;
   NuisanceBounds nuisance;
   std::vector<std::string>
       notices;  ///< what a reader should know: empty keyframes, ends of trajectories, ...
+
+  bool is_solid() const { return tetrahedra.rows() > 0; }
 };
 
 /// Reads recording.json (or its folder), its mesh and trajectories and checks them: field by field, times
@@ -110,11 +134,11 @@ Recording load_recording(const std::string& path);
 
 /// Points of the observation that lie in the crop box, base frame [m].
 struct Keyframe {
-  double time = 0.0;  ///< [s]
-  Points cloud;       ///< may be empty
-  Points contour;     ///< may be empty
-  std::vector<int> marker_vertices;
-  Points markers;                        ///< one row each of marker_vertices
+  double time = 0.0;                     ///< [s]
+  Points cloud;                          ///< may be empty
+  Points contour;                        ///< may be empty
+  Points markers;                        ///< [m]
+  Points marker_places;                  ///< of each on the object at rest, or beside it [m]
   std::optional<Eigen::Vector3d> force;  ///< [N]
 };
 
@@ -123,8 +147,17 @@ struct Keyframe {
 /// empty, whether that is usual, and how many points are not finite.
 std::vector<Keyframe> load_keyframes(const Recording& recording, std::vector<std::string>& notices);
 
+/// Puts a mesh in place of the recording's: its name, the rest shape, and of a file or specification of
+/// tetrahedra these. Throws InputError, of a specification naming `source` and `field`.
+void load_object_mesh(const std::string& mesh, const std::string& source, const std::string& field,
+                      Recording& recording);
+
 /// Vertices a grasp takes, in order of index. Throws InputError where there are none.
 std::vector<int> select_vertices(const Recording& recording, const RecordedGrasp& grasp);
+
+/// Those of a support or a load; `field` names it in the message.
+std::vector<int> select_vertices(const Recording& recording, const Selection& select,
+                                 const std::string& field);
 
 /// Writes recording.json with paths relative to it. The files it names must stand already.
 void save_recording(const Recording& recording, const std::string& path);

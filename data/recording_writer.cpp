@@ -17,15 +17,33 @@ Json numbers(const Eigen::Matrix<double, size, 1>& values) {
   return list;
 }
 
-Json grasp_json(const RecordedGrasp& grasp, double origin) {
+Json select_json(const Selection& selection) {
   Json select = Json::object();
-  if (grasp.select.corner) select["corner"] = *grasp.select.corner;
-  if (!grasp.select.vertices.empty()) select["vertices"] = grasp.select.vertices;
-  if (grasp.select.position) select["position"] = numbers(*grasp.select.position);
-  select["within"] = grasp.select.within;
+  if (selection.corner) select["corner"] = *selection.corner;
+  if (!selection.vertices.empty()) select["vertices"] = selection.vertices;
+  if (selection.position) select["position"] = numbers(*selection.position);
+  if (selection.box)
+    select["box"] = {{"min", numbers<3>(selection.box->min())}, {"max", numbers<3>(selection.box->max())}};
+  else
+    select["within"] = selection.within;
+  return select;
+}
+
+void add_supports(const Recording& recording, Json& json) {
+  const auto time = [&](double t) { return std::isfinite(t) ? Json(recording.origin + t) : Json(nullptr); };
+  for (const RecordedSupport& support : recording.supports)
+    json["supports"].push_back({{"name", support.name},
+                                {"from", time(support.from)},
+                                {"to", time(support.to)},
+                                {"select", select_json(support.select)}});
+  for (const RecordedLoad& load : recording.loads)
+    json["loads"].push_back({{"select", select_json(load.select)}, {"attached_mass", load.attached_mass}});
+}
+
+Json grasp_json(const RecordedGrasp& grasp, double origin) {
   Json json = {{"gripper", grasp.gripper}, {"from", origin + grasp.from}};
   json["to"] = std::isfinite(grasp.to) ? Json(origin + grasp.to) : Json(nullptr);
-  json["select"] = select;
+  json["select"] = select_json(grasp.select);
   json["shape"] = to_string(grasp.shape);
   if (grasp.shape == GraspShape::pinch) {
     json["depth"] = grasp.depth;
@@ -43,7 +61,8 @@ void save_recording(const Recording& recording, const std::string& path) {
   json["gravity"] = numbers(recording.gravity);
 
   Json object;
-  object["mesh"] = is_mesh_spec(recording.mesh_spec) ? recording.mesh_spec : named(recording.mesh_spec);
+  object["mesh"] =
+      is_made_on_the_spot(recording.mesh_spec) ? recording.mesh_spec : named(recording.mesh_spec);
   object["asset"] = recording.asset.empty() ? Json(nullptr) : Json(named(recording.asset));
   if (recording.start_mesh.empty())
     object["start"] = {{"T_base_object", numbers(to_vector(recording.base_from_object))}};
@@ -58,6 +77,13 @@ void save_recording(const Recording& recording, const std::string& path) {
   json["grasps"] = Json::array();
   for (const RecordedGrasp& grasp : recording.grasps)
     json["grasps"].push_back(grasp_json(grasp, recording.origin));
+  add_supports(recording, json);
+  const RecordedMarkers& markers = recording.markers;
+  if (!markers.tracks_path.empty()) {
+    json["markers"]["tracks"] = named(markers.tracks_path);
+    if (!markers.placed_path.empty()) json["markers"]["placed"] = named(markers.placed_path);
+    if (!markers.on_support.empty()) json["markers"]["on_support"] = markers.on_support;
+  }
   if (recording.camera)
     json["camera"] = {{"intrinsics", named(recording.camera->intrinsics_path)},
                       {"T_base_camera", numbers(to_vector(recording.camera->base_from_camera))},
@@ -78,6 +104,7 @@ void save_recording(const Recording& recording, const std::string& path) {
     put("markers", keyframe.markers);
     put("contour", keyframe.contour);
     if (keyframe.force) entry["force"] = numbers(*keyframe.force);
+    if (keyframe.sample >= 0 && entry.size() == 1) continue;  // the tracks make it
     json["keyframes"].push_back(entry);
   }
   const NuisanceBounds& bounds = recording.nuisance;

@@ -24,7 +24,7 @@ struct ImportSettings {
   std::string trajectory_path;  ///< where it stands, for messages
   std::string mesh_spec;        ///< mesh spec or file that `mesh` came from
   data::TriangleMesh mesh;      ///< the sheet at rest, in the plane z = 0 [m]
-  data::GraspSelection grasp{std::array<int, 2>{0, 0}, {}, {}, 0.012};  ///< by the one gripper
+  data::Selection grasp{std::array<int, 2>{0, 0}, {}, {}, 0.012};  ///< by the one gripper
   data::GraspShape shape = data::GraspShape::clamp;
   bool tool_at_patch =
       false;  ///< the middle of the grasped patch is at the tool centre point, not the corner

@@ -27,7 +27,7 @@ namespace {
 /// One gripper: what it takes and how far it carries it.
 struct Hand {
   std::string name;
-  data::GraspSelection select;
+  data::Selection select;
   Eigen::Vector3d displacement;
 };
 

@@ -46,6 +46,7 @@ std::string sheet_hash(const data::Recording& recording) {
   hash.add_matrix(recording.mesh.vertices);
   hash.add_matrix(recording.mesh.triangles);
   hash.add_matrix(recording.start);
+  if (recording.is_solid()) hash.add_matrix(recording.tetrahedra);
   return hash.text();
 }
 
@@ -99,6 +100,23 @@ std::string grasps_hash(const Replay& replay) {
   return hash.text();
 }
 
+std::string supports_hash(const data::Recording& recording) {
+  Hash hash;
+  const auto add = [&](const data::Selection& select) {
+    for (const int vertex : data::select_vertices(recording, select, "supports")) hash.add(vertex);
+  };
+  for (const data::RecordedSupport& support : recording.supports) {
+    add(support.select);
+    hash.add(support.from);
+    hash.add(support.to);
+  }
+  for (const data::RecordedLoad& load : recording.loads) {
+    add(load.select);
+    hash.add(load.attached_mass);
+  }
+  return hash.text();
+}
+
 std::string keyframes_hash(const std::vector<Observation>& observations) {
   Hash hash;
   for (const Observation& observation : observations) {
@@ -107,6 +125,8 @@ std::string keyframes_hash(const std::vector<Observation>& observations) {
     hash.add_matrix(observation.points);
     hash.add_matrix(observation.contour);
     hash.add_matrix(observation.markers);
+    for (const Mark& mark : observation.marks)
+      if (!mark.offset.isZero(0)) hash.add_matrix(mark.offset);
     if (observation.force) hash.add_matrix(*observation.force);
   }
   return hash.text();
@@ -125,16 +145,31 @@ void add_replay(const Replay& replay, Fingerprint& print) {
   print[name + " nuisance bounds"] = nuisance_hash(replay.recording.nuisance);
   print[name + " trajectories"] = trajectories_hash(replay.recording);
   print[name + " grasps"] = grasps_hash(replay);
+  if (!replay.recording.supports.empty() || !replay.recording.loads.empty())
+    print[name + " supports and loads"] = supports_hash(replay.recording);
   print[name + " keyframes"] = keyframes_hash(replay.observations);
   print[name + " begins, steps, closing time"] =
       values_text({replay.start, static_cast<double>(replay.steps), replay.settings.closing_time});
+  if (replay.recording.is_solid())
+    print["element_order"] = replay.settings.element_order == data::ElementOrder::quadratic ? "2" : "1";
   const sim::SolverSettings& solver = replay.settings.solver;
   print["time_step_s"] = data::format_number(solver.time_step);
   print["tolerance"] = data::format_number(solver.tolerance);
   print["iterations"] = std::to_string(solver.max_iterations);
 }
 
+void add_solid(const data::SolidMaterial& m, Fingerprint& print) {
+  print["asset constitutive"] = data::to_string(m.constitutive);
+  print["asset young"] = data::format_number(m.youngs_modulus);
+  print["asset poisson"] = data::format_number(m.poissons_ratio);
+  print["asset density"] = data::format_number(m.density);
+  print["asset friction"] = data::format_number(m.friction);
+  print["asset air_drag"] = data::format_number(m.air_drag);
+  print["asset stiffness_damping"] = data::format_number(m.stiffness_damping);
+}
+
 void add_material(const MaterialBase& base, Fingerprint& print) {
+  if (base.solid) return add_solid(*base.solid, print);
   const data::SheetMaterial& m = base.material;
   print["asset constitutive"] = data::to_string(m.constitutive);
   print["asset bending_model"] = data::to_string(m.bending_model);

@@ -134,7 +134,7 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
                  const std::function<void(const Progress&)>& progress, const std::atomic<bool>* stop) {
   std::vector<Axis> axes = settings.axes;
   axes.insert(axes.end(), settings.fixed.begin(), settings.fixed.end());
-  check_axes(axes, settings.base.material);
+  check_axes(axes, settings.base);
   const std::vector<std::vector<double>> grid = cartesian_product(axes);
   std::vector<int> wanted;
   for (int id = 0; id < static_cast<int>(grid.size()); ++id) {

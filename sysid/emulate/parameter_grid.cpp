@@ -50,12 +50,14 @@ void check_range(const std::string& option, const ParameterInfo& info, double va
 
 const std::vector<ParameterInfo>& known_parameters() {
   static const std::vector<ParameterInfo> parameters = {
-      {"young", "Pa or N/m", true, kTiny, 1e13, "Young's modulus, or E t where the asset has no thickness"},
+      {"young", "Pa or N/m", true, kTiny, 1e13,
+       "Young's modulus, or E t where the asset of a sheet has no thickness"},
       {"poisson", "", true, -0.99, 0.5, "Poisson's ratio"},
       {"bending", "N m", true, 0, 1e6, "flexural rigidity D"},
       {"bending_ratio", "", true, 0.01, 100, "woven: D across the warp over D along it"},
       {"friction", "", true, 0, 10, "Coulomb coefficient against the table"},
       {"areal_density", "kg/m^2", true, kTiny, 1e4, "mass per area"},
+      {"density", "kg/m^3", true, kTiny, 1e6, "solid: mass per volume"},
       {"air_drag", "1/s", true, 0, 1e4, "mass-proportional damping"},
       {"stiffness_damping", "s", true, 0, 1e3, "stiffness-proportional damping"},
       {"start_yaw", "rad", false, -kPi, kPi, "turn of the sheet on the table about the gripper"},
@@ -168,12 +170,35 @@ double count_candidates(const std::vector<Axis>& axes) {
   return count;
 }
 
-void check_axes(const std::vector<Axis>& axes, const data::SheetMaterial& material) {
+namespace {
+
+/// Refuses what a solid does not have, or a sheet.
+void check_kind(const Axis& axis, const MaterialBase& base) {
+  const std::string& name = axis.name;
+  if (!base.solid) {
+    if (name == "density")
+      throw data::InputError("--density: found a sheet, expected a solid; a sheet has --areal-density");
+    return;
+  }
+  for (const char* own : {"bending", "bending_ratio", "areal_density", "start_yaw", "table_height"})
+    if (name == own)
+      throw data::InputError(option_of(name) + ": found a solid, expected a sheet" +
+                             (name == "areal_density" ? "; a solid has --density" : ""));
+  if (name == "poisson" && axis.values.back() >= 0.5)
+    throw data::InputError("--poisson: found " + data::format_short(axis.values.back()) +
+                           ", expected below 0.5 for a solid");
+}
+
+}  // namespace
+
+void check_axes(const std::vector<Axis>& axes, const MaterialBase& base) {
+  const data::SheetMaterial& material = base.material;
   bool young = false, poisson = false;
   for (std::size_t i = 0; i < axes.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       if (axes[i].name == axes[j].name) throw data::InputError(option_of(axes[i].name) + ": given twice");
     }
+    check_kind(axes[i], base);
     if (axes[i].name == "bending_ratio" && material.bending_model != data::BendingModel::plate)
       throw data::InputError("--bending-ratio: found bending_model " +
                              std::string(data::to_string(material.bending_model)) +
@@ -209,9 +234,27 @@ void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& 
                              "--grasp-shape pinch, or leave it out");
 }
 
+namespace {
+
+void set_values(const std::vector<Axis>& axes, const std::vector<double>& values,
+                data::SolidMaterial& material) {
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const std::string& name = axes[i].name;
+    if (name == "young") material.youngs_modulus = values[i];
+    if (name == "poisson") material.poissons_ratio = values[i];
+    if (name == "density") material.density = values[i];
+    if (name == "friction") material.friction = values[i];
+    if (name == "air_drag") material.air_drag = values[i];
+    if (name == "stiffness_damping") material.stiffness_damping = values[i];
+  }
+}
+
+}  // namespace
+
 ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,
                                const std::vector<double>& values) {
-  ReplayCandidate candidate{base.material, {}};
+  ReplayCandidate candidate{base.material, {}, base.solid};
+  if (candidate.solid) set_values(axes, values, *candidate.solid);
   data::SheetMaterial& material = candidate.material;
   const double thickness = base.thickness.value_or(1.0);
   bool bending_given = !base.bending_from_thickness;

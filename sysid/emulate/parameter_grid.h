@@ -24,8 +24,8 @@ struct ParameterInfo {
   std::string meaning;
 };
 
-/// young, poisson, bending, bending_ratio, friction, areal_density, air_drag, stiffness_damping; start_yaw,
-/// table_height, grasp_depth, grasp_direction, grasp_pitch.
+/// young, poisson, bending, bending_ratio, friction, areal_density, density, air_drag, stiffness_damping;
+/// start_yaw, table_height, grasp_depth, grasp_direction, grasp_pitch.
 const std::vector<ParameterInfo>& known_parameters();
 
 /// How the command line calls a parameter: "--start-yaw" for start_yaw.
@@ -57,22 +57,24 @@ std::vector<double> values_of(const std::vector<Axis>& axes, int id);
 /// How many cartesian_product makes.
 double count_candidates(const std::vector<Axis>& axes);
 
-/// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
-/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; bending_ratio under a bending model that
-/// is not woven; more than a million candidates. Throws data::InputError with the reason.
-void check_axes(const std::vector<Axis>& axes, const data::SheetMaterial& material);
-
-/// Refuses grasp_depth, grasp_direction and grasp_pitch where no grasp of the recordings is a pinch: nothing
-/// would change with them.
-void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& replays);
-
 /// What candidates are built on: the asset's material and how `young` and `bending` are understood.
 struct MaterialBase {
   data::SheetMaterial material;
   std::optional<double> thickness;  ///< given: young is E [Pa]; absent: young is E t [N/m]
   bool bending_from_thickness =
       false;  ///< D = E t^3 / (12 (1 - nu^2)) follows young unless bending is an axis
+  std::optional<data::SolidMaterial> solid = {};  ///< of a solid, in place of all that; young is E [Pa]
 };
+
+/// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
+/// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; bending_ratio under a bending model that
+/// is not woven; what a sheet has alone of a solid, and the other way round; more than a million candidates.
+/// Throws data::InputError with the reason.
+void check_axes(const std::vector<Axis>& axes, const MaterialBase& base);
+
+/// Refuses grasp_depth, grasp_direction and grasp_pitch where no grasp of the recordings is a pinch: nothing
+/// would change with them.
+void check_grasp_axes(const std::vector<Axis>& axes, const std::vector<Replay>& replays);
 
 /// The base with the named values in place of its own. Fixed parameters are axes of one value.
 ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>& axes,

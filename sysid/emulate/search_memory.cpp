@@ -11,8 +11,9 @@ namespace {
 constexpr double kLikelihood = 1e6;  // bytes a keyframe: fields of the likelihoods at hand
 constexpr double kAtEstimate = 14;   // motions about the estimate that are kept, of the search's own mesh
 constexpr double kOfErrors =
-    48;                       // and of the answer's mesh: what errors are of, and how each moves the sheet
-constexpr double kFiner = 4;  // vertices of the mesh of half the cell, over those of the search's
+    48;  // and of the answer's mesh: what errors are of, and how each moves the sheet
+// Vertices of the mesh of half the cell, over those of the search's; what a solver of it takes, over that.
+constexpr double kFiner = 4, kFinerSolid = 8, kFinerSolver = 4, kFinerSolidSolver = 16;
 
 double kept_steps(const Replay& replay) {
   const std::vector<bool> read = steps_read(replay, replay.start, replay.settings.solver.time_step,
@@ -28,25 +29,29 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
   double motion = 0, solver = 0, kept = 0, keyframes = 0;
   for (const Replay& replay : replays) {
     const double vertices = vertices_of(replay);
-    solver = std::max(solver, sim::solver_bytes_per_vertex * vertices);
+    solver = std::max(solver, solver_bytes(replay));
     motion += 2 * motion_bytes(replay);  // in its batch, and until all recordings are scored
     keyframes += static_cast<double>(replay.observations.size());
     kept += kept_steps(replay) * vertices * bytes_per_position;
   }
   const double candidates = count_candidates(settings.axes);
+  const bool solid = replays.front().recording.is_solid();
+  const double vertices_finer = solid ? kFinerSolid : kFiner,
+               solver_finer = solid ? kFinerSolidSolver : kFinerSolver;
   const double at_once = std::min<double>(settings.envs, candidates);
   const double threads = std::min<double>(settings.threads, at_once);
   estimate.steps = at_once * motion;
   estimate.simulation = threads * solver + estimate.steps;
   if (solver_check) {
-    estimate.steps = std::max(estimate.steps, kFiner * at_once * motion);
-    estimate.simulation = std::max(estimate.simulation, kFiner * (threads * solver + at_once * motion));
+    estimate.steps = std::max(estimate.steps, vertices_finer * at_once * motion);
+    estimate.simulation =
+        std::max(estimate.simulation, solver_finer * threads * solver + vertices_finer * at_once * motion);
   }
   const double finer = solver_check ? count_candidates(thinned(settings.axes)) : 0;
   // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer
   // one.
-  const double own = candidates * kept, half_cell = finer * kFiner * kept;
-  const double about_estimate = (kAtEstimate + kOfErrors * (solver_check ? kFiner : 1)) * kept;
+  const double own = candidates * kept, half_cell = finer * vertices_finer * kept;
+  const double about_estimate = (kAtEstimate + kOfErrors * (solver_check ? vertices_finer : 1)) * kept;
   estimate.kept = own + std::max(own, 2 * half_cell) + about_estimate + kLikelihood * keyframes;
   return estimate;
 }

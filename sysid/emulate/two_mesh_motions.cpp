@@ -151,8 +151,8 @@ std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Motion
   if (!fine) return std::nullopt;
   auto differences = motions_over(*fine, axes, grid, store, told);
   if (!differences) return std::nullopt;
-  const auto matrix = std::make_shared<const Eigen::SparseMatrix<double>>(
-      prolongation(replay.recording.mesh, fine->recording.mesh));
+  const auto matrix =
+      std::make_shared<const Eigen::SparseMatrix<double>>(prolongation(replay.surface, fine->surface));
   const std::vector<std::vector<double>> points = cartesian_product(axes);
   data::for_each_in_parallel(points.size(), replay.settings.threads, [&](std::size_t i) {
     add((*differences)[i], -1, prolonged(motions.at(points[i]), *matrix));

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numeric>
+#include <utility>
 
 #include "sysid/infer/local_noise.h"
 
@@ -19,13 +21,24 @@ constexpr double kLeast = 1e-5;                      // variance of a coordinate
 constexpr int kSizes = 20;                           // values of tau, to that of the residuals
 constexpr double kFirstSize = 0.03;                  // over sigma
 constexpr double kLarge = 2.995732;                  // -log of one in twenty
-constexpr double kVague = 100;                       // of what is not known, over the residuals
+constexpr double kLeastFreedom = 0.1;                // of the rows
+constexpr int kFew = 12;        // rows of one keyframe and channel that are too few to tell noise from misfit
+constexpr double kVague = 100;  // of what is not known, over the residuals
 // Chi-square with 3 degrees of freedom: a size and two reaches.
 constexpr double kOnceInTwenty = 7.815;
 
 /// Row of (keyframe, channel) blocks, `modes` long each.
 Eigen::Index block(int keyframe, int channel, int channels, int modes) {
   return (static_cast<Eigen::Index>(keyframe) * channels + channel) * modes;
+}
+
+/// The most rows that one keyframe has of one channel.
+int most_rows_together(const ObservedRows& rows) {
+  std::map<std::pair<int, int>, int> counts;
+  int most = 0;
+  for (std::size_t i = 0; i < rows.keyframe.size(); ++i)
+    most = std::max(most, ++counts[{rows.keyframe[i], rows.channel[i]}]);
+  return most;
 }
 
 /// -2 log likelihood at one size from coordinates in which all is diagonal.
@@ -61,7 +74,7 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
   }
   modes_known_ = sums(known_).modes;
   estimate_noise(residuals);
-  const double between = noise_between_neighbours(rows_, residuals);
+  const double between = noise_is_told_ ? noise_between_neighbours(rows_, residuals) : 0;
   misfit_.noise = between > 0 ? std::clamp(between, 1e-9, noise_) : noise_;
   if (repeatability)
     explained_ = std::sqrt(
@@ -192,7 +205,8 @@ DiscrepancyModel::Reduced DiscrepancyModel::reduce(const Eigen::MatrixXd& residu
 }
 
 /// The fixed point of sigma^2 = squares of what is left / (rows - what was fitted), under a discrepancy that
-/// is all but free (Fellner 1986).
+/// is all but free (Fellner 1986). Where that leaves no row, as of a few markers, nothing tells noise
+/// from discrepancy: of what the errors of known shape leave, half of the variance counts as each.
 void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
   const double rows = rows_.weights.sum();
   const double all = std::sqrt(residuals.cwiseAbs2().dot(rows_.weights) / rows);
@@ -218,8 +232,15 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
     const double left = reduced.squares[0] - 2 * (fitted * x).sum() + (fitted * fitted * gains).sum();
     const double freedom =
         rows - (variance * gains / (1 + variance * gains)).sum() - static_cast<double>(count);
+    if (round == 0 && freedom < 1 && most_rows_together(rows_) <= kFew) {
+      const double of_known = (inverse_known_ * known).trace();
+      noise_ = std::max(left_ * std::sqrt(0.5 * rows / std::max(rows - of_known, 1.0)), 1e-9);
+      noise_is_told_ = false;
+      break;
+    }
     const double before = noise_;
-    noise_ = std::max(noise_ * std::sqrt(std::max(left, 0.0) / std::max(freedom, 0.1 * rows)), 1e-9);
+    noise_ =
+        std::max(noise_ * std::sqrt(std::max(left, 0.0) / std::max(freedom, kLeastFreedom * rows)), 1e-9);
     if (std::abs(noise_ - before) < 1e-3 * before) break;
   }
   fields_.clear();
@@ -234,6 +255,18 @@ void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
   const Reduced reduced = reduce(residuals);
   misfit_.explained = explained_;
   misfit_.keyframes = keyframes_;
+  if (!noise_is_told_) {
+    // As long as the recording, so that keyframes alike do not count as many, and short along the sheet.
+    const std::size_t longest = (std::size(kTimes) - 1) * std::size(kSheets);
+    const Eigen::VectorXd at_rows =
+        along_.values.cwiseAbs2() * variances_along(along_, fields_[longest].shape.reach_sheet);
+    variances_.assign(fields_.size(), 0);
+    variances_[longest] = noise_ * noise_ / at_rows.mean();
+    misfit_.size = noise_;
+    misfit_.reach_time = fields_[longest].shape.reach_time;
+    misfit_.reach_sheet = fields_[longest].shape.reach_sheet;
+    return;
+  }
   std::vector<double> deviances;
   double least = std::numeric_limits<double>::infinity(), without = least;
   for (std::size_t f = 0; f < fields_.size(); ++f) {

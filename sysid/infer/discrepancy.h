@@ -106,6 +106,7 @@ class DiscrepancyModel {
   Eigen::MatrixXd known_;  ///< errors of known shape and, of no known size, free ones and the parameters
   int channels_ = 1, keyframes_ = 0, modes_ = 0;
   double noise_ = 0, left_ = 0, explained_ = 0, duration_ = 0;
+  bool noise_is_told_ = true;    ///< from the discrepancy
   SheetModes along_;             ///< of each row
   Eigen::MatrixXd modes_modes_;  ///< (keyframe, channel) blocks of sum w phi phi^T, side by side
   Eigen::MatrixXd modes_known_;  ///< (keyframe, channel, mode) by known

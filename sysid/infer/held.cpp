@@ -18,13 +18,14 @@ bool is_known(const std::string& name, const GridSettings& grid) {
 std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays) {
   std::vector<double> first;
   for (const Axis& axis : grid.axes) first.push_back(axis.values.front());
-  const data::SheetMaterial material = candidate_at(first, grid).material;
+  const ReplayCandidate candidate = candidate_at(first, grid);
+  const double friction = candidate.solid ? candidate.solid->friction : candidate.material.friction;
   std::vector<HeldParameter> held;
   const auto add = [&](const char* name, double low, double high) {
     if (!is_known(name, grid)) held.push_back({name, {low, high}});
   };
   if (std::any_of(replays.begin(), replays.end(), [](const Replay& r) { return r.recording.has_table; }))
-    add("friction", material.friction / 2, 2 * material.friction);
+    add("friction", friction / 2, 2 * friction);
   double yaw = 0, height = 0;
   for (const Replay& replay : replays) {
     yaw = std::max(yaw, replay.recording.nuisance.start_yaw);

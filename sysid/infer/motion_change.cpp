@@ -12,11 +12,11 @@ bool are_alike(const data::TriangleMesh& one, const data::TriangleMesh& other) {
 }  // namespace
 
 SheetShifts shifts_of(const MotionChange& change, std::size_t r, const Replay& replay, double time_offset) {
-  const data::TriangleMesh& mesh = replay.recording.mesh;
+  const data::TriangleMesh& mesh = replay.surface;
   SheetShifts shifts(replay.observations.size());
   for (SheetShift& shift : shifts) shift.positions = data::Points::Zero(mesh.vertices.rows(), 3);
   for (const MotionTerm& term : change) {
-    const data::TriangleMesh& own = term.motions->replays[r].recording.mesh;
+    const data::TriangleMesh& own = term.motions->replays[r].surface;
     const Motion& motion = term.motions->results[r].motion;
     Eigen::SparseMatrix<double> to_mesh;
     if (!are_alike(own, mesh)) to_mesh = prolongation(own, mesh);

@@ -71,7 +71,7 @@ ObservedRows observed_rows(const Replay& replay, const LinearObservations& place
   std::map<std::pair<Term, int>, int> channels;
   rows.places.resize(places.rows(), 2);
   rows.weights = robust_weights(places, robust);
-  const auto [centre, plane] = plane_of(replay.recording.mesh.vertices);
+  const auto [centre, plane] = plane_of(replay.surface.vertices);
   for (Eigen::Index i = 0; i < places.rows(); ++i) {
     const auto row = places.row(i);
     const auto [keyframe, is_new] =

@@ -10,6 +10,10 @@ std::optional<double> predictability_horizon(const Replay& replay, const ReplayC
   twin.material.membrane_stiffness *= 1 + perturbation;
   twin.material.bending_rigidity *= 1 + perturbation;
   twin.material.friction *= 1 + perturbation;
+  if (twin.solid) {
+    twin.solid->youngs_modulus *= 1 + perturbation;
+    twin.solid->friction *= 1 + perturbation;
+  }
   std::vector<ReplayResult> results(2);
   store.run(replay, {candidate, twin},
             [&](std::size_t i, ReplayResult result) { results[i] = std::move(result); });

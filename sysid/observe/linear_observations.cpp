@@ -32,7 +32,7 @@ Eigen::Vector3d border_normal(const data::Points& positions, const Eigen::Vector
 }  // namespace
 
 SheetDistance sheet_of(const Replay& replay) {
-  const data::TriangleMesh& mesh = replay.recording.mesh;
+  const data::TriangleMesh& mesh = replay.surface;
   return replay.queries ? *replay.queries : SheetDistance(mesh.triangles, mesh.vertices);
 }
 
@@ -57,13 +57,18 @@ void LinearObservations::add_term(const data::Points& points, Eigen::Index at_mo
     if (place.term == Term::mark)
       nearest = sheet.mark(replay.observations[place.observation].marks[place.mark], point);
     hint = nearest.triangle;
-    const Eigen::Vector3i corners = replay.recording.mesh.triangles.row(nearest.triangle);
+    const Eigen::Vector3i corners = replay.surface.triangles.row(nearest.triangle);
     place.triangle = nearest.triangle;
     place.barycentric = nearest.barycentric;
     place.position = nearest.position;
     place.velocity = at(velocities, corners, nearest.barycentric);
-    place.rest = at(replay.recording.mesh.vertices, corners, nearest.barycentric);
+    place.rest = at(replay.surface.vertices, corners, nearest.barycentric);
     const bool mark = place.term == Term::mark;
+    if (mark) {
+      place.corners = corners_of(positions, replay.surface.triangles, nearest.triangle);
+      place.velocity = mark_shift(replay.observations[place.observation].marks[place.mark], place.corners,
+                                  corners_of(velocities, replay.surface.triangles, nearest.triangle));
+    }
     place.weight = std::sqrt(common.weight / static_cast<double>(count));
     for (int k = 0; k < (mark ? 3 : 1); ++k) {
       place.direction = mark ? Eigen::Vector3d(Eigen::Vector3d::Unit(k))
@@ -154,7 +159,7 @@ Eigen::VectorXd LinearObservations::distances(const Replay& replay, const Motion
                                               const Registration& registration, const SheetShifts& shifts,
                                               SheetDistance& sheet, std::vector<int>& triangles) const {
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
-  const data::Triangles& corners = replay.recording.mesh.triangles;
+  const data::Triangles& corners = replay.surface.triangles;
   Eigen::VectorXd rows(this->rows());
   if (triangles.empty())
     for (const Place& place : places_) triangles.push_back(place.triangle);
@@ -235,10 +240,13 @@ Eigen::VectorXd LinearObservations::moved_by(const Replay& replay, const SheetSh
   for (Eigen::Index i = 0; i < rows.size(); ++i) {
     const Place& place = places_[static_cast<std::size_t>(i)];
     const SheetShift& shift = shifts[place.observation];
+    const data::Triangles& triangles = replay.surface.triangles;
     const Eigen::Vector3d moved =
-        place.term == Term::force
-            ? shift.force
-            : at(shift.positions, replay.recording.mesh.triangles.row(place.triangle), place.barycentric);
+        place.term == Term::force ? shift.force
+        : place.term == Term::mark
+            ? mark_shift(replay.observations[place.observation].marks[place.mark], place.corners,
+                         corners_of(shift.positions, triangles, place.triangle))
+            : at(shift.positions, triangles.row(place.triangle), place.barycentric);
     rows[i] = place.weight * place.direction.dot(moved);
   }
   return rows;

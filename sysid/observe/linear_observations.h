@@ -78,6 +78,7 @@ class LinearObservations {
     Eigen::Vector3d direction;  // unit, frame of the simulation
     Eigen::Vector3d position;   // [m]; of a force [N]
     Eigen::Vector3d velocity;   // of the sheet there [m/s]
+    Eigen::Matrix3d corners;    // of a mark: those of its triangle [m]
   };
   void add_term(const data::Points& points, Eigen::Index at_most, const Place& common,
                 const Eigen::Isometry3d& simulated_from_observed, const SheetDistance& sheet,

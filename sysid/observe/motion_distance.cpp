@@ -22,7 +22,7 @@ double mean_distance(const data::Points& points, const SurfaceDistance& surface)
 
 std::vector<std::pair<double, double>> motion_distance(const Replay& replay, const Motion& a,
                                                        const Motion& b) {
-  SurfaceDistance surface(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  SurfaceDistance surface(replay.surface.triangles, replay.surface.vertices);
   std::vector<std::pair<double, double>> distances;
   data::Points positions;
   for (const Observation& observation : replay.observations) {

@@ -269,7 +269,7 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
 
 RegistrationProblem registration_problem(const Replay& replay, const Motion& motion) {
   RegistrationProblem problem;
-  problem.triangles = &replay.recording.mesh.triangles;
+  problem.triangles = &replay.surface.triangles;
   problem.motion = &motion;
   problem.observations = &replay.observations;
   problem.sheet = replay.queries.get();

@@ -5,10 +5,10 @@
 
 namespace flash::sysid {
 std::string scaled_cell(const std::string& specification, double factor) {
-  if (!data::is_mesh_spec(specification)) return "";
+  if (!data::is_made_on_the_spot(specification)) return "";
   const std::vector<std::string_view> words = data::split(specification, ":");
   const auto cell = words.size() >= 3 ? data::parse_number(words[2]) : std::nullopt;
-  if (!cell || words[0] != "sheet") return "";
+  if (!cell || (words[0] != "sheet" && words[0] != "box")) return "";
   std::string scaled =
       std::string(words[0]) + ":" + std::string(words[1]) + ":" + data::format_number(factor * *cell);
   for (std::size_t k = 3; k < words.size(); ++k) scaled += ":" + std::string(words[k]);

@@ -6,7 +6,8 @@
 
 namespace flash::sysid {
 
-/// "sheet:0.4x0.4:0.02[:pattern]" with its cell times a factor; empty for anything else.
+/// "sheet:0.4x0.4:0.02[:pattern]" or "box:0.1x0.03x0.03:0.01" with its cell times a factor; empty for
+/// anything else.
 std::string scaled_cell(const std::string& specification, double factor);
 
 /// The same recording on cells of half the size, keyframes weighing as they do; empty where the sheet is not

@@ -5,9 +5,12 @@
 
 #include "data/error.h"
 #include "data/text.h"
+#include "sim/newton/solver_memory.h"
 
 namespace flash::sysid {
 double vertices_of(const Replay& replay) { return static_cast<double>(replay.sheet().rest.vertices.rows()); }
+
+double solver_bytes(const Replay& replay) { return sim::solver_bytes(replay.sheet()); }
 
 double motion_bytes(const Replay& replay, bool all_steps) {
   const double positions = all_steps ? replay.steps + 1 : static_cast<double>(scored_steps(replay).size());
@@ -22,8 +25,7 @@ MemoryEstimate estimate_batch(const std::vector<Replay>& replays, std::size_t ca
   for (const Replay& replay : replays) {
     const double threads = std::min<double>(replay.settings.threads, count);
     const double at_once = std::min<double>(replay.settings.envs, count);
-    estimate.simulation =
-        std::max(estimate.simulation, threads * sim::solver_bytes_per_vertex * vertices_of(replay));
+    estimate.simulation = std::max(estimate.simulation, threads * solver_bytes(replay));
     estimate.steps += (count + at_once) * motion_bytes(replay, all_steps);
   }
   estimate.simulation += estimate.steps;

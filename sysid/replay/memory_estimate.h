@@ -16,8 +16,11 @@ struct MemoryEstimate {
 /// What one position of one vertex takes [bytes].
 inline constexpr double bytes_per_position = 3 * sizeof(double);
 
-/// Number of vertices of the sheet that is simulated.
+/// Number of vertices of the sheet or solid that is simulated.
 double vertices_of(const Replay& replay);
+
+/// What a solver of it takes [bytes].
+double solver_bytes(const Replay& replay);
 
 /// What a batch holds of one candidate [bytes]: positions at the scored steps, or at all, and how each step
 /// went.

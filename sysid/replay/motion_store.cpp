@@ -109,8 +109,22 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
     for (const int vertex : hold.vertices) bytes.add(vertex);
     for (const double value : {hold.from, hold.to, hold.closing_time}) bytes.add(value);
     bytes.add_matrix(hold.targets);
+    if (hold.frame == sim::base_frame) continue;
     for (const Eigen::Isometry3d& pose : world.schedule->frames[static_cast<std::size_t>(hold.frame)])
       bytes.add_matrix(pose.matrix());
+  }
+  for (const sim::PointMass& mass : world.point_masses) {
+    bytes.add(mass.vertex);
+    bytes.add(mass.mass);
+  }
+  if (const auto found = world.solids.find(0); found != world.solids.end()) {
+    const data::SolidMaterial& solid = found->second;
+    bytes.add_matrix(replay.recording.tetrahedra);
+    for (const double value :
+         {static_cast<double>(solid.constitutive), static_cast<double>(replay.settings.element_order),
+          solid.youngs_modulus, solid.poissons_ratio, solid.density, solid.friction, solid.air_drag,
+          solid.stiffness_damping})
+      bytes.add(value);
   }
   for (const sim::RestTriangle& triangle : replay.sheet().triangles)
     if (triangle.stiff) bytes.add_matrix(triangle.vertices);
@@ -153,7 +167,7 @@ ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std:
   result.converged = bytes.take<char>() != 0;
   result.finite = bytes.take<char>() != 0;
   result.motion.positions.assign(static_cast<std::size_t>(replay.steps) + 1, data::Points(0, 3));
-  const Eigen::Index vertices = replay.recording.mesh.vertices.rows();
+  const Eigen::Index vertices = replay.surface.vertices.rows();
   for (const int step : kept)
     result.motion.positions[static_cast<std::size_t>(step)] = bytes.take_points(vertices, "vertices");
   const data::Points forces = bytes.take_points(replay.steps, "forces");

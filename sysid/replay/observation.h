@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "data/mesh.h"
-#include "sysid/replay/surface_distance.h"
+#include "sysid/replay/mark.h"
 
 namespace flash::sysid {
 
@@ -15,7 +15,7 @@ struct Observation {
   double weight = 1;                       ///< in the mean over keyframes; 0 leaves it out of score and fit
   data::Points contour{};                  ///< of the outline, inside the crop [m]
   data::Points markers{};                  ///< [m]
-  std::vector<SurfacePoint> marks{};       ///< where on the sheet each of `markers` was put
+  std::vector<Mark> marks{};               ///< where on the sheet each of `markers` was put
   std::optional<Eigen::Vector3d> force{};  ///< last gripper on sheet [N]
 
   /// Whether there is anything to compare with.

@@ -6,6 +6,7 @@
 #include "data/error.h"
 #include "data/text.h"
 #include "sim/scene/grasp.h"
+#include "sim/scene/solid.h"
 
 namespace flash::sysid {
 
@@ -29,7 +30,8 @@ std::vector<int> patch_of(const Replay& replay, const data::RecordedGrasp& recor
   if (replay.settings.grasp_within) grasp.select.within = *replay.settings.grasp_within;
   if (shape == data::GraspShape::pinch) grasp.select.within = nuisance.grasp_depth.value_or(recorded.depth);
   std::vector<int> patch = data::select_vertices(replay.recording, grasp);
-  if (shape != data::GraspShape::point) return patch;
+  if (shape != data::GraspShape::point)
+    return replay.recording.is_solid() ? sim::with_midsides(replay.sheet(), patch) : patch;
   const data::Points& rest = replay.recording.mesh.vertices;
   Eigen::RowVector3d held = rest.row(patch.front());
   if (grasp.select.corner) {
@@ -122,6 +124,22 @@ sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, i
   const Eigen::Isometry3d gripper = data::pose_at(trajectory_of(recording, recorded), hold.from);
   hold.targets = (targets.rowwise() - gripper.translation().transpose()) * gripper.linear();
   return hold;
+}
+
+void add_supports(const Replay& replay, sim::Environment& environment) {
+  const data::Recording& recording = replay.recording;
+  for (const data::RecordedSupport& support : recording.supports)
+    environment.holds.push_back(
+        {.name = support.name,
+         .vertices =
+             sim::with_midsides(replay.sheet(), data::select_vertices(recording, support.select, "supports")),
+         .from = support.from <= replay.beginning ? replay.start : support.from,
+         .to = support.to});
+  for (const data::RecordedLoad& load : recording.loads) {
+    const std::vector<int> vertices = data::select_vertices(recording, load.select, "loads");
+    for (const int vertex : vertices)
+      environment.point_masses.push_back({vertex, load.attached_mass / static_cast<double>(vertices.size())});
+  }
 }
 
 }  // namespace flash::sysid

@@ -27,6 +27,9 @@ std::shared_ptr<const sim::Schedule> gripper_schedule(const Replay& replay);
 sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, int frame,
                     const ReplayNuisance& nuisance, const data::Points& flat);
 
+/// Adds what holds the object where it starts, and what hangs on it.
+void add_supports(const Replay& replay, sim::Environment& environment);
+
 /// Makes stiff the triangles inside patches that a clamp takes at the beginning and never lets go.
 void stiffen_clamped(const Replay& replay, sim::Sheet& sheet);
 

@@ -6,11 +6,10 @@
 #include <numeric>
 
 #include "data/error.h"
-#include "data/mesh_io.h"
-#include "data/procedural_mesh.h"
 #include "data/scene.h"
 #include "data/text.h"
 #include "data/worst.h"
+#include "sim/scene/solid.h"
 #include "sysid/replay/recorded_grasp.h"
 
 namespace flash::sysid {
@@ -30,7 +29,8 @@ void turn(data::Points& points, const Eigen::Vector3d& pivot, const Eigen::Vecto
 
 /// The vertices of `mesh` inside the bounding box, at rest, of those that were taken on the recording's own.
 std::vector<int> same_place(const std::vector<int>& taken, const data::TriangleMesh& own,
-                            const data::TriangleMesh& mesh, const std::string& source) {
+                            const data::TriangleMesh& mesh, const std::string& source,
+                            const std::string& field) {
   Eigen::AlignedBox3d box;
   for (const int vertex : taken) box.extend(own.vertices.row(vertex).transpose());
   const double slack = 1e-6 * (own.vertices.colwise().maxCoeff() - own.vertices.colwise().minCoeff()).norm();
@@ -39,24 +39,62 @@ std::vector<int> same_place(const std::vector<int>& taken, const data::TriangleM
     if (box.exteriorDistance(Eigen::Vector3d(mesh.vertices.row(i))) <= slack)
       vertices.push_back(static_cast<int>(i));
   if (vertices.empty())
-    throw data::input_error(source, "grasps.select.vertices", "none of the other mesh lies where these do");
+    throw data::input_error(source, field + ".select.vertices", "none of the other mesh lies where these do");
   return vertices;
 }
 
-/// Replaces the recording's mesh; the start follows its pose, grasps the place of their vertices.
+/// Replaces the recording's mesh; the start follows its pose; grasps, supports and loads the place of their
+/// vertices.
 void replace_mesh(data::Recording& recording, const std::string& mesh) {
   if (!recording.start_mesh.empty()) {
     throw data::input_error(recording.source, "object.start",
                             "is a mesh of its own, so that the sheet cannot be meshed anew as " + mesh);
   }
   const data::TriangleMesh own = std::move(recording.mesh);
-  recording.mesh = data::is_mesh_spec(mesh) ? data::parse_mesh_spec(mesh) : data::load_triangle_mesh(mesh);
-  for (data::RecordedGrasp& grasp : recording.grasps)
-    if (!grasp.select.vertices.empty())
-      grasp.select.vertices = same_place(grasp.select.vertices, own, recording.mesh, recording.source);
-  recording.mesh_spec = mesh;
+  const bool was_solid = recording.is_solid();
+  data::load_object_mesh(mesh, "mesh", "sheet", recording);
+  if (recording.is_solid() != was_solid)
+    throw data::InputError("--mesh: found " + mesh + ", expected " +
+                           (was_solid ? "a solid as box:0.1x0.03x0.03:0.01 or a file of tetrahedra"
+                                      : "a sheet as sheet:0.4x0.4:0.02 or a file of triangles"));
+  const auto moved = [&](data::Selection& select, const char* field) {
+    if (!select.vertices.empty())
+      select.vertices = same_place(select.vertices, own, recording.mesh, recording.source, field);
+  };
+  for (data::RecordedGrasp& grasp : recording.grasps) moved(grasp.select, "grasps");
+  for (data::RecordedSupport& support : recording.supports) moved(support.select, "supports");
+  for (data::RecordedLoad& load : recording.loads) moved(load.select, "loads");
   recording.start = (recording.mesh.vertices * recording.base_from_object.linear().transpose()).rowwise() +
                     recording.base_from_object.translation().transpose();
+}
+
+/// The plan of a solid, and of its vertices those that its outer faces have.
+void take_solid(Replay& replay) {
+  const data::Recording& recording = replay.recording;
+  if (!replay.plan)
+    replay.plan = sim::make_sheet_plan(
+        sim::make_solid({recording.mesh.vertices, recording.tetrahedra}, {}, replay.settings.element_order));
+  const sim::Sheet& solid = replay.sheet();
+  if (const int inverted = sim::first_inverted(solid, recording.start); inverted >= 0)
+    throw data::input_error(recording.source, "object.start",
+                            "turns tetrahedron " + std::to_string(inverted) +
+                                " of object.mesh inside out or flat, expected a positive volume");
+  for (const data::RecordedGrasp& grasp : recording.grasps)
+    if (shape_of(grasp, replay.settings) == data::GraspShape::pinch)
+      throw data::input_error(recording.source, "grasps.shape",
+                              "found pinch, which folds a sheet, expected clamp or point for a solid");
+  std::vector<int> place(static_cast<std::size_t>(solid.rest.vertices.rows()), -1);
+  data::Triangles& triangles = replay.surface.triangles;
+  triangles = solid.solid_surface;
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
+    for (int k = 0; k < 3; ++k) place[static_cast<std::size_t>(triangles(t, k))] = 0;
+  for (std::size_t v = 0; v < place.size(); ++v) {
+    if (place[v] < 0) continue;
+    place[v] = static_cast<int>(replay.surface_vertices.size());
+    replay.surface_vertices.push_back(static_cast<int>(v));
+  }
+  triangles = triangles.unaryExpr([&](int vertex) { return place[static_cast<std::size_t>(vertex)]; }).eval();
+  replay.surface.vertices = solid.rest.vertices(replay.surface_vertices, Eigen::all);
 }
 
 /// Throws data::InputError where --from and --to leave nothing to score.
@@ -112,9 +150,12 @@ Replay assemble(const data::Recording& recording, const ReplaySettings& settings
   if (!settings.mesh.empty()) replace_mesh(replay.recording, settings.mesh);
   replay.up = upward(recording);
 
-  // Marks are named by vertices of the recording's own mesh.
-  replay.queries =
-      std::make_shared<const SheetDistance>(replay.recording.mesh.triangles, replay.recording.mesh.vertices);
+  replay.plan = std::move(plan);
+  if (replay.recording.is_solid())
+    take_solid(replay);
+  else
+    replay.surface = replay.recording.mesh;
+  replay.queries = std::make_shared<const SheetDistance>(replay.surface.triangles, replay.surface.vertices);
   observe(replay);
   check_window(replay);
 
@@ -124,9 +165,9 @@ Replay assemble(const data::Recording& recording, const ReplaySettings& settings
     replay.beginning = std::min(replay.beginning, grasp.from);
     closes = closes || shape_of(grasp, settings) == data::GraspShape::pinch;
   }
-  if (plan) {
-    replay.plan = std::move(plan);
-  } else {
+  for (const data::RecordedSupport& support : recording.supports)
+    if (std::isfinite(support.from)) replay.beginning = std::min(replay.beginning, support.from);
+  if (!replay.plan) {
     sim::Sheet sheet = sim::make_sheet(replay.recording.mesh);
     if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
     replay.plan = sim::make_sheet_plan(sheet);
@@ -158,8 +199,11 @@ Replay make_replay(const data::Recording& recording, const ReplaySettings& setti
                               .contour = keyframe.contour,
                               .markers = keyframe.markers,
                               .force = keyframe.force};
-      for (const int vertex : keyframe.marker_vertices)
-        observation.marks.push_back(replay.queries->nearest(recording.mesh.vertices.row(vertex).transpose()));
+      // Marks are named by places on the recording's own mesh, which another one covers.
+      for (Eigen::Index i = 0; i < keyframe.marker_places.rows(); ++i) {
+        const Eigen::Vector3d place = keyframe.marker_places.row(i).transpose();
+        observation.marks.push_back(put_mark(place, replay.surface, replay.queries->nearest(place)));
+      }
       const bool weighs =
           keyframe.time >= settings.score_from && keyframe.time <= settings.score_to &&
           (keyframe.cloud.rows() >= settings.min_points || keyframe.contour.rows() >= settings.min_points ||
@@ -174,13 +218,11 @@ Replay make_replay(const Replay& replay, const ReplaySettings& settings,
                    std::shared_ptr<const sim::SheetPlan> plan) {
   return assemble(replay.recording, settings, std::move(plan), [&](Replay& made) {
     made.observations = replay.observations;
-    const data::TriangleMesh& mesh = replay.recording.mesh;
     for (Observation& observation : made.observations)
-      for (SurfacePoint& mark : observation.marks) {
-        Eigen::Vector3d rest = Eigen::Vector3d::Zero();
-        for (int k = 0; k < 3; ++k)
-          rest += mark.barycentric[k] * mesh.vertices.row(mesh.triangles(mark.triangle, k)).transpose();
-        mark = made.queries->nearest(rest);
+      for (Mark& mark : observation.marks) {
+        const Eigen::Vector3d place =
+            mark_position(mark, corners_of(replay.surface.vertices, replay.surface.triangles, mark.triangle));
+        mark = put_mark(place, made.surface, made.queries->nearest(place));
       }
   });
 }
@@ -188,12 +230,13 @@ Replay make_replay(const Replay& replay, const ReplaySettings& settings,
 sim::Environment make_environment(const Replay& replay, const ReplayCandidate& candidate) {
   const data::Recording& recording = replay.recording;
   const ReplayNuisance& nuisance = candidate.nuisance;
-  data::Points flat = recording.start;
+  data::Points flat = sim::with_midsides(replay.sheet(), recording.start);
   turn(flat, replay.pivot, replay.up, nuisance.start_yaw);
   const Eigen::RowVector3d raise = nuisance.table_height * replay.up.transpose();
 
   sim::Environment environment;
   environment.materials[0] = candidate.material;
+  if (candidate.solid) environment.solids[0] = *candidate.solid;
   environment.gravity = recording.gravity;
   environment.state.time = replay.start;
   environment.state.positions = flat.rowwise() + raise;
@@ -204,6 +247,7 @@ sim::Environment make_environment(const Replay& replay, const ReplayCandidate& c
   }
   for (std::size_t k = 0; k < recording.grasps.size(); ++k)
     environment.holds.push_back(make_hold(replay, recording.grasps[k], static_cast<int>(k), nuisance, flat));
+  add_supports(replay, environment);
   environment.schedule = replay.schedule;
   return environment;
 }
@@ -243,7 +287,11 @@ ReplayResult result_of(const Replay& replay, const std::vector<int>& kept, const
   for (std::size_t k = 0; k < kept.size(); ++k) {
     const auto x = batch.kept_positions(environment, static_cast<int>(k));
     result.finite = result.finite && in_reach(x);
-    motion.positions[static_cast<std::size_t>(kept[k])] = x;
+    data::Points& positions = motion.positions[static_cast<std::size_t>(kept[k])];
+    if (replay.surface_vertices.empty())
+      positions = x;
+    else
+      positions = x(replay.surface_vertices, Eigen::all);
   }
   const std::span<const sim::StepStats> stats = batch.stats(environment);
   int missed = 0;

@@ -18,6 +18,7 @@ namespace flash::sysid {
 struct ReplaySettings {
   sim::SolverSettings solver;
   std::string mesh;  ///< mesh specification or file in place of the recording's; empty: the recording's
+  data::ElementOrder element_order = data::ElementOrder::linear;  ///< of a solid
   std::optional<double> pre_roll;  ///< simulated before the recording starts, gripper at its first pose;
                                    ///< absent: 0.4 where a grasp needs time to close, else 0 [s]
   double closing_time = 0.25;      ///< the fingers', within the pre-roll [s]
@@ -43,13 +44,14 @@ struct ReplayNuisance {
 };
 
 struct ReplayCandidate {
-  data::SheetMaterial material;
+  data::SheetMaterial material;  ///< of a sheet
   ReplayNuisance nuisance;
+  std::optional<data::SolidMaterial> solid = {};  ///< of a solid
 };
 
 /// One candidate's simulated motion, its positions at the steps that were wanted, and how the solver fared.
 struct ReplayResult {
-  Motion motion;
+  Motion motion;                 ///< of the surface
   bool converged = false;        ///< every step
   bool finite = false;           ///< all positions are numbers
   double residual_max = 0;       ///< |r| / |M g|
@@ -62,9 +64,12 @@ struct Replay {
   data::Recording recording;
   std::string
       object_mesh;  ///< mesh specification or file of the recording itself, whatever settings.mesh says
-  std::shared_ptr<const sim::SheetPlan> plan;     ///< of the sheet that is simulated
+  std::shared_ptr<const sim::SheetPlan> plan;  ///< of the sheet or solid that is simulated
+  data::TriangleMesh
+      surface;  ///< what of it can be seen, at rest: a sheet itself, the outer faces of a solid
+  std::vector<int> surface_vertices;              ///< those of a solid that the surface has; empty: a sheet
   std::shared_ptr<const sim::Schedule> schedule;  ///< of the grippers, a frame for each grasp
-  std::shared_ptr<const SheetDistance> queries;   ///< of the sheet at rest
+  std::shared_ptr<const SheetDistance> queries;   ///< of the surface at rest
   ReplaySettings settings;
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity; the table normal without gravity
   Eigen::Vector3d pivot =

@@ -48,11 +48,11 @@ SurfacePoint SheetDistance::nearest_on_border(const Eigen::Vector3d& query) cons
   return result;
 }
 
-SurfacePoint SheetDistance::mark(const SurfacePoint& place, const Eigen::Vector3d& query) const {
-  SurfacePoint result = place;
-  result.position.setZero();
-  for (int k = 0; k < 3; ++k)
-    result.position += place.barycentric[k] * positions_.row(triangles_(place.triangle, k)).transpose();
+SurfacePoint SheetDistance::mark(const Mark& mark, const Eigen::Vector3d& query) const {
+  SurfacePoint result;
+  result.triangle = mark.triangle;
+  result.barycentric = mark.barycentric;
+  result.position = mark_position(mark, corners_of(positions_, triangles_, mark.triangle));
   result.distance = (query - result.position).norm();
   return result;
 }

@@ -1,6 +1,7 @@
 #pragma once
 #include <vector>
 
+#include "sysid/replay/mark.h"
 #include "sysid/replay/surface_distance.h"
 
 namespace flash::sysid {
@@ -22,8 +23,8 @@ class SheetDistance {
   /// Nearest point of the border, the edges of one triangle only; triangle -1 where there is no border.
   SurfacePoint nearest_on_border(const Eigen::Vector3d& query) const;
 
-  /// The mark (its triangle and barycentric weights count) and how far it is from `query`.
-  SurfacePoint mark(const SurfacePoint& place, const Eigen::Vector3d& query) const;
+  /// Where a mark is, and how far that is from `query`.
+  SurfacePoint mark(const Mark& mark, const Eigen::Vector3d& query) const;
 
  private:
   struct BorderEdge {

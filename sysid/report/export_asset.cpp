@@ -8,6 +8,7 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "sim/scene/sheet.h"
+#include "sim/scene/solid.h"
 
 namespace flash::sysid {
 namespace {
@@ -88,6 +89,30 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
   return data::format_json(json);
 }
 
+/// The parameters as the asset has them, by name.
+std::map<std::string, double> values_of_sheet(const data::Asset& asset) {
+  const double area = sim::make_sheet(data::load_rest_mesh(asset)).vertex_area.sum();
+  const data::SheetMaterial material = data::resolve_sheet(asset, area).material;
+  return {{"young", asset.young},
+          {"poisson", asset.poisson},
+          {"bending", material.bending_rigidity},
+          {"bending_ratio", asset.weave.bending_ratio},
+          {"friction", asset.friction},
+          {"areal_density", material.areal_density},
+          {"air_drag", asset.air_drag},
+          {"stiffness_damping", asset.stiffness_damping}};
+}
+
+std::map<std::string, double> values_of_solid(const data::Asset& asset) {
+  const double volume = sim::make_solid(data::load_asset_tet_mesh(asset)).vertex_volume.sum();
+  return {{"young", asset.young},
+          {"poisson", asset.poisson},
+          {"density", data::resolve_solid(asset, volume).material.density},
+          {"friction", asset.friction},
+          {"air_drag", asset.air_drag},
+          {"stiffness_damping", asset.stiffness_damping}};
+}
+
 }  // namespace
 
 std::map<std::string, std::array<double, 2>> randomization_ranges(const Summary& summary) {
@@ -107,16 +132,8 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
   data::Asset asset = base;
   const auto mesh = summary.settings.find("object_mesh");
   if (mesh != summary.settings.end()) asset.mesh = mesh->second;
-  const double area = sim::make_sheet(data::load_rest_mesh(asset)).vertex_area.sum();
-  const data::SheetMaterial material = data::resolve_sheet(base, area).material;
-  const std::map<std::string, double> base_values = {{"young", base.young},
-                                                     {"poisson", base.poisson},
-                                                     {"bending", material.bending_rigidity},
-                                                     {"bending_ratio", base.weave.bending_ratio},
-                                                     {"friction", base.friction},
-                                                     {"areal_density", material.areal_density},
-                                                     {"air_drag", base.air_drag},
-                                                     {"stiffness_damping", base.stiffness_damping}};
+  const bool solid = asset.element_type == data::ElementType::tetrahedron;
+  const std::map<std::string, double> base_values = solid ? values_of_solid(asset) : values_of_sheet(asset);
 
   std::map<std::string, double> values = summary.best;
   bool bending_found = summary.fixed.count("bending") > 0;
@@ -130,6 +147,16 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
   asset.format = data::AssetFormat::flash_1;
   asset.young = values.at("young");
   asset.poisson = values.at("poisson");
+  asset.identification = identification(base, base_values, summary);
+  if (solid) {
+    asset.friction = values.at("friction");
+    asset.air_drag = values.at("air_drag");
+    asset.stiffness_damping = values.at("stiffness_damping");
+    asset.density = values.at("density");
+    asset.mass.reset();
+    asset.object_mass.reset();
+    return asset;
+  }
   if (const auto ratio = values.find("bending_ratio"); ratio != values.end())
     asset.weave.bending_ratio = ratio->second;
   asset.friction = values.at("friction");
@@ -142,7 +169,6 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
   asset.mass.reset();
   asset.object_mass.reset();
   asset.areal_density = values.at("areal_density");
-  asset.identification = identification(base, base_values, summary);
   return asset;
 }
 

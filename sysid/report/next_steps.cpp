@@ -17,7 +17,7 @@ bool is_fixed_as(const Summary& summary, const std::string& name, const std::str
 }
 
 std::string label(const Summary& summary, const std::string& name) {
-  return parameter_label(name, summary.settings.count("thickness_m") > 0).label;
+  return parameter_label(name, young_is_in_pascal(summary)).label;
 }
 
 /// "a bar pull"; "\"lift\" once more".
@@ -102,16 +102,18 @@ std::vector<std::string> next_steps(const Summary& summary) {
 
 std::vector<std::string> standing_unknowns(const Summary& summary) {
   std::vector<std::string> unknowns;
+  const bool solid = summary.best.count("density") > 0;
+  const std::string density = solid ? "density" : "areal_density";
   bool searched_density = false;
   for (const ParameterFinding& finding : summary.parameters)
-    searched_density = searched_density || finding.name == "areal_density";
-  if (!searched_density && !is_fixed_as(summary, "areal_density", "measured"))
-    unknowns.push_back(
-        "The weight: the areal density is taken from the asset, and every stiffness scales with it. Weigh "
-        "the sheet.");
+    searched_density = searched_density || finding.name == density;
+  if (!searched_density && !is_fixed_as(summary, density, "measured"))
+    unknowns.push_back(std::string("The weight: the ") + (solid ? "density" : "areal density") +
+                       " is taken from the asset, and every stiffness scales with it. Weigh the " +
+                       (solid ? "object." : "sheet."));
   std::string assumed;
   for (const auto& [name, fixed] : summary.fixed)
-    if (fixed.source == "assumed" && name != "areal_density")
+    if (fixed.source == "assumed" && name != density)
       assumed += (assumed.empty() ? "" : ", ") + label(summary, name);
   if (!assumed.empty()) unknowns.push_back("Assumed, not measured: " + assumed + ".");
   const auto left_out = [&](const char* setting) {

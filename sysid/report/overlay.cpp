@@ -32,7 +32,7 @@ Overlay make_overlay(const Replay& replay, const Motion& motion, const Recording
   registration.yaw = score.yaw;
   registration.time_offset = score.time_offset;
   const Eigen::Isometry3d move = registration.observed_from_simulated();
-  Overlay overlay{replay.recording.name, replay.recording.mesh.triangles, {}};
+  Overlay overlay{replay.recording.name, replay.surface.triangles, {}};
   for (std::size_t k = 0; k < replay.observations.size(); ++k) {
     OverlayFrame& frame = overlay.frames.emplace_back();
     frame.t = replay.observations[k].t;

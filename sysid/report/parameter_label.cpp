@@ -12,6 +12,7 @@ ParameterLabel parameter_label(const std::string& name, bool has_thickness) {
       {"bending_ratio", {"bending, weft over warp", "D₂/D₁", ""}},
       {"friction", {"friction", "μ", ""}},
       {"areal_density", {"areal density", "ρ", "kg/m²"}},
+      {"density", {"density", "ρ", "kg/m³"}},
       {"air_drag", {"air drag", "α", "1/s"}},
       {"stiffness_damping", {"stiffness damping", "β", "s"}},
       {"start_yaw", {"start yaw of the sheet", "ψ", "rad"}},

@@ -194,7 +194,7 @@ Json map_axes(const Summary& summary, const std::array<std::string, 2>& names) {
 
 std::string render_report(const Summary& summary, const GridResults& results,
                           const std::vector<Overlay>& overlays, const ReportSettings& settings) {
-  const bool has_thickness = summary.settings.count("thickness_m") > 0;
+  const bool has_thickness = young_is_in_pascal(summary);
   Json json;
   json["parameters"] = parameters_of(summary, has_thickness);
   json["fixed"] = fixed_of(summary, has_thickness);

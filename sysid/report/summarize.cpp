@@ -39,11 +39,21 @@ std::map<std::string, double> parameters_of(const data::SheetMaterial& material,
           {"stiffness_damping", material.stiffness_damping}};
 }
 
+std::map<std::string, double> parameters_of(const ReplayCandidate& candidate,
+                                            std::optional<double> thickness) {
+  if (!candidate.solid) return parameters_of(candidate.material, thickness);
+  const data::SolidMaterial& material = *candidate.solid;
+  return {{"young", material.youngs_modulus}, {"poisson", material.poissons_ratio},
+          {"density", material.density},      {"friction", material.friction},
+          {"air_drag", material.air_drag},    {"stiffness_damping", material.stiffness_damping}};
+}
+
 // What was held, and on whose word: a measurement, or an assumption of the command line or the asset.
 std::map<std::string, FixedParameter> fixed_of(const Summary& summary, const GridSettings& settings) {
   std::map<std::string, FixedParameter> fixed;
   for (const Axis& axis : settings.fixed) fixed[axis.name] = {axis.values.front(), "measured"};
-  for (const char* name : {"young", "poisson", "bending", "friction", "areal_density"}) {
+  for (const char* name : {"young", "poisson", "bending", "friction", "areal_density", "density"}) {
+    if (summary.best.count(name) == 0) continue;
     const Axis* axis = axis_named(settings.axes, name);
     const bool follows_young = std::string(name) == "bending" && settings.base.bending_from_thickness;
     if (fixed.count(name) || follows_young || (axis && axis->values.size() > 1)) continue;
@@ -69,7 +79,7 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
 }
 
 /// "lift: the model does not fit: ..."; empty where it fits.
-std::string warning_of_misfit(const SummaryRecording& recording) {
+std::string warning_of_misfit(const SummaryRecording& recording, const std::string& object) {
   const Misfit& misfit = recording.misfit;
   if (model_fits(misfit)) return "";
   const auto mm = [](double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; };
@@ -78,7 +88,7 @@ std::string warning_of_misfit(const SummaryRecording& recording) {
     worth = "; " + std::to_string(misfit.keyframes) + " keyframes are worth " +
             data::format_short(std::round(10 * misfit.worth) / 10);
   return recording.name + ": the model does not fit: apart from noise of " + mm(misfit.noise) +
-         " it misses the cloth by " + mm(misfit.size) +
+         " it misses the " + object + " by " + mm(misfit.size) +
          (misfit.explained > 0 ? " where repeatability explains " + mm(misfit.explained) : "") + worth +
          ". The intervals allow for it, but are those of a model that does not fit";
 }
@@ -170,11 +180,17 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
   texts["mesh"] = replay.recording.mesh_spec + " (" +
                   data::format_count(static_cast<std::size_t>(replay.sheet().rest.vertices.rows())) +
                   " vertices)";
-  texts["object_mesh"] = data::is_mesh_spec(replay.object_mesh)
+  texts["object_mesh"] = data::is_made_on_the_spot(replay.object_mesh)
                              ? replay.object_mesh
                              : std::filesystem::absolute(replay.object_mesh).lexically_normal().string();
-  texts["constitutive"] = data::to_string(settings.base.material.constitutive);
-  texts["bending_model"] = data::to_string(settings.base.material.bending_model);
+  if (const auto& solid = settings.base.solid) {
+    texts["element_type"] = "TETRAHEDRON";
+    texts["element_order"] = replay.settings.element_order == data::ElementOrder::quadratic ? "2" : "1";
+    texts["constitutive"] = data::to_string(solid->constitutive);
+  } else {
+    texts["constitutive"] = data::to_string(settings.base.material.constitutive);
+    texts["bending_model"] = data::to_string(settings.base.material.bending_model);
+  }
   texts["time_step_s"] = data::format_number(replay.settings.solver.time_step);
   texts["max_iterations"] = std::to_string(replay.settings.solver.max_iterations);
   texts["tolerance"] = data::format_number(replay.settings.solver.tolerance);
@@ -221,8 +237,8 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   }
   const CandidateResult& estimate = answer.estimate;
   const ReplayCandidate candidate = candidate_at(answer.values, settings);
-  summary.best = parameters_of(candidate.material, settings.base.thickness);
-  summary.membrane_stiffness = candidate.material.membrane_stiffness;
+  summary.best = parameters_of(candidate, settings.base.thickness);
+  if (!candidate.solid) summary.membrane_stiffness = candidate.material.membrane_stiffness;
   summary.best_score = answer.fit.score.score;
   summary.score_on_mesh = estimate.score;
   const bool on_mesh = answer.fit.replays.empty() || answer.fit.score.score == estimate.score;
@@ -246,8 +262,9 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
         summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
     if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
   }
+  const std::string object = settings.base.solid ? "object" : "cloth";
   for (const SummaryRecording& recording : summary.recordings)
-    if (const std::string warning = warning_of_misfit(recording); !warning.empty())
+    if (const std::string warning = warning_of_misfit(recording, object); !warning.empty())
       summary.warnings.push_back(warning);
   for (const std::string& warning : warnings_of(summary, estimate, results.candidates, replays, settings))
     summary.warnings.push_back(warning);

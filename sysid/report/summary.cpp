@@ -308,6 +308,10 @@ void check_values(const Summary& summary, const std::string& path) {
 
 }  // namespace
 
+bool young_is_in_pascal(const Summary& summary) {
+  return summary.settings.count("thickness_m") > 0 || summary.settings.count("element_type") > 0;
+}
+
 double duration_of(const SummaryRecording& recording) {
   double first = INFINITY, last = -INFINITY;
   for (const SummaryFrame& frame : recording.frames) {

@@ -38,6 +38,11 @@ struct SummaryRecording {
   std::vector<SummaryFrame> frames;
 };
 
+struct Summary;
+
+/// Whether young is E [Pa], of a solid or beside a thickness, and not E t [N/m].
+bool young_is_in_pascal(const Summary& summary);
+
 /// From the first to the last keyframe that counts [s].
 double duration_of(const SummaryRecording& recording);
 

@@ -168,8 +168,9 @@ TEST_F(RecordingFiles, MarkersContourAndForce) {
   folder_.write("marks.csv", "vertex,x,y,z\n3,0.1,0.2,0.3\n");
   json_["keyframes"][0] = {{"t", 0}, {"markers", "marks.csv"}, {"contour", "frames/000.ply"}};
   std::vector<std::string> notices;
-  const std::vector<Keyframe> keyframes = load_keyframes(load(), notices);
-  EXPECT_EQ(keyframes[0].marker_vertices, std::vector<int>{3});
+  const Recording recording = load();
+  const std::vector<Keyframe> keyframes = load_keyframes(recording, notices);
+  EXPECT_EQ(keyframes[0].marker_places.row(0), recording.mesh.vertices.row(3));
   EXPECT_EQ(keyframes[0].markers.row(0), Eigen::RowVector3d(0.1, 0.2, 0.3));
   EXPECT_EQ(keyframes[0].contour.rows(), 2);
   folder_.write("marks.csv", "vertex,x,y,z\n25,0.1,0.2,0.3\n");
@@ -205,7 +206,7 @@ TEST_F(RecordingFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed("/grasps/0/select/corner", {2, 0}),
             "grasps[0].select.corner: found [2,0], expected [i, j], each 0 or 1");
   EXPECT_EQ(changed("/grasps/0/select/vertices", {1}),
-            "grasps[0].select: expected exactly one of corner, vertices and position");
+            "grasps[0].select: expected exactly one of corner, vertices, position and box");
   EXPECT_EQ(changed("/grasps/0/select", {{"vertices", {25}}}),
             "grasps[0].select.vertices: found [25], expected indices below 25, the vertices of the mesh");
   EXPECT_EQ(changed("/crop/min/1", 2), "crop.min: found [null,2,0.02], expected below max on every axis");

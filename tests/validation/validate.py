@@ -6,6 +6,7 @@ import pathlib
 import shutil
 
 import beam
+import beam_search
 import handeye
 import convergence
 import lifts
@@ -49,6 +50,7 @@ def main():
         document |= convergence.tables(options.sim, options.out, tables.table)
     if options.only in (None, "beam") and options.sim:
         document |= beam.tables(options.sim, options.data / "beam", options.out, tables.table)
+        document |= beam_search.tables(runs, options.data / "beam", tables.table)
     if options.only in (None, "lifts"):
         results = run_lifts(runs, options.data)
         document |= tables.lift_tables(results)

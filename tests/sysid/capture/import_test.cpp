@@ -246,7 +246,7 @@ TEST_F(ImportFiles, TheAssetIsNamedFromTheRecording) {
 }
 
 TEST_F(ImportFiles, WhatFailsItsCheckLeavesNothing) {
-  const data::GraspSelection corner = settings_.grasp;
+  const data::Selection corner = settings_.grasp;
   settings_.grasp.corner.reset();
   settings_.grasp.position =
       Eigen::Vector3d::Zero();  // the sheet would lie at the origin, half a metre from the gripper

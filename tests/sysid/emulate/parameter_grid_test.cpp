@@ -43,7 +43,7 @@ TEST(ParameterGrid, NamesWhatIsWrong) {
   const std::vector<Axis> many = {parse_axis("bending", "1e-6:1e-3:100000"),
                                   parse_axis("friction", "0.1:1:100000")};
   EXPECT_NE(message_of([&] {
-              check_axes(many, data::SheetMaterial{});
+              check_axes(many, {});
             }).find("--bending, --friction: found 1e+10 candidates, expected at most 1,000,000"),
             std::string::npos);
   EXPECT_NE(message_of([] { parse_axis("poisson", "0.7"); }).find("expected -0.99 to 0.5"),
@@ -53,9 +53,9 @@ TEST(ParameterGrid, NamesWhatIsWrong) {
 
 TEST(ParameterGrid, AWeaveIsSearchedWhereBendingIsThatOfAPlate) {
   const std::vector<Axis> axes = {parse_axis("bending_ratio", "1:5:3")};
-  EXPECT_EQ(message_of([&] { check_axes(axes, data::SheetMaterial{}); }), "");
+  EXPECT_EQ(message_of([&] { check_axes(axes, {}); }), "");
   EXPECT_NE(message_of([&] {
-              check_axes(axes, {.bending_model = data::BendingModel::hinge});
+              check_axes(axes, {{.bending_model = data::BendingModel::hinge}, {}});
             }).find("--bending-ratio: found bending_model hinge, expected plate"),
             std::string::npos);
   EXPECT_EQ(make_candidate({}, axes, {3}).material.weave, (data::Weave{.bending_ratio = 3}));
@@ -102,10 +102,36 @@ TEST(ParameterGrid, ParametersOfAPinchNeedAPinch) {
 
 TEST(ParameterGrid, RefusesYoungAndPoissonTogetherUnderArap) {
   const std::vector<Axis> axes = {parse_axis("young", "1e3:1e6:4:log"), parse_axis("poisson", "0:0.4:3")};
-  EXPECT_NE(message_of([&] { check_axes(axes, arap); }).find("E / (1 + nu)"), std::string::npos);
-  EXPECT_EQ(message_of([&] { check_axes(axes, data::SheetMaterial{}); }), "");
-  EXPECT_EQ(message_of([&] { check_axes({axes[0], parse_hold("poisson=0.3").axis}, arap); }), "");
-  EXPECT_NE(message_of([&] { check_axes({axes[0], axes[0]}, arap); }).find("twice"), std::string::npos);
+  EXPECT_NE(message_of([&] { check_axes(axes, {arap, {}}); }).find("E / (1 + nu)"), std::string::npos);
+  EXPECT_EQ(message_of([&] { check_axes(axes, {}); }), "");
+  EXPECT_EQ(message_of([&] { check_axes({axes[0], parse_hold("poisson=0.3").axis}, {arap, {}}); }), "");
+  EXPECT_NE(message_of([&] { check_axes({axes[0], axes[0]}, {arap, {}}); }).find("twice"), std::string::npos);
+}
+
+TEST(ParameterGrid, SolidsAndSheetsHaveTheirOwnParameters) {
+  MaterialBase solid;
+  solid.solid = data::SolidMaterial{};
+  const auto message = [](const char* name, const char* values, const MaterialBase& base) {
+    return message_of([&] { check_axes({parse_axis(name, values)}, base); });
+  };
+  for (const char* name : {"young", "density", "friction", "air_drag", "stiffness_damping"})
+    EXPECT_EQ(message(name, "1:2:2", solid), "") << name;
+  EXPECT_EQ(message("bending", "1:2:2", solid), "--bending: found a solid, expected a sheet");
+  EXPECT_EQ(message("areal_density", "1:2:2", solid),
+            "--areal-density: found a solid, expected a sheet; a solid has --density");
+  EXPECT_EQ(message("poisson", "0.3:0.5:2", solid), "--poisson: found 0.5, expected below 0.5 for a solid");
+  EXPECT_EQ(message("density", "1:2:2", {}),
+            "--density: found a sheet, expected a solid; a sheet has --areal-density");
+  const std::vector<Axis> axes = {parse_axis("young", "2e5"), parse_axis("poisson", "0.4"),
+                                  parse_axis("density", "900"), parse_axis("stiffness_damping", "0.01")};
+  const ReplayCandidate candidate = make_candidate(solid, axes, {2e5, 0.4, 900, 0.01});
+  data::SolidMaterial expected;
+  expected.youngs_modulus = 2e5;
+  expected.poissons_ratio = 0.4;
+  expected.density = 900;
+  expected.stiffness_damping = 0.01;
+  EXPECT_EQ(candidate.solid, expected);
+  EXPECT_FALSE(make_candidate({}, {}, {}).solid);
 }
 
 TEST(ParameterGrid, ProductHoldsEveryCombinationOnceLastAxisFastest) {

@@ -45,6 +45,37 @@ Eigen::VectorXd normal(std::mt19937& random, Eigen::Index count) {
   return Eigen::VectorXd::NullaryExpr(count, [&](Eigen::Index) { return draw(random); });
 }
 
+// Three markers at rest: nothing tells what is rough from what is smooth.
+TEST(Discrepancy, NoiseAndMisfitOfAFewMarkersAreWhatTheParametersLeave) {
+  ObservedRows rows;
+  rows.times = {4};
+  rows.places.resize(9, 2);
+  rows.weights = Eigen::VectorXd::Ones(9);
+  for (int i = 0; i < 9; ++i) {
+    rows.keyframe.push_back(0);
+    rows.channel.push_back(i % 3);
+    rows.places.row(i) << 0.1, 0.015 * (i / 3);
+  }
+  rows.rates = Eigen::VectorXd::LinSpaced(9, -6e-3, 2e-3);
+  constexpr int kSeeds = 200;
+  double sum = 0;
+  for (unsigned seed = 0; seed < kSeeds; ++seed) {
+    std::mt19937 random(seed);
+    const Eigen::VectorXd y = kNoise * normal(random, 9) + rows.rates;
+    const DiscrepancyModel model(rows, y);
+    sum += std::pow(model.noise(), 2) + std::pow(model.misfit().size, 2);
+    EXPECT_FALSE(model.misfit().found);
+    const ResidualLikelihood likelihood(rows, y);
+    EXPECT_TRUE(std::isfinite(likelihood.deviance(y)));
+    // Rows have the whole variance, in the mean over them.
+    const Eigen::MatrixXd each = model.covariance_of(Eigen::MatrixXd::Identity(9, 9));
+    EXPECT_NEAR(each.trace() / 9, 2 * model.noise() * model.noise(), 1e-9 * model.noise() * model.noise());
+  }
+  // Sum of squares over eight degrees of freedom; its mean over the seeds scatters by sqrt(2 / 8 / 200) = 3.5
+  // %.
+  EXPECT_NEAR(sum / kSeeds, kNoise * kNoise, 0.15 * kNoise * kNoise);
+}
+
 TEST(Discrepancy, LikelihoodIsThatOfTheDenseCovariance) {
   ObservedRows rows = strip_rows(3, 47);  // of which all coordinates are kept
   std::mt19937 random(1);

@@ -51,7 +51,7 @@ Motion motion_at(const data::TriangleMesh& mesh, const std::vector<double>& valu
 class Problem {
  public:
   Problem() : axes_(searched()) {
-    data::TriangleMesh& mesh = replay_.recording.mesh;
+    data::TriangleMesh& mesh = replay_.surface;
     mesh = flat_sheet(kCells);
     replay_.queries = std::make_shared<const SheetDistance>(mesh.triangles, mesh.vertices);
     replay_.pivot = Eigen::Vector3d(0.2, 0.15, 0);
@@ -91,7 +91,7 @@ class Problem {
     registration.time_offset = bounds.time * even(random);
     registration.pivot = replay_.pivot;
     registration.up = replay_.up;
-    const data::TriangleMesh& mesh = replay_.recording.mesh;
+    const data::TriangleMesh& mesh = replay_.surface;
     // The emulator is what is tested with: the motion is its own, the bulge beside it.
     Motion motion = interpolant_->at(values);
     const double size = normal(random);
@@ -134,7 +134,7 @@ class Problem {
     const std::vector<double> middle = {axes_[0].values[2], axes_[1].values[2]};
     const auto one = [&](double size) {
       ReplayResult result;
-      result.motion = motion_at(replay_.recording.mesh, middle, size);
+      result.motion = motion_at(replay_.surface, middle, size);
       result.finite = result.converged = true;
       return std::make_shared<const Motions>(Motions{{replay_}, {result}});
     };

@@ -14,7 +14,7 @@ namespace {
 struct Cloth {
   Replay replay;
   explicit Cloth(int cells) {
-    data::TriangleMesh& mesh = replay.recording.mesh;
+    data::TriangleMesh& mesh = replay.surface;
     mesh = flat_sheet(cells);
     replay.queries = std::make_shared<const SheetDistance>(mesh.triangles, mesh.vertices);
     for (int k = 0; k < 10; ++k) {
@@ -26,10 +26,10 @@ struct Cloth {
   }
   /// Bulge that grows and wanders, far from straight in its size: it turns as it grows.
   Motion bulged(double size) const {
-    Motion motion = moving_sheet_motion(replay.recording.mesh, 0.1, 10);
+    Motion motion = moving_sheet_motion(replay.surface, 0.1, 10);
     for (data::Points& positions : motion.positions)
       for (Eigen::Index i = 0; i < positions.rows(); ++i) {
-        const Eigen::RowVector3d rest = replay.recording.mesh.vertices.row(i);
+        const Eigen::RowVector3d rest = replay.surface.vertices.row(i);
         const double there = std::exp(-20 * (rest.head<2>() - Eigen::RowVector2d(0.25, 0.2)).squaredNorm());
         positions.row(i) += size * there * Eigen::RowVector3d(0.6, 0.2, 0.8);
       }
@@ -39,7 +39,7 @@ struct Cloth {
     for (Observation& observation : replay.observations) {
       data::Points positions;
       surface_at(motion, observation.t, positions);
-      const data::Triangles& triangles = replay.recording.mesh.triangles;
+      const data::Triangles& triangles = replay.surface.triangles;
       observation.points.resize(triangles.rows(), 3);
       for (Eigen::Index i = 0; i < triangles.rows(); ++i)
         observation.points.row(i) = (positions.row(triangles(i, 0)) + positions.row(triangles(i, 1)) +
@@ -67,8 +67,7 @@ TEST(MotionChange, IsThatOfEachVertexWhateverTheMeshItWasSimulatedOn) {
                         shifts_of(from_to(fine, fine.bulged(0), fine, fine.bulged(0.01)), 0, fine.replay, 0),
                     other = shifts_of(from_to(fine, fine.bulged(0), fine, fine.bulged(0.01)), 0,
                                       coarse.replay, 0);
-  const Eigen::SparseMatrix<double> to_fine =
-      prolongation(coarse.replay.recording.mesh, fine.replay.recording.mesh);
+  const Eigen::SparseMatrix<double> to_fine = prolongation(coarse.replay.surface, fine.replay.surface);
   ASSERT_EQ(other.size(), 10u);
   // Linear interpolation of a bulge that bends by 40 / m^2 of its size over cells of 50 mm.
   for (const std::size_t k : {0, 4, 9})
@@ -122,7 +121,7 @@ TEST(MotionLikelihood, WhatIsCorrectedIsTakenForGranted) {
 TEST(MotionLikelihood, ReadsTheStepsAtItsClockAndTellsWhereItLacksOne) {
   Cloth cloth(12);
   cloth.replay.recording.nuisance.time = 0.3;
-  Motion motion = moving_sheet_motion(cloth.replay.recording.mesh, 0.02, 60);
+  Motion motion = moving_sheet_motion(cloth.replay.surface, 0.02, 60);
   cloth.see(motion);
   ScoreSettings settings;
   const MotionLikelihood likelihood({cloth.replay}, result_of(motion), settings, {}, {}, {});

@@ -21,7 +21,7 @@ struct SeenSheet {
     const auto jitter = [&](double size) {
       return Eigen::RowVector3d(size * even(random), size * even(random), size * even(random));
     };
-    data::TriangleMesh& mesh = replay.recording.mesh;
+    data::TriangleMesh& mesh = replay.surface;
     mesh = flat_sheet(6);
     replay.pivot = Eigen::Vector3d(0.1, 0.2, 0);
     motion = moving_sheet_motion(mesh, 0.05, 12);
@@ -38,7 +38,7 @@ struct SeenSheet {
         for (Eigen::Index i = 0; i < points->rows(); ++i)
           points->row(i) = positions.row(static_cast<Eigen::Index>(random() % 49)) + jitter(0.02);
       for (int i = 0; i < 4; ++i) {
-        SurfacePoint mark;
+        Mark mark;
         mark.triangle = static_cast<int>(random() % static_cast<unsigned>(mesh.triangles.rows()));
         mark.barycentric = {0.2, 0.3, 0.5};
         observation.marks.push_back(mark);
@@ -85,17 +85,17 @@ TEST(LinearObservations, DistancesOnAnotherMotionAreThoseOfItsOwnRows) {
 // A flat sheet at rest and points 3 mm above it: 3 mm, and 5 mm where the sheet is shifted down by 2 mm.
 TEST(LinearObservations, DistancesAreSignedAlongTheNormal) {
   Replay replay;
-  replay.recording.mesh = flat_sheet(4);
+  replay.surface = flat_sheet(4);
   Observation observation{.t = 0};
-  observation.points = replay.recording.mesh.vertices.middleRows(6, 3);
+  observation.points = replay.surface.vertices.middleRows(6, 3);
   observation.points.col(2).array() += 0.003;
   replay.observations = {observation};
-  const Motion motion{0, 0.1, {replay.recording.mesh.vertices, replay.recording.mesh.vertices}};
+  const Motion motion{0, 0.1, {replay.surface.vertices, replay.surface.vertices}};
   const LinearObservations places(replay, motion, {}, {});
   SheetDistance sheet = sheet_of(replay);
   std::vector<int> triangles;
   SheetShifts down(1);
-  down[0].positions = data::Points::Zero(replay.recording.mesh.vertices.rows(), 3);
+  down[0].positions = data::Points::Zero(replay.surface.vertices.rows(), 3);
   down[0].positions.col(2).setConstant(-0.002);
   for (Eigen::Index i = 0; i < 3; ++i) {
     const Eigen::VectorXd own = places.distances(replay, motion, {}, {}, sheet, triangles),

@@ -292,7 +292,7 @@ TEST(Replay, UnderOtherSettingsIsThatOfItsFilesWithoutThem) {
   settings.solver.time_step *= 0.5;
   const Replay read = make_replay(data::load_recording(folder / "lift"), settings);
   replay.observations[3].weight = 0.5;
-  SurfacePoint mark;  // the middle of an edge from the corner
+  Mark mark;  // the middle of an edge from the corner
   mark.triangle = 0;
   mark.barycentric = {0.5, 0.5, 0};
   replay.observations[3].marks = {mark};
@@ -310,7 +310,11 @@ TEST(Replay, UnderOtherSettingsIsThatOfItsFilesWithoutThem) {
   const data::TriangleMesh& coarse = replay.recording.mesh;
   const Eigen::RowVector3d middle =
       0.5 * (coarse.vertices.row(coarse.triangles(0, 0)) + coarse.vertices.row(coarse.triangles(0, 1)));
-  EXPECT_LT((made.observations[3].marks[0].position.transpose() - middle).norm(), 1e-12);
+  const Mark& found = made.observations[3].marks[0];
+  EXPECT_LT((mark_position(found, corners_of(made.surface.vertices, made.surface.triangles, found.triangle)) -
+             middle.transpose())
+                .norm(),
+            1e-12);
 }
 
 }  // namespace

@@ -20,6 +20,36 @@ data::Asset towel() {
   return asset;
 }
 
+TEST(ExportAsset, OfASolidHasItsDensityAndWhatWasTold) {
+  data::Asset asset;
+  asset.source = "silicone.json";
+  asset.mesh = "box:0.1x0.03x0.03:0.015";
+  asset.element_type = data::ElementType::tetrahedron;
+  asset.element_order = data::ElementOrder::quadratic;
+  asset.constitutive = data::Constitutive::tet_neohookean;
+  asset.young = 2e5;
+  asset.poisson = 0.48;
+  asset.mass = 0.09;
+  Summary summary = example_summary();
+  summary.best = {{"young", 2.6e5},  {"poisson", 0.499}, {"density", 1070.0},
+                  {"friction", 0.3}, {"air_drag", 0.0},  {"stiffness_damping", 0.01}};
+  summary.settings["object_mesh"] = "box:0.1x0.03x0.03:0.01";
+  summary.parameters.resize(2);
+  summary.parameters[0].name = "young";
+  summary.parameters[0].identifiable = Identifiable::yes;
+  summary.parameters[0].estimate = 2.61e5;
+  summary.parameters[1].name = "poisson";
+  summary.parameters[1].identifiable = Identifiable::no;
+  const data::Asset tuned = tuned_asset(asset, summary);
+  EXPECT_EQ(tuned.mesh, "box:0.1x0.03x0.03:0.01");
+  EXPECT_EQ(tuned.element_order, data::ElementOrder::quadratic);
+  EXPECT_EQ(tuned.young, 2.61e5);
+  EXPECT_EQ(tuned.poisson, 0.48);  // not told: the asset's
+  EXPECT_EQ(tuned.density, 1070);
+  EXPECT_FALSE(tuned.mass || tuned.areal_density || tuned.bending_rigidity);
+  EXPECT_EQ(tuned.stiffness_damping, 0.01);
+}
+
 TEST(ExportAsset, TakesEstimatesWhereKnownAndTheAssetsValueElsewhere) {
   const data::Asset tuned = tuned_asset(towel(), example_summary());
   EXPECT_EQ(tuned.bending_rigidity, 1.1e-4);  // identified: the estimate, not the best grid value 1e-4

@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""A clamped beam of known Young's modulus, made by synth from a recording of markers, searched and exported: the interval
+holds the truth, Poisson's ratio is not claimed, and bad input is refused in one line without a trace."""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+MESH = "box:0.1x0.03x0.03:0.015"
+TRUTH = {"young": 2.8e5, "poisson": 0.47}
+PLACES = {"base": (0.006, 0.04, 0), "corner": (0.1, 0.036, 0.006), "side": (0.1, -0.006, 0.024), "tip": (0.1, 0.015, 0.036)}
+REST = ["--time-step", "1", "--tolerance", "1e-6"]  # long steps: at rest
+SEARCH = ["--young", "2e5:4e5:3:log", "--poisson", "0.45:0.499:2", "--hold", "density=1070:measured", "--from", "1", *REST]
+
+
+def write(folder, tracks="t,marker,x,y,z\n", **fields):
+    folder.mkdir(parents=True, exist_ok=True)
+    for time in (0, 4, 4.5):
+        tracks += "".join(f"{time},{name},{x},{y},{z}\n" for name, (x, y, z) in PLACES.items())
+    (folder / "tracks.csv").write_text(tracks)
+    (folder / "recording.json").write_text(json.dumps({
+        "schema": "flash-recording/1", "name": "beam", "kind": "cantilever", "object": {"mesh": MESH},
+        "supports": [{"name": "clamp", "select": {"box": {"max": [0, None, None]}}}],
+        "markers": {"tracks": "tracks.csv", "on_support": ["base"]}, **fields}))
+    return folder
+
+
+def asset(path, **props):
+    path.write_text(json.dumps({
+        "schema": "flash-asset/1", "mesh": MESH, "element_type": "TETRAHEDRON", "element_order": 2,
+        "mechanical_props": {"density": 1070, "young": 2.5e5, "poisson": 0.48, "constitutive": "TET_NEOHOOKEAN", **props}}))
+    return path
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sysid", required=True)
+    sysid = str(pathlib.Path(parser.parse_args().sysid).resolve())
+    with tempfile.TemporaryDirectory() as temporary:
+        check(sysid, pathlib.Path(temporary))
+
+
+def check(sysid, folder):
+    def run(*words):
+        return subprocess.run([sysid, *map(str, words)], capture_output=True, text=True, cwd=folder)
+
+    def expect(done, code):
+        if done.returncode != code:
+            sys.exit(f"{' '.join(done.args)}: exit code {done.returncode}, expected {code}\n{done.stderr}")
+        return done
+
+    like, silicone = write(folder / "like"), asset(folder / "silicone.json")
+    # The truth stands on a mesh of half the cell of the one that is searched, noise is a fiftieth of the sag.
+    expect(run("synth", "--like", like, "--asset", silicone, "--mesh", MESH.replace("0.015", "0.0075"), *REST[:2],
+               *(word for name, value in TRUTH.items() for word in ("--hold", f"{name}={value}")),
+               "--marker-noise", "1e-4", "-o", folder / "twin"), 0)
+    truth = json.loads((folder / "twin/truth.json").read_text())["parameters"]
+    assert all(truth[name] == value for name, value in TRUTH.items()), truth
+    expect(run("grid", folder / "twin", "--asset", silicone, "--mesh", MESH, *SEARCH, "-o", folder / "run"), 0)
+    found = json.loads((folder / "run/summary.json").read_text())["parameters"]
+    low, high = found["young"]["interval95"]
+    assert low < TRUTH["young"] < high, (low, high)
+    assert found["poisson"]["identifiable"] == "no", found["poisson"]
+    expect(run("export", folder / "run", "-o", folder / "tuned.json"), 0)
+    tuned = json.loads((folder / "tuned.json").read_text())
+    assert tuned["element_type"] == "TETRAHEDRON" and tuned["element_order"] == 2
+    assert tuned["mechanical_props"]["poisson"] == 0.48  # the asset's: it is not told
+    assert tuned["mechanical_props"]["density"] == 1070
+    expect(run("replay", folder / "twin", "--asset", folder / "tuned.json", *REST, "-o", folder / "overlay"), 0)
+
+    sheet = folder / "sheet.json"
+    sheet.write_text(json.dumps({"mesh": "sheet:0.1x0.1:0.02", "mechanical_props": {
+        "obj_mass": 0.01, "young": 100, "poisson": 0.3, "constitutive": "TRI_COROTATED", "bending": 1e-5}}))
+    late = write(folder / "late", supports=[{"from": -1, "select": {"box": {"max": [0, None, None]}}}])
+    cases = [
+        (("grid", like, "--asset", silicone, "--bending", "1e-6:1e-3:2"), "--bending: found a solid, expected a sheet"),
+        (("grid", like, "--asset", silicone, "--poisson", "0.4:0.5:2"), "--poisson: found 0.5, expected below 0.5"),
+        (("grid", like, "--asset", silicone, "--hold", "areal_density=1", *SEARCH[:2]), "--areal-density: found a solid"),
+        (("grid", like, "--asset", sheet, *SEARCH[:2]), "element_type: found TRIANGLE, expected TETRAHEDRON"),
+        (("grid", like, "--asset", silicone, "--mesh", "sheet:0.1x0.1:0.05", *SEARCH[:2]), "--mesh: found sheet:"),
+        (("grid", late, "--asset", silicone, *SEARCH[:2]), 'markers.placed: marker "corner" is missing'),
+        (("grid", write(folder / "inf", "t,marker,x,y,z\n-1,tip,inf,0,0\n"), "--asset", silicone, *SEARCH[:2]),
+         "tracks.csv: line 2: found \"inf\", expected a finite number"),
+        (("grid", write(folder / "nobody", supports=[{"select": {"box": {"min": [9, 9, 9]}}}]), "--asset", silicone,
+          *SEARCH[:2]), "supports[0].select: no vertex"),
+        (("plan", like, "--asset", silicone), "object.mesh: found a solid, expected a sheet"),
+        (("replay", like, "--asset", silicone, "--hold", "bending=1"), "found a solid"),
+        (("synth", "--asset", silicone, "--marker-noise", "1e-4"), "--like"),
+    ]
+    for words, message in cases:
+        out = folder / "refused"
+        done = expect(run(*words, "-o", out), 2)
+        if message not in done.stderr or len(done.stderr.strip().splitlines()) > 1 or out.exists():
+            sys.exit(f"{' '.join(map(str, words))}: said \"{done.stderr}\", expected one line with \"{message}\" and no files")
+
+
+if __name__ == "__main__":
+    main()
