@@ -47,7 +47,7 @@ TEST(AprilTagFinder, CornersOfAStandardTagAreThoseOfItsBorder) {
   expect_corners_of_the_border("Standard41h12", tagStandard41h12_create(), tagStandard41h12_destroy);
 }
 
-// Its table of codes takes a gigabyte.
+// The largest family; with all codes that are two bits off a detector takes gigabytes and half a minute.
 TEST(AprilTagFinder, CornersOfALargeStandardTagAreThoseOfItsBorder) {
   expect_corners_of_the_border("Standard52h13", tagStandard52h13_create(), tagStandard52h13_destroy);
 }
