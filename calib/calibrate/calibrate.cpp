@@ -1,6 +1,7 @@
 #include "calib/calibrate/calibrate.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -275,6 +276,31 @@ void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_
   if (depends) result.usable = false;
 }
 
+/// An answer for arms that share a lens keeps it as it is stated. What the lens may be off drops out between
+/// the arms, but not of where the camera is.
+void add_shared_lens(Calibration& result, Bundle plain, RefineSettings refine_settings,
+                     const data::CameraIntrinsics& camera, const LensCovariance& stated) {
+  refine_settings.bundle.unknowns.intrinsics = kLensUnknowns;
+  plain.priors.lenses = {lens_prior(camera, stated)};
+  const Refinement refined = refine(std::move(plain), refine_settings);
+  const Vector6d away = motion_between(result.poses.X, refined.bundle.cameras.front());
+  const Matrix6d more = refined.covariance.topLeftCorner<6, 6>() - result.repeatable;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(more);
+  result.covariance += eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() *
+                           eigen.eigenvectors().transpose() +
+                       away * away.transpose();
+  const LensEstimate lens =
+      lens_estimate(refined.bundle, refine_settings.bundle.unknowns, refined.covariance);
+  if (lens.far_off.empty()) return;
+  char text[200];
+  std::snprintf(
+      text, sizeof text,
+      "; it was kept, as arms on one camera share it, and the camera is %.1f mm and %.2f deg from where "
+      "it is with the other: calibrate the lens",
+      1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
+  result.warnings.insert(result.warnings.begin(), lens_differs(lens) + text);
+}
+
 void warn(Calibration& result) {
   std::size_t missing = 0;
   for (const ViewResult& view : result.views) missing += view.used ? 0 : 1;
@@ -395,6 +421,8 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   }
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
+  if (settings.lens != given.lens)
+    add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
   const bool plausible = finish(result, observations);
   if (given.lens == LensKnowledge::stated)

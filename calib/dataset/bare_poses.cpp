@@ -16,7 +16,7 @@ using Row = std::vector<double>;
 constexpr double kTurn = 2 * M_PI + 1e-6;
 
 std::vector<Row> read_rows(const std::string& path) {
-  const std::string text = data::read_file(path);
+  const std::string text = read_text(path);
   std::vector<Row> rows;
   data::LineReader lines(text);
   for (std::string_view line; lines.next(line);) {

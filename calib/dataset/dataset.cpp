@@ -112,7 +112,7 @@ PoseList load_poses(const fs::path& source) {
 std::string find_camera(const fs::path& folder) {
   for (const fs::path& place : {folder, folder.parent_path()}) {
     for (const char* name :
-         {"camera_info", "camera", "intrinsics", "calibration", "camera_matrix", "camera_params"})
+         {"camera_info", "camera", "intrinsics", "calibration", "calib", "camera_matrix", "camera_params"})
       for (const char* ending : {".yaml", ".yml", ".json", ".npz"})
         if (fs::exists(place / (std::string(name) + ending)))
           return (place / (std::string(name) + ending)).string();
@@ -271,11 +271,14 @@ std::string choose_poses(const fs::path& folder, const DatasetOptions& options) 
   const std::vector<fs::path> sources = pose_sources(folder);
   const std::vector<fs::path> pairs = pair_files(folder);
   if (sources.empty() && pairs.size() == 1) return pairs.front().string();
-  if (sources.empty())
-    throw InputError(
-        folder.string() +
-        ": found no poses, expected poses.tum, .csv, .txt or .json, or poses/*.yaml or *.txt (or name "
-        "them)");
+  if (sources.empty()) {
+    std::string instead;
+    for (const char* name : {"poses.yaml", "poses.yml", "poses.npz", "poses.npy"})
+      if (fs::exists(folder / name)) instead = std::string(": found ") + name + ", which is not read";
+    throw InputError(folder.string() + (instead.empty() ? std::string(": found no poses") : instead) +
+                     ", expected poses.tum, .csv, .txt or .json, or poses/*.yaml or *.txt, one pose a file "
+                     "(or name them)");
+  }
   if (sources.size() > 1)
     throw InputError(folder.string() + ": found poses in " + sources[0].filename().string() + " and in " +
                      sources[1].filename().string() + ", expected one (name it)");

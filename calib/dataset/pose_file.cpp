@@ -161,7 +161,7 @@ void expect_columns(const Columns& columns, const std::string& path) {
 /// Reads the lines below a header; `check` looks at its columns, `read` makes a pose of each line.
 template <class Check, class Read>
 PoseList read_csv(const std::string& path, const Check& check, const Read& read) {
-  const std::string text = data::read_file(path);
+  const std::string text = read_text(path);
   PoseList list;
   Columns columns;
   const char* separator = ",";
@@ -213,7 +213,7 @@ std::vector<std::string> joint_columns(const Columns& columns, const SerialChain
 
 /// The words of the first line that holds any but comments.
 std::vector<std::string> first_words(const std::string& path) {
-  const std::string text = data::read_file(path);
+  const std::string text = read_text(path);
   data::LineReader lines(text);
   for (std::string_view line; lines.next(line);) {
     if (trimmed(line).empty() || line.front() == '#') continue;
@@ -233,7 +233,7 @@ bool has_header(const std::string& path) {
 /// Eight values parted by blanks are TUM's in a file of any name.
 bool is_tum(const std::string& path) {
   if (data::lower_extension(path) == ".csv") return false;
-  const std::string text = data::read_file(path);
+  const std::string text = read_text(path);
   return text.find(',') == std::string::npos && text.find(';') == std::string::npos &&
          first_words(path).size() == 8;
 }
@@ -365,7 +365,8 @@ RecordedPose load_pose_yaml(const std::string& path) {
   pose.stamp = static_cast<double>(*stamp);
   YAML::Node file = load_yaml(path);
   if (file.IsMap() && file.size() == 1 && !file.begin()->second.IsScalar()) file = file.begin()->second;
-  if (file.IsMap() && file["pose"]) file = file["pose"];
+  for (const char* name : {"pose", "transform"})  // of ROS's stamped messages
+    if (file.IsMap() && file[name]) file = file[name];
   if (file.IsMap() && file["qw"]) {
     pose.pose = pose_of(xyz(file, path, "pose"),
                         {yaml_number(file["qx"], path, "qx"), yaml_number(file["qy"], path, "qy"),

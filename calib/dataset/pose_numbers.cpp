@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "calib/geometry/pose.h"
+#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/median.h"
 #include "data/text.h"
@@ -61,6 +63,13 @@ Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::
                           "found " + std::to_string(values.size()) +
                               " numbers, expected a pose: 16 or 12 (matrix), 7 (x y z qx qy qz qw) or 6 (x y "
                               "z and axis times angle)");
+}
+
+std::string read_text(const std::string& path) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  std::string text = data::read_file(path);
+  if (text.starts_with(kMark)) text.erase(0, kMark.size());
+  return text;
 }
 
 bool beyond_reach(std::vector<double> distances) {

@@ -16,6 +16,9 @@ Eigen::Isometry3d pose_of(const Eigen::Matrix4d& matrix, const std::string& path
 Eigen::Isometry3d pose_of_numbers(const std::vector<double>& values, const std::string& path,
                                   const std::string& where);
 
+/// The text of a file, without the byte order mark that spreadsheets put before it.
+std::string read_text(const std::string& path);
+
 /// No arm reaches 10 m: half of the distances beyond that are in another unit.
 bool beyond_reach(std::vector<double> distances);
 void expect_metres(const std::vector<double>& distances, const std::string& path);

@@ -1,13 +1,11 @@
 #include "calib/detect/detect.h"
 
 #include <algorithm>
-#include <atomic>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <tuple>
 
-#include "calib/detect/detection_cache.h"
+#include "calib/detect/find_in_all.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/planar_pose.h"
 #include "data/error.h"
@@ -64,29 +62,6 @@ void add_poses(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& poi
                            : "the corners fit no pose of the target";
 }
 
-std::string size_text(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
-
-/// Throws data::InputError where the picture cannot be looked at: that is said of a place, not of a content.
-Found find_in(const Frame& frame, const Dataset& dataset, const Rectifier& rectifier, const Finder& finder) {
-  const GreyImage image = load_grey_image(frame.image);
-  if (image.width == rectifier.width() && image.height == rectifier.height()) return finder(image);
-  throw data::InputError("the picture is " + size_text(image.width, image.height) + ", " +
-                         (dataset.camera ? dataset.camera_path : std::string("the first")) + " says " +
-                         size_text(rectifier.width(), rectifier.height()));
-}
-
-Found find_or_say(const Frame& frame, const DetectionCache& cache, const std::function<Found()>& find) {
-  try {
-    return cache.get(frame.image, find);
-  } catch (const data::InputError& error) {
-    Found found;
-    found.reason = error.what();
-    return found;
-  }
-}
-
 /// A view that fits far worse than the others of its set shows wrong corners.
 void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detections) {
   std::vector<double> rms;
@@ -126,44 +101,6 @@ Rectifier make_rectifier(const Dataset& dataset) {
   return {width, height};
 }
 
-/// Whether a quick search sees the chessboard in any of the first `count` pictures.
-bool is_seen(const Dataset& dataset, const Target& board, const Rectifier& rectifier, std::size_t count,
-             int threads) {
-  std::atomic<bool> seen = false;
-  data::for_each_in_parallel(std::min(count, dataset.frames.size()), threads, [&](std::size_t i) {
-    if (seen) return;
-    try {
-      const Finder finder = chessboard_finder(board, rectifier, Search::quick);
-      if (!find_in(dataset.frames[i], dataset, rectifier, finder).sightings.empty()) seen = true;
-    } catch (const data::InputError&) {
-      return;  // a picture that cannot be read shows nothing
-    }
-  });
-  return seen;
-}
-
-/// The board that is seen where the stated one is not: people count squares, or outer corners. This is asked
-/// before a thorough search, which takes seconds for every picture that does not show the target.
-std::optional<Target> miscounted_board(const Dataset& dataset, const Target& target,
-                                       const Rectifier& rectifier, int threads) {
-  if (target.kind != TargetKind::chessboard) return {};
-  constexpr std::size_t kPictures = 4;
-  if (is_seen(dataset, target, rectifier, kPictures, threads)) return {};
-  // Larger ones first: a smaller one may be a part of the board.
-  constexpr std::pair<int, int> kOff[] = {{1, 1}, {1, 0}, {0, 1}, {0, -1}, {-1, 0}, {-1, -1}, {-2, -2}};
-  for (const auto& [columns, rows] : kOff) {
-    Target other = target;
-    other.columns += columns;
-    other.rows += rows;
-    if (other.columns < 3 || other.rows < 3) continue;
-    if (!is_seen(dataset, other, rectifier, kPictures, threads)) continue;
-    // Boards that the pictures cut off look smaller: all of them have to.
-    if (is_seen(dataset, target, rectifier, dataset.frames.size(), threads)) return {};
-    return other;
-  }
-  return {};
-}
-
 /// What most of the first pictures show instead of the target, in words; empty where they do not agree.
 std::string shown_instead(const Dataset& dataset, const Target& target, const Rectifier& rectifier) {
   constexpr std::size_t kPictures = 4;
@@ -200,55 +137,31 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
                               const std::function<void(int, int)>& progress) {
   const Rectifier rectifier = make_rectifier(dataset);
   const Eigen::Matrix3Xd points = target_points(target);
-  const std::size_t count = dataset.frames.size();
-  std::vector<Detection> detections(count);
-  const DetectionCache cache(settings.cache, dataset.camera, target);
-  if (const auto board = miscounted_board(dataset, target, rectifier, settings.threads)) {
-    const std::string size = std::to_string(board->columns) + "x" + std::to_string(board->rows);
-    throw data::InputError(dataset.source + ": the target is seen in none of " + std::to_string(count) +
-                           " pictures; but they show one of " + size +
-                           " inner corners, where four squares meet: --target chessboard:" + size + ":" +
-                           data::format_short(target.spacing));
-  }
-
-  std::mutex mutex;
-  std::vector<Finder> idle;  // a finder serves one thread at a time
-  int done = 0;
-  const auto take_finder = [&] {
-    const std::lock_guard lock(mutex);
-    if (idle.empty()) return make_finder(target, rectifier);
-    Finder finder = std::move(idle.back());
-    idle.pop_back();
-    return finder;
-  };
-  const auto look_at = [&](std::size_t k) {
+  const std::vector<Found> found = find_in_all(dataset, target, rectifier, settings, progress);
+  std::vector<Detection> detections(found.size());
+  data::for_each_in_parallel(found.size(), settings.threads, [&](std::size_t k) {
     const Frame& frame = dataset.frames[k];
-    Finder finder = take_finder();
-    const Found found = find_or_say(frame, cache, [&] { return find_in(frame, dataset, rectifier, finder); });
     Detection& detection = detections[k];
     detection.image = frame.name;
-    detection.reason = found.reason;
-    for (const Sighting& sighting : found.sightings)
+    detection.reason = found[k].reason;
+    for (const Sighting& sighting : found[k].sightings)
       detection.readings.push_back({sighting.refiner, observe(frame, sighting)});
     if (dataset.camera && detection.reason.empty())
       add_poses(*dataset.camera, points, settings.largest_rms, detection);
-    const std::lock_guard lock(mutex);
-    idle.push_back(std::move(finder));
-    if (progress) progress(++done, static_cast<int>(count));
-  };
-  data::for_each_in_parallel(count, settings.threads, look_at);
+  });
 
   drop_misfits(settings, detections);
   const bool none = std::all_of(detections.begin(), detections.end(),
                                 [](const Detection& detection) { return detection.readings.empty(); });
   const std::string shown = none ? shown_instead(dataset, target, rectifier) : std::string();
   if (!shown.empty())
-    throw data::InputError(dataset.source + ": the target is seen in none of " + std::to_string(count) +
-                           " pictures; but they show another: --target " + shown);
+    throw data::InputError(dataset.source + ": the target is seen in none of " +
+                           std::to_string(found.size()) + " pictures; but they show another: --target " +
+                           shown);
   if (none)
-    throw data::InputError(dataset.source + ": the target is seen in none of " + std::to_string(count) +
-                           " pictures" +
-                           (count == 0 ? "" : "; " + detections[0].image + ": " + detections[0].reason));
+    throw data::InputError(dataset.source + ": the target is seen in none of " +
+                           std::to_string(found.size()) + " pictures" +
+                           (found.empty() ? "" : "; " + detections[0].image + ": " + detections[0].reason));
   return detections;
 }
 

@@ -15,7 +15,7 @@
 namespace flash::calib {
 namespace {
 
-constexpr int kFinderVersion = 4;  // counts changes of what the finders return
+constexpr int kFinderVersion = 5;  // counts changes of what the finders return
 
 /// Points of the target, each once, at places in or near a picture.
 bool is_sound(const Sighting& sighting, int points) {
@@ -93,7 +93,7 @@ Found DetectionCache::get(const std::string& image, const std::function<Found()>
   const std::string path = (std::filesystem::path(folder_) / (data::sha256(key_ + bytes) + ".json")).string();
   if (std::optional<Found> kept = read(path, points_)) return std::move(*kept);
   Found found = find();
-  write(found, path);
+  if (!found.is_open) write(found, path);
   return found;
 }
 

@@ -22,6 +22,7 @@ struct Sighting {
 struct Found {
   std::vector<Sighting> sightings;
   std::string reason;
+  bool is_open = false;  ///< nothing was found, but a thorough search might
 };
 
 /// Looks for one target in pictures of one camera; not to be shared between threads. The rectifier must
@@ -32,10 +33,15 @@ using Finder = std::function<Found(const GreyImage&)>;
 /// are those of the libraries: corner_sub_pix and sectors (OpenCV), apriltag, blobs.
 inline const char* const kImageModel = "image_model";
 
-Finder make_finder(const Target& target, const Rectifier& rectifier);
+/// How long a chessboard is looked for.
+enum class Search {
+  glance,   ///< by sectors, in a small picture
+  nearby,   ///< by sectors; and by other ways where these see it
+  thorough  ///< by other ways in the whole picture as well: seconds where it shows none
+};
 
-/// How long a board is looked for where it is not seen at once: thorough takes seconds a picture.
-enum class Search { thorough, quick };
+/// The search is that of chessboards; other targets are looked for in one way.
+Finder make_finder(const Target& target, const Rectifier& rectifier, Search search = Search::thorough);
 
 /// The kinds behind make_finder.
 Finder chessboard_finder(const Target& target, const Rectifier& rectifier, Search search = Search::thorough);

@@ -7,6 +7,7 @@
 #include "data/png_reader.h"
 
 namespace flash::calib {
+
 GreyImage load_grey_image(const std::string& path) {
   if (data::read_file(path).starts_with("\x89PNG")) {  // whose decoder would tell the terminal what is wrong
     data::RawPng png;
@@ -31,6 +32,10 @@ GreyImage load_grey_image(const std::string& path) {
   for (int y = 0; y < picture.rows; ++y)
     image.pixels.insert(image.pixels.end(), picture.ptr(y), picture.ptr(y) + picture.cols);
   return image;
+}
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
 }
 
 }  // namespace flash::calib

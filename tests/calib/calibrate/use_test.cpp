@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+
 #include "calib/calibrate/calibrate.h"
 #include "tests/calib/arm_scene.h"
 
@@ -48,6 +50,35 @@ TEST(Use, TwoArmsTakeTheLensAsStatedAndSolveForThePrint) {
   EXPECT_GT(*result.use.value, 0);
   for (const ComparedMethod& method : result.comparison)
     EXPECT_EQ(method.halves.has_value(), method.held_out.has_value());
+}
+
+/// The scene with a lens that is stated `off` times too long and with its centre `shift` px beside.
+HandEyeScene misstated(HandEyeScene scene, double off, double shift) {
+  scene.camera.fx *= off;
+  scene.camera.fy *= off;
+  scene.camera.cx += shift;
+  for (Observation& o : scene.observations)
+    o.T_camera_target = {fitted_pose(scene.camera, scene.points, o.pixels, o.T_camera_target.front())};
+  return scene;
+}
+
+// Two arms keep a lens that is off by what lenses usually are: what it may do to the camera's place is
+// stated.
+TEST(Use, TwoArmsStateWhatTheLensTheyKeepMayBeOff) {
+  constexpr double kChiSquare999 = 22.458;  // six degrees of freedom
+  SceneSettings settings = protocol_settings(Setup::eye_in_hand);
+  settings.robot_deg = 0.03;
+  settings.robot_mm = 0.3;
+  for (const unsigned seed : {71U, 72U, 73U, 74U}) {
+    const HandEyeScene scene = misstated(make_scene(settings, board_points(), seed), 1.005, 3);
+    const Calibration result = solved(scene, Use::two_arms);
+    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), kChiSquare999) << seed;
+  }
+  const Calibration far = solved(misstated(make_scene(settings, board_points(), 75), 1.05, 0), Use::two_arms);
+  std::string said;
+  for (const std::string& warning : far.warnings) said += warning + '\n';
+  EXPECT_NE(said.find("the lens is not as stated"), std::string::npos) << said;
 }
 
 TEST(Use, TwoArmsWithPrintsOfTheirOwnAreNearerThanWithPrintsAsStated) {

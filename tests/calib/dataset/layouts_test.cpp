@@ -98,6 +98,7 @@ TEST(Layouts, HeadersOfManyProgramsAreRead) {
       {"x,y,z,qw,qx,qy,qz\n0.1,0.2,0.3,0.7071068,0,0,0.7071068\n0.4,0.5,0.6,1,0,0,0\n",
        "in the order of the pictures"},
       {"X,Y,Z,A,B,C\n0.1,0.2,0.3,0,0,90\n0.4,0.5,0.6,0,0,0\n", "in the order of the pictures"},
+      {"\xEF\xBB\xBFimage;x;y;z;rx;ry;rz\na_9.png;0.1;0.2;0.3;0;0;1.5708\na_10.png;0.4;0.5;0.6;0;0;0\n", ""},
       {"filename,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\na_9.png,100,200,300,0,0,90\na_10.png,400,500,600,0,0,"
        "0\n",
        ""},
@@ -136,6 +137,28 @@ TEST(Layouts, MatrixPerTextFile) {
     folder.write(beginning + std::string("10.txt"), "1, 0, 0, 0.4\n0, 1, 0, 0.5\n0, 0, 1, 0.6\n0, 0, 0, 1\n");
     expect_read(folder, "a matrix, row by row [m]");
   }
+}
+
+TEST(Layouts, TransformsOfRos) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  const std::string head = "header: {stamp: {sec: 1, nanosec: 2}, frame_id: base}\nchild_frame_id: tool0\n";
+  folder.write("poses/9.yaml", head +
+                                   "transform:\n  translation: {x: 0.1, y: 0.2, z: 0.3}\n"
+                                   "  rotation: {x: 0, y: 0, z: 0.7071068, w: 0.7071068}\n");
+  folder.write("poses/10.yaml", head +
+                                    "transform:\n  translation: {x: 0.4, y: 0.5, z: 0.6}\n"
+                                    "  rotation: {x: 0, y: 0, z: 0, w: 1}\n");
+  expect_read(folder, "");
+}
+
+TEST(Layouts, PosesInOneYamlAreNamedAsNotRead) {
+  const data::TemporaryFolder folder;
+  write_pictures(folder);
+  folder.write("poses.yaml", "poses: []\n");
+  const std::string message = data::input_error_of([&] { load_dataset(folder / ""); });
+  EXPECT_NE(message.find("found poses.yaml, which is not read, expected poses.tum"), std::string::npos)
+      << message;
 }
 
 TEST(Layouts, JsonLists) {

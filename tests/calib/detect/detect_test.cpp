@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 
+#include "calib/detect/finder.h"
 #include "calib/detect/grey_image.h"
 #include "data/depth_image.h"
 #include "data/picture.h"
@@ -151,6 +153,69 @@ TEST(Detect, BoardsThatTheFirstPicturesCutOffAreFoundInTheRest) {
   const std::vector<Detection> detections = detect(dataset, target);
   EXPECT_TRUE(detections[0].readings.empty());
   EXPECT_FALSE(detections[4].readings.empty());
+}
+
+/// A lens so wide that sectors do not see a board at the edge of the picture; another way does.
+data::CameraIntrinsics wide_camera() {
+  data::CameraIntrinsics camera = small_camera();
+  camera.fx = camera.fy = 300;
+  camera.model = data::DistortionModel::plumb_bob;
+  camera.distortion = {-0.28, 0.07, 0, 0, -0.007};
+  return camera;
+}
+
+// A thorough search takes seconds a picture: it is asked for few pictures where none shows the board.
+TEST(Detect, ThoroughSearchGoesOnOnlyWhereABoardIsSeen) {
+  const Target target = parse_target("chessboard:9x6:0.025");
+  const data::CameraIntrinsics camera = wide_camera();
+  const Renderer renderer(target, camera);
+  const Rectifier rectifier(camera);
+  const Finder nearby = make_finder(target, rectifier, Search::nearby),
+               thorough = make_finder(target, rectifier);
+  std::mt19937 random(7);
+  GreyImage easy, hard;
+  for (int view = 0; view < 200 && (easy.pixels.empty() || hard.pixels.empty()); ++view) {
+    const GreyImage image = renderer.draw(random_view(target, camera, 0.1, 0.2, 1.0, random), random);
+    const Found found = nearby(image);
+    if (!found.is_open)
+      easy = image;
+    else if (!thorough(image).sightings.empty())
+      hard = image;
+  }
+  ASSERT_FALSE(easy.pixels.empty() || hard.pixels.empty());
+
+  constexpr int kPictures = 12;  // of which six, the even ones, are asked first
+  const auto seen = [&](int hard_picture, int easy_picture) {
+    const data::TemporaryFolder folder;
+    std::filesystem::create_directories(folder / "images");
+    std::string poses;
+    for (int k = 0; k < kPictures; ++k) {
+      GreyImage blank = easy;
+      std::fill(blank.pixels.begin(), blank.pixels.end(), 120);
+      data::save_mask(k == hard_picture   ? hard
+                      : k == easy_picture ? easy
+                                          : blank,
+                      folder / ("images/" + std::to_string(10 + k) + ".png"));
+      poses += std::to_string(10 + k) + " 0.1 0 0 0 0 0 1\n";
+    }
+    folder.write("poses.tum", poses);
+    data::save_camera_info(camera, folder / "camera_info.yaml");
+    std::vector<int> pictures;
+    int told = 0;
+    try {
+      const std::vector<Detection> detections =
+          detect(load_dataset(folder / ""), target, {}, [&](int done, int) { told = done; });
+      for (int k = 0; k < kPictures; ++k)
+        if (!detections[static_cast<std::size_t>(k)].readings.empty()) pictures.push_back(k);
+    } catch (const data::InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("seen in none of 12 pictures"), std::string::npos);
+    }
+    EXPECT_EQ(told, kPictures);
+    return pictures;
+  };
+  EXPECT_EQ(seen(4, -1), std::vector<int>({4}));
+  EXPECT_EQ(seen(5, -1), std::vector<int>());
+  EXPECT_EQ(seen(5, 8), std::vector<int>({5, 8}));
 }
 
 TEST(Detect, TransposedBoardIsTheSameBoard) {
