@@ -1,8 +1,10 @@
 #include "calib/calibrate/calibrate_images.h"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <cstdio>
 
+#include "calib/calibrate/plausibility.h"
 #include "calib/dataset/symmetry.h"
 #include "calib/solve/linearization.h"
 #include "data/error.h"
@@ -47,7 +49,20 @@ TimeOffset offset_left(const Bundle& bundle, const Unknowns& unknowns, const Eig
   return {bundle.time_offsets.front(), std::sqrt(covariance(column, column))};
 }
 
-/// Warns where the poses' clock and the pictures' differ, in a solution that took them to be one.
+/// Noise of the robot that an offset makes is the offset's, and needs no cause of its own.
+void drop_noise_of_offset(const NoiseLevels& with_offset, Calibration& result) {
+  const NoiseLevels& without = result.refined.noise;
+  constexpr double kExplained = 0.5;  // of the noise
+  if (with_offset.translation.front() > kExplained * without.translation.front() &&
+      with_offset.rotation.front() > kExplained * without.rotation.front())
+    return;
+  bool unusable = false;
+  const std::string noisy = unusual_noise(without, unusable);
+  std::erase(result.warnings, noisy);
+}
+
+/// Tells where the poses' clock and the pictures' differ, in a solution that took them to be one. An answer
+/// that depends on it is none.
 void check_time(const Dataset& dataset, const CalibrateSettings& settings, Calibration& result) {
   RefineSettings with_offset = settings.refine;
   with_offset.estimate_pivots = false;
@@ -65,10 +80,19 @@ void check_time(const Dataset& dataset, const CalibrateSettings& settings, Calib
   const Refinement refined = refine(std::move(bundle), with_offset);
   const TimeOffset offset = offset_left(refined.bundle, with_offset.bundle.unknowns, refined.covariance);
   if (!(std::abs(offset.estimate) > 5 * offset.sd)) return;
+  // The noise that the offset makes would hide what it does: that of the solution with the offset counts.
+  constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
+  const Vector6d away = motion_between(result.poses.X, refined.bundle.cameras.front());
+  const Matrix6d covariance = refined.covariance.topLeftCorner<6, 6>();
+  if (away.dot(covariance.ldlt().solve(away)) > kChiSquare999) result.usable = false;
+  drop_noise_of_offset(refined.noise, result);
   result.warnings.insert(
       result.warnings.begin(),
-      formatted("pictures and poses are %.1f +- %.1f ms apart: --time-offset takes that into account",
-                1e3 * offset.estimate, 1e3 * offset.sd));
+      formatted(
+          "pictures and poses are %.1f +- %.1f ms apart, and with that the camera is %.1f mm and %.2f deg "
+          "from where it is here: --time-offset takes that into account",
+          1e3 * offset.estimate, 1e3 * offset.sd, 1e3 * away.head<3>().norm(),
+          away.tail<3>().norm() * 180 / M_PI));
 }
 
 /// Solves with the poses as the stream has them at the pictures' times, and again at the times found, until

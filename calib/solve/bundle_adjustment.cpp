@@ -347,6 +347,22 @@ void hold(ceres::Problem& problem, double* block) {
   if (problem.HasParameterBlock(block)) problem.SetParameterBlockConstant(block);
 }
 
+/// Ceres lists blocks, and orders those of a group, by their addresses; rounding goes with the order. Each of
+/// the shared blocks has a group of its own, so that a solution is the same bit by bit in every run.
+void order_shared(const ceres::Problem& problem, Blocks& blocks, ceres::ParameterBlockOrdering& order) {
+  int group = 1;
+  const auto take = [&](double* block) {
+    if (problem.HasParameterBlock(block) && !order.IsMember(block)) order.AddElementToGroup(block, group++);
+  };
+  for (auto* list : {&blocks.cameras, &blocks.bases, &blocks.targets, &blocks.corrections})
+    for (PoseBlock& block : *list) take(block.data());
+  for (IntrinsicsVector& block : blocks.intrinsics) take(block.data());
+  for (Eigen::Vector2d& block : blocks.warps) take(block.data());
+  for (Eigen::VectorXd& block : blocks.joint_zeros) take(block.data());
+  for (auto* list : {&blocks.scales, &blocks.time_offsets, &blocks.depth_scales})
+    for (double& block : *list) take(&block);
+}
+
 void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, const NoiseLevels& noise,
                   const Unknowns& unknowns, ceres::ParameterBlockOrdering& order) {
   auto* const manifold = new PoseManifold;  // the problem owns it
@@ -412,10 +428,7 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
   for (double& scale : blocks.depth_scales)
     if (!unknowns.depth_scales) hold(problem, &scale);
 
-  std::vector<double*> all;
-  problem.GetParameterBlocks(&all);
-  for (double* block : all)
-    if (!order.IsMember(block)) order.AddElementToGroup(block, 1);
+  order_shared(problem, blocks, order);
 }
 
 }  // namespace

@@ -151,6 +151,23 @@ TEST(TimeOffset, UnaskedForItIsWarnedOf) {
     EXPECT_EQ(warning.find("--time-offset"), std::string::npos) << warning;
 }
 
+// A robot moves by centimetres in a tenth of a second: an answer that leaves it out must not be used, and the
+// robot's noise is no second cause.
+TEST(TimeOffset, ThatTheAnswerDependsOnLeavesNone) {
+  const StreamScene scene(0.1, 4);
+  const Calibration late = scene.solved(false).calibration;
+  EXPECT_FALSE(late.usable);
+  int named = 0;
+  for (const std::string& warning : late.warnings) {
+    named += warning.find("--time-offset") != std::string::npos;
+    EXPECT_EQ(warning.find("two tools"), std::string::npos) << warning;
+  }
+  EXPECT_EQ(named, 1);
+  EXPECT_NE(late.warnings.front().find("--time-offset"), std::string::npos) << late.warnings.front();
+  EXPECT_TRUE(scene.solved().calibration.usable);
+  EXPECT_TRUE(StreamScene(0, 4).solved(false).calibration.usable);
+}
+
 TEST(TimeOffset, IsRefusedWithoutAStreamAndOfARobotAtRest) {
   StreamScene scene(0.03, 5);
   scene.dataset.stream.reset();

@@ -4,7 +4,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <random>
 
+#include "calib/solve/lens_prior.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {
@@ -58,6 +60,31 @@ TEST_P(ErrorsInVariables, NoiseIsEstimatedAndTheStatedUncertaintyIsTrue) {
   };
   EXPECT_LT(median(corrected), 0.7 * median(bundled));
   EXPECT_LT(median(corrected), 1.2 * median(closed));
+}
+
+// A heap of another past puts the unknowns at other addresses; what they are must not go with that.
+TEST_P(ErrorsInVariables, SolutionDoesNotDependOnWhereTheUnknownsLieInMemory) {
+  const HandEyeScene scene = protocol_scene(GetParam(), 0.05, 0.5, 7);
+  Bundle bundle = seeded_bundle(scene);
+  bundle.priors.warp_sd = {1e-3};
+  bundle.priors.scale_sd = {3e-3};
+  bundle.priors.lenses = {usual_lens_prior(scene.camera)};
+  RefineSettings settings;
+  settings.bundle.unknowns.scales = settings.bundle.unknowns.warps = true;
+  settings.bundle.unknowns.intrinsics = kLensUnknowns;
+  const Refinement once = refine(bundle, settings);
+  std::mt19937 random(3);
+  std::vector<std::vector<double>> kept;
+  for (int run = 0; run < 5; ++run) {
+    std::vector<std::vector<double>> freed;
+    for (int i = 0; i < 2000; ++i) (random() % 2 ? kept : freed).emplace_back(1 + random() % 40);
+    std::shuffle(freed.begin(), freed.end(), random);
+    freed.clear();
+    const Refinement again = refine(bundle, settings);
+    EXPECT_EQ(again.bundle.cameras.front().matrix(), once.bundle.cameras.front().matrix());
+    EXPECT_EQ(again.covariance, once.covariance);
+    EXPECT_EQ(again.noise.rotation, once.noise.rotation);
+  }
 }
 
 }  // namespace
