@@ -11,6 +11,7 @@
 #include "data/error.h"
 #include "data/parallel.h"
 #include "data/sha256.h"
+#include "sim/law/vertex_contact.h"
 
 namespace flash::sysid {
 namespace {
@@ -101,7 +102,8 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
         m.weave.bending_ratio, m.weave.twisting_ratio, m.weave.warp_direction, replay.start,
         replay.settings.solver.time_step, replay.settings.solver.tolerance,
         static_cast<double>(replay.settings.solver.max_iterations),
-        static_cast<double>(replay.settings.device), static_cast<double>(replay.recording.has_table)})
+        static_cast<double>(replay.settings.device), static_cast<double>(replay.recording.has_table),
+        sim::bristle_length(replay.settings.solver.time_step)})
     bytes.add(value);
   bytes.add_matrix(replay.recording.table_point);
   bytes.add_matrix(replay.recording.table_normal);
