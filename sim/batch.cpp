@@ -113,8 +113,10 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
     require(environment.state.positions.rows() == plan.pattern.size &&
                 environment.state.velocities.rows() == plan.pattern.size,
             "batch: every environment needs a position and a velocity for each vertex of the plan");
-    require(environment.state.bristles.rows() == 0 || environment.state.bristles.rows() == plan.pattern.size,
-            "batch: an environment needs bristles for each vertex of the plan, or none");
+    require(environment.state.bristles.rows() == 0 ||
+                environment.state.bristles.rows() ==
+                    plan.pattern.size * static_cast<Eigen::Index>(environment.obstacles.size()),
+            "batch: an environment needs bristles for each vertex on each obstacle, or none");
     require(environment.holds.size() == environments.front().holds.size(),
             "batch: all environments need the same number of holds");
     require(solids_match(plan, environment),

@@ -55,7 +55,8 @@ void check(const SheetPlan& plan, const std::vector<ReplayEnvironment>& environm
   for (const ReplayEnvironment& e : environments) {
     require(e.positions.rows() == size && e.velocities.rows() == size,
             "every environment needs a position and a velocity for each vertex");
-    require(e.bristles.rows() == 0 || e.bristles.rows() == size, "bristles for each vertex, or none");
+    require(e.bristles.rows() == 0 || e.bristles.rows() == size * std::ssize(e.obstacles),
+            "bristles for each vertex on each obstacle, or none");
     require(e.holds == nullptr || std::ssize(*e.holds) >= settings.steps - settings.first_step,
             "what is held has to be given for each step");
     require(e.hold_count == environments.front().hold_count, "all environments need as many holds");
@@ -216,6 +217,7 @@ struct BatchReplay::Memory {
   cudaStream_t stream = nullptr;
   int* stop = nullptr;  ///< of the host, read by the device
 
+  std::vector<int> obstacle_counts;  ///< of each environment
   DeviceArray<ReplayMaterial> materials;
   DeviceArray<Point> positions, velocities, bristles, loads;
   DeviceArray<int> hold_starts, kept_index, order, steps;
@@ -245,6 +247,7 @@ struct BatchReplay::Memory {
     const bool damped = std::any_of(environments.begin(), environments.end(),
                                     [](const auto& e) { return e.material.stiffness_damping != 0; });
     const int most_obstacles_each = upload_obstacles(environments);
+    upload_bristles(environments, most_obstacles_each);
     lay_out_teams({front_plan, layout, damped, most_held, most_obstacles_each});
     steps = DeviceArray<int>(environments.size());
 
@@ -292,7 +295,7 @@ struct BatchReplay::Memory {
   std::size_t size() const { return layout.order.size(); }
 
   void upload_state(const std::vector<ReplayEnvironment>& environments) {
-    std::vector<Point> x, v, b, forces;
+    std::vector<Point> x, v, forces;
     const bool loaded = std::any_of(environments.begin(), environments.end(),
                                     [](const ReplayEnvironment& e) { return !e.loads.empty(); });
     for (const ReplayEnvironment& e : environments) {
@@ -304,15 +307,27 @@ struct BatchReplay::Memory {
         };
         x.push_back(point(e.positions));
         v.push_back(point(e.velocities));
-        b.push_back(e.bristles.rows() == 0 ? Point{} : point(e.bristles));
         if (loaded) forces.push_back(point(load));
       }
     }
     positions = DeviceArray<Point>(x);
     velocities = DeviceArray<Point>(v);
-    bristles = DeviceArray<Point>(b);
     loads = DeviceArray<Point>(forces);
     order = DeviceArray<int>(layout.order);
+  }
+
+  /// Each environment has room for `most_obstacles_each`.
+  void upload_bristles(const std::vector<ReplayEnvironment>& environments, int most_obstacles_each) {
+    std::vector<Point> all;
+    for (const ReplayEnvironment& e : environments) {
+      for (int k = 0; k < most_obstacles_each; ++k)
+        for (const int vertex : layout.order) {
+          const Eigen::Index row = static_cast<Eigen::Index>(k) * layout.size + vertex;
+          all.push_back(row < e.bristles.rows() ? Point{e.bristles(row, 0), e.bristles(row, 1), e.bristles(row, 2), 0}
+                                                : Point{});
+        }
+    }
+    bristles = DeviceArray<Point>(all);
   }
 
   /// Returns how many vertices are held at once at most.
@@ -337,7 +352,10 @@ struct BatchReplay::Memory {
   /// Returns how many obstacles an environment has at most.
   int upload_obstacles(const std::vector<ReplayEnvironment>& environments) {
     std::size_t most = 0;
-    for (const ReplayEnvironment& e : environments) most = std::max(most, e.obstacles.size());
+    for (const ReplayEnvironment& e : environments) {
+      obstacle_counts.push_back(static_cast<int>(e.obstacles.size()));
+      most = std::max(most, e.obstacles.size());
+    }
     std::vector<PlacedObstacle> all;
     for (const ReplayEnvironment& e : environments) {
       for (const Obstacle& obstacle : e.obstacles)
@@ -396,9 +414,10 @@ struct BatchReplay::Memory {
     step = end;
   }
 
-  Points points(const DeviceArray<Point>& array, int e) const {
+  /// A part of an array with a point for each vertex.
+  Points points(const DeviceArray<Point>& array, std::size_t part) const {
     check(cudaStreamSynchronize(stream));
-    const std::vector<Point> all = array.read(static_cast<std::size_t>(e) * size(), size());
+    const std::vector<Point> all = array.read(part * size(), size());
     Points result(layout.size, 3);
     for (int i = 0; i < layout.size; ++i) result.row(layout.order[i]) << all[i].x, all[i].y, all[i].z;
     return result;
@@ -426,13 +445,19 @@ void BatchReplay::synchronize(const std::atomic<bool>* stop) {
 }
 
 Points BatchReplay::positions(int environment) const {
-  return memory_->points(memory_->positions, environment);
+  return memory_->points(memory_->positions, static_cast<std::size_t>(environment));
 }
 Points BatchReplay::velocities(int environment) const {
-  return memory_->points(memory_->velocities, environment);
+  return memory_->points(memory_->velocities, static_cast<std::size_t>(environment));
 }
 Points BatchReplay::bristles(int environment) const {
-  return memory_->points(memory_->bristles, environment);
+  const Memory& m = *memory_;
+  const int obstacles = m.obstacle_counts[static_cast<std::size_t>(environment)];
+  Points all(static_cast<Eigen::Index>(obstacles) * m.layout.size, 3);
+  for (int k = 0; k < obstacles; ++k)
+    all.middleRows(static_cast<Eigen::Index>(k) * m.layout.size, m.layout.size) = m.points(
+        m.bristles, static_cast<std::size_t>(environment) * m.numbers.most_obstacles_each + static_cast<std::size_t>(k));
+  return all;
 }
 
 Points BatchReplay::kept_positions(int environment, int index) const {

@@ -28,8 +28,9 @@ __device__ __noinline__ void project_vertices(const SheetTables& tables, const S
     Triple place = point;
     if (contacts != nullptr && contacts->listed[i] != 0) {
       read_touches(*contacts, i, obstacles.count, touches);
-      place = feasible_place(obstacles, start, triple(step.bristles[i]),
-                             read_contact(*contacts, i, obstacles, touches), touches, point, room);
+      carry_bristles(obstacles, step, i, touches);
+      place = feasible_place(obstacles, start, read_contact(*contacts, i, obstacles, touches), touches, point,
+                             room);
     } else if (!(clearance_of(obstacles, start, point) >= 0)) {
       place = projected_out(obstacles, start, nullptr, point, room);
     }
@@ -206,12 +207,12 @@ __device__ __noinline__ void write_bristles_of_contacts(const SheetTables& table
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   VertexTouch touches[most];
   for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
-    Triple bristle{};
-    if (step.held_axes[i] == 0 && contacts.listed[i] != 0) {
-      read_touches(contacts, i, obstacles.count, touches);
-      bristle = bristles_at_end(obstacles, read_contact(contacts, i, obstacles, touches), touches);
+    const bool touched = step.held_axes[i] == 0 && contacts.listed[i] != 0;
+    if (touched) read_touches(contacts, i, obstacles.count, touches);
+    for (int k = 0; k < obstacles.count; ++k) {
+      const Triple own = touched ? bristle_at_end(obstacles.obstacles[k], touches[k]) : Triple{};
+      bristles[k * tables.size + i] = {own.x, own.y, own.z, 0};
     }
-    bristles[i] = {bristle.x, bristle.y, bristle.z, 0};
   }
 }
 
@@ -256,8 +257,8 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
     }
     if (axes != 0 || end.contacts.listed[i] == 0) continue;
     read_touches(end.contacts, i, obstacles.count, touches);
-    const Triple bristle = triple(step.bristles[i]);
-    bristles += 0.5 * friction_bound_of(obstacles, touches) * bristle_length(step.h) * dot(bristle, bristle);
+    carry_bristles(obstacles, step, i, touches);
+    bristles += bristle_energy(obstacles, touches);
     for (int k = 0; k < obstacles.count; ++k) {
       const VertexTouch& touch = touches[k];
       if (!touch.holds) continue;

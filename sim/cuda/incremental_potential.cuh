@@ -16,6 +16,7 @@ struct StepProblem {
   double h;                                    ///< [s]
   EnvironmentNumbers numbers;                  ///< of this h
   const Point *start, *velocities, *bristles;  ///< as in State
+  int size;                                    ///< number of vertices
   const Point* loads;                          ///< null without
   Restrictions restrictions;
   const int* held_axes;  ///< by place: bits 1, 2 and 4 for x, y and z
@@ -31,6 +32,8 @@ struct StepProblem {
     return {material->gravity[0], material->gravity[1], material->gravity[2]};
   }
   __device__ Triple load(int i) const { return loads == nullptr ? Triple{0, 0, 0} : triple(loads[i]); }
+  /// The bristles of an obstacle on a vertex at the start of the step, as in State.
+  __device__ Triple bristle(int obstacle, int i) const { return triple(bristles[obstacle * size + i]); }
   /// Displacement since the start of the step, less that without forces but gravity.
   __device__ Triple inertial(int i, const Triple& moved) const {
     return moved - h * triple(velocities[i]) - (h * h) * gravity();
@@ -155,6 +158,10 @@ __device__ auto for_obstacles_of(const StepProblem& step, const Act& act) {
 __device__ inline void read_touches(const ContactSet& contacts, int i, int count, VertexTouch* touches) {
   for (int k = 0; k < count; ++k) touches[k] = touch_of(read(contacts.touches, i, k));
 }
+__device__ inline void carry_bristles(const ObstacleStep<double>& obstacles, const StepProblem& step, int i,
+                                      VertexTouch* touches) {
+  carry_bristles(obstacles, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
+}
 /// What holds a vertex that is listed, as contact_of says. `touches`: what read_touches gave.
 __device__ inline VertexContact read_contact(const ContactSet& contacts, int i,
                                              const ObstacleStep<double>& obstacles,
@@ -179,7 +186,8 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   ContactResponse response = {};
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
-    response.line_friction = friction_potential_of(obstacles, start, triple(step.bristles[i]), point,
+    carry_bristles(obstacles, step, i, touches);
+    response.line_friction = friction_potential_of(obstacles, start, point,
                                                    read_contact(*line, i, obstacles, touches), touches);
   }
   const double clearance = clearance_of(obstacles, start, point);
@@ -187,14 +195,14 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   contacts.listed[i] = 0;
   if (clearance > touching_gap) return response;
   find_touches(obstacles, start, point, touches);
+  carry_bristles(obstacles, step, i, touches);
   SurfaceRoom<most> room;
-  const Triple bristles = triple(step.bristles[i]);
-  const VertexContact contact = decide_contact(obstacles, start, bristles, point, force, touches, room);
+  const VertexContact contact = decide_contact(obstacles, start, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
   write_contact(contact, touches, obstacles.count, contacts, i);
   contacts.listed[i] = 1;
   response.reaction = contact.reaction;
-  response.friction = friction_potential_of(obstacles, start, bristles, point, contact, touches);
+  response.friction = friction_potential_of(obstacles, start, point, contact, touches);
   response.rounding = epsilon * norm(point) * norm(contact.slip_stiffness);
   return response;
 }

@@ -23,7 +23,7 @@ __device__ void keep(const ReplayNumbers& replay, const Point* positions, double
 /// Takes an environment from its step `first` up to `end`.
 __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, int e, int first, int end) {
   const int size = replay.sheet.size;
-  const SheetState state = replay.states.of(e, size);
+  const SheetState state = replay.states.of(e, size, replay.most_obstacles_each);
   const ReplayMaterial& material = replay.materials[e];
   const auto iterate = [&](int k) {
     Iterate at = {};
@@ -41,6 +41,7 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
                       state.positions,
                       state.velocities,
                       state.bristles,
+                      size,
                       replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
                       {memory.restrictions, 0, memory.restriction_of},
                       memory.held_axes,

@@ -106,12 +106,13 @@ struct TeamMemory {
   long long* clocks;    ///< ticks of the processor spent in each phase
 };
 
-/// State of one environment, or of one behind the other.
+/// State of one environment, or of one behind the other. Bristles: a point for each vertex on each obstacle.
 struct SheetState {
   Point *positions, *velocities, *bristles;
 
-  __host__ __device__ SheetState of(long environment, int size) const {
-    return {positions + environment * size, velocities + environment * size, bristles + environment * size};
+  __host__ __device__ SheetState of(long environment, int size, int obstacles) const {
+    return {positions + environment * size, velocities + environment * size,
+            bristles + environment * obstacles * size};
   }
 };
 

@@ -62,15 +62,14 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<d
 template <typename Room>
 FLASH_CALLED_ON_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<double>& step,
                                                             const Vector3<double>& start,
-                                                            const Vector3<double>& bristles,
                                                             const VertexTouch* touches, Vector3<double> place,
                                                             Room& room) {
   constexpr int rounds = 10;
-  Vector3<double> slip = slip_against(step, start, bristles, place, touches);
+  Vector3<double> slip = slip_against(step, start, place, touches);
   // The way back leaves a round surface: the vertex is projected on it, and the slip taken back again.
   for (int round = 0; round < rounds && norm(slip) > resting_slip; ++round) {
     place = projected_out(step, start, touches, place - slip, room);
-    slip = slip_against(step, start, bristles, place, touches);
+    slip = slip_against(step, start, place, touches);
   }
   return place;
 }
@@ -79,15 +78,15 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<d
 /// that turned against its direction is stopped at no slip, where it has to decide again.
 template <typename Room>
 FLASH_HOST_DEVICE inline Vector3<double> feasible_place(
-    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& bristles,
-    const VertexContact& contact, const VertexTouch* touches, const Vector3<double>& point, Room& room) {
+    const ObstacleStep<double>& step, const Vector3<double>& start, const VertexContact& contact,
+    const VertexTouch* touches, const Vector3<double>& point, Room& room) {
   constexpr double sliding = 0.999;  // squared length of the direction of what slides
   const Vector3<double> place = projected_out(step, start, touches, point, room);
   if (contact.freedom != Freedom::slip || dot(contact.slip_direction, contact.slip_direction) < sliding)
     return place;
-  const Vector3<double> slip = slip_against(step, start, bristles, place, touches);
+  const Vector3<double> slip = slip_against(step, start, place, touches);
   return dot(slip, contact.slip_direction) >= 0 ? place
-                                                : stopped_place(step, start, bristles, touches, place, room);
+                                                : stopped_place(step, start, touches, place, room);
 }
 
 }  // namespace FLASH_LEVEL

@@ -41,6 +41,13 @@ FLASH_HOST_DEVICE inline Vector3<Real> material_motion(const MovingObstacle<Real
   return place - place_from(obstacle.start, place_in(obstacle.end, place));
 }
 
+/// Where a direction that is fixed to the obstacle at the start of the step points at its end.
+template <typename Real>
+FLASH_HOST_DEVICE inline Vector3<Real> turned_with(const MovingObstacle<Real>& obstacle,
+                                                   const Vector3<Real>& direction) {
+  return obstacle.moves ? direction_from(obstacle.end, direction_in(obstacle.start, direction)) : direction;
+}
+
 /// By how much a point in the frame of a box exceeds its half extents along each axis.
 template <typename Real>
 FLASH_HOST_DEVICE inline Vector3<Real> excess_over(const Vector3<Real>& half_extents,

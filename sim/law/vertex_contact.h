@@ -40,29 +40,36 @@ FLASH_HOST_DEVICE inline double friction_energy(double slip, double time_step) {
   return slip <= length ? slip * slip / (2 * length) : slip - 0.5 * length;
 }
 
-/// Slip of a vertex along and against the surfaces that hold it [m]: the deflection of its bristles at the
-/// start of the step, and its displacement since. Where there are several surfaces, it is against their mean,
-/// weighted by mu lambda_n. `bristles`: as in State.
+/// Fills in the bristles of the touches of a vertex. Each obstacle has its own, which turn with it.
+/// `bristle_of(k)`: those of obstacle k as in State.
+template <typename BristleOf>
+FLASH_HOST_DEVICE inline void carry_bristles(const ObstacleStep<double>& step, const BristleOf& bristle_of,
+                                             VertexTouch* touches) {
+  for (int k = 0; k < step.count; ++k)
+    touches[k].bristle = bristle_length(step.time_step) * turned_with(step.obstacles[k], bristle_of(k));
+}
+
+/// Slip of a vertex along and against the surfaces that hold it [m]: the deflection of their bristles at the
+/// start of the step, and its displacement since. Where there are several surfaces, it is the mean of that
+/// against each, weighted by mu lambda_n.
 FLASH_HOST_DEVICE inline Vector3<double> slip_against(const ObstacleStep<double>& step,
                                                       const Vector3<double>& start,
-                                                      const Vector3<double>& bristles,
                                                       const Vector3<double>& point,
                                                       const VertexTouch* touches) {
   constexpr double least_weight = 1e-300;  // surfaces without friction count alike
-  Vector3<double> moved{}, first{}, second{};
+  Vector3<double> gone{}, first{}, second{};
   double weights = 0;
   int held = 0;
   for (int k = 0; k < step.count; ++k) {
     if (!touches[k].holds) continue;
     const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
     const double weight = step.obstacles[k].friction * touches[k].normal_force + least_weight;
-    moved = moved + weight * gap.surface_moved;
+    gone = gone + weight * (touches[k].bristle - gap.surface_moved);
     weights += weight;
     (held == 0 ? first : second) = gap.normal;
     ++held;
   }
-  const Vector3<double> against =
-      bristle_length(step.time_step) * bristles + point - start - (1 / weights) * moved;
+  const Vector3<double> against = point - start + (1 / weights) * gone;
   if (held == 1) return along_plane(first, against);
   if (held > 2) return {};
   const Vector3<double> edge = cross(first, second);
@@ -104,16 +111,15 @@ FLASH_HOST_DEVICE inline Symmetric3 slip_stiffness_of(const ObstacleStep<double>
 /// vertex moves along their edge alone, between three not at all.
 template <typename Room>
 FLASH_HOST_DEVICE inline VertexContact decide_contact(
-    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& bristles,
-    const Vector3<double>& point, const Vector3<double>& needed, VertexTouch* touches, Room& room) {
+    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& point, const Vector3<double>& needed, VertexTouch* touches, Room& room) {
   VertexContact contact;
   int touching = 0;
   for (int k = 0; k < step.count; ++k) {
     VertexTouch& touch = touches[k];
     if (!touch.touches()) continue;
     ++touching;
-    const Vector3<double> slip = along_plane(
-        touch.normal, bristle_length(step.time_step) * bristles + point - start - touch.surface_moved);
+    const Vector3<double> slip =
+        along_plane(touch.normal, touch.bristle + point - start - touch.surface_moved);
     touch.slip = norm(slip);
     touch.slip_direction = (1 / friction_length(touch.slip, step.time_step)) * slip;
   }
@@ -132,7 +138,7 @@ FLASH_HOST_DEVICE inline VertexContact decide_contact(
   contact.slip_stiffness = slip_stiffness_of(step, touches);
   contact.free = along_surfaces(step.count, touches);
   if (held > 1) {
-    const Vector3<double> slip = slip_against(step, start, bristles, point, touches);
+    const Vector3<double> slip = slip_against(step, start, point, touches);
     contact.slip_direction = (1 / friction_length(norm(slip), step.time_step)) * slip;
   }
   for (int k = 0; k < step.count; ++k) {
@@ -146,31 +152,33 @@ FLASH_HOST_DEVICE inline VertexContact decide_contact(
 
 /// Energy of friction of a vertex at `point`, at the normal forces of its contact [J].
 FLASH_HOST_DEVICE inline double friction_potential_of(
-    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& bristles,
-    const Vector3<double>& point, const VertexContact& contact, const VertexTouch* touches) {
+    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& point, const VertexContact& contact, const VertexTouch* touches) {
   if (contact.friction_bound == 0) return 0;
   double potential = 0;
   for (int k = 0; k < step.count; ++k) {
     if (!touches[k].holds) continue;
     const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
-    const double slip = norm(along_plane(
-        gap.normal, bristle_length(step.time_step) * bristles + point - start - gap.surface_moved));
+    const double slip =
+        norm(along_plane(gap.normal, touches[k].bristle + point - start - gap.surface_moved));
     potential += step.obstacles[k].friction * touches[k].normal_force * friction_energy(slip, step.time_step);
   }
   return potential;
 }
 
-/// The deflection of a vertex's bristles at the end of a step, as in State; of several surfaces their mean,
-/// weighted by mu lambda_n.
-FLASH_HOST_DEVICE inline Vector3<double> bristles_at_end(const ObstacleStep<double>& step,
-                                                         const VertexContact& contact,
-                                                         const VertexTouch* touches) {
-  if (!(contact.friction_bound > 0)) return {};
-  Vector3<double> sum{};
+/// The bristles of an obstacle on a vertex at the end of a step, as in State.
+FLASH_HOST_DEVICE inline Vector3<double> bristle_at_end(const MovingObstacle<double>& obstacle,
+                                                        const VertexTouch& touch) {
+  return touch.holds && obstacle.friction > 0 ? touch.slip_direction : Vector3<double>{};
+}
+
+/// Energy of the bristles of a vertex's touches at the start of a step, at the normal forces of its end [J].
+FLASH_HOST_DEVICE inline double bristle_energy(const ObstacleStep<double>& step, const VertexTouch* touches) {
+  double energy = 0;
   for (int k = 0; k < step.count; ++k)
     if (touches[k].holds)
-      sum = sum + (step.obstacles[k].friction * touches[k].normal_force) * touches[k].slip_direction;
-  return (1 / contact.friction_bound) * sum;
+      energy += step.obstacles[k].friction * touches[k].normal_force *
+                friction_energy(norm(touches[k].bristle), step.time_step);
+  return energy;
 }
 
 /// How the friction force of a slipping vertex changes with the force on it: the sum of mu_k d_k l_k^T, where

@@ -19,6 +19,7 @@ struct VertexTouch {
   Vector3<double> curvature_direction{};  ///< as in SurfaceGap [m^-1/2]
   double ball_curvature = 0;              ///< as in SurfaceGap [1/m]
   Vector3<double> surface_moved{};        ///< motion of the surface over the step [m]
+  Vector3<double> bristle{};              ///< deflection at the start of the step, as carry_bristles says [m]
   Vector3<double> slip_direction{};       ///< the slip over its friction_length
   Vector3<double> friction{};             ///< friction force of the surface on the vertex [N]
 

@@ -82,8 +82,8 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
       report.work += dot(c.reaction, way);
       start_is_feasible = start_is_feasible && is_zero(way - c.free * way);
     }
-    const Vector3<double> bristle = problem.contacts.bristles(c.vertex);
-    bristles += 0.5 * c.friction_bound * bristle_length(h) * dot(bristle, bristle);
+    if (k >= end.contacts.held)
+      bristles += bristle_energy(problem.contacts.view_of(c.vertex), end.contacts.touches_of(k).data());
     for (const VertexTouch& touch : end.contacts.touches_of(k)) {
       if (!touch.holds) continue;
       const Vector3<double> force = touch.normal_force * touch.normal + touch.friction;

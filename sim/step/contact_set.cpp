@@ -96,7 +96,9 @@ VertexTouch* add_touches(const ContactStep& step, const Points& positions, int i
   const std::size_t first = contacts.touches.size();
   contacts.touches.resize(first + contacts.obstacles);
   VertexTouch* touches = contacts.touches.data() + first;
-  find_touches(step.view(), step.start(i), vector3(positions, i), touches);
+  const ObstacleStep<double> view = step.view();
+  find_touches(view, step.start(i), vector3(positions, i), touches);
+  carry_bristles(view, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
   return touches;
 }
 
@@ -115,8 +117,8 @@ void update_contacts(const ContactStep& step, const Points& positions, const Poi
   for (int i = 0; i < positions.rows(); ++i) {
     if (contacts.place[i] >= 0 || contacts.clearance[i] > touching_gap) continue;
     VertexTouch* touches = add_touches(step, positions, i, contacts);
-    const VertexContact contact = decide_contact(step.view_of(i), step.start(i), step.bristles(i),
-                                                 vector3(positions, i), vector3(force, i), touches, room);
+    const VertexContact contact = decide_contact(step.view_of(i), step.start(i), vector3(positions, i),
+                                                 vector3(force, i), touches, room);
     if (contact.freedom == Freedom::free) {
       contacts.touches.resize(contacts.touches.size() - contacts.obstacles);
       continue;
@@ -142,19 +144,22 @@ double friction_potential(const ContactStep& step, const ContactSet& contacts, c
   for (size_t k = contacts.held; k < contacts.constraints.size(); ++k) {
     const VertexConstraint& constraint = contacts.constraints[k];
     const int i = constraint.vertex;
-    potential += friction_potential_of(step.view_of(i), step.start(i), step.bristles(i),
-                                       vector3(positions, i), constraint, contacts.touches_of(k).data());
+    potential += friction_potential_of(step.view_of(i), step.start(i), vector3(positions, i), constraint,
+                                       contacts.touches_of(k).data());
   }
   return potential;
 }
 
 Points bristles_at_end(const ContactStep& step, const ContactSet& contacts) {
-  Points bristles = Points::Zero(step.environment.state.positions.rows(), 3);
+  const Eigen::Index vertices = step.environment.state.positions.rows();
+  Points bristles = Points::Zero(static_cast<Eigen::Index>(step.obstacles.size()) * vertices, 3);
   for (size_t k = contacts.held; k < contacts.constraints.size(); ++k) {
-    const VertexConstraint& constraint = contacts.constraints[k];
-    const int i = constraint.vertex;
-    bristles.row(i) =
-        vector3d(bristles_at_end(step.view_of(i), constraint, contacts.touches_of(k).data())).transpose();
+    const int i = contacts.constraints[k].vertex;
+    const ObstacleStep<double> view = step.view_of(i);
+    const std::span<const VertexTouch> touches = contacts.touches_of(k);
+    for (int obstacle = 0; obstacle < view.count; ++obstacle)
+      bristles.row(obstacle * vertices + i) =
+          vector3d(bristle_at_end(view.obstacles[obstacle], touches[static_cast<size_t>(obstacle)])).transpose();
   }
   return bristles;
 }

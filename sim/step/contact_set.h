@@ -32,10 +32,12 @@ struct ContactStep {
   /// Where vertex i is at the start of the step.
   Vector3<double> start(int i) const { return vector3(environment.state.positions, i); }
 
-  /// The bristles of vertex i at the start of the step, as in State.
-  Vector3<double> bristles(int i) const {
-    return environment.state.bristles.rows() == 0 ? Vector3<double>{}
-                                                  : vector3(environment.state.bristles, i);
+  /// The bristles of an obstacle on vertex i at the start of the step, as in State.
+  Vector3<double> bristle(int obstacle, int i) const {
+    const State& state = environment.state;
+    return state.bristles.rows() == 0
+               ? Vector3<double>{}
+               : vector3(state.bristles, obstacle * static_cast<int>(state.positions.rows()) + i);
   }
 
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
@@ -115,7 +117,7 @@ std::vector<Eigen::Matrix3d> friction_couplings(const ContactStep& step, const C
 /// step [J].
 double friction_potential(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
 
-/// The bristles of each vertex at the end of the step, as in State; zero where nothing holds it.
+/// The bristles at the end of the step, as in State; zero where nothing holds a vertex.
 data::Points bristles_at_end(const ContactStep& step, const ContactSet& contacts);
 
 }  // namespace flash::sim

@@ -16,7 +16,7 @@
 namespace flash::sysid {
 namespace {
 
-constexpr std::string_view kMagic = "flash-rollout/3\n";
+constexpr std::string_view kMagic = "flash-rollout/4\n";
 constexpr std::size_t kDigest = 64;  // hexadecimal digits of a SHA-256
 
 /// Numbers as the bytes they are.
@@ -157,7 +157,7 @@ ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std:
   const std::size_t header = kMagic.size() + 2 * kDigest;
   BytesReader bytes(whole.substr(std::min(header, whole.size())), path);
   if (!whole.starts_with(kMagic) || whole.size() < header)
-    bytes.fail("header", "another", "that of a motion of flash-sysid, \"flash-rollout/3\"");
+    bytes.fail("header", "another", "that of a motion of flash-sysid, \"flash-rollout/4\"");
   if (whole.substr(kMagic.size(), kDigest) != key) bytes.fail("key", "that of another motion", key);
   const std::string_view kept_sum = whole.substr(kMagic.size() + kDigest, kDigest);
   if (const std::string sum = data::sha256(whole.substr(header)); sum != kept_sum)

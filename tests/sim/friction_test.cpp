@@ -98,5 +98,64 @@ TEST(Friction, AShakenSheetBelowItsConeDoesNotCreep) {
             bristle_length(time_step));
 }
 
+TEST(Friction, ASheetOnATurningTableTurnsWithIt) {
+  // Off the axis, where it needs a third of what friction carries.
+  const Sheet sheet = small_sheet(1, 0.02);
+  const double time_step = 0.01, speed = 2 * M_PI, radius = 0.08, ramp = 1;  // [s] [rad/s] [m] [s]
+  const int steps = 500;
+  ASSERT_LT(radius * speed * speed, 1.1 * friction * gravity);
+  const auto angle = [&](double time) {
+    return time < ramp ? speed * time * time / (2 * ramp) : speed * (time - 0.5 * ramp);
+  };
+  data::Trajectory turning;
+  for (int n = 0; n <= steps; ++n) {
+    turning.times.push_back(n * time_step);
+    turning.poses.push_back(
+        Eigen::Isometry3d(Eigen::AngleAxisd(angle(n * time_step), Vector3d::UnitZ())));
+  }
+  Environment environment = environment_of(sheet);
+  environment.materials[0].friction = 3 * friction;
+  environment.obstacles = {{Plane{}}};
+  environment.obstacles[0].frame = add_frame(environment, turning, time_step);
+  environment.state.positions.col(0).array() += radius;
+  const data::Points start = environment.state.positions;
+  Solver solver(sheet, {.time_step = time_step, .tolerance = 1e-8});
+  const auto carried = [&] {
+    const Eigen::AngleAxisd back(-angle(environment.state.time), Vector3d::UnitZ());
+    return data::Points(environment.state.positions * back.toRotationMatrix().transpose());
+  };
+  run(solver, environment, 200);
+  const data::Points after_a_turn = carried();
+  run(solver, environment, steps - 200);
+  // Bristles bend by less than their length, and have bent once the speed is reached.
+  EXPECT_LE((carried() - start).leftCols<2>().cwiseAbs().maxCoeff(), 2 * bristle_length(time_step));
+  EXPECT_LE((carried() - after_a_turn).leftCols<2>().cwiseAbs().maxCoeff(), 0.01 * bristle_length(time_step));
+}
+
+TEST(Friction, WhatLeansOnASlidingWallDoesNotCreep) {
+  // The table carries what the wall's friction pulls: of two surfaces at a vertex one slides, one holds.
+  const Sheet sheet = small_sheet(1, 0.02);
+  const double time_step = 0.01, wall_speed = 0.1;
+  const int steps = 300;
+  data::Trajectory along;
+  for (int n = 0; n <= steps; ++n) {
+    along.times.push_back(n * time_step);
+    along.poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(0, wall_speed * n * time_step, 0)));
+  }
+  Environment environment = environment_of(sheet);
+  environment.gravity = Vector3d(0.8 * gravity, 0, -gravity);
+  environment.materials[0].friction = 0.5;
+  environment.obstacles = {{Plane{}},
+                           {Plane{Vector3d(environment.state.positions.col(0).maxCoeff(), 0, 0),
+                                  -Vector3d::UnitX()},
+                            {0.3}}};
+  environment.obstacles[1].frame = add_frame(environment, along, time_step);
+  Solver solver(sheet, {.time_step = time_step, .tolerance = 1e-8});
+  run(solver, environment, steps / 3);
+  const data::Points early = environment.state.positions;
+  run(solver, environment, steps - steps / 3);
+  EXPECT_LE((environment.state.positions - early).cwiseAbs().maxCoeff(), 0.01 * bristle_length(time_step));
+}
+
 }  // namespace
 }  // namespace flash::sim

@@ -14,27 +14,29 @@ const double longest = bristle_length(ContactWorld::time_step);  ///< slip in wh
 /// A vertex of a world on its surfaces, with what decides of it.
 struct Decided {
   ObstacleStep<double> view;
-  Vector3<double> start, bristles, point, needed;
+  Vector3<double> start, point, needed;
+  std::vector<Vector3<double>> bristles;  ///< of each obstacle, as in State
   std::vector<VertexTouch> touches;
   VertexContact contact;
 
   Decided(const ContactStep& step, const data::Points& positions, const data::Points& force, int i)
       : view(step.view()),
         start(step.start(i)),
-        bristles(step.bristles(i)),
         point(vector3(positions, i)),
         needed(vector3(force, i)) {
+    for (int k = 0; k < view.count; ++k) bristles.push_back(step.bristle(k, i));
     decide();
   }
   void decide() {
     touches.assign(static_cast<std::size_t>(view.count), {});
     find_touches(view, start, point, touches.data());
+    carry_bristles(view, [&](int k) { return bristles[static_cast<std::size_t>(k)]; }, touches.data());
     ContactRoom room(touches.size());
-    contact = decide_contact(view, start, bristles, point, needed, touches.data(), room);
+    contact = decide_contact(view, start, point, needed, touches.data(), room);
   }
   /// The slip against a surface.
   Vector3<double> slip_on(const VertexTouch& touch) const {
-    return along_plane(touch.normal, longest * bristles + point - start - touch.surface_moved);
+    return along_plane(touch.normal, touch.bristle + point - start - touch.surface_moved);
   }
   /// Longest slip against a surface that is touched.
   double slipped() const {
@@ -50,14 +52,24 @@ struct Decided {
   }
 };
 
+/// Bristles on each obstacle of a world.
+data::Points random_bristles(const ContactWorld& world, std::mt19937& engine) {
+  const auto obstacles = static_cast<Eigen::Index>(world.environment.obstacles.size());
+  data::Points bristles(obstacles * ContactWorld::vertices, 3);
+  for (Eigen::Index k = 0; k < obstacles; ++k)
+    bristles.middleRows(k * ContactWorld::vertices, ContactWorld::vertices) = random_points(0.5, engine);
+  return bristles;
+}
+
 /// Calls `check` with each vertex of many worlds that something holds, moved out of the obstacles.
+/// `world_of`: mixed_world or world_of_planes.
 template <typename Check>
-void for_each_held(const Check& check) {
+void for_each_held(ContactWorld (*world_of)(unsigned), const Check& check) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     SCOPED_TRACE(seed);
-    ContactWorld world = mixed_world(seed);
+    ContactWorld world = world_of(seed);
     std::mt19937 engine(seed);
-    world.environment.state.bristles = random_points(0.5, engine);
+    world.environment.state.bristles = random_bristles(world, engine);
     const ContactStep step = world.step();
     ContactSet set = begin_step(step, world.positions);
     project_to_feasible(step, set, world.positions);
@@ -100,7 +112,7 @@ TEST(VertexTouch, SurfacesShareAForceByNonNegativeLeastSquares) {
 
 TEST(VertexContact, ObeysTheLawsOfSignoriniAndCoulomb) {
   int sticking = 0, slipping = 0, on_several = 0;
-  for_each_held([&](const Decided& d) {
+  for_each_held(mixed_world, [&](const Decided& d) {
     if (has_no_unique_force(d.touches)) return;
     const Vector3d rest = vector3d(d.needed - d.contact.reaction);
     Vector3d sum = Vector3d::Zero();
@@ -145,7 +157,7 @@ TEST(VertexContact, ObeysTheLawsOfSignoriniAndCoulomb) {
 TEST(VertexContact, FrictionFollowsTheForceAsItsCouplingSays) {
   constexpr double step = 1e-6;  // [N]; the law is linear in the force while the same surfaces hold
   int checked = 0;
-  for_each_held([&](const Decided& d) {
+  for_each_held(mixed_world, [&](const Decided& d) {
     if (d.contact.freedom != Freedom::slip || has_no_unique_force(d.touches)) return;
     for (int axis = 0; axis < 3; ++axis) {
       Vector3d ends[2];
@@ -169,14 +181,14 @@ TEST(VertexContact, FrictionFollowsTheForceAsItsCouplingSays) {
 
 TEST(VertexContact, FrictionOnAPlaneIsTheGradientOfItsPotential) {
   int sliding = 0, sticking = 0;
-  for_each_held([&](const Decided& d) {
+  for_each_held(mixed_world, [&](const Decided& d) {
     const double slip = d.slipped();
     const bool slides = slip > 1e-4;
     if (d.view.count != 1 || d.view.obstacles[0].shape != ObstacleShape::plane || d.view.obstacles[0].moves ||
         (!slides && slip > 0.9 * longest))
       return;
     const auto potential = [&](const Vector3<double>& at) {
-      return friction_potential_of(d.view, d.start, d.bristles, at, d.contact, d.touches.data());
+      return friction_potential_of(d.view, d.start, at, d.contact, d.touches.data());
     };
     // A spring's potential is of second order: its differences are exact.
     const double first = slides ? 1e-7 : 0.05 * longest, second = slides ? 1e-5 : first;  // [m]
@@ -210,23 +222,42 @@ TEST(VertexContact, FrictionOnAPlaneIsTheGradientOfItsPotential) {
 }
 
 TEST(VertexContact, BristlesKeepTheFriction) {
-  for_each_held([&](const Decided& d) {
-    const Vector3<double> kept = bristles_at_end(d.view, d.contact, d.touches.data());
-    EXPECT_LE(norm(kept), 1 + 1e-12);
-    if (d.contact.friction_bound == 0) {
-      EXPECT_EQ(norm(kept), 0);
-      return;
-    }
-    EXPECT_LE((d.contact.friction_bound * vector3d(kept) + d.friction()).norm(), rounding);
-    if (d.view.count != 1) return;
-    // A step without motion from there on has the same friction.
+  int kept_by_one = 0, kept_by_several = 0;
+  const auto check = [&](const Decided& d) {
     Decided next = d;
-    next.bristles = kept;
-    next.start = d.point - d.touches[0].surface_moved;
+    next.start = d.point;
+    int held = 0;
+    bool starts_inside = false;
+    for (int k = 0; k < d.view.count; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      const VertexTouch& touch = d.touches[at];
+      const double bound = d.view.obstacles[k].friction * touch.normal_force;
+      const Vector3<double> kept = next.bristles[at] = bristle_at_end(d.view.obstacles[k], touch);
+      EXPECT_LE(norm(kept), 1 + 1e-12);
+      EXPECT_LE((bound * vector3d(kept) + vector3d(touch.friction)).norm(), rounding);
+      held += touch.holds ? 1 : 0;
+      starts_inside = starts_inside || touch.starts_inside;
+    }
+    if (d.view.obstacles[0].moves || starts_inside) return;
+    // A step without motion from there on has the same friction.
     next.decide();
-    if (next.contact.freedom == Freedom::free || d.touches[0].starts_inside) return;
+    if (next.contact.freedom == Freedom::free) return;
     EXPECT_LE((next.friction() - d.friction()).norm(), rounding + 1e-9 * d.contact.friction_bound);
-  });
+    (held == 1 ? kept_by_one : kept_by_several) += 1;
+  };
+  for_each_held(mixed_world, check);
+  for_each_held(world_of_planes, check);
+  EXPECT_GT(kept_by_one, 300);
+  EXPECT_GT(kept_by_several, 30);
+}
+
+TEST(VertexContact, BristlesTurnWithTheirObstacle) {
+  // A quarter turn about z takes bristles along x to y, and those along z stay.
+  MovingObstacle<double> obstacle;
+  obstacle.start = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 2, 3}};
+  obstacle.end = {{0, 1, 0}, {-1, 0, 0}, {0, 0, 1}, {3, 2, 1}};
+  obstacle.moves = true;
+  EXPECT_EQ(vector3d(turned_with(obstacle, {0.5, 0, 0.25})), Vector3d(0, 0.5, 0.25));
 }
 
 }  // namespace
