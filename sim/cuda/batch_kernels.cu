@@ -35,7 +35,7 @@ __device__ LinearVectors linear_vectors(const BatchNumbers& batch) {
   for (int e = static_cast<int>(blockIdx.x); e < (batch).environment_count; e += static_cast<int>(gridDim.x))
 
 template <bool places_on_chip>
-__global__ void __launch_bounds__(team_threads, resident_teams_each)
+__global__ void __launch_bounds__(block_threads, resident_blocks_each)
     evaluate_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int triangles = batch.sheet.triangle_count;
   FOR_OWN_ENVIRONMENTS(batch, e) {
@@ -43,35 +43,35 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
         batch.sheet, batch.environments[e], {}, places_of(batch, e),
         batch.gradients + 3L * batch.sheet.size * e,
         {batch.triangle_gradients + 9L * triangles * blockIdx.x, nullptr}, shared_memory<double>());
-    if (threadIdx.x == 0) batch.energies[e] = energy;
-    __syncthreads();
+    if (team_rank() == 0) batch.energies[e] = energy;
+    synchronize_team();
   }
 }
 
 template <bool Preconditioner>
-__global__ void __launch_bounds__(team_threads, resident_teams_each)
+__global__ void __launch_bounds__(block_threads, resident_blocks_each)
     assemble_kernel(const __grid_constant__ BatchNumbers batch, float) {
   float* chip = shared_memory<float>();
   float* shares = batch.shares + 3L * share_step<false> * batch.sheet.triangle_count * blockIdx.x;
   FOR_OWN_ENVIRONMENTS(batch, e) {
     write_shares<false>(batch.sheet, batch.environments[e], {}, places_of(batch, e), Preconditioner, shares,
                         chip);
-    __syncthreads();
+    synchronize_team();
     if constexpr (Preconditioner)
       assemble_blocks<false>(batch.sheet, batch.environments[e], {}, {}, shares,
                              batch.blocks + 9L * batch.sheet.block_count * e, chip);
     else
       assemble_block_rows<false>(batch.sheet, batch.environments[e], shares,
                                  batch.block_rows + batch.block_row_size * e, chip);
-    __syncthreads();
+    synchronize_team();
   }
 }
 
 template <int parts>
-__global__ void __launch_bounds__(team_threads, resident_teams_each)
+__global__ void __launch_bounds__(block_threads, resident_blocks_each)
     factorize_kernel(const __grid_constant__ BatchNumbers batch, float) {
   FOR_OWN_ENVIRONMENTS(batch, e) {
-    if (threadIdx.x == 0) batch.positive[e] = 1;
+    if (team_rank() == 0) batch.positive[e] = 1;
     const bool positive = factorize<parts>(batch.fronts, batch.blocks + 9L * batch.sheet.block_count * e,
                                            batch.updates + batch.fronts.update_size * blockIdx.x,
                                            factor_of<parts>(batch, e), shared_memory<float>());
@@ -80,37 +80,36 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
 }
 
 template <int parts>
-__global__ void __launch_bounds__(team_threads, resident_teams_each)
+__global__ void __launch_bounds__(block_threads, resident_blocks_each)
     solve_kernel(const __grid_constant__ BatchNumbers batch, float) {
   const int size = 3 * batch.sheet.size;
   FOR_OWN_ENVIRONMENTS(batch, e) {
     const LinearVectors v = linear_vectors(batch);
-    for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
-      v.solved[size + i] = vector_of(batch, e)[i];
+    for (int i = team_rank(); i < size; i += team_size()) v.solved[size + i] = vector_of(batch, e)[i];
     solve<parts>(batch.fronts, factor_of<parts>(batch, e), v, shared_memory<char>());
-    for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
-      result_of(batch, e)[i] = v.solved[size + i];
-    __syncthreads();
+    for (int i = team_rank(); i < size; i += team_size()) result_of(batch, e)[i] = v.solved[size + i];
+    synchronize_team();
   }
 }
 
-__global__ void __launch_bounds__(team_threads, resident_teams_each)
+__global__ void __launch_bounds__(block_threads, resident_blocks_each)
     multiply_kernel(const __grid_constant__ BatchNumbers batch, float) {
   FOR_OWN_ENVIRONMENTS(batch, e) {
     Four<float>* x = linear_vectors(batch).search;
-    for (int i = static_cast<int>(threadIdx.x); i < batch.sheet.size; i += team_threads) {
+    for (int i = team_rank(); i < batch.sheet.size; i += team_size()) {
       const float* from = vector_of(batch, e) + 3 * i;
       x[i] = {from[0], from[1], from[2], 0};
     }
-    __syncthreads();
+    synchronize_team();
     multiply(batch.sheet, batch.block_rows + batch.block_row_size * e,
-             static_cast<float>(batch.environments[e].rigidity), {}, x, result_of(batch, e));
-    __syncthreads();
+             static_cast<float>(batch.environments[e].rigidity), {}, x, result_of(batch, e),
+             shared_memory<float>());
+    synchronize_team();
   }
 }
 
 template <int parts>
-__global__ void __launch_bounds__(team_threads, resident_teams_each)
+__global__ void __launch_bounds__(block_threads, resident_blocks_each)
     find_directions_kernel(const __grid_constant__ BatchNumbers batch, float tolerance) {
   float* chip = shared_memory<float>();
   FOR_OWN_ENVIRONMENTS(batch, e) {
@@ -125,8 +124,8 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
         tolerance};
     const int solves = conjugate_gradients<parts>(
         batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
-        batch.changes + 3L * batch.sheet.size * e, chip, reinterpret_cast<char*>(chip + team_warps));
-    if (threadIdx.x == 0) batch.solves[e] = solves;
+        batch.changes + 3L * batch.sheet.size * e, chip, reinterpret_cast<char*>(chip + seats));
+    if (team_rank() == 0) batch.solves[e] = solves;
   }
 }
 
@@ -139,7 +138,7 @@ struct Choice {
 /// Places on chip where all teams find room.
 Choice evaluation(int size) {
   const int near = gradient_memory(size, true);
-  return resident_teams_each * (near + 1024) <= most_memory()
+  return resident_blocks_each * (near + 1024) <= most_memory()
              ? Choice{evaluate_kernel<true>, near}
              : Choice{evaluate_kernel<false>, gradient_memory(size, false)};
 }
@@ -157,13 +156,13 @@ Choice choice(BatchKernel kernel, const FrontTables& fronts) {
     case BatchKernel::factorize:
       return {factorize_kernel<parts>, number * factor_memory(fronts.shared_panel)};
     case BatchKernel::multiply:
-      return {multiply_kernel, 0};
+      return {multiply_kernel, seats * number};
     case BatchKernel::solve:
       return {solve_kernel<parts>, solve_bytes};
     case BatchKernel::find_directions:
       break;
   }
-  return {find_directions_kernel<parts>, solve_bytes + number * team_warps};
+  return {find_directions_kernel<parts>, solve_bytes + number * seats};
 }
 
 Choice choice(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts) {
@@ -181,8 +180,9 @@ int resident_teams(BatchKernel kernel, FactorPrecision precision, const FrontTab
 void run(BatchKernel kernel, FactorPrecision precision, const BatchNumbers& numbers, int teams,
          float tolerance, cudaStream_t stream) {
   const Choice chosen = choice(kernel, precision, numbers.fronts);
-  launch(chosen.kernel, std::min(teams, resident_teams(chosen.kernel, chosen.bytes)), chosen.bytes, stream,
-         numbers, tolerance);
+  const TeamLaunch teams_at_once(std::min(teams, resident_teams(chosen.kernel, chosen.bytes)), 1,
+                                 chosen.bytes, stream);
+  launch(chosen.kernel, teams_at_once, numbers, tolerance);
 }
 
 }  // namespace flash::sim::cuda

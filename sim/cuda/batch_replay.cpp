@@ -44,6 +44,9 @@ void check(const SheetPlan& plan, const std::vector<ReplayEnvironment>& environm
   require(settings.first_step >= 0 && settings.steps >= settings.first_step,
           "the steps have to ascend from first_step to steps");
   require(settings.restart_interval > 0, "restart_interval has to be positive");
+  require(settings.team_blocks >= 0 && settings.team_blocks <= most_team_blocks &&
+              (settings.team_blocks & (settings.team_blocks - 1)) == 0,
+          "team_blocks have to be 0, 1, 2, 4 or 8");
   require(settings.halvings >= 0 && settings.halvings <= most_halvings,
           "halvings have to lie between 0 and 16");
   const std::vector<int>& kept = settings.kept_steps;
@@ -228,7 +231,7 @@ struct BatchReplay::Memory {
   DeviceArray<double> kept, hold_forces;
   DeviceArray<char> arena;
   DeviceArray<TeamMemory> team_memory;
-  int teams = 0;
+  int teams = 0, team_blocks = 1;
   ReplayNumbers numbers{};
 
   Memory(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments,
@@ -248,6 +251,8 @@ struct BatchReplay::Memory {
                                     [](const auto& e) { return e.material.stiffness_damping != 0; });
     const int most_obstacles_each = upload_obstacles(environments);
     upload_bristles(environments, most_obstacles_each);
+    team_blocks = settings.team_blocks > 0 ? settings.team_blocks : team_blocks_for(plan.fronts, count);
+    plan.share_out_solves(front_plan, team_blocks);
     lay_out_teams({front_plan, layout, damped, most_held, most_obstacles_each});
     steps = DeviceArray<int>(environments.size());
 
@@ -257,7 +262,7 @@ struct BatchReplay::Memory {
     check(cudaMallocHost(&stop, sizeof(int)));
     *stop = 0;
     numbers.waiting = {steps.data(), count, stop};
-    place_on_chip(numbers);
+    place_on_chip(numbers, team_blocks);
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
     numbers.max_iterations = settings.max_iterations;
@@ -323,8 +328,9 @@ struct BatchReplay::Memory {
       for (int k = 0; k < most_obstacles_each; ++k)
         for (const int vertex : layout.order) {
           const Eigen::Index row = static_cast<Eigen::Index>(k) * layout.size + vertex;
-          all.push_back(row < e.bristles.rows() ? Point{e.bristles(row, 0), e.bristles(row, 1), e.bristles(row, 2), 0}
-                                                : Point{});
+          all.push_back(row < e.bristles.rows()
+                            ? Point{e.bristles(row, 0), e.bristles(row, 1), e.bristles(row, 2), 0}
+                            : Point{});
         }
     }
     bristles = DeviceArray<Point>(all);
@@ -378,7 +384,7 @@ struct BatchReplay::Memory {
   }
 
   void lay_out_teams(const TeamSizes& sizes) {
-    teams = std::min(count, resident_replay_teams(plan.fronts));
+    teams = std::min(count, resident_replay_teams(plan.fronts, team_blocks));
     require(teams > 0, "the sheet is too large for the device");
     DeviceArena counting(nullptr);
     lay_out_team(sizes, counting);
@@ -410,7 +416,7 @@ struct BatchReplay::Memory {
     const std::vector<int> stand(static_cast<std::size_t>(count), step);
     steps.write(0, stand.data(), stand.size());
     numbers.end_step = end;
-    run_replay(numbers, teams, stream);
+    run_replay(numbers, teams, team_blocks, stream);
     step = end;
   }
 
@@ -435,6 +441,7 @@ BatchReplay::BatchReplay(BatchReplay&&) noexcept = default;
 int BatchReplay::size() const { return memory_->count; }
 int BatchReplay::step() const { return memory_->step; }
 int BatchReplay::teams() const { return memory_->teams; }
+int BatchReplay::team_blocks() const { return memory_->team_blocks; }
 void BatchReplay::advance(int steps) { memory_->advance(steps); }
 void BatchReplay::synchronize(const std::atomic<bool>* stop) {
   const Memory& m = *memory_;
@@ -455,8 +462,9 @@ Points BatchReplay::bristles(int environment) const {
   const int obstacles = m.obstacle_counts[static_cast<std::size_t>(environment)];
   Points all(static_cast<Eigen::Index>(obstacles) * m.layout.size, 3);
   for (int k = 0; k < obstacles; ++k)
-    all.middleRows(static_cast<Eigen::Index>(k) * m.layout.size, m.layout.size) = m.points(
-        m.bristles, static_cast<std::size_t>(environment) * m.numbers.most_obstacles_each + static_cast<std::size_t>(k));
+    all.middleRows(static_cast<Eigen::Index>(k) * m.layout.size, m.layout.size) =
+        m.points(m.bristles, static_cast<std::size_t>(environment) * m.numbers.most_obstacles_each +
+                                 static_cast<std::size_t>(k));
   return all;
 }
 

@@ -54,6 +54,7 @@ struct ReplaySettings {
   int steps = 0;                  ///< the last one
   std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; step 0 is the start
   int restart_interval = 10;      ///< steps after which a solver forgets its factor and may change its team
+  int team_blocks = 0;  ///< processors that work on an environment, 1, 2, 4 or 8; 0: as many as there are
   FrontSettings fronts{};
 };
 
@@ -66,10 +67,10 @@ struct ReplayStep {
 };
 
 /// Replays of many environments of one sheet on the device, each step to the tolerance that the CPU's Solver
-/// has. A block of threads takes an environment through up to `restart_interval` steps and then another one
-/// that waits. So none waits for the others, and what an environment gets depends on its own numbers alone,
-/// bitwise. Linear problems are in single precision, energies, residuals, contact and positions in double. A
-/// held vertex moves on a straight line within a step that has to be halved.
+/// has. A team, one processor or several, takes an environment through up to `restart_interval` steps and
+/// then another one that waits. So none waits for the others, and what an environment gets depends on its own
+/// numbers alone, bitwise. Linear problems are in single precision, energies, residuals, contact and
+/// positions in double. A held vertex moves on a straight line within a step that has to be halved.
 class BatchReplay {
  public:
   /// Throws std::invalid_argument where environments do not fit the plan, have not the same bending operator,
@@ -80,8 +81,9 @@ class BatchReplay {
   BatchReplay(BatchReplay&&) noexcept;
 
   int size() const;
-  int step() const;   ///< steps that are queued or taken, first_step included
-  int teams() const;  ///< environments that the device works on at the same time
+  int step() const;         ///< steps that are queued or taken, first_step included
+  int teams() const;        ///< environments that the device works on at the same time
+  int team_blocks() const;  ///< processors that work on an environment
 
   /// Queues the next steps of all environments and returns; what reads results waits for them.
   void advance(int steps);

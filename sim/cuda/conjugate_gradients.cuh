@@ -4,11 +4,13 @@
 #include "sim/cuda/own_vertices.cuh"
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/sheet_product.cuh"
+#include "sim/cuda/team_sum.cuh"
 
 namespace flash::sim::cuda {
 
 // Conjugate gradients of one environment, as NewtonMatrix::solve of the CPU. A thread owns the vertices i,
-// i + team_threads, ... of each vector; a few of them are on their way at a time.
+// i + team_size(), ... of each vector; a few of them are on their way at a time. Of what is on chip each
+// block has a copy, and what a thread writes there goes to all of them.
 
 /// The linear problem of an environment.
 struct LinearProblem {
@@ -40,17 +42,20 @@ __device__ void solve(const FrontTables& fronts, const __half* factor, const Lin
     solve<parts, false>(fronts, factor, v.solved, chip);
 }
 
-__device__ inline void restrict_to_free(const Restrictions& restrictions, float* x) {
+/// `copies`: whether each block has a copy of x.
+__device__ inline void restrict_to_free(const Restrictions& restrictions, float* x, bool copies) {
   if (restrictions.count == 0) return;
-  __syncthreads();
-  for (int k = static_cast<int>(threadIdx.x); k < restrictions.count; k += team_threads) {
+  synchronize_team();
+  const int first = copies ? static_cast<int>(threadIdx.x) : team_rank(),
+            step = copies ? block_threads : team_size();
+  for (int k = first; k < restrictions.count; k += step) {
     const VertexRestriction& restriction = restrictions.list[k];
     float* own = x + 3 * restriction.place;
     const float a = own[0], b = own[1], c = own[2];
     const float* free = restriction.free;
     for (int r = 0; r < 3; ++r) own[r] = free[r] * a + free[3 + r] * b + free[6 + r] * c;
   }
-  __syncthreads();
+  synchronize_team();
 }
 
 /// Three numbers of a vertex.
@@ -71,6 +76,11 @@ __device__ inline void put(const Numbers3& v, float* vector, int vertex) {
   own[0] = v.x;
   own[1] = v.y;
   own[2] = v.z;
+}
+/// Into a vector on chip of all blocks.
+__device__ inline void put_in_all(const Numbers3& v, float* vector, int vertex) {
+  const int blocks = team_blocks();
+  for (int block = 0; block < blocks; ++block) put(v, blocks == 1 ? vector : in_block(vector, block), vertex);
 }
 __device__ inline Numbers3 scaled_sum(const Numbers3& a, float scale, const Numbers3& b) {
   return {a.x + scale * b.x, a.y + scale * b.y, a.z + scale * b.z};
@@ -101,7 +111,12 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   float *residual = v.residual, *preconditioned = v.solved + 3 * size;
   const Restrictions& restrictions = problem.restrictions;
   const auto multiply_search = [&] {
-    return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
+    return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image, partial);
+  };
+  const auto put_search = [&](int i, const Numbers3& own) {
+    const Four<float> four = {own.x, own.y, own.z, 0};
+    v.search[i] = four;
+    if (v.near != v.search) put_in_all(v.near + i, four);
   };
   // The right-hand side, and where the restrictions have the solution start.
   int moved = 0;
@@ -119,12 +134,12 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
         put({-gradient.x, -gradient.y, -gradient.z}, residual, i);
         put(start, direction, i);
         put({}, change, i);
-        v.search[i] = v.near[i] = {start.x, start.y, start.z, 0};
+        put_search(i, start);
       });
-  const bool starts_elsewhere = __syncthreads_or(moved) != 0;
+  const bool starts_elsewhere = any_of_team(moved != 0);
   if (starts_elsewhere) {
     multiply_search();
-    __syncthreads();
+    synchronize_team();
     for_own_vertices(
         size, [&](int i) { return numbers_at(v.image, i); },
         [&](int i, const Numbers3& own) { put(own, change, i); });
@@ -132,20 +147,24 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   // The norm of the residual, of which `step` times the image is taken off. What the restrictions leave
   // becomes the next right-hand side of the factor.
   const auto take_residual = [&](float step) {
-    float squares = 0;
-    for_own_vertices(
-        size,
+    synchronize_team();
+    add_up<1, 2>(
+        size, partial,
         [&](int i) {
           const Numbers3 own = numbers_at(residual, i);
           const Numbers3 left = step == 0 ? own : scaled_sum(own, -step, numbers_at(v.image, i));
           return free_part(restrictions, i, left);
         },
-        [&](int i, const Numbers3& left) {
+        [&](int i, const Numbers3& left, float(&squares)[1]) {
           put(left, residual, i);
-          put(left, preconditioned, i);
-          squares += product(left, left);
+          if (v.solved_on_chip)
+            put_in_all(left, preconditioned, i);
+          else
+            put(left, preconditioned, i);
+          squares[0] += product(left, left);
         });
-    return sqrtf(sum_over_team(squares, partial));
+    synchronize_team();
+    return sqrtf(total(size, partial));
   };
   // Goes a step along the search direction, the image with it.
   const auto go = [&](float step) {
@@ -170,11 +189,11 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     solve<parts>(fronts, problem.factor, v, chip);
     v.clock.count(ReplayPhase::solves);
     // The residual has free parts alone, so that those of what the factor gives need not be taken for this.
-    float products = 0;
-    for_own_vertices(
-        size, [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },
-        [&](int, float own) { products += own; });
-    const float along = sum_over_team(products, partial);
+    add_up<1, 2>(
+        size, partial, [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },
+        [&](int, float own, float(&sum)[1]) { sum[0] += own; });
+    synchronize_team();
+    const float along = total(size, partial);
     const float kept = iteration == 1 ? 0 : along / previous;
     previous = along;
     for_own_vertices(
@@ -184,13 +203,10 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
           const Numbers3 own = free_part(restrictions, i, numbers_at(preconditioned, i));
           return iteration == 1 ? own : scaled_sum(own, kept, {last.x, last.y, last.z});
         },
-        [&](int i, const Numbers3& next) {
-          v.search[i] = v.near[i] = {next.x, next.y, next.z, 0};
-        });
-    __syncthreads();
+        put_search);
+    synchronize_team();
     v.clock.count(ReplayPhase::directions);
-    products = multiply_search();
-    const float curvature = sum_over_team(products, partial);
+    const float curvature = multiply_search();
     v.clock.count(ReplayPhase::products);
     // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
     if (curvature <= 0 && iteration > 1) break;
@@ -199,7 +215,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     if (curvature <= 0) break;
     norm = take_residual(step);
   }
-  __syncthreads();
+  synchronize_team();
   return iteration;
 }
 

@@ -1,14 +1,14 @@
 #pragma once
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/incremental_potential.cuh"
-#include "sim/cuda/team.cuh"
+#include "sim/cuda/team_sum.cuh"
 #include "sim/law/contact_exchange.h"
 #include "sim/law/feasible_place.h"
 
 namespace flash::sim::cuda {
 
 // Contact of a sheet with obstacles: sim/newton/active_set.h and sim/step/contact_set.h for one environment.
-// A thread decides for the vertices i, i + team_threads, ...; none of them reads what another decides.
+// A thread decides for the vertices i, i + team_size(), ...; none of them reads what another decides.
 
 /// The way of the linear problem's solution at a vertex.
 __device__ inline Triple way_at(const float* direction, int i) {
@@ -21,8 +21,8 @@ __device__ __noinline__ void project_vertices(const SheetTables& tables, const S
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   SurfaceRoom<most> room;
   VertexTouch touches[most];
-  __syncthreads();
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  synchronize_team();
+  for (int i = team_rank(); i < tables.size; i += team_size()) {
     if (step.held_axes[i] != 0) continue;
     const Triple start = triple(step.start[i]), point = triple(positions[i]);
     Triple place = point;
@@ -49,7 +49,7 @@ __device__ inline void project_to_feasible(const SheetTables& tables, const Step
 /// Copies what holds the vertices at an iterate.
 __device__ inline void copy_contacts(const SheetTables& tables, const StepProblem& step,
                                      const ContactSet& from, const ContactSet& to) {
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  for (int i = team_rank(); i < tables.size; i += team_size()) {
     const int listed = from.listed[i];
     to.listed[i] = listed;
     if (listed == 0) continue;
@@ -64,7 +64,7 @@ __device__ void gather_contacts(const SheetTables& tables, const StepProblem& st
                                 float* left, int* count) {
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   VertexTouch touches[most];
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  for (int i = team_rank(); i < tables.size; i += team_size()) {
     if (step.held_axes[i] != 0) continue;
     VertexContact contact;
     if (contacts.listed[i] != 0) {
@@ -93,21 +93,23 @@ __device__ void gather_contacts(const SheetTables& tables, const StepProblem& st
 }
 
 /// Fills in what may not move freely: held vertices, and those that `contacts` hold. Their order does not
-/// matter. `left`: null, or the matrices of sim/cuda/generalized_residuals.cuh. `count`: on chip.
+/// matter. `left`: null, or the matrices of sim/cuda/generalized_residuals.cuh. `count`: on chip, of which
+/// that of the first block is used.
 __device__ inline void gather_restrictions(const SheetTables& tables, StepProblem& step,
                                            const ContactSet& contacts, VertexRestriction* list, int* of_place,
                                            float* left, int* count) {
   if (step.obstacles.count == 0) return;
-  __syncthreads();
-  if (threadIdx.x == 0) *count = step.held_count;
-  for (int k = static_cast<int>(threadIdx.x); k < step.held_count && left != nullptr; k += team_threads)
+  count = in_block(count, 0);
+  synchronize_team();
+  if (team_rank() == 0) *count = step.held_count;
+  for (int k = team_rank(); k < step.held_count && left != nullptr; k += team_size())
     for (int e = 0; e < 9; ++e) left[9 * k + e] = list[k].free[e];
-  __syncthreads();
+  synchronize_team();
   for_obstacles_of(
       step, [&](auto most) { gather_contacts<most>(tables, step, contacts, list, of_place, left, count); });
-  __syncthreads();
+  synchronize_team();
   step.restrictions.count = *count;
-  __syncthreads();
+  synchronize_team();
 }
 
 /// Second derivative of the gap to a surface that holds a vertex at `point` [1/m].
@@ -128,7 +130,7 @@ __device__ __noinline__ void write_blocks_of_contacts(const SheetTables& tables,
                                                       const Iterate& now, bool curved, float* blocks) {
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   VertexTouch touches[most];
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  for (int i = team_rank(); i < tables.size; i += team_size()) {
     Symmetric3 sum;
     if (step.held_axes[i] == 0 && now.contacts.listed[i] != 0) {
       read_touches(now.contacts, i, obstacles.count, touches);
@@ -160,7 +162,7 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
   SurfaceRoom<most> room;
   VertexTouch touches[most];
   bool any = false;
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  for (int i = team_rank(); i < tables.size; i += team_size()) {
     if (step.held_axes[i] != 0) continue;
     const Triple way = way_at(direction, i);
     VertexContact contact;
@@ -187,7 +189,7 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
     write_contact(contact, touches, obstacles.count, contacts, i);
     any = true;
   }
-  return __syncthreads_or(any) != 0;
+  return any_of_team(any);
 }
 
 /// One exchange of the active set of the linear problem, as exchange_contacts of the CPU; `stuck`: as
@@ -206,7 +208,7 @@ __device__ __noinline__ void write_bristles_of_contacts(const SheetTables& table
                                                         const ContactSet& contacts, Point* bristles) {
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   VertexTouch touches[most];
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  for (int i = team_rank(); i < tables.size; i += team_size()) {
     const bool touched = step.held_axes[i] == 0 && contacts.listed[i] != 0;
     if (touched) read_touches(contacts, i, obstacles.count, touches);
     for (int k = 0; k < obstacles.count; ++k) {
@@ -238,9 +240,9 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
                                                   const Iterate& end, double* partial) {
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   VertexTouch touches[most];
-  double complementarity = 0, penetration = 0, start_depth = 0, sums[2] = {};
-  double &work = sums[0], &bristles = sums[1];
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  double complementarity = 0, penetration = 0, start_depth = 0, sums[2];
+  sum_over_team(tables.size, sums, partial, [&](int i, double(&own)[2]) {
+    double &work = own[0], &bristles = own[1];
     const Triple start = triple(step.start[i]), point = triple(end.positions[i]);
     const int axes = step.held_axes[i];
     for (int k = 0; k < obstacles.count; ++k) {
@@ -255,7 +257,7 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
       complementarity = worse_of(complementarity, -gap.distance);
       if (axes == 0) start_depth = worse_of(start_depth, -distance_at_start(obstacles.obstacles[k], start));
     }
-    if (axes != 0 || end.contacts.listed[i] == 0) continue;
+    if (axes != 0 || end.contacts.listed[i] == 0) return;
     read_touches(end.contacts, i, obstacles.count, touches);
     carry_bristles(obstacles, step, i, touches);
     bristles += bristle_energy(obstacles, touches);
@@ -269,13 +271,12 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
       work += touch.starts_inside ? fmax(0.0, dot(force, point - start))
                                   : dot(force, gap_in_step(obstacles, k, start, point).surface_moved);
     }
-  }
-  sum_over_team(sums, partial);
+  });
   complementarity = worst_over_team(complementarity, partial);
   penetration = worst_over_team(penetration, partial);
   start_depth = worst_over_team(start_depth, partial);
-  __syncthreads();
-  return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, work, bristles};
+  synchronize_team();
+  return {complementarity, penetration, start_depth > inside_depth ? start_depth : 0, sums[0], sums[1]};
 }
 
 __device__ inline ContactEnd judge_contacts(const SheetTables& tables, const StepProblem& step,

@@ -7,7 +7,7 @@
 namespace flash::sim::cuda {
 
 FrontSettings fitting_fronts(FrontSettings settings) {
-  constexpr int tile = 1024, rest = team_warps * tile + 64;  // numbers
+  constexpr int tile = 1024, rest = block_warps * tile + 64;  // numbers
   settings.panel_capacity =
       std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
   return settings;
@@ -49,10 +49,6 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.levels = upload(plan.levels, levels_);
   fronts.panel_rows = upload(plan.panel_rows, ints_);
   fronts.blocks = upload(plan.blocks, places_);
-  const SolvePlan solve = plan_solve(plan);
-  fronts.chunks = upload(solve.chunks, chunks_);
-  fronts.chunk_starts = upload(solve.starts, ints_);
-  fronts.gathers = upload(solve.gathers, gathers_);
 
   sheet.size = layout.size;
   sheet.triangle_count = layout.triangle_count;
@@ -88,6 +84,13 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.hinge_corners = upload(layout.hinge_corners, ints_);
   sheet.hinge_source_starts = upload(layout.hinge_source_starts, ints_);
   sheet.hinge_sources = upload(layout.hinge_sources, ints_);
+}
+
+void DevicePlan::share_out_solves(const FrontPlan& plan, int team_blocks) {
+  const SolvePlan solve = plan_solve(plan, team_blocks * block_warps);
+  fronts.chunks = upload(solve.chunks, chunks_);
+  fronts.chunk_starts = upload(solve.starts, ints_);
+  fronts.gathers = upload(solve.gathers, gathers_);
 }
 
 }  // namespace flash::sim::cuda

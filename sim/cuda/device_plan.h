@@ -14,6 +14,9 @@ class DevicePlan {
  public:
   DevicePlan(const FrontPlan& fronts, const SheetLayout& layout);
 
+  /// How the warps of teams of so many blocks share solves; has to be called once.
+  void share_out_solves(const FrontPlan& fronts, int team_blocks);
+
   FrontTables fronts;
   SheetTables sheet;
 

@@ -4,6 +4,7 @@
 #include "sim/cuda/membrane.cuh"
 #include "sim/cuda/membrane_damping.cuh"
 #include "sim/cuda/sheet_product.cuh"
+#include "sim/cuda/team_sum.cuh"
 
 namespace flash::sim::cuda {
 
@@ -11,9 +12,9 @@ namespace flash::sim::cuda {
 // adds up its triangles in a fixed order. Most of what is read are the values of bending, a megabyte for
 // 1,024 vertices, and most of the time goes by until they are there: so many are on their way at a time.
 
-/// Bytes on chip: places, where they fit, and sums over the team.
+/// Bytes on chip: sums over the team and places, where they fit.
 __host__ __device__ inline int gradient_memory(int size, bool places_on_chip) {
-  return static_cast<int>(sizeof(double)) * (most_sums * team_warps + (places_on_chip ? 3 * size : 0));
+  return static_cast<int>(sizeof(double)) * (most_sums * seats + (places_on_chip ? 3 * size : 0));
 }
 
 /// Bytes of what the triangles give.
@@ -26,17 +27,16 @@ struct GradientShares {
   double *triangles, *hinges;
 };
 
-/// What the triangles of one environment give to `shares`. Returns the energy of the thread's own.
+/// What the triangles of one environment give to `shares`. Their energy is added up at `partial`.
 template <typename Places>
-__device__ double triangle_gradients(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                     const Places& place, double* shares) {
+__device__ void triangle_gradients(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                   const Places& place, double* shares, double* partial) {
   const int count = tables.triangle_count;
-  double membrane = 0;
-  for (int t = static_cast<int>(threadIdx.x); t < count; t += team_threads) {
+  add_up<1>(count, partial, [&](int t, double(&membrane)[1]) {
     const TriangleFrame f = triangle_frame(tables, t, place);
     const PrincipalResponse<double> response = response_at(environment, f.frame.s1, f.frame.s2);
     const StressColumns<double> stress = stress_of(f.frame, response);
-    membrane += f.area * response.energy;
+    membrane[0] += f.area * response.energy;
     const Triple g1 = f.area * (f.w10 * stress.p1 + f.w11 * stress.p2),
                  g2 = f.area * (f.w20 * stress.p1 + f.w21 * stress.p2), g0 = -1.0 * (g1 + g2);
     const Triple all[3] = {g0, g1, g2};
@@ -47,20 +47,18 @@ __device__ double triangle_gradients(const SheetTables& tables, const Environmen
       to[count] = all[k].y;
       to[2 * count] = all[k].z;
     }
-  }
-  return membrane;
+  });
 }
 
-/// Adds the triangles' shares to the gradient, in which that of bending stands. Returns twice the bending
-/// energy of the thread's own vertices.
+/// Adds the triangles' shares to the gradient, in which that of bending stands. Twice the bending energy is
+/// added up at `partial`.
 template <typename Places>
-__device__ double add_up_gradient(const SheetTables& tables, const Places& place, const double* shares,
-                                  const double* hinge_shares, double* gradient) {
-  double bending = 0;
-  for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += team_threads) {
+__device__ void add_up_gradient(const SheetTables& tables, const Places& place, const double* shares,
+                                const double* hinge_shares, double* gradient, double* partial) {
+  add_up<1>(tables.size, partial, [&](int vertex, double(&bending)[1]) {
     double* own = gradient + 3 * vertex;
     const Triple p = place(vertex), bent = {own[0], own[1], own[2]};
-    bending += dot(bent, p);
+    bending[0] += dot(bent, p);
     Triple sum = {0, 0, 0};
     if (tables.hinge_count > 0) sum = hinge_gradient_of(tables, vertex, hinge_shares);
     // Most vertices have no more corners than this; what they read is on its way together.
@@ -83,17 +81,18 @@ __device__ double add_up_gradient(const SheetTables& tables, const Places& place
     own[0] = bent.x + sum.x;
     own[1] = bent.y + sum.y;
     own[2] = bent.z + sum.z;
-  }
-  return bending;
+  });
 }
 
 /// Membrane and bending energy [J], to all threads, and the gradient of both [N], three numbers a vertex;
-/// with the damping of elements since `start`. `chip`: gradient_memory.
+/// with the damping of elements since `start`. `chip`: gradient_memory, free for all threads.
 template <bool places_on_chip>
 __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const EnvironmentNumbers& environment,
                                             const StepStart& start, const Point* positions, double* gradient,
                                             const GradientShares& shares, double* chip) {
-  double *partial = chip, *near = chip + most_sums * team_warps;
+  double* near = chip + most_sums * seats;
+  enum { membrane, bending, damping, hinges, hinge_damping };  // sums
+  const auto sums = [&](int k) { return chip + seats * k; };
   // Far from the origin places would round the energy of bending.
   const Triple origin = triple(positions[0]);
   const auto place = [&](int vertex) -> Triple {
@@ -103,27 +102,33 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
       return triple(positions[vertex]) - origin;
   };
   if constexpr (places_on_chip) {
-    for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += team_threads) {
+    for (int vertex = static_cast<int>(threadIdx.x); vertex < tables.size; vertex += block_threads) {
       const Triple p = triple(positions[vertex]) - origin;
       near[3 * vertex] = p.x;
       near[3 * vertex + 1] = p.y;
       near[3 * vertex + 2] = p.z;
     }
-    __syncthreads();
+    synchronize_team();
   }
   multiply_scalar_rows(tables, tables.step_values, place, [&](int row, int c, double sum) {
     gradient[3 * row + c] = environment.rigidity * sum;
   });
-  const double membrane = triangle_gradients(tables, environment, place, shares.triangles);
-  ElasticEnergies rest = {};
-  if (tables.hinge_count > 0) rest = hinge_gradients(tables, environment, start.angles, place, shares.hinges);
+  triangle_gradients(tables, environment, place, shares.triangles, sums(membrane));
+  if (tables.hinge_count > 0)
+    hinge_gradients(tables, environment, start.angles, place, shares.hinges, sums(hinges));
   if (start.metrics != nullptr)
-    rest.damping += add_damping_gradients(tables, environment, start.metrics, place, shares.triangles);
-  __syncthreads();
-  const double bending = add_up_gradient(tables, place, shares.triangles, shares.hinges, gradient);
-  double sums[3] = {membrane, 0.5 * bending + rest.bending, rest.damping};
-  sum_over_team(sums, partial);
-  return {sums[0], sums[1], sums[2]};
+    add_damping_gradients(tables, environment, start.metrics, place, shares.triangles, sums(damping));
+  synchronize_team();
+  add_up_gradient(tables, place, shares.triangles, shares.hinges, gradient, sums(bending));
+  synchronize_team();
+  ElasticEnergies energies = {total(tables.triangle_count, sums(membrane)),
+                              0.5 * total(tables.size, sums(bending)), 0};
+  if (start.metrics != nullptr) energies.damping += total(tables.triangle_count, sums(damping));
+  if (tables.hinge_count > 0) {
+    energies.bending += total(tables.hinge_count, sums(hinges));
+    energies.damping += total(tables.hinge_count, sums(hinge_damping));
+  }
+  return energies;
 }
 
 }  // namespace flash::sim::cuda

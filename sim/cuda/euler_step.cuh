@@ -20,7 +20,7 @@ struct StepMotion {
 
 /// Notes what is held and where it is now; forget_restrictions takes it back.
 __device__ inline void begin_holds(const Work& w, const StepMotion& motion, const Point* positions) {
-  for (int k = static_cast<int>(threadIdx.x); k < motion.held_count; k += team_threads) {
+  for (int k = team_rank(); k < motion.held_count; k += team_size()) {
     const HeldPlace& held = motion.held[k];
     VertexRestriction restriction = {held.place, {}, {}};
     for (int axis = 0; axis < 3; ++axis) restriction.free[4 * axis] = held.axes >> axis & 1 ? 0.0f : 1.0f;
@@ -32,27 +32,27 @@ __device__ inline void begin_holds(const Work& w, const StepMotion& motion, cons
     w.memory.hold_starts[3 * k + 1] = from.y;
     w.memory.hold_starts[3 * k + 2] = from.z;
   }
-  __syncthreads();
+  synchronize_team();
 }
 
 __device__ inline void forget_restrictions(const Work& w) {
-  __syncthreads();
-  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+  synchronize_team();
+  for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
     w.memory.restriction_of[i] = -1;
     w.memory.held_axes[i] = 0;
   }
-  __syncthreads();
+  synchronize_team();
 }
 
 /// The positions without forces, held vertices where they have to be: `share` of their way of the whole step.
 __device__ inline void predict(const Work& w, const StepProblem& step, const StepMotion& motion,
                                double share) {
-  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+  for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
     const Triple x = triple(step.start[i]) + step.h * triple(step.velocities[i]);
     w.now.positions[i] = {x.x, x.y, x.z, 0};
   }
-  __syncthreads();
-  for (int k = static_cast<int>(threadIdx.x); k < motion.held_count; k += team_threads) {
+  synchronize_team();
+  for (int k = team_rank(); k < motion.held_count; k += team_size()) {
     const HeldPlace& held = motion.held[k];
     Point& own = w.now.positions[held.place];
     double* places[3] = {&own.x, &own.y, &own.z};
@@ -67,17 +67,16 @@ __device__ inline void predict(const Work& w, const StepProblem& step, const Ste
 /// Adds what the holds exert in a share of the step.
 __device__ inline void add_hold_forces(const Work& w, const StepMotion& motion, double share) {
   for (int hold = 0; hold < w.replay.hold_count; ++hold) {
-    double sums[3] = {};
-    for (int k = static_cast<int>(threadIdx.x); k < motion.held_count; k += team_threads) {
+    double sums[3];
+    sum_over_team(motion.held_count, sums, shared_memory<double>(), [&](int k, double(&own)[3]) {
       const HeldPlace& held = motion.held[k];
       for (int axis = 0; axis < 3; ++axis)
         if ((held.axes >> axis & 1) != 0 && held.holds[axis] == hold)
-          sums[axis] += w.now.force[3 * held.place + axis];
-    }
-    sum_over_team(sums, shared_memory<double>());
-    if (threadIdx.x == 0)
+          own[axis] += w.now.force[3 * held.place + axis];
+    });
+    if (team_rank() == 0)
       for (int axis = 0; axis < 3; ++axis) motion.hold_forces[3 * hold + axis] += share * sums[axis];
-    __syncthreads();
+    synchronize_team();
   }
 }
 
@@ -104,23 +103,22 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
     mass_sum,
     count
   };
-  double sums[count] = {};
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  double sums[count];
+  sum_over_team(tables.size, sums, shared_memory<double>(), [&](int i, double(&own)[count]) {
     const double mass = step.mass(tables, i);
     const Triple way = triple(w.now.positions[i]) - triple(step.start[i]), speed = triple(step.velocities[i]),
                  residual = force_at(w.now.residuals, i), inertial = step.inertial(i, {0, 0, 0}),
                  held_way = step.held_part(i, way);
-    sums[kinetic] += 0.5 * mass * dot(way, way);
-    sums[kinetic_at_start] += 0.5 * mass * dot(speed, speed);
-    sums[falls] += mass * dot(step.gravity(), way) + dot(step.load(i), way);
-    sums[unbalanced] += fabs(dot(residual, way));
-    sums[work] += dot(force_at(w.now.force, i), held_way);
-    sums[moved_holds] += dot(held_way, held_way) > 0 ? 1 : 0;
-    sums[inertial_at_start] += 0.5 * mass * dot(inertial, inertial);
-    sums[mass_sum] += mass;
-  }
-  sum_over_team(sums, shared_memory<double>());
-  __syncthreads();
+    own[kinetic] += 0.5 * mass * dot(way, way);
+    own[kinetic_at_start] += 0.5 * mass * dot(speed, speed);
+    own[falls] += mass * dot(step.gravity(), way) + dot(step.load(i), way);
+    own[unbalanced] += fabs(dot(residual, way));
+    own[work] += dot(force_at(w.now.force, i), held_way);
+    own[moved_holds] += dot(held_way, held_way) > 0 ? 1 : 0;
+    own[inertial_at_start] += 0.5 * mass * dot(inertial, inertial);
+    own[mass_sum] += mass;
+  });
+  synchronize_team();
   const ContactEnd contact = judge_contacts(tables, step, w.now, shared_memory<double>());
   sums[work] += contact.work;
   bool start_is_feasible = sums[moved_holds] == 0 && contact.start_depth == 0;
@@ -159,7 +157,7 @@ __device__ inline void begin_damping(const Work& w, StepProblem& step) {
   write_metrics(w.replay.sheet, place, w.memory.start_metrics);
   if (w.replay.sheet.hinge_count > 0) write_angles(w.replay.sheet, place, w.memory.start_angles);
   step.damped_since = {w.memory.start_metrics, w.memory.start_angles};
-  __syncthreads();
+  synchronize_team();
 }
 
 /// The obstacles from a share of the step to another one.
@@ -231,7 +229,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   add_hold_forces(w, motion, end - begin);
   stats.penetration = worse_of(stats.penetration, judged.penetration);
   stats.converged = judged.sound && balanced(step, w.now, w.replay.tolerance);
-  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+  for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
     const Triple moved = triple(w.now.positions[i]) - triple(state.positions[i]),
                  speed = (1 / step.h) * moved;
     state.velocities[i] = {judged.finite ? speed.x : 0, judged.finite ? speed.y : 0,
@@ -240,7 +238,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   }
   if (judged.finite) write_bristles(w.replay.sheet, step, w.now.contacts, state.bristles);
   if (judged.finite) step.at_start = w.now.elastic;
-  __syncthreads();
+  synchronize_team();
   return solved;
 }
 

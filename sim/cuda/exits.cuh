@@ -21,13 +21,12 @@ __device__ inline Triple shortest_way_out(const SheetTables& tables, const StepP
   double shortest = no_such_side;
   for (int own = 0; own < obstacles.count; ++own) {
     bool any = false;
-    for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads)
-      any = any || starts_inside(step, i, own);
-    if (__syncthreads_or(any) == 0) continue;
+    for (int i = team_rank(); i < tables.size; i += team_size()) any = any || starts_inside(step, i, own);
+    if (!any_of_team(any)) continue;
     for (int k = 0; k < exit_directions(obstacles.obstacles[own]); ++k) {
       const Triple direction = exit_direction(obstacles.obstacles[own], k);
       double longest = 0;
-      for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads)
+      for (int i = team_rank(); i < tables.size; i += team_size())
         for (int other = 0; other < obstacles.count; ++other)
           if (starts_inside(step, i, other))
             longest =
@@ -52,7 +51,7 @@ __device__ inline bool exits_gently(const SheetTables& tables, const StepProblem
     return false;
   };
   bool torn = false;
-  for (int k = static_cast<int>(threadIdx.x); k < tables.edge_count; k += team_threads) {
+  for (int k = team_rank(); k < tables.edge_count; k += team_size()) {
     const int i = tables.block_rows[tables.size + k], j = tables.block_columns[tables.size + k];
     if (!exits(i) && !exits(j)) continue;
     const auto strain = [&](const Point* x) {
@@ -61,7 +60,7 @@ __device__ inline bool exits_gently(const SheetTables& tables, const StepProblem
     const double at_end = strain(end);
     torn = torn || !(at_end <= limit || at_end <= strain(step.start));
   }
-  return __syncthreads_or(torn) == 0;
+  return !any_of_team(torn);
 }
 
 }  // namespace flash::sim::cuda

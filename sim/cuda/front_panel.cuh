@@ -104,8 +104,8 @@ __device__ inline void gather_columns(const Panel& panel, const ChildRows& rows,
 }
 
 /// Adds the blocks of the matrix, a column of a block each thread, a few of them at a time.
-__device__ inline void add_blocks(const FrontTables& tables, const FrontLayout& front,
-                                  const float* __restrict__ blocks, const Panel& panel) {
+__device__ inline void add_blocks(const FrontTables& tables, const FrontLayout& front, const float* blocks,
+                                  const Panel& panel) {
   constexpr int together = 4;
   const int count = 3 * front.block_count;
   for (int base = panel.group.rank; base < count; base += together * panel.group.size) {

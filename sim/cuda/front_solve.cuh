@@ -26,7 +26,7 @@ struct ChunkSlot {
 /// On-chip bytes that a solve needs.
 template <int parts>
 __host__ __device__ constexpr int solve_memory(int depth) {
-  return team_warps * depth * ChunkSlot<parts>::size;
+  return block_warps * depth * ChunkSlot<parts>::size;
 }
 
 /// Chunks that a warp works on side by side, where it has `depth` of them on chip. Each waits for numbers
@@ -44,7 +44,7 @@ class ChunkStream {
   __device__ ChunkStream(const FrontTables& tables, const __half* factor, const char* chip)
       : gathers_(tables.gathers + lane()),
         factor_(reinterpret_cast<const char*>(factor) + 16 * lane()),
-        next_(reinterpret_cast<const int4*>(tables.chunks + tables.chunk_starts[warp()])),
+        next_(reinterpret_cast<const int4*>(tables.chunks + tables.chunk_starts[team_warp()])),
         depth_(tables.solve_depth),
         first_(chip_address(chip) + warp() * depth_ * Slot::size),
         end_(first_ + depth_ * Slot::size),
@@ -118,27 +118,41 @@ struct ChunkInputs {
   float scale;  ///< of products with them
 };
 
+/// What a solve works on: in memory, or on chip with a copy in each block of the team.
+template <bool on_chip>
+struct SolveVector {
+  float* numbers;
+
+  __device__ float operator[](int i) const { return numbers[i]; }
+  __device__ void set(int i, float number) const {
+    if constexpr (on_chip)
+      put_in_all(numbers + i, number);
+    else
+      numbers[i] = number;
+  }
+};
+
 /// Writes the results of a task, whose chunks added up to `sums`.
-template <int parts, bool backward>
-__device__ void finish_task(unsigned slot, int own_at, const float (&sums)[4], float* vector) {
+template <int parts, bool backward, typename Vector>
+__device__ void finish_task(unsigned slot, int own_at, const float (&sums)[4], const Vector& vector) {
   using Slot = ChunkSlot<parts>;
   // Four lanes have the same four rows; each keeps one.
   const int t = lane() % 4, row = 8 * t + lane() / 4;
   const float result = t < 2 ? (t == 0 ? sums[0] : sums[1]) : (t == 2 ? sums[2] : sums[3]);
   const int4 end = load_int4(slot + Slot::chunk + 16);
   if (row < end.x) {
-    vector[own_at + row] = result;
+    vector.set(own_at + row, result);
   } else if (!backward && row >= end.z && row < end.w) {
     const int2 passed = load_int2(slot + Slot::result_table + 8 * row);
-    vector[end.y + row] = result + vector[passed.x] + vector[passed.y];
+    vector.set(end.y + row, result + vector[passed.x] + vector[passed.y]);
   }
 }
 
 /// Multiplies by the `width` chunks from `first_slot` on, none of which needs what another gives. `sums`: of
 /// the chunks of the task so far, of the rows lane() / 4 + 8 k; zero at first. Returns the SolveChunk::flags
 /// of the last one.
-template <int parts, bool backward, int width>
-__device__ int run_chunks(unsigned first_slot, float* vector, float (&sums)[4]) {
+template <int parts, bool backward, int width, typename Vector>
+__device__ int run_chunks(unsigned first_slot, const Vector& vector, float (&sums)[4]) {
   using Slot = ChunkSlot<parts>;
   const auto slot = [&](int k) { return first_slot + k * Slot::size; };
   int4 chunks[width];
@@ -200,21 +214,21 @@ __device__ int run_chunks(unsigned first_slot, float* vector, float (&sums)[4]) 
 }
 
 /// All heights upwards, or downwards.
-template <int parts, bool backward, int width>
-__device__ void run_levels(int count, ChunkStream<parts, width>& stream, float* vector) {
+template <int parts, bool backward, int width, typename Vector>
+__device__ void run_levels(int count, ChunkStream<parts, width>& stream, const Vector& vector) {
   float sums[4] = {};
   for (int level = 0; level < count; ++level) {
-    __syncthreads();
+    synchronize_team();
     while (!(run_chunks<parts, backward, width>(stream.take(), vector, sums) & SolveChunk::ends_level)) {
     }
   }
 }
 
-template <int parts, int width>
-__device__ void run_both_ways(const FrontTables& tables, const __half* factor, float* vector,
+template <int parts, int width, typename Vector>
+__device__ void run_both_ways(const FrontTables& tables, const __half* factor, const Vector& vector,
                               const char* chip) {
   ChunkStream<parts, width> stream(tables, factor, chip);
-  if (threadIdx.x == 0) vector[6 * tables.size] = 0;
+  if (threadIdx.x == 0) vector.numbers[6 * tables.size] = 0;
   run_levels<parts, false>(tables.level_count, stream, vector);
   run_levels<parts, true>(tables.level_count, stream, vector);
   wait_for_copies<0>();
@@ -228,10 +242,10 @@ __device__ void solve(const FrontTables& tables, const __half* factor, float* ve
   if (on_chip) __builtin_assume(__isShared(vector));
 #endif
   if (chunks_side_by_side(tables.solve_depth) == chunks_together)
-    run_both_ways<parts, chunks_together>(tables, factor, vector, chip);
+    run_both_ways<parts, chunks_together>(tables, factor, SolveVector<on_chip>{vector}, chip);
   else
-    run_both_ways<parts, 1>(tables, factor, vector, chip);
-  __syncthreads();
+    run_both_ways<parts, 1>(tables, factor, SolveVector<on_chip>{vector}, chip);
+  synchronize_team();
 }
 
 }  // namespace flash::sim::cuda

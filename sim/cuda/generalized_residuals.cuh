@@ -43,101 +43,105 @@ __device__ __noinline__ int generalized_residuals(const FrontTables& fronts, con
                                                   const LinearProblem& problem, const LinearVectors& v,
                                                   const CoupledMemory& memory, float* direction,
                                                   float* change, float* partial, char* chip) {
-  const int size = 3 * sheet.size, first = static_cast<int>(threadIdx.x);
+  const int size = 3 * sheet.size, first = team_rank(), step = team_size();
+  // Each block fills its copy of a vector on chip.
+  const int first_of_copy = static_cast<int>(threadIdx.x);
   float *search = reinterpret_cast<float*>(v.search), *preconditioned = v.solved + size;
   const auto slot = [](int i) { return i / 3 * 4 + i % 3; };
   const Restrictions& restrictions = problem.restrictions;
   const auto apply_left = [&](float* x) {
-    __syncthreads();
-    for (int k = first; k < restrictions.count; k += team_threads) {
+    synchronize_team();
+    for (int k = first; k < restrictions.count; k += step) {
       float* own = x + 3 * restrictions.list[k].place;
       const float a = own[0], b = own[1], c = own[2], *left = memory.left + 9 * k;
       for (int r = 0; r < 3; ++r) own[r] = left[r] * a + left[3 + r] * b + left[6 + r] * c;
     }
-    __syncthreads();
+    synchronize_team();
   };
   // v.image = A x, x in the search vector.
   const auto multiply_search = [&] {
-    __syncthreads();
+    synchronize_team();
     if (v.near != v.search) {
-      for (int i = first; i < 4 * sheet.size; i += team_threads)
+      for (int i = first_of_copy; i < 4 * sheet.size; i += block_threads)
         reinterpret_cast<float*>(v.near)[i] = search[i];
-      __syncthreads();
+      synchronize_team();
     }
-    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image);
-    __syncthreads();
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image, partial);
+    synchronize_team();
   };
   const auto norm_of = [&](const float* x) {
-    float squares = 0;
-    for (int i = first; i < size; i += team_threads) squares += x[i] * x[i];
-    return sqrtf(sum_over_team(squares, partial));
+    float squares[1];
+    sum_over_team(size, squares, partial, [&](int i, float(&own)[1]) { own[0] += x[i] * x[i]; });
+    return sqrtf(squares[0]);
   };
 
-  for (int i = first; i < size; i += team_threads) {
+  for (int i = first; i < size; i += step) {
     v.residual[i] = -problem.gradient[i];
     direction[i] = search[slot(i)] = 0;
   }
-  for (int i = first; i < sheet.size; i += team_threads) search[4 * i + 3] = 0;
-  __syncthreads();
-  for (int k = first; k < restrictions.count; k += team_threads)
+  for (int i = first; i < sheet.size; i += step) search[4 * i + 3] = 0;
+  synchronize_team();
+  for (int k = first; k < restrictions.count; k += step)
     for (int c = 0; c < 3; ++c) {
       const int at = restrictions.list[k].place;
       direction[3 * at + c] = search[4 * at + c] = restrictions.list[k].correction[c];
     }
-  restrict_to_free(restrictions, v.residual);
+  restrict_to_free(restrictions, v.residual, false);
   multiply_search();
   apply_left(v.image);
-  for (int i = first; i < size; i += team_threads) v.residual[i] -= v.image[i];
+  for (int i = first; i < size; i += step) v.residual[i] -= v.image[i];
   const float norm = norm_of(v.residual), target = fmaxf(0.1f * norm, problem.tolerance);
   double* right = memory.small + most_directions * small_columns + 2 * most_directions;
   if (first == 0) right[0] = norm;
-  for (int i = first; i < size; i += team_threads) memory.basis[i] = v.residual[i] / norm;
+  for (int i = first; i < size; i += step) memory.basis[i] = v.residual[i] / norm;
   int count = 0;
   for (float rest = norm; rest > target && count < most_directions;) {
     float* own_direction = memory.directions + static_cast<long>(count) * size;
     const float* last = memory.basis + static_cast<long>(count) * size;
-    __syncthreads();
-    for (int i = first; i < size; i += team_threads) preconditioned[i] = last[i];
-    __syncthreads();
+    synchronize_team();
+    for (int i = v.solved_on_chip ? first_of_copy : first; i < size;
+         i += v.solved_on_chip ? block_threads : step)
+      preconditioned[i] = last[i];
+    synchronize_team();
     solve<parts>(fronts, problem.factor, v, chip);
-    restrict_to_free(restrictions, preconditioned);
-    __syncthreads();
-    for (int i = first; i < size; i += team_threads) own_direction[i] = search[slot(i)] = preconditioned[i];
+    restrict_to_free(restrictions, preconditioned, v.solved_on_chip);
+    synchronize_team();
+    for (int i = first; i < size; i += step) own_direction[i] = search[slot(i)] = preconditioned[i];
     multiply_search();
     apply_left(v.image);
     for (int k = 0; k <= count; ++k) {
       const float* other = memory.basis + static_cast<long>(k) * size;
-      float product = 0;
-      for (int i = first; i < size; i += team_threads) product += other[i] * v.image[i];
-      const float along = sum_over_team(product, partial);
-      for (int i = first; i < size; i += team_threads) v.image[i] -= along * other[i];
+      float product[1];
+      sum_over_team(size, product, partial, [&](int i, float(&own)[1]) { own[0] += other[i] * v.image[i]; });
+      const float along = product[0];
+      for (int i = first; i < size; i += step) v.image[i] -= along * other[i];
       if (first == 0) memory.small[count * small_columns + k] = along;
     }
     const float length = norm_of(v.image);
-    for (int i = first; i < size; i += team_threads)
+    for (int i = first; i < size; i += step)
       memory.basis[static_cast<long>(count + 1) * size + i] = length > 0 ? v.image[i] / length : 0;
     if (first == 0) {
       memory.small[count * small_columns + count + 1] = length;
-      partial[0] = static_cast<float>(rotate_column(memory.small, count));
+      put_in_all(partial, static_cast<float>(rotate_column(memory.small, count)));
     }
-    __syncthreads();
+    synchronize_team();
     rest = partial[0];
-    __syncthreads();
+    synchronize_team();
     ++count;
     if (!(length > 0)) break;
   }
   if (first == 0) solve_small(memory.small, count);
-  __syncthreads();
+  synchronize_team();
   const double* weights = right + small_columns;
-  for (int i = first; i < size; i += team_threads) {
+  for (int i = first; i < size; i += step) {
     float sum = direction[i];
     for (int k = 0; k < count; ++k)
       sum += static_cast<float>(weights[k]) * memory.directions[static_cast<long>(k) * size + i];
     direction[i] = search[slot(i)] = sum;
   }
   multiply_search();
-  for (int i = first; i < size; i += team_threads) change[i] = v.image[i];
-  __syncthreads();
+  for (int i = first; i < size; i += step) change[i] = v.image[i];
+  synchronize_team();
   return count;
 }
 

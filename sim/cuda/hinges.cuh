@@ -1,7 +1,7 @@
 #pragma once
 #include "sim/cuda/four.h"
 #include "sim/cuda/membrane.cuh"
-#include "sim/cuda/team.cuh"
+#include "sim/cuda/team_sum.cuh"
 
 namespace flash::sim::cuda {
 
@@ -72,18 +72,18 @@ __device__ inline void add_area_gradient(const HingeShape& s, int a, int b, int 
 
 template <typename Places>
 __device__ void write_angles(const SheetTables& tables, const Places& place, double* angles) {
-  for (int e = static_cast<int>(threadIdx.x); e < tables.hinge_count; e += team_threads)
+  for (int e = team_rank(); e < tables.hinge_count; e += team_size())
     angles[e] = angle_of(hinge_shape(tables, e, place));
 }
 
-/// What the hinges give to `shares`: twelve numbers each, hinge_count apart. Returns the energies of the
-/// thread's own: bending, and damping where there are angles at the start.
+/// What the hinges give to `shares`: twelve numbers each, hinge_count apart. Their energies are added up at
+/// `partial`: of bending, and then of damping where there are angles at the start.
 template <typename Places>
-__device__ ElasticEnergies hinge_gradients(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                           const double* start_angles, const Places& place, double* shares) {
+__device__ void hinge_gradients(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                const double* start_angles, const Places& place, double* shares,
+                                double* partial) {
   const int count = tables.hinge_count;
-  ElasticEnergies energy = {};
-  for (int e = static_cast<int>(threadIdx.x); e < count; e += team_threads) {
+  add_up<2>(count, partial, [&](int e, double(&energies)[2]) {
     const HingeShape s = hinge_shape(tables, e, place);
     const double present = s.shares[0] * s.shares[1], rest_weight = tables.hinge_weights[e];
     Triple g[4] = {};
@@ -91,13 +91,13 @@ __device__ ElasticEnergies hinge_gradients(const SheetTables& tables, const Envi
       const double angle = angle_of(s), bent = deviation(angle, tables.hinge_rest_angles[e]);
       double moment = environment.rigidity * bent,
              of_angle = 0.5 * rest_weight * environment.rigidity * bent * bent;
-      energy.bending += present * of_angle;
+      energies[0] += present * of_angle;
       if (start_angles != nullptr) {
         const double turned = deviation(angle, start_angles[e]),
                      damping = environment.damping_share * environment.rigidity,
                      of_turn = 0.5 * rest_weight * damping * turned * turned;
         moment += damping * turned;
-        energy.damping += present * of_turn;
+        energies[1] += present * of_turn;
         of_angle += of_turn;
       }
       angle_gradient(s, g);
@@ -112,8 +112,7 @@ __device__ ElasticEnergies hinge_gradients(const SheetTables& tables, const Envi
       to[count] = g[k].y;
       to[2 * count] = g[k].z;
     }
-  }
-  return energy;
+  });
 }
 
 /// What hinges give to a vertex.
@@ -136,7 +135,7 @@ struct HingeMatrix {
 template <typename Places>
 __device__ void write_hinge_matrix(const SheetTables& tables, double rigidity, const Places& place,
                                    const HingeMatrix& matrix) {
-  for (int e = static_cast<int>(threadIdx.x); e < tables.hinge_count; e += team_threads) {
+  for (int e = team_rank(); e < tables.hinge_count; e += team_size()) {
     const HingeShape s = hinge_shape(tables, e, place);
     const double weight = rigidity * s.shares[0] * s.shares[1] * tables.hinge_weights[e], root = sqrt(weight);
     Triple g[4] = {};
@@ -154,7 +153,7 @@ __device__ void write_hinge_matrix(const SheetTables& tables, double rigidity, c
 /// g^T x of each hinge; the caller synchronizes.
 __device__ inline void multiply_hinges(const SheetTables& tables, const HingeMatrix& matrix,
                                        const Four<float>* x) {
-  for (int e = static_cast<int>(threadIdx.x); e < tables.hinge_count; e += team_threads) {
+  for (int e = team_rank(); e < tables.hinge_count; e += team_size()) {
     const float* g = matrix.gradients + 12L * e;
     float sum = 0;
 #pragma unroll

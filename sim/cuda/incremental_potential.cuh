@@ -68,58 +68,55 @@ __device__ inline Triple force_at(const double* force, int i) {
 __device__ inline double add_turned_damping(const SheetTables& tables, const StepProblem& step,
                                             const TeamMemory& memory, const Point* positions, double* force,
                                             double* partial) {
-  const int first = static_cast<int>(threadIdx.x);
-  double centres[7] = {};
+  const int first = team_rank(), step_size = team_size();
+  double centres[7];
   const Triple origin = triple(positions[0]), start_origin = triple(step.start[0]);
-  for (int i = first; i < tables.size; i += team_threads) {
+  sum_over_team(tables.size, centres, partial, [&](int i, double(&own)[7]) {
     const double mass = step.mass(tables, i);
     const Triple to = triple(positions[i]) - origin, from = triple(step.start[i]) - start_origin;
-    centres[0] += mass * to.x;
-    centres[1] += mass * to.y;
-    centres[2] += mass * to.z;
-    centres[3] += mass * from.x;
-    centres[4] += mass * from.y;
-    centres[5] += mass * from.z;
-    centres[6] += mass;
-  }
-  sum_over_team(centres, partial);
+    own[0] += mass * to.x;
+    own[1] += mass * to.y;
+    own[2] += mass * to.z;
+    own[3] += mass * from.x;
+    own[4] += mass * from.y;
+    own[5] += mass * from.z;
+    own[6] += mass;
+  });
   const double per_mass = 1 / centres[6];
   const Triple to_centre = origin + per_mass * Triple{centres[0], centres[1], centres[2]},
                from_centre = start_origin + per_mass * Triple{centres[3], centres[4], centres[5]};
-  double sums[9] = {};
-  for (int i = first; i < tables.size; i += team_threads) {
+  double sums[9];
+  sum_over_team(tables.size, sums, partial, [&](int i, double(&own)[9]) {
     const Triple to = step.mass(tables, i) * (triple(positions[i]) - to_centre),
                  from = triple(step.start[i]) - from_centre;
     const double left[3] = {to.x, to.y, to.z}, right[3] = {from.x, from.y, from.z};
 #pragma unroll
-    for (int k = 0; k < 9; ++k) sums[k] += left[k / 3] * right[k % 3];
-  }
-  sum_over_team(sums, partial);
+    for (int k = 0; k < 9; ++k) own[k] += left[k / 3] * right[k % 3];
+  });
   double moments[3][3];
   for (int k = 0; k < 9; ++k) moments[k / 3][k % 3] = sums[k];
   const RigidTurn turn = rigid_turn(moments);
-  for (int i = first; i < tables.size; i += team_threads) {
+  for (int i = first; i < tables.size; i += step_size) {
     const Triple bent = triple(positions[i]) - to_centre - turn.turn(triple(step.start[i]) - from_centre);
     memory.bent[i] = {bent.x, bent.y, bent.z, 0};
   }
-  __syncthreads();
+  synchronize_team();
   const double rigidity = step.numbers.damping_share * step.numbers.rigidity;
   multiply_scalar_rows(
       tables, tables.step_values, [&](int vertex) { return triple(memory.bent[vertex]); },
       [&](int row, int c, double sum) { memory.damped[3 * row + c] = rigidity * sum; });
-  __syncthreads();
-  double totals[4] = {};
-  for (int i = first; i < tables.size; i += team_threads) {
+  synchronize_team();
+  double totals[4];
+  sum_over_team(tables.size, totals, partial, [&](int i, double(&own)[4]) {
     const Triple damped = force_at(memory.damped, i),
                  torque = cross(damped, turn.turn(triple(step.start[i]) - from_centre));
-    totals[0] += 0.5 * dot(damped, triple(memory.bent[i]));
-    totals[1] += torque.x;
-    totals[2] += torque.y;
-    totals[3] += torque.z;
-  }
-  sum_over_team(totals, partial);
+    own[0] += 0.5 * dot(damped, triple(memory.bent[i]));
+    own[1] += torque.x;
+    own[2] += torque.y;
+    own[3] += torque.z;
+  });
   const Triple response = turn.respond({totals[1], totals[2], totals[3]});
-  for (int i = first; i < tables.size; i += team_threads) {
+  for (int i = first; i < tables.size; i += step_size) {
     const Triple added =
         force_at(memory.damped, i) +
         step.mass(tables, i) * cross(response, turn.turn(triple(step.start[i]) - from_centre));
@@ -160,7 +157,8 @@ __device__ inline void read_touches(const ContactSet& contacts, int i, int count
 }
 __device__ inline void carry_bristles(const ObstacleStep<double>& obstacles, const StepProblem& step, int i,
                                       VertexTouch* touches) {
-  carry_bristles(obstacles, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
+  carry_bristles(
+      obstacles, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
 }
 /// What holds a vertex that is listed, as contact_of says. `touches`: what read_touches gave.
 __device__ inline VertexContact read_contact(const ContactSet& contacts, int i,
@@ -187,8 +185,8 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
     carry_bristles(obstacles, step, i, touches);
-    response.line_friction = friction_potential_of(obstacles, start, point,
-                                                   read_contact(*line, i, obstacles, touches), touches);
+    response.line_friction =
+        friction_potential_of(obstacles, start, point, read_contact(*line, i, obstacles, touches), touches);
   }
   const double clearance = clearance_of(obstacles, start, point);
   contacts.clearance[i] = clearance;
@@ -216,7 +214,7 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
   double* partial = shared_memory<double>();
   double* force = at.force;
   const Point* positions = at.positions;
-  __syncthreads();
+  synchronize_team();
   at.elastic = elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, positions, force,
                                                 {triangle_shares, memory.hinge_gradients}, partial);
   double damping = at.elastic.damping;
@@ -224,13 +222,13 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
     damping += add_turned_damping(tables, step, memory, positions, force, partial);
   const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
   // Potential, squared residuals, friction, friction along the line, squared rounding.
-  double sums[5] = {}, worst = 0;
-  for (int i = static_cast<int>(threadIdx.x); i < tables.size; i += team_threads) {
+  double sums[5], worst = 0;
+  sum_over_team(tables.size, sums, partial, [&](int i, double(&added)[5]) {
     const double mass = step.mass(tables, i);
     const Triple moved = triple(positions[i]) - triple(step.start[i]), inertial = step.inertial(i, moved),
                  load = step.load(i);
     const Triple own = force_at(force, i) + mass * (per_step * inertial + drag * moved) - load;
-    sums[0] +=
+    added[0] +=
         0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
     force[3 * i] = own.x;
     force[3 * i + 1] = own.y;
@@ -243,19 +241,18 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
       });
       reaction = contact.reaction;
       rounding = contact.rounding;
-      sums[2] += contact.friction;
-      sums[3] += contact.line_friction;
+      added[2] += contact.friction;
+      added[3] += contact.line_friction;
     }
     const Triple residual = own - reaction;
     at.residuals[3 * i] = residual.x;
     at.residuals[3 * i + 1] = residual.y;
     at.residuals[3 * i + 2] = residual.z;
     const double squared = dot(residual, residual);
-    sums[1] += squared;
-    sums[4] += rounding * rounding;
+    added[1] += squared;
+    added[4] += rounding * rounding;
     worst = worse_of(worst, (sqrt(squared) - rounding) / mass);
-  }
-  sum_over_team(sums, partial);
+  });
   worst = worst_over_team(worst, partial);
   at.potential = sums[0] + damping + at.elastic.membrane + at.elastic.bending;
   at.residual = sqrt(sums[1]);
@@ -263,7 +260,7 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
   at.line_friction = sums[3];
   at.rounding = sqrt(sums[4]);
   at.worst = worst / step.material->weight_factor;
-  __syncthreads();
+  synchronize_team();
 }
 
 /// Whether |r| <= tolerance |M g|, and no vertex misses its weight by more than 30 times as much. The

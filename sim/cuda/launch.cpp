@@ -22,4 +22,23 @@ int most_memory() {
   return bytes;
 }
 
+bool launches_clusters() {
+  int device = 0, clusters = 0;
+  check(cudaGetDevice(&device));
+  check(cudaDeviceGetAttribute(&clusters, cudaDevAttrClusterLaunch, device));
+  return clusters != 0;
+}
+
+TeamLaunch::TeamLaunch(int teams, int blocks, int bytes, cudaStream_t stream) {
+  config_.gridDim = dim3(static_cast<unsigned>(teams), static_cast<unsigned>(blocks));
+  config_.blockDim = dim3(block_threads);
+  config_.dynamicSmemBytes = static_cast<size_t>(bytes);
+  config_.stream = stream;
+  if (blocks == 1) return;
+  cluster_.id = cudaLaunchAttributeClusterDimension;
+  cluster_.val.clusterDim = {1, static_cast<unsigned>(blocks), 1};
+  config_.attrs = &cluster_;
+  config_.numAttrs = 1;
+}
+
 }  // namespace flash::sim::cuda

@@ -1,6 +1,6 @@
 #pragma once
 #include "sim/cuda/membrane.cuh"
-#include "sim/cuda/team.cuh"
+#include "sim/cuda/team_sum.cuh"
 
 namespace flash::sim::cuda {
 
@@ -43,7 +43,7 @@ __device__ TriangleGradient triangle_gradient(const SheetTables& tables, int t, 
 template <typename Places>
 __device__ void write_metrics(const SheetTables& tables, const Places& place, double* metrics) {
   const int count = tables.triangle_count;
-  for (int t = static_cast<int>(threadIdx.x); t < count; t += team_threads) {
+  for (int t = team_rank(); t < count; t += team_size()) {
     const Metric metric = triangle_gradient(tables, t, place).metric();
     metrics[t] = metric.xx;
     metrics[count + t] = metric.xy;
@@ -67,17 +67,18 @@ __device__ inline Metric stress_of(const SheetLame& lame, const Metric& strain) 
 }
 
 /// Adds to what the triangles give to their corners, as triangle_gradients (elastic_gradient.cuh) wrote it.
-/// Returns the potential of the thread's own.
+/// Their potential is added up at `partial`.
 template <typename Places>
-__device__ double add_damping_gradients(const SheetTables& tables, const EnvironmentNumbers& environment,
-                                        const double* metrics, const Places& place, double* shares) {
+__device__ void add_damping_gradients(const SheetTables& tables, const EnvironmentNumbers& environment,
+                                      const double* metrics, const Places& place, double* shares,
+                                      double* partial) {
   const int count = tables.triangle_count;
-  double potential = 0;
-  for (int t = static_cast<int>(threadIdx.x); t < count; t += team_threads) {
+  add_up<1>(count, partial, [&](int t, double(&potential)[1]) {
     const TriangleGradient g = triangle_gradient(tables, t, place);
     const Metric strain = strain_since(tables, t, g, metrics),
                  stress = stress_of(environment.damping, strain);
-    potential += 0.5 * g.area * (stress.xx * strain.xx + 2 * stress.xy * strain.xy + stress.yy * strain.yy);
+    potential[0] +=
+        0.5 * g.area * (stress.xx * strain.xx + 2 * stress.xy * strain.xy + stress.yy * strain.yy);
     const Triple p1 = g.area * (stress.xx * g.f1 + stress.xy * g.f2),
                  p2 = g.area * (stress.xy * g.f1 + stress.yy * g.f2);
 #pragma unroll
@@ -88,8 +89,7 @@ __device__ double add_damping_gradients(const SheetTables& tables, const Environ
       to[count] += force.y;
       to[2 * count] += force.z;
     }
-  }
-  return potential;
+  });
 }
 
 /// Without its negative eigenvalues.
@@ -109,7 +109,7 @@ __device__ void add_damping_shares(const SheetTables& tables, const EnvironmentN
                                    const double* metrics, const Places& place, bool positive, int block_step,
                                    float* shares) {
   const SheetLame& lame = environment.damping;
-  for (int t = static_cast<int>(threadIdx.x); t < tables.triangle_count; t += team_threads) {
+  for (int t = team_rank(); t < tables.triangle_count; t += team_size()) {
     const TriangleGradient g = triangle_gradient(tables, t, place);
     Metric stress = stress_of(lame, strain_since(tables, t, g, metrics));
     if (positive) stress = without_negative(stress);

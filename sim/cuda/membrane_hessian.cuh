@@ -19,11 +19,11 @@ template <bool on_chip>
 inline constexpr int share_step = on_chip ? 9 : 12;
 
 /// Through these on chip a warp writes what its lanes have one after the other.
-inline constexpr int hessian_memory = team_threads * 3 * share_step<false>;
+inline constexpr int hessian_memory = block_threads * 3 * share_step<false>;
 
 /// On-chip numbers of a matrix whose triangles' shares are there too, behind nine numbers a thread.
 __host__ __device__ inline int hessian_memory_with_shares(int triangles) {
-  return 9 * team_threads + 3 * share_step<true> * triangles;
+  return 9 * block_threads + 3 * share_step<true> * triangles;
 }
 
 /// The blocks (1,0), (2,0), (2,1) of each triangle, with its damping since `start`. `positive`: of the
@@ -34,7 +34,7 @@ __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers
                              float* chip) {
   constexpr int block_numbers = share_step<on_chip>, fours = 3 * share_step<false> / 4;
   float4* own_chip = reinterpret_cast<float4*>(chip) + 32 * fours * warp();
-  for (int first = 32 * warp(); first < tables.triangle_count; first += team_threads) {
+  for (int first = 32 * team_warp(); first < tables.triangle_count; first += team_size()) {
     const int t = min(first + lane(), tables.triangle_count - 1);
     const TriangleFrame f = triangle_frame(tables, t, [&](int vertex) { return triple(positions[vertex]); });
     PrincipalResponse<double> response = response_at(environment, f.frame.s1, f.frame.s2);
@@ -88,7 +88,7 @@ __device__ void write_shares(const SheetTables& tables, const EnvironmentNumbers
     __syncwarp();
   }
   if (start.metrics == nullptr) return;
-  __syncthreads();
+  synchronize_team();
   add_damping_shares(
       tables, environment, start.metrics, [&](int vertex) { return triple(positions[vertex]); }, positive,
       block_numbers, shares);
@@ -188,7 +188,7 @@ __device__ void assemble_block_rows(const SheetTables& tables, const Environment
 #pragma unroll
     for (int e = 0; e < 9; ++e) to[32 * e] = own_chip[32 * e + lane()];
   };
-  for (int slice = warp(); slice_size * slice < tables.size; slice += team_warps) {
+  for (int slice = team_warp(); slice_size * slice < tables.size; slice += team_warps()) {
     const int vertex = slice_size * slice + lane();
     const Block diagonal = go_through_row<on_chip>(tables, environment, vertex, shares, write);
     write(tables.slice_starts[slice] * slice_size, diagonal);
@@ -238,7 +238,7 @@ __device__ void assemble_blocks(const SheetTables& tables, const EnvironmentNumb
                                 const Restrictions& restrictions, const HingeMatrix& hinges,
                                 const float* shares, float* blocks, float* chip) {
   float* own_chip = chip + 9 * 32 * warp();
-  for (int first = 32 * warp(); first < tables.block_count; first += team_threads) {
+  for (int first = 32 * team_warp(); first < tables.block_count; first += team_size()) {
     const int b = min(first + lane(), tables.block_count - 1);
     Block block = b < tables.size ? go_through_row<on_chip>(tables, environment, tables.block_rows[b], shares,
                                                             [](int, const Block&) {})

@@ -38,7 +38,7 @@ __device__ inline void evaluate(const Work& w, const StepProblem& step, const Co
 /// What triangles give to a matrix: on chip behind nine numbers a thread, or in memory.
 template <bool on_chip>
 __device__ float* matrix_shares(const Work& w) {
-  return on_chip ? shared_memory<float>() + 9 * team_threads : w.memory.shares;
+  return on_chip ? shared_memory<float>() + 9 * block_threads : w.memory.shares;
 }
 
 /// The parts of the Hessian at the iterate, from which a matrix is put together.
@@ -52,7 +52,7 @@ __device__ void write_parts(const Work& w, const StepProblem& step, bool positiv
                        [&](int vertex) { return triple(w.now.positions[vertex]); },
                        {w.memory.hinge_matrix, w.memory.hinge_products});
   if (step.obstacles.count > 0) write_own_blocks(tables, step, w.now, !positive, w.memory.own_blocks);
-  __syncthreads();
+  synchronize_team();
 }
 
 /// What the linear problem may not move freely; with `coupled`, how friction follows the normal forces.
@@ -83,7 +83,7 @@ __device__ __noinline__ void assemble_matrix(const Work& w, const StepProblem& s
     assemble_block_rows<on_chip>(w.replay.sheet, step.numbers, matrix_shares<on_chip>(w), w.memory.block_rows,
                                  shared_memory<float>());
   });
-  __syncthreads();
+  synchronize_team();
   count_phase(w.memory, ReplayPhase::matrix);
 }
 
@@ -99,15 +99,13 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
   count_phase(w.memory, ReplayPhase::preconditioner);
   const bool positive =
       factorize<half_parts>(w.replay.fronts, w.memory.blocks, w.memory.updates, w.memory.factor, chip);
-  const float failures = sum_over_team(positive ? 0.0f : 1.0f, chip);
-  __syncthreads();
+  const bool failed = any_of_team(!positive);
   count_phase(w.memory, ReplayPhase::factorization);
-  return failures == 0;
+  return !failed;
 }
 
 /// On-chip bytes for sums over the team, before what a solve needs.
-inline constexpr int linear_partial_bytes = 64;
-static_assert(linear_partial_bytes >= team_warps * static_cast<int>(sizeof(float)));
+inline constexpr int linear_partial_bytes = seats * static_cast<int>(sizeof(float));
 
 /// Solves the linear problem. Returns the number of solves with the factor.
 __device__ __noinline__ int find_direction(const Work& w, const StepProblem& step, bool coupled) {
@@ -152,10 +150,10 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
   const bool touches = step.obstacles.count > 0;
-  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size; i += team_threads)
+  for (int i = team_rank(); i < 3 * tables.size; i += team_size())
     m.gradient[i] = static_cast<float>(w.now.residuals[i]);
   if (touches) copy_contacts(tables, step, w.now.contacts, w.linear);
-  __syncthreads();
+  synchronize_team();
   w.refactor = false;
   count_phase(m, ReplayPhase::rest);
   for (int solved = 1;; ++solved) {
@@ -175,17 +173,17 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
 
 /// The slope of the potential along the direction, at an iterate [J].
 __device__ inline double slope_at(const Work& w, const Iterate& at) {
-  double slope[1] = {};
-  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads)
-    slope[0] += dot(force_at(at.residuals, i), way_at(w.memory.direction, i));
-  sum_over_team(slope, shared_memory<double>());
-  __syncthreads();
+  double slope[1];
+  sum_over_team(w.replay.sheet.size, slope, shared_memory<double>(), [&](int i, double(&sums)[1]) {
+    sums[0] += dot(force_at(at.residuals, i), way_at(w.memory.direction, i));
+  });
+  synchronize_team();
   return slope[0];
 }
 
 /// Evaluates the feasible iterate nearest to the point `length` directions from the iterate.
 __device__ inline void move(const Work& w, const StepProblem& step, double length, Iterate& to) {
-  for (int i = static_cast<int>(threadIdx.x); i < w.replay.sheet.size; i += team_threads) {
+  for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
     const Point from = w.now.positions[i];
     const float* way = w.memory.direction + 3 * i;
     to.positions[i] = {from.x + length * way[0], from.y + length * way[1], from.z + length * way[2], 0};

@@ -1,5 +1,6 @@
 #pragma once
 #include "sim/cuda/replay_numbers.h"
+#include "sim/cuda/team.cuh"
 
 namespace flash::sim::cuda {
 
@@ -33,7 +34,7 @@ __device__ inline Frame<double> carried(const Frame<double>& by, const Frame<dou
 __device__ inline void place_obstacles(const PlacedObstacle* placed, int count, const FramePose* poses,
                                        int frames, double begin, double end,
                                        MovingObstacle<double>* obstacles) {
-  const int k = static_cast<int>(threadIdx.x);
+  const int k = team_rank();
   if (k < count) {
     const PlacedObstacle& own = placed[k];
     MovingObstacle<double> moving = own.obstacle;
@@ -44,7 +45,7 @@ __device__ inline void place_obstacles(const PlacedObstacle* placed, int count, 
     }
     obstacles[k] = moving;
   }
-  __syncthreads();
+  synchronize_team();
 }
 
 }  // namespace flash::sim::cuda

@@ -3,17 +3,18 @@
 
 namespace flash::sim::cuda {
 
-/// Goes through the vertices i, i + team_threads, ... of a thread, `together` at a time: first load(i) of all
+/// Goes through the vertices i, i + team_size(), ... of a thread, `together` at a time: first load(i) of all
 /// of them, so that what they read is on its way at the same time, then use(i, what was loaded) of each.
 template <int together = 2, typename Load, typename Use>
 __device__ void for_own_vertices(int size, const Load& load, const Use& use) {
-  for (int base = static_cast<int>(threadIdx.x); base < size; base += together * team_threads) {
+  const int step = team_size();
+  for (int base = team_rank(); base < size; base += together * step) {
     decltype(load(0)) loaded[together];
 #pragma unroll
-    for (int k = 0; k < together; ++k) loaded[k] = load(min(base + k * team_threads, size - 1));
+    for (int k = 0; k < together; ++k) loaded[k] = load(min(base + k * step, size - 1));
 #pragma unroll
     for (int k = 0; k < together; ++k)
-      if (base + k * team_threads < size) use(base + k * team_threads, loaded[k]);
+      if (base + k * step < size) use(base + k * step, loaded[k]);
   }
 }
 

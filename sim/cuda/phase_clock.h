@@ -1,4 +1,7 @@
 #pragma once
+#ifdef __CUDACC__
+#include "sim/cuda/team.cuh"
+#endif
 
 namespace flash::sim::cuda {
 
@@ -17,16 +20,16 @@ enum class ReplayPhase {
 inline constexpr int replay_phases = 9;
 
 #ifdef __CUDACC__
-/// Ticks of a team's processor spent in each phase, and behind them when the present one began.
+/// Ticks of a team's first processor spent in each phase, and behind them when the present one began.
 struct PhaseClock {
   long long* ticks = nullptr;  ///< null: not counted
 
   __device__ void start() const {
-    if (threadIdx.x == 0) ticks[replay_phases] = clock64();
+    if (team_rank() == 0) ticks[replay_phases] = clock64();
   }
   /// Counts the time since the last call to a phase. All threads have just been synchronized.
   __device__ void count(ReplayPhase phase) const {
-    if (threadIdx.x != 0 || ticks == nullptr) return;
+    if (ticks == nullptr || team_rank() != 0) return;
     const long long now = clock64();
     ticks[static_cast<int>(phase)] += now - ticks[replay_phases];
     ticks[replay_phases] = now;

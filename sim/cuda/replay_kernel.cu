@@ -11,7 +11,7 @@ namespace {
 
 /// Positions of an environment in the order of the mesh.
 __device__ void keep(const ReplayNumbers& replay, const Point* positions, double* kept) {
-  for (int i = static_cast<int>(threadIdx.x); i < replay.sheet.size; i += team_threads) {
+  for (int i = team_rank(); i < replay.sheet.size; i += team_size()) {
     double* to = kept + 3L * replay.order[i];
     const Point from = positions[i];
     to[0] = from.x;
@@ -51,8 +51,7 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
                       {}};
   // The energy that it starts with.
   Iterate& now = w.now;
-  for (int i = static_cast<int>(threadIdx.x); i < size; i += team_threads)
-    now.positions[i] = state.positions[i];
+  for (int i = team_rank(); i < size; i += team_size()) now.positions[i] = state.positions[i];
   step.numbers = {material.law, material.lame, material.rigidity, 0};
   evaluate(w, step, nullptr, now);
   step.at_start = now.elastic;
@@ -72,7 +71,7 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
     step.restrictions.count = step.held_count = motion.held_count;
     const ReplayStats stats = advance_step(w, step, motion, state);
     const long place = at - replay.stats_begin;
-    if (threadIdx.x == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
+    if (team_rank() == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
     const int kept = replay.kept_index[place];
     if (kept >= 0)
       keep(replay, state.positions,
@@ -80,14 +79,14 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
   }
 }
 
-/// A block is a team. It takes an environment through some steps, until the solver forgets what it holds,
+/// A team takes an environment through some steps, until the solver forgets what it holds,
 /// and then takes the one that is furthest behind. So none waits for another, and all end at nearly the same
 /// time.
-__global__ void __launch_bounds__(team_threads, resident_teams_each)
+__global__ void __launch_bounds__(block_threads, resident_blocks_each)
     replay_kernel(const __grid_constant__ ReplayNumbers replay) {
-  const TeamMemory& memory = replay.teams[blockIdx.x];
+  const TeamMemory& memory = replay.teams[team_index()];
   while (true) {
-    __syncthreads();
+    synchronize_team();
     int first = 0;
     const int e = take(replay.waiting, &first);
     if (e < 0) return;
@@ -95,8 +94,8 @@ __global__ void __launch_bounds__(team_threads, resident_teams_each)
               end = min(replay.end_step, (first / interval + 1) * interval);
     advance(replay, memory, e, first, end);
     count_phase(memory, ReplayPhase::rest);
-    __syncthreads();
-    if (threadIdx.x == 0 && end < replay.end_step) add(replay.waiting, e, end);
+    synchronize_team();
+    if (team_rank() == 0 && end < replay.end_step) add(replay.waiting, e, end);
   }
 }
 
@@ -107,12 +106,12 @@ int bytes_of(const FrontTables& fronts) {
   constexpr int number = sizeof(float), reserved = 1024;  // by the device, for each team
   return std::max({gradient_memory(fronts.size, false), hessian_memory * number,
                    number * factor_memory(fronts.shared_panel), linear_bytes_of(fronts.solve_depth),
-                   most_memory() / resident_teams_each - reserved});
+                   most_memory() / resident_blocks_each - reserved});
 }
 
 }  // namespace
 
-void place_on_chip(ReplayNumbers& numbers) {
+void place_on_chip(ReplayNumbers& numbers, int blocks) {
   FrontTables& fronts = numbers.fronts;
   const int room = bytes_of(fronts);
   constexpr long number = sizeof(float);
@@ -121,9 +120,10 @@ void place_on_chip(ReplayNumbers& numbers) {
     if (linear_bytes_of(depth) + vector <= room) fronts.solve_depth = depth;
   const int near = gradient_memory(fronts.size, true), triangles = numbers.sheet.triangle_count;
   numbers.places_on_chip = near <= room;
-  numbers.gradient_shares_at = near + gradient_share_memory(triangles) <= room ? near : -1;
+  // What triangles give is read by other threads, of other blocks too.
+  numbers.gradient_shares_at = blocks == 1 && near + gradient_share_memory(triangles) <= room ? near : -1;
   numbers.matrix_shares_on_chip =
-      static_cast<int>(sizeof(float)) * hessian_memory_with_shares(triangles) <= room;
+      blocks == 1 && static_cast<int>(sizeof(float)) * hessian_memory_with_shares(triangles) <= room;
   int used = linear_bytes_of(fronts.solve_depth);
   const auto place = [&](long bytes) {
     if (used + bytes > room) return -1;
@@ -137,12 +137,19 @@ void place_on_chip(ReplayNumbers& numbers) {
   numbers.search_at = fits ? linear_partial_bytes : -1;
 }
 
-int resident_replay_teams(const FrontTables& fronts) {
-  return resident_teams(replay_kernel, bytes_of(fronts));
+int resident_replay_teams(const FrontTables& fronts, int blocks) {
+  return resident_teams(replay_kernel, bytes_of(fronts), blocks);
 }
 
-void run_replay(const ReplayNumbers& numbers, int teams, cudaStream_t stream) {
-  launch(replay_kernel, teams, bytes_of(numbers.fronts), stream, numbers);
+int team_blocks_for(const FrontTables& fronts, int environments) {
+  if (!launches_clusters()) return 1;
+  int blocks = most_team_blocks;
+  while (blocks > 1 && resident_replay_teams(fronts, blocks) < environments) blocks /= 2;
+  return blocks;
+}
+
+void run_replay(const ReplayNumbers& numbers, int teams, int blocks, cudaStream_t stream) {
+  launch(replay_kernel, TeamLaunch(teams, blocks, bytes_of(numbers.fronts), stream), numbers);
 }
 
 }  // namespace flash::sim::cuda

@@ -3,7 +3,7 @@
 #include "sim/cuda/hinges.cuh"
 #include "sim/cuda/layout/edge_sources.h"
 #include "sim/cuda/sheet_tables.h"
-#include "sim/cuda/team.cuh"
+#include "sim/cuda/team_sum.cuh"
 
 namespace flash::sim::cuda {
 
@@ -24,10 +24,9 @@ template <typename Number, typename Places, typename Write>
 __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* values, const Places& x,
                                      const Write& write) {
   static_assert(4 * bundle_groups == 32);
-  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size && tables.bundle_count == 0;
-       i += team_threads)
+  for (int i = team_rank(); i < 3 * tables.size && tables.bundle_count == 0; i += team_size())
     write(i / 3, i % 3, Number{});
-  for (int bundle = warp(); bundle < tables.bundle_count; bundle += team_warps) {
+  for (int bundle = team_warp(); bundle < tables.bundle_count; bundle += team_warps()) {
     const int start = tables.bundle_starts[bundle], end = tables.bundle_starts[bundle + 1];
     Number sums[4][3] = {};
     int columns[steps_together];
@@ -71,13 +70,15 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
   }
 }
 
-/// y += B x, B the block rows of one environment: a thread a scalar row. Returns the thread's part of x.y.
+/// y += B x, B the block rows of one environment: a thread a scalar row. Returns x.y, to all threads.
+/// `partial`: as sum_over_team wants it.
 inline __device__ float add_block_rows(const SheetTables& tables, const float* blocks,
-                                       const HingeMatrix& hinges, const Four<float>* x, float* y) {
+                                       const HingeMatrix& hinges, const Four<float>* x, float* y,
+                                       float* partial) {
   // The blocks of most rows are no more than this, and are on their way together.
   constexpr int together = 8;
-  float product = 0;
-  for (int i = static_cast<int>(threadIdx.x); i < 3 * tables.size; i += team_threads) {
+  float product[1];
+  sum_over_team(3 * tables.size, product, partial, [&](int i, float(&sums)[1]) {
     const int slice = i / (3 * slice_size), row = i - slice * 3 * slice_size, vertex = row / 3;
     const int start = tables.slice_starts[slice], end = tables.slice_starts[slice + 1];
     float sum = y[i];
@@ -100,21 +101,20 @@ inline __device__ float add_block_rows(const SheetTables& tables, const float* b
     }
     if (hinges.gradients != nullptr) sum += hinge_row(tables, hinges, i);
     y[i] = sum;
-    product += sum * reinterpret_cast<const float*>(x)[i / 3 * 4 + i % 3];
-  }
-  return product;
+    sums[0] += sum * reinterpret_cast<const float*>(x)[i / 3 * 4 + i % 3];
+  });
+  return product[0];
 }
 
 /// y = (B + scale S + hinges) x, x four numbers a vertex. The caller has synchronized x; y is of the calling
-/// threads' own rows i, i + team_threads, ... Returns the thread's part of x.y.
+/// threads' own rows. Returns x.y, to all threads, behind a barrier. `partial`: as sum_over_team wants it.
 inline __device__ float multiply(const SheetTables& tables, const float* blocks, float scale,
-                                 const HingeMatrix& hinges, const Four<float>* x, float* y) {
+                                 const HingeMatrix& hinges, const Four<float>* x, float* y, float* partial) {
   if (hinges.gradients != nullptr) multiply_hinges(tables, hinges, x);
   multiply_scalar_rows(
       tables, tables.single_step_values, [&](int vertex) { return x[vertex]; },
       [&](int row, int c, float sum) { y[3 * row + c] = scale * sum; });
-  __syncthreads();
-  return add_block_rows(tables, blocks, hinges, x, y);
+  return add_block_rows(tables, blocks, hinges, x, y, partial);
 }
 
 }  // namespace flash::sim::cuda

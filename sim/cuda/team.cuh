@@ -3,8 +3,9 @@
 
 namespace flash::sim::cuda {
 
-// A team is the block of threads that works on one environment. What a thread computes for an entry never
-// depends on how many threads, groups or environments there are: so a batch equals alone, bitwise.
+// A team works on one environment: the threads of a block, or of a cluster of blocks, each on a processor of
+// its own. What a thread computes for an entry never depends on how many threads, groups, blocks or
+// environments there are: so a batch equals alone, bitwise.
 
 /// On-chip memory of the block, as many bytes as the launch asked for.
 template <typename Number>
@@ -27,17 +28,76 @@ __device__ inline Number* kept_whole(Number* pointer) {
 __device__ inline int lane() { return static_cast<int>(threadIdx.x % 32); }
 __device__ inline int warp() { return static_cast<int>(threadIdx.x / 32); }
 
-/// Whole warps of a team that work on something of their own.
+// A launch has the teams along x and the blocks of each, a cluster, along y.
+
+__device__ inline int team_index() { return static_cast<int>(blockIdx.x); }
+__device__ inline int block_of_team() { return static_cast<int>(blockIdx.y); }
+__device__ inline int team_blocks() { return static_cast<int>(gridDim.y); }
+
+// Warps of a team by turns of its blocks: so few vertices are spread over all of them.
+
+__device__ inline int team_warp() { return warp() * team_blocks() + block_of_team(); }
+__device__ inline int team_warps() { return block_warps * team_blocks(); }
+__device__ inline int team_rank() { return 32 * team_warp() + lane(); }
+__device__ inline int team_size() { return block_threads * team_blocks(); }
+
+/// A barrier for the team, behind which each thread sees what the others wrote.
+__device__ inline void synchronize_team() {
+  if (team_blocks() == 1) {
+    __syncthreads();
+    return;
+  }
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  asm volatile("barrier.cluster.arrive.release;\nbarrier.cluster.wait.acquire;" ::: "memory");
+#endif
+}
+
+/// The same place on chip in a block of the team.
+template <typename Number>
+__device__ Number* in_block(Number* on_chip, [[maybe_unused]] int block) {
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ >= 900
+  Number* there;
+  asm("mapa.u64 %0, %1, %2;" : "=l"(there) : "l"(on_chip), "r"(block));
+  return there;
+#else
+  return on_chip;
+#endif
+}
+
+/// Writes a number to the same place on chip in all blocks of the team.
+template <typename Number>
+__device__ void put_in_all(Number* on_chip, const Number& value) {
+  const int blocks = team_blocks();
+  if (blocks == 1)
+    *on_chip = value;
+  else
+    for (int block = 0; block < blocks; ++block) *in_block(on_chip, block) = value;
+}
+
+/// Whether any thread of the team has found what it looked for, to all. A barrier.
+__device__ inline bool any_of_team(bool found) {
+  const int in_own_block = __syncthreads_or(found);
+  if (team_blocks() == 1) return in_own_block != 0;
+  __shared__ int blocks[most_team_blocks];
+  if (threadIdx.x == 0) put_in_all(blocks + block_of_team(), in_own_block);
+  synchronize_team();
+  int any = 0;
+  for (int block = 0; block < team_blocks(); ++block) any |= blocks[block];
+  synchronize_team();
+  return any != 0;
+}
+
+/// Whole warps of a block that work on something of their own.
 struct Group {
   int index, rank, size;
 
   /// One of `count`, a power of two.
   __device__ static Group of(int count) {
-    const int size = team_threads / count, rank = static_cast<int>(threadIdx.x);
+    const int size = block_threads / count, rank = static_cast<int>(threadIdx.x);
     return {rank / size, rank % size, size};
   }
   __device__ void synchronize() const {
-    if (size == team_threads)
+    if (size == block_threads)
       __syncthreads();
     else if (size == 32)
       __syncwarp();
@@ -45,62 +105,5 @@ struct Group {
       __barrier_sync_count(1 + index, size);
   }
 };
-
-template <typename Number>
-__device__ Number sum_over_warp(Number value) {
-  for (int offset = 16; offset > 0; offset /= 2) value += __shfl_xor_sync(0xffffffffu, value, offset);
-  return value;
-}
-
-/// On-chip numbers that sums over the team need: as many at once at most.
-inline constexpr int most_sums = 12;
-
-/// Sums of `count` values a thread, for all threads. `partial`: on-chip memory for as many a warp.
-template <int count>
-__device__ void sum_over_team(double (&values)[count], double* partial) {
-  static_assert(count <= most_sums);
-#pragma unroll
-  for (int k = 0; k < count; ++k) values[k] = sum_over_warp(values[k]);
-  __syncthreads();
-  if (lane() == 0)
-#pragma unroll
-    for (int k = 0; k < count; ++k) partial[count * warp() + k] = values[k];
-  __syncthreads();
-#pragma unroll
-  for (int k = 0; k < count; ++k) {
-    values[k] = 0;
-    for (int w = 0; w < team_warps; ++w) values[k] += partial[count * w + k];
-  }
-}
-
-/// The sum of one value a thread, for all threads. `partial`: on-chip memory for a number a warp.
-template <typename Number>
-__device__ Number sum_over_team(Number value, Number* partial) {
-  value = sum_over_warp(value);
-  __syncthreads();
-  if (lane() == 0) partial[warp()] = value;
-  __syncthreads();
-  Number sum = 0;
-  for (int w = 0; w < team_warps; ++w) sum += partial[w];
-  return sum;
-}
-
-/// The larger of two numbers, of which what is not a number counts as the largest.
-__device__ inline double worse_of(double worst, double other) {
-  return other <= worst || worst != worst ? worst : other;
-}
-
-/// The largest of one value a thread, not negative, for all threads; what is not a number counts as the
-/// largest. `partial`: on-chip memory for a number a warp.
-__device__ inline double worst_over_team(double value, double* partial) {
-  for (int offset = 16; offset > 0; offset /= 2)
-    value = worse_of(value, __shfl_xor_sync(0xffffffffu, value, offset));
-  __syncthreads();
-  if (lane() == 0) partial[warp()] = value;
-  __syncthreads();
-  double worst = 0;
-  for (int w = 0; w < team_warps; ++w) worst = worse_of(worst, partial[w]);
-  return worst;
-}
 
 }  // namespace flash::sim::cuda

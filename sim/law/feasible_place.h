@@ -77,16 +77,17 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<d
 /// The feasible place nearest to a trial `point` of a vertex, by its contact in the linear problem. A slip
 /// that turned against its direction is stopped at no slip, where it has to decide again.
 template <typename Room>
-FLASH_HOST_DEVICE inline Vector3<double> feasible_place(
-    const ObstacleStep<double>& step, const Vector3<double>& start, const VertexContact& contact,
-    const VertexTouch* touches, const Vector3<double>& point, Room& room) {
+FLASH_HOST_DEVICE inline Vector3<double> feasible_place(const ObstacleStep<double>& step,
+                                                        const Vector3<double>& start,
+                                                        const VertexContact& contact,
+                                                        const VertexTouch* touches,
+                                                        const Vector3<double>& point, Room& room) {
   constexpr double sliding = 0.999;  // squared length of the direction of what slides
   const Vector3<double> place = projected_out(step, start, touches, point, room);
   if (contact.freedom != Freedom::slip || dot(contact.slip_direction, contact.slip_direction) < sliding)
     return place;
   const Vector3<double> slip = slip_against(step, start, place, touches);
-  return dot(slip, contact.slip_direction) >= 0 ? place
-                                                : stopped_place(step, start, touches, place, room);
+  return dot(slip, contact.slip_direction) >= 0 ? place : stopped_place(step, start, touches, place, room);
 }
 
 }  // namespace FLASH_LEVEL

@@ -1,6 +1,7 @@
 // Whole steps on the device: sheets carried by a corner, each of its own material. Usage:
-// flash_cuda_replay_bench [VERTICES[,...] [ENVIRONMENTS[,...] [STEPS [SOLVES_BY_AN_OLD_FACTOR [table]]]]]
-// They hang free, or lie on a table with friction of 0.3.
+// flash_cuda_replay_bench [VERTICES[,...] [ENVIRONMENTS[,...] [STEPS [SOLVES_BY_AN_OLD_FACTOR [table|air
+// [BLOCKS[,...]]]]]]] They hang free, or lie on a table with friction of 0.3. BLOCKS: processors that work on
+// an environment, 0 for as many as there are.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -93,10 +94,12 @@ Slowest slowest_of(const BatchReplay& replay) {
   return slowest;
 }
 
-void time_replay(const Towel& towel, int environments, int steps, int stale_factor_solves, bool table) {
+void time_replay(const Towel& towel, int environments, int steps, int stale_factor_solves, bool table,
+                 int team_blocks) {
   ReplaySettings settings;
   settings.stale_factor_solves = stale_factor_solves;
   settings.steps = steps;
+  settings.team_blocks = team_blocks;
   settings.kept_steps = {steps};
   const std::vector<ReplayEnvironment> all = lifts(towel, environments, steps, settings.time_step, table);
   BatchReplay replay(towel.plan, all, settings);
@@ -118,9 +121,9 @@ void time_replay(const Towel& towel, int environments, int steps, int stale_fact
   const double count = static_cast<double>(environments) * steps;
   const Floor floor = floor_of(towel, iterations / count, factorizations / count, solves / count);
   const double each = seconds / environments;
-  std::printf("%8d %6d %6d %10.3f %8.2f %8.2f %8.2f %8.3f %9.3f %10.2f %10.2f %8.1f %7.3f %7.3f\n",
-              static_cast<int>(towel.positions.rows()), environments, replay.teams(), 1e3 * seconds,
-              iterations / count, factorizations / count, solves / count, substeps / count,
+  std::printf("%8d %6d %6d %6d %10.3f %8.2f %8.2f %8.2f %8.3f %9.3f %10.2f %10.2f %8.1f %7.3f %7.3f\n",
+              static_cast<int>(towel.positions.rows()), environments, replay.teams(), replay.team_blocks(),
+              1e3 * seconds, iterations / count, factorizations / count, solves / count, substeps / count,
               100 * converged / count, 1e6 * each, 1e6 * floor.seconds, each / floor.seconds,
               floor.bytes / each / bandwidth, floor.flops / each / single_rate);
   std::printf(
@@ -148,12 +151,14 @@ int main(int count, char** arguments) {
                          environments = numbers_of(count > 2 ? arguments[2] : "1,64,256,1024");
   const int steps = count > 3 ? std::stoi(arguments[3]) : 100,
             stale = count > 4 ? std::stoi(arguments[4]) : 5;
+  const std::vector<int> blocks = numbers_of(count > 6 ? arguments[6] : "0");
   const bool table = count > 5 && std::string(arguments[5]) == "table";
-  std::printf("%8s %6s %6s %10s %8s %8s %8s %8s %9s %10s %10s %8s %7s %7s\n", "vertices", "envs", "teams",
-              "ms a step", "iters", "factors", "solves", "substeps", "conv. %", "us an env.", "floor us",
-              "ratio", "of B/s", "of F/s");
+  std::printf("%8s %6s %6s %6s %10s %8s %8s %8s %8s %9s %10s %10s %8s %7s %7s\n", "vertices", "envs", "teams",
+              "blocks", "ms a step", "iters", "factors", "solves", "substeps", "conv. %", "us an env.",
+              "floor us", "ratio", "of B/s", "of F/s");
   for (const int size : vertices) {
     const flash::sim::Towel towel(size);
-    for (const int batch : environments) time_replay(towel, batch, steps, stale, table);
+    for (const int batch : environments)
+      for (const int each : blocks) time_replay(towel, batch, steps, stale, table, each);
   }
 }

@@ -5,13 +5,16 @@ namespace flash::sim::cuda {
 
 // Plain numbers, laid out on the host and read by kernels as they are.
 
-/// Threads of a team: the block that works on one environment. A power of two.
-inline constexpr int team_threads = 512;
-inline constexpr int team_warps = team_threads / 32;
-static_assert((team_threads & (team_threads - 1)) == 0);
+/// Threads of a block. A power of two.
+inline constexpr int block_threads = 512;
+inline constexpr int block_warps = block_threads / 32;
+static_assert((block_threads & (block_threads - 1)) == 0);
 
-/// Teams that a processor of the device has registers for, at least.
-inline constexpr int resident_teams_each = 1;
+/// Blocks of a team, which works on one environment, at most: 1, 2, 4 or 8, a processor each.
+inline constexpr int most_team_blocks = 8;
+
+/// Blocks that a processor of the device has registers for, at least.
+inline constexpr int resident_blocks_each = 1;
 
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;

@@ -65,7 +65,7 @@ std::vector<Node> split_nodes(const std::vector<Node>& whole, int capacity) {
     Node rest = node;
     for (int& child : rest.children)
       if (child >= 0) child = last_piece[child];
-    while (panel_size(rest) > capacity || 3 * rest.column_count > team_threads / 2) {
+    while (panel_size(rest) > capacity || 3 * rest.column_count > block_threads / 2) {
       Node piece = rest;
       // The rows that the piece leaves above it are as many as before: only its columns get fewer.
       const auto take = [&](int count) {
@@ -74,7 +74,7 @@ std::vector<Node> split_nodes(const std::vector<Node>& whole, int capacity) {
         std::iota(piece.rows.begin(), piece.rows.end(), rest.first_column + count);
         piece.rows.insert(piece.rows.end(), rest.rows.begin(), rest.rows.end());
       };
-      int count = std::min((rest.column_count + 1) / 2, team_threads / 6);
+      int count = std::min((rest.column_count + 1) / 2, block_threads / 6);
       for (take(count); panel_size(piece) > capacity && count > 1;) take(--count);
       if (panel_size(piece) > capacity) throw std::invalid_argument("front_plan: a row does not fit on chip");
       nodes.push_back(piece);

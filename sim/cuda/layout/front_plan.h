@@ -34,9 +34,9 @@ struct FrontPlan {
 };
 
 struct FrontSettings {
-  int leaf_size = 10;            ///< vertices, at most, of a front without children
-  int panel_capacity = 40000;    ///< numbers of on-chip memory that a team has for panels
-  int most_groups = team_warps;  ///< of a team in a factorization
+  int leaf_size = 10;             ///< vertices, at most, of a front without children
+  int panel_capacity = 40000;     ///< numbers of on-chip memory that a team has for panels
+  int most_groups = block_warps;  ///< of a team in a factorization
 };
 
 /// `places` of the vertices guide the order (dissection.h). Fronts too large for `panel_capacity` become

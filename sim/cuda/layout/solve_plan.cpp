@@ -1,7 +1,6 @@
 #include "sim/cuda/layout/solve_plan.h"
 
 #include <algorithm>
-#include <array>
 
 namespace flash::sim::cuda {
 namespace {
@@ -60,13 +59,13 @@ Task backward_task(const FrontPlan& plan, int entries, const FrontLayout& front,
   return task;
 }
 
-using Shares = std::array<std::vector<SolveChunk>, team_warps>;
+using Shares = std::vector<std::vector<SolveChunk>>;  ///< of each warp
 
 /// A level's tasks for each warp: the longest first, each to the warp with the least to do.
-Shares share_out(std::vector<Task> tasks) {
+Shares share_out(std::vector<Task> tasks, std::size_t warps) {
   std::stable_sort(tasks.begin(), tasks.end(),
                    [](const Task& a, const Task& b) { return a.size() > b.size(); });
-  Shares shares;
+  Shares shares(warps);
   for (const Task& task : tasks) {
     const auto least = std::min_element(shares.begin(), shares.end(),
                                         [](const auto& a, const auto& b) { return a.size() < b.size(); });
@@ -81,11 +80,13 @@ std::size_t longest(const Shares& shares) {
   return most;
 }
 
-/// Adds a level in tasks of whichever width has the warps wait least for each other.
+/// Adds a level in tasks of whichever width has the warps of one block wait least for each other: for any
+/// team the same, since chunks of other columns are rounded otherwise.
 template <typename Cut>
 void add_level(const Cut& cut, Shares& warps) {
-  Shares shares = share_out(cut(chunk_width)), narrow = share_out(cut(solve_tile_width));
-  if (longest(narrow) < longest(shares)) shares = std::move(narrow);
+  const auto most = [&](int width) { return longest(share_out(cut(width), block_warps)); };
+  const int width = most(solve_tile_width) < most(chunk_width) ? solve_tile_width : chunk_width;
+  Shares shares = share_out(cut(width), warps.size());
   for (std::size_t w = 0; w < warps.size(); ++w) {
     while (shares[w].empty() || shares[w].size() % chunks_together != 0) shares[w].emplace_back();
     shares[w].back().flags |= SolveChunk::ends_level;
@@ -115,11 +116,11 @@ std::vector<Gather> gathers_of(const FrontPlan& plan) {
 
 }  // namespace
 
-SolvePlan plan_solve(const FrontPlan& plan) {
+SolvePlan plan_solve(const FrontPlan& plan, int warps_of_team) {
   SolvePlan solve;
   solve.gathers = gathers_of(plan);
   solve.entries = static_cast<int>(plan.entries.size());
-  Shares warps;
+  Shares warps(static_cast<std::size_t>(warps_of_team));
   for (const FrontLevel& level : plan.levels)
     add_level(
         [&](int rows) {

@@ -18,6 +18,7 @@ struct SolvePlan {
   int entries = 0;
 };
 
-SolvePlan plan_solve(const FrontPlan& fronts);
+/// For a team of so many warps. What is added up to a number does not depend on how many there are.
+SolvePlan plan_solve(const FrontPlan& fronts, int warps = block_warps);
 
 }  // namespace flash::sim::cuda

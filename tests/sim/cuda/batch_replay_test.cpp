@@ -313,7 +313,25 @@ TEST(BatchReplay, AMotionDoesNotDependOnHowATeamIsDivided) {
   SKIP_WITHOUT_DEVICE();
   Scene scene = scenes()[5];
   scene.steps = 4;
-  expect_equal(by_team(scene, 1), by_team(scene, team_warps));
+  expect_equal(by_team(scene, 1), by_team(scene, block_warps));
+}
+
+TEST(BatchReplay, AMotionDoesNotDependOnHowManyProcessorsWorkOnIt) {
+  SKIP_WITHOUT_DEVICE();
+  for (const std::size_t which : {std::size_t{5}, std::size_t{9}}) {
+    Scene scene = scenes()[which];
+    scene.steps = 4;
+    const auto by_blocks = [&](int blocks) {
+      ReplaySettings settings = settings_of(scene.steps, 1e-3);
+      settings.team_blocks = blocks;
+      BatchReplay replay(scene.plan, {scene.environment}, settings);
+      EXPECT_EQ(replay.team_blocks(), blocks);
+      replay.advance(scene.steps);
+      return trajectory_of(replay, 0, scene.steps);
+    };
+    const Trajectory one = by_blocks(1);
+    for (const int blocks : {2, 4, 8}) expect_equal(one, by_blocks(blocks));
+  }
 }
 
 TEST(BatchReplay, AFallingSheetMovesAsImplicitEulerSays) {

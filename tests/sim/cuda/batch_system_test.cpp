@@ -68,7 +68,7 @@ struct Bench {
   BatchSystem batch;
 
   Bench(std::shared_ptr<const SheetPlan> sheet, int count,
-        FactorPrecision precision = FactorPrecision::single, int first = 0, int most_groups = team_warps)
+        FactorPrecision precision = FactorPrecision::single, int first = 0, int most_groups = block_warps)
       : plan(std::move(sheet)), batch(make_batch(count, precision, first, most_groups)) {
     for (int e = 0; e < count; ++e) {
       positions.push_back(crumpled(*plan, first + e));
@@ -358,7 +358,7 @@ TEST(BatchSystem, TheFactorDoesNotDependOnHowATeamIsDivided) {
   const auto plan = small_plans()[3].second;
   const BendingOperator& bending = bending_operator(*plan, data::BendingModel::plate, 0.3);
   std::vector<Points> solutions;
-  for (const int most_groups : {1, 4, team_warps}) {
+  for (const int most_groups : {1, 4, block_warps}) {
     BatchSystem batch(*plan, bending, {numbers_of(material_of(0))}, FactorPrecision::single,
                       {.leaf_size = 6, .panel_capacity = 12 * 1024, .most_groups = most_groups});
     batch.set_positions(0, crumpled(*plan, 0));

@@ -128,7 +128,7 @@ TEST(FrontPlan, PanelsFitOnChip) {
       const FrontPlan plan = plan_of(*sheet, capacity);
       EXPECT_LE(plan.shared_panel, capacity);
       for (const FrontLevel& level : plan.levels) {
-        EXPECT_LE(level.groups, team_warps);
+        EXPECT_LE(level.groups, block_warps);
         for (int f = level.first_front; f < level.first_front + level.front_count; ++f) {
           const FrontLayout& front = plan.fronts[f];
           // All panels of a level at a time.

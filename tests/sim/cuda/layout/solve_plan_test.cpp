@@ -121,16 +121,18 @@ TEST(SolvePlan, ItsChunksComeToTheSolveInWhateverOrderWarpsTakeThem) {
     for (const int leaf_size : {3, 8, 12}) {
       const FrontPlan fronts = plan_fronts(sheet->pattern, sheet->sheet.rest.vertices,
                                            {.leaf_size = leaf_size, .panel_capacity = 12 * 1024});
-      const SolvePlan solve = plan_solve(fronts);
-      const std::vector<Eigen::MatrixXd> columns = random_columns(fronts);
-      const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(3L * fronts.size, -1, 2);
-      std::vector<int> order(team_warps);
-      std::iota(order.begin(), order.end(), 0);
-      const Eigen::VectorXd x = solve_by_chunks(fronts, solve, columns, right, order);
-      std::reverse(order.begin(), order.end());
-      EXPECT_EQ(x, solve_by_chunks(fronts, solve, columns, right, order));
-      const Eigen::VectorXd expected = solve_by_fronts(fronts, columns, right);
-      EXPECT_LE((x - expected).norm(), 1e-10 * expected.norm());
+      for (const int warps : {block_warps, 8 * block_warps}) {
+        const SolvePlan solve = plan_solve(fronts, warps);
+        const std::vector<Eigen::MatrixXd> columns = random_columns(fronts);
+        const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(3L * fronts.size, -1, 2);
+        std::vector<int> order(static_cast<std::size_t>(warps));
+        std::iota(order.begin(), order.end(), 0);
+        const Eigen::VectorXd x = solve_by_chunks(fronts, solve, columns, right, order);
+        std::reverse(order.begin(), order.end());
+        EXPECT_EQ(x, solve_by_chunks(fronts, solve, columns, right, order));
+        const Eigen::VectorXd expected = solve_by_fronts(fronts, columns, right);
+        EXPECT_LE((x - expected).norm(), 1e-10 * expected.norm());
+      }
     }
   }
 }
@@ -139,8 +141,8 @@ TEST(SolvePlan, EachWarpEndsWithChunksToLookAheadTo) {
   for (const auto& [name, sheet] : small_plans()) {
     SCOPED_TRACE(name);
     const SolvePlan solve = plan_solve(plan_fronts(sheet->pattern, sheet->sheet.rest.vertices));
-    ASSERT_EQ(solve.starts.size(), std::size_t{team_warps} + 1);
-    for (std::size_t w = 1; w <= team_warps; ++w)
+    ASSERT_EQ(solve.starts.size(), std::size_t{block_warps} + 1);
+    for (std::size_t w = 1; w <= block_warps; ++w)
       for (int k = 1; k <= chunks_ahead; ++k)
         EXPECT_EQ(solve.chunks[static_cast<std::size_t>(solve.starts[w] - k)].inputs, 0);
   }

@@ -1,0 +1,106 @@
+#pragma once
+#include "sim/cuda/team.cuh"
+
+namespace flash::sim::cuda {
+
+// Sums over a team, to the same bits whatever the number of its blocks. There are as many seats as the
+// largest team has warps. A seat adds up the items 32 seat + lane, and those `seats` times 32 further on; a
+// team of fewer warps takes one seat after the other. Then each warp adds up what stands at the seats.
+
+inline constexpr int seats = most_team_blocks * block_warps;
+
+template <typename Number>
+__device__ Number sum_over_warp(Number value) {
+  for (int offset = 16; offset > 0; offset /= 2) value += __shfl_xor_sync(0xffffffffu, value, offset);
+  return value;
+}
+
+/// Sums that stand on chip at the same time at most, a number a seat each.
+inline constexpr int most_sums = 12;
+
+/// The seats' sums of `count` values over the items below n, to `partial` of all blocks, one value behind the
+/// other: use(i, load(i), values) adds what item i has; a few items are loaded at a time.
+template <int count, int together = 1, typename Number, typename Load, typename Use>
+__device__ void add_up(int n, Number* partial, const Load& load, const Use& use) {
+  static_assert(count <= most_sums);
+  const int warps = team_warps();
+  for (int first = team_warp(); first < seats && 32 * first < n; first += together * warps) {
+    Number values[together][count] = {};
+    for (int base = 32 * first + lane(); base < n; base += 32 * seats) {
+      decltype(load(0)) loaded[together];
+      bool there[together];
+#pragma unroll
+      for (int k = 0; k < together; ++k) {
+        const int i = base + 32 * k * warps;
+        there[k] = i < n && first + k * warps < seats;
+        loaded[k] = load(there[k] ? i : base);
+      }
+#pragma unroll
+      for (int k = 0; k < together; ++k)
+        if (there[k]) use(base + 32 * k * warps, loaded[k], values[k]);
+    }
+#pragma unroll
+    for (int k = 0; k < together; ++k)
+#pragma unroll
+      for (int v = 0; v < count; ++v) values[k][v] = sum_over_warp(values[k][v]);
+    if (lane() >= team_blocks()) continue;
+    Number* to = team_blocks() == 1 ? partial : in_block(partial, lane());
+#pragma unroll
+    for (int k = 0; k < together; ++k)
+      if (const int seat = first + k * warps; seat < seats)
+#pragma unroll
+        for (int v = 0; v < count; ++v) to[seats * v + seat] = values[k][v];
+  }
+}
+
+/// The same with own(i, values).
+template <int count, typename Number, typename Own>
+__device__ void add_up(int n, Number* partial, const Own& own) {
+  add_up<count>(
+      n, partial, [](int) { return 0; }, [&](int i, int, Number(&values)[count]) { own(i, values); });
+}
+
+/// A sum over n items that add_up has left at `partial`, behind a barrier.
+template <typename Number>
+__device__ Number total(int n, const Number* partial) {
+  const int used = min(seats, (n + 31) / 32);
+  Number sum = 0;
+  for (int seat = lane(); seat < used; seat += 32) sum += partial[seat];
+  return sum_over_warp(sum);
+}
+
+/// Sums over n items of what own(i, values) adds to them, for all threads. `partial`: on chip, a number a
+/// seat for each value, which is free behind a barrier.
+template <int count, typename Number, typename Own>
+__device__ void sum_over_team(int n, Number (&sums)[count], Number* partial, const Own& own) {
+  synchronize_team();
+  add_up<count>(n, partial, own);
+  synchronize_team();
+#pragma unroll
+  for (int v = 0; v < count; ++v) sums[v] = total(n, partial + seats * v);
+}
+
+/// The larger of two numbers, of which what is not a number counts as the largest.
+__device__ inline double worse_of(double worst, double other) {
+  return other <= worst || worst != worst ? worst : other;
+}
+
+__device__ inline double worst_over_warp(double value) {
+  for (int offset = 16; offset > 0; offset /= 2)
+    value = worse_of(value, __shfl_xor_sync(0xffffffffu, value, offset));
+  return value;
+}
+
+/// The largest of one value a thread, not negative, for all threads; what is not a number counts as the
+/// largest. `partial`: on chip, a number a seat, which is free behind a barrier.
+__device__ inline double worst_over_team(double value, double* partial) {
+  value = worst_over_warp(value);
+  synchronize_team();
+  if (lane() == 0) put_in_all(partial + team_warp(), value);
+  synchronize_team();
+  double worst = 0;
+  for (int w = lane(); w < team_warps(); w += 32) worst = worse_of(worst, partial[w]);
+  return worst_over_warp(worst);
+}
+
+}  // namespace flash::sim::cuda
