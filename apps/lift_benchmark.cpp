@@ -130,21 +130,30 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   data::Points x;  // of the environment in the middle, halfway
   const std::vector<data::Trajectory> gripper = {lift_of(Eigen::Vector3d(side, side, 0))};
   const auto schedule = make_schedule(gripper, 0.0, benchmark.time_step, settings.steps);
-  const auto start = std::chrono::steady_clock::now();
-  replay_in_batches(
-      plan, counts.size(), environments_at_once, settings,
-      [&](std::size_t i) { return lift_environment(benchmark, plan->sheet, schedule, static_cast<int>(i)); },
-      [&](std::size_t i, const Batch& batch, int e) {
-        for (const StepStats& step : batch.stats(e)) {
-          counts[i].iterations += step.iterations;
-          counts[i].solves += step.solves;
-          counts[i].factorizations += step.factorizations;
-          counts[i].converged += step.converged;
-          counts[i].residual_max = data::worst(counts[i].residual_max, step.residual);
-        }
-        if (i == middle) x = batch.kept_positions(e, 0);
-      });
+  const auto environment = [&](std::size_t i) {
+    return lift_environment(benchmark, plan->sheet, schedule, static_cast<int>(i));
+  };
   LiftBenchmarkResult result;
+  auto start = std::chrono::steady_clock::now();
+  if (benchmark.device == Device::cuda) {
+    BatchSettings first = settings;
+    first.steps = 1;
+    first.kept_steps.clear();
+    replay_in_batches(plan, 1, 1, first, environment, [](std::size_t, const Batch&, int) {});
+    result.start_seconds = seconds_since(start);
+    start = std::chrono::steady_clock::now();
+  }
+  replay_in_batches(plan, counts.size(), environments_at_once, settings, environment,
+                    [&](std::size_t i, const Batch& batch, int e) {
+                      for (const StepStats& step : batch.stats(e)) {
+                        counts[i].iterations += step.iterations;
+                        counts[i].solves += step.solves;
+                        counts[i].factorizations += step.factorizations;
+                        counts[i].converged += step.converged;
+                        counts[i].residual_max = data::worst(counts[i].residual_max, step.residual);
+                      }
+                      if (i == middle) x = batch.kept_positions(e, 0);
+                    });
   result.wall_seconds = seconds_since(start);
   result.vertices = plan->pattern.size;
   const double total = double(benchmark.environments) * benchmark.steps;

@@ -35,7 +35,8 @@ struct BenchmarkPhase {
 
 struct LiftBenchmarkResult {
   int vertices = 0;
-  double wall_seconds = 0;
+  double start_seconds = 0;      ///< of a device, until it has taken the first step of one material
+  double wall_seconds = 0;       ///< after that
   double step_milliseconds = 0;  ///< wall time a step and environment, times the threads at work; on a device
                                  ///< a step of all environments
   double converged_share = 0;    ///< of environment-steps

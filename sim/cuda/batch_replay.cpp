@@ -154,6 +154,7 @@ struct FlatMotions {
 /// What a team needs besides the sheet.
 struct TeamSizes {
   const FrontPlan& fronts;
+  int vector_size;  ///< FrontTables::vector_size
   const SheetLayout& layout;
   bool damped;
   int most_held, most_obstacles;
@@ -170,7 +171,7 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
   }
   for (float** vector : {&m.gradient, &m.direction, &m.change, &m.residual, &m.image})
     *vector = arena.take<float>(3 * size);
-  m.solved = arena.take<float>(number(sizes.fronts.vector_size));
+  m.solved = arena.take<float>(number(sizes.vector_size));
   m.search = arena.take<Four<float>>(size);
   m.shares = arena.take<float>(36 * triangles);
   m.updates = arena.take<float>(number(sizes.fronts.update_size));
@@ -253,7 +254,7 @@ struct BatchReplay::Memory {
     upload_bristles(environments, most_obstacles_each);
     team_blocks = settings.team_blocks > 0 ? settings.team_blocks : team_blocks_for(plan.fronts, count);
     plan.share_out_solves(front_plan, team_blocks);
-    lay_out_teams({front_plan, layout, damped, most_held, most_obstacles_each});
+    lay_out_teams({front_plan, plan.fronts.vector_size, layout, damped, most_held, most_obstacles_each});
     steps = DeviceArray<int>(environments.size());
 
     numbers.fronts = plan.fronts;
@@ -289,7 +290,7 @@ struct BatchReplay::Memory {
     numbers.kept_count = static_cast<int>(settings.kept_steps.size());
     numbers.order = order.data();
     numbers.kept = kept.data();
-    check(cudaStreamCreate(&stream));
+    check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
     keep_start(environments);
   }
   ~Memory() {
@@ -390,14 +391,12 @@ struct BatchReplay::Memory {
     lay_out_team(sizes, counting);
     const std::size_t bytes = counting.used();
     arena = DeviceArray<char>(static_cast<std::size_t>(teams) * bytes);
-    check(cudaMemset(arena.data(), 0, static_cast<std::size_t>(teams) * bytes));
     std::vector<TeamMemory> all;
     const std::vector<int> none(size(), -1);
     for (int t = 0; t < teams; ++t) {
       DeviceArena own(arena.data() + static_cast<std::size_t>(t) * bytes);
       all.push_back(lay_out_team(sizes, own));
-      check(cudaMemcpy(all.back().restriction_of, none.data(), none.size() * sizeof(int),
-                       cudaMemcpyHostToDevice));
+      copy_to_end(all.back().restriction_of, none.data(), none.size() * sizeof(int), cudaMemcpyHostToDevice);
     }
     team_memory = DeviceArray<TeamMemory>(all);
   }
@@ -492,7 +491,7 @@ std::vector<double> BatchReplay::phases() const {
   double all = 0;
   for (const TeamMemory& team : m.team_memory.read(0, m.team_memory.size())) {
     long long clocks[replay_phases];
-    cuda::check(cudaMemcpy(clocks, team.clocks, sizeof(clocks), cudaMemcpyDeviceToHost));
+    copy_to_end(clocks, team.clocks, sizeof(clocks), cudaMemcpyDeviceToHost);
     for (int k = 0; k < replay_phases; ++k) {
       shares[static_cast<std::size_t>(k)] += static_cast<double>(clocks[k]);
       all += static_cast<double>(clocks[k]);

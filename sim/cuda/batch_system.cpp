@@ -66,7 +66,6 @@ struct BatchSystem::Memory {
     block_rows = DeviceArray<float>(environment_count * row_size);
     blocks = DeviceArray<float>(environment_count * 9 * static_cast<size_t>(layout.block_count));
     factors = DeviceArray<__half>(environment_count * factor_size);
-    check(cudaMemset(factors.data(), 0, environment_count * factor_size * sizeof(__half)));
     restrictions = DeviceArray<VertexRestriction>(environment_count * size);
     restriction_counts = DeviceArray<int>(environment_count);
     restriction_of = DeviceArray<int>(environment_count * size);
@@ -75,7 +74,7 @@ struct BatchSystem::Memory {
     triangle_gradients = DeviceArray<double>(team_count * 9 * triangles);
     shares = DeviceArray<float>(team_count * 36 * triangles);
     updates = DeviceArray<float>(team_count * static_cast<size_t>(front_plan.update_size));
-    solved = DeviceArray<float>(team_count * static_cast<size_t>(front_plan.vector_size));
+    solved = DeviceArray<float>(team_count * static_cast<size_t>(plan.fronts.vector_size));
     residuals = DeviceArray<float>(team_count * 3 * size);
     images = DeviceArray<float>(team_count * 3 * size);
     searches = DeviceArray<Four<float>>(team_count * size);
@@ -88,7 +87,7 @@ struct BatchSystem::Memory {
                positive.data(),       solves.data(),       triangle_gradients.data(),
                shares.data(),         updates.data(),      solved.data(),
                residuals.data(),      images.data(),       searches.data()};
-    check(cudaStreamCreate(&stream));
+    check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
   }
   ~Memory() {
     if (stream != nullptr) cudaStreamDestroy(stream);

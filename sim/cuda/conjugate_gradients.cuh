@@ -79,8 +79,8 @@ __device__ inline void put(const Numbers3& v, float* vector, int vertex) {
 }
 /// Into a vector on chip of all blocks.
 __device__ inline void put_in_all(const Numbers3& v, float* vector, int vertex) {
-  const int blocks = team_blocks();
-  for (int block = 0; block < blocks; ++block) put(v, blocks == 1 ? vector : in_block(vector, block), vertex);
+  put(v, vector, vertex);
+  for (int k = 1; k < team_blocks(); ++k) put(v, in_block(vector, other_block(k)), vertex);
 }
 __device__ inline Numbers3 scaled_sum(const Numbers3& a, float scale, const Numbers3& b) {
   return {a.x + scale * b.x, a.y + scale * b.y, a.z + scale * b.z};

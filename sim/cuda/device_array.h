@@ -8,7 +8,20 @@
 
 namespace flash::sim::cuda {
 
-/// Numbers in the memory of the device.
+// What a host thread writes and reads goes through a stream of its own, to its end: replays of other threads
+// go on beside it.
+
+inline void copy_to_end(void* to, const void* from, size_t bytes, cudaMemcpyKind kind) {
+  check(cudaMemcpyAsync(to, from, bytes, kind, cudaStreamPerThread));
+  check(cudaStreamSynchronize(cudaStreamPerThread));
+}
+inline void fill_with_zeros(void* memory, size_t bytes) {
+  check(cudaMemsetAsync(memory, 0, bytes, cudaStreamPerThread));
+  check(cudaStreamSynchronize(cudaStreamPerThread));
+}
+
+/// Numbers in the memory of the device. What runs on a stream has to have ended before they are read or
+/// written.
 template <typename Number>
 class DeviceArray {
  public:
@@ -17,7 +30,7 @@ class DeviceArray {
   explicit DeviceArray(size_t size) : size_(size) {
     if (size == 0) return;
     check(cudaMalloc(&data_, size * sizeof(Number)));
-    check(cudaMemset(data_, 0, size * sizeof(Number)));
+    fill_with_zeros(data_, size * sizeof(Number));
   }
   explicit DeviceArray(const std::vector<Number>& numbers) : DeviceArray(numbers.size()) {
     write(0, numbers.data(), numbers.size());
@@ -32,14 +45,12 @@ class DeviceArray {
   Number* data() const { return data_; }
   size_t size() const { return size_; }
 
-  /// Waits for what runs before, as `read` does.
   void write(size_t first, const Number* numbers, size_t count) {
-    if (count > 0) check(cudaMemcpy(data_ + first, numbers, count * sizeof(Number), cudaMemcpyHostToDevice));
+    if (count > 0) copy_to_end(data_ + first, numbers, count * sizeof(Number), cudaMemcpyHostToDevice);
   }
   std::vector<Number> read(size_t first, size_t count) const {
     std::vector<Number> numbers(count);
-    if (count > 0)
-      check(cudaMemcpy(numbers.data(), data_ + first, count * sizeof(Number), cudaMemcpyDeviceToHost));
+    if (count > 0) copy_to_end(numbers.data(), data_ + first, count * sizeof(Number), cudaMemcpyDeviceToHost);
     return numbers;
   }
 

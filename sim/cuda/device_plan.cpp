@@ -40,7 +40,6 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
-  fronts.vector_size = plan.vector_size;
   constexpr int room_for_two = 160 * 1024;  // chunks of a warp, with their tables, and two parts a number
   fronts.solve_depth = most_memory() >= room_for_two ? 2 : 1;
   fronts.factor_tiles = plan.factor_tiles;
@@ -87,10 +86,11 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
 }
 
 void DevicePlan::share_out_solves(const FrontPlan& plan, int team_blocks) {
-  const SolvePlan solve = plan_solve(plan, team_blocks * block_warps);
+  const SolvePlan solve = plan_solve(plan, team_blocks);
   fronts.chunks = upload(solve.chunks, chunks_);
   fronts.chunk_starts = upload(solve.starts, ints_);
   fronts.gathers = upload(solve.gathers, gathers_);
+  fronts.vector_size = solve.vector_size;
 }
 
 }  // namespace flash::sim::cuda

@@ -124,27 +124,29 @@ struct SolveVector {
   float* numbers;
 
   __device__ float operator[](int i) const { return numbers[i]; }
-  __device__ void set(int i, float number) const {
-    if constexpr (on_chip)
+  /// `to_all`: in all copies.
+  __device__ void set(int i, float number, bool to_all) const {
+    if (on_chip && to_all)
       put_in_all(numbers + i, number);
     else
       numbers[i] = number;
   }
 };
 
-/// Writes the results of a task, whose chunks added up to `sums`.
+/// Writes the results of a task, whose chunks added up to `sums`. `flags`: of its last chunk.
 template <int parts, bool backward, typename Vector>
-__device__ void finish_task(unsigned slot, int own_at, const float (&sums)[4], const Vector& vector) {
+__device__ void finish_task(unsigned slot, int flags, int own_at, const float (&sums)[4],
+                            const Vector& vector) {
   using Slot = ChunkSlot<parts>;
   // Four lanes have the same four rows; each keeps one.
   const int t = lane() % 4, row = 8 * t + lane() / 4;
   const float result = t < 2 ? (t == 0 ? sums[0] : sums[1]) : (t == 2 ? sums[2] : sums[3]);
   const int4 end = load_int4(slot + Slot::chunk + 16);
   if (row < end.x) {
-    vector.set(own_at + row, result);
+    vector.set(own_at + row, result, flags & SolveChunk::own_to_all);
   } else if (!backward && row >= end.z && row < end.w) {
     const int2 passed = load_int2(slot + Slot::result_table + 8 * row);
-    vector.set(end.y + row, result + vector[passed.x] + vector[passed.y]);
+    vector.set(end.y + row, result + vector[passed.x] + vector[passed.y], flags & SolveChunk::passed_to_all);
   }
 }
 
@@ -205,7 +207,7 @@ __device__ int run_chunks(unsigned first_slot, const Vector& vector, float (&sum
     for (int r = 0; r < 4; ++r)
       sums[r] += rights[k].scale * (products[r / 2][r % 2 * 2] + products[r / 2][r % 2 * 2 + 1]);
     if (flags & SolveChunk::ends) {
-      finish_task<parts, backward>(slot(k), chunks[k].w, sums, vector);
+      finish_task<parts, backward>(slot(k), flags, chunks[k].w, sums, vector);
 #pragma unroll
       for (float& sum : sums) sum = 0;
     }
@@ -213,14 +215,18 @@ __device__ int run_chunks(unsigned first_slot, const Vector& vector, float (&sum
   return chunks[width - 1].x;
 }
 
-/// All heights upwards, or downwards.
+/// All heights upwards, or downwards. Blocks of a team wait for each other only where they share fronts.
 template <int parts, bool backward, int width, typename Vector>
 __device__ void run_levels(int count, ChunkStream<parts, width>& stream, const Vector& vector) {
   float sums[4] = {};
+  int flags = SolveChunk::next_is_shared;
   for (int level = 0; level < count; ++level) {
-    synchronize_team();
-    while (!(run_chunks<parts, backward, width>(stream.take(), vector, sums) & SolveChunk::ends_level)) {
-    }
+    if (flags & SolveChunk::next_is_shared)
+      synchronize_team();
+    else
+      __syncthreads();
+    do flags = run_chunks<parts, backward, width>(stream.take(), vector, sums);
+    while (!(flags & SolveChunk::ends_level));
   }
 }
 

@@ -31,8 +31,20 @@ __device__ inline int warp() { return static_cast<int>(threadIdx.x / 32); }
 // A launch has the teams along x and the blocks of each, a cluster, along y.
 
 __device__ inline int team_index() { return static_cast<int>(blockIdx.x); }
-__device__ inline int block_of_team() { return static_cast<int>(blockIdx.y); }
-__device__ inline int team_blocks() { return static_cast<int>(gridDim.y); }
+__device__ inline int block_of_team() {
+#ifdef FLASH_ONE_BLOCK
+  return 0;
+#else
+  return static_cast<int>(blockIdx.y);
+#endif
+}
+__device__ inline int team_blocks() {
+#ifdef FLASH_ONE_BLOCK
+  return 1;
+#else
+  return static_cast<int>(gridDim.y);
+#endif
+}
 
 // Warps of a team by turns of its blocks: so few vertices are spread over all of them.
 
@@ -64,14 +76,15 @@ __device__ Number* in_block(Number* on_chip, [[maybe_unused]] int block) {
 #endif
 }
 
-/// Writes a number to the same place on chip in all blocks of the team.
+/// The k-th block behind this one, around.
+__device__ inline int other_block(int k) { return (block_of_team() + k) & (team_blocks() - 1); }
+
+/// Writes a number to the same place on chip in all blocks of the team. Its own block sees it behind a
+/// barrier of the block, the others behind one of the team.
 template <typename Number>
 __device__ void put_in_all(Number* on_chip, const Number& value) {
-  const int blocks = team_blocks();
-  if (blocks == 1)
-    *on_chip = value;
-  else
-    for (int block = 0; block < blocks; ++block) *in_block(on_chip, block) = value;
+  *on_chip = value;
+  for (int k = 1; k < team_blocks(); ++k) *in_block(on_chip, other_block(k)) = value;
 }
 
 /// Whether any thread of the team has found what it looked for, to all. A barrier.

@@ -97,7 +97,7 @@ Eigen::MatrixXd errors_of_solution(const Replay& replay, const LinearObservation
   };
   if (const std::optional<Replay> finer = on_half_the_cell(replay))
     add(kMesh, *finer, store.run(*finer, candidate));
-  for (const FinerSolution& finer : finer_solutions({replay}, candidate, store))
+  for (const FinerSolution& finer : finer_solutions(finer_settings({replay}), candidate, store))
     add(1, finer.replays.front(), finer.motions.front());
   Eigen::MatrixXd errors(places.rows(), static_cast<Eigen::Index>(columns.size()));
   for (std::size_t c = 0; c < columns.size(); ++c) errors.col(static_cast<Eigen::Index>(c)) = columns[c];

@@ -18,6 +18,17 @@ bool all_finite(const std::vector<ReplayResult>& results) {
                      [](const ReplayResult& result) { return result.finite; });
 }
 
+/// Motions of the estimate on both meshes, as far as the emulator has them.
+std::vector<WantedMotion> wanted_at(const Task& task, const Emulator& emulator,
+                                    const ReplayCandidate& candidate) {
+  std::vector<WantedMotion> wanted;
+  for (std::size_t r = 0; r < task.replays.size(); ++r) {
+    wanted.push_back({&task.replays[r], candidate});
+    if (emulator.share != own_mesh) wanted.push_back({&emulator.models[r].replay, candidate});
+  }
+  return wanted;
+}
+
 }  // namespace
 
 std::vector<Replay> replays_of(const Emulator& emulator) {
@@ -30,7 +41,14 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
                                        const std::vector<ReplayResult>& here) {
   std::vector<KnownError> errors;
   const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
-  for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
+  const std::vector<HeldParameter> all = held_parameters(task.grid, task.replays);
+  std::vector<WantedMotion> wanted;
+  for (const HeldParameter& held : all)
+    for (const double value : held.values)
+      for (const Replay& replay : task.replays)
+        wanted.push_back({&replay, candidate_with(values, task.grid, held.name, value)});
+  task.store.prepare(wanted);
+  for (const HeldParameter& held : all) {
     std::array<std::vector<ReplayResult>, 2> ends;
     for (const std::size_t side : {0, 1})
       for (const Replay& replay : task.replays) {
@@ -64,10 +82,17 @@ std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emu
   const Eigen::MatrixXd samples = samples_of(posterior);
   const std::vector<Replay> on_model = replays_of(emulator);
   const double share = 1 / std::sqrt(static_cast<double>(emulator_draws));
+  std::vector<std::vector<double>> draws;
+  std::vector<WantedMotion> wanted;
   for (int draw = 0; draw < emulator_draws; ++draw) {
     const Eigen::VectorXd row =
         samples.row((2 * draw + 1) * samples.rows() / (2 * emulator_draws)).transpose();
-    const std::vector<double> values(row.begin(), row.end());
+    draws.emplace_back(row.begin(), row.end());
+    for (const Replay& replay : task.replays)
+      wanted.push_back({&replay, candidate_at(draws.back(), task.grid)});
+  }
+  task.store.prepare(wanted);
+  for (const std::vector<double>& values : draws) {
     const ReplayCandidate candidate = candidate_at(values, task.grid);
     Motions simulated{on_model, {}};
     for (std::size_t r = 0; r < task.replays.size(); ++r) {
@@ -88,6 +113,7 @@ std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emu
                                                      const std::vector<double>& values, bool finer,
                                                      std::vector<ReplayResult>& own) {
   const ReplayCandidate candidate = candidate_at(values, task.grid);
+  if (finer) task.store.prepare(wanted_at(task, emulator, candidate));
   own.clear();
   for (const Replay& replay : task.replays) {
     own.push_back(task.store.run(replay, candidate));
@@ -123,6 +149,12 @@ std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
   const ReplayCandidate candidate = candidate_at(values, task.grid);
   const std::vector<Replay> on_model = replays_of(emulator);
   const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share);
+  std::vector<FinerSettings> finer_steps;
+  if (task.settings.solver_check) finer_steps = finer_settings(task.replays);
+  std::vector<WantedMotion> wanted = wanted_at(task, emulator, candidate);
+  for (const FinerSettings& finer : finer_steps)
+    for (const Replay& replay : finer.replays) wanted.push_back({&replay, candidate});
+  task.store.prepare(wanted);
   auto simulated = simulate_at(task, emulator, values, true, estimate.motions);
   if (!simulated) return std::nullopt;
   const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects,
@@ -135,7 +167,7 @@ std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
   if (emulator.share != own_mesh)
     add_error("double_mesh", {on_model, motions_at(emulator, values, finer_mesh)}, {on_model, model}, false,
               kUnsure);
-  for (FinerSolution& finer : finer_solutions(task.replays, candidate, task.store)) {
+  for (FinerSolution& finer : finer_solutions(std::move(finer_steps), candidate, task.store)) {
     for (std::size_t r = 0; r < task.replays.size(); ++r) task.tell_motion();
     add_error(finer.what, {task.replays, estimate.motions},
               {std::move(finer.replays), std::move(finer.motions)}, true);

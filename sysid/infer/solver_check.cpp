@@ -71,11 +71,21 @@ SolverCheck compare_solutions(const std::string& what, const Sensitivity& sensit
   return found;
 }
 
-std::vector<FinerSolution> finer_solutions(const std::vector<Replay>& replays,
+std::vector<FinerSettings> finer_settings(const std::vector<Replay>& replays) {
+  std::vector<FinerSettings> settings;
+  for (const auto& [what, change] : kFinerSteps) settings.push_back({what, changed(replays, change)});
+  return settings;
+}
+
+std::vector<FinerSolution> finer_solutions(std::vector<FinerSettings> settings,
                                            const ReplayCandidate& candidate, const MotionStore& store) {
+  std::vector<WantedMotion> wanted;
+  for (const FinerSettings& finer : settings)
+    for (const Replay& replay : finer.replays) wanted.push_back({&replay, candidate});
+  store.prepare(wanted);
   std::vector<FinerSolution> solutions;
-  for (const auto& [what, change] : kFinerSteps) {
-    FinerSolution solution{what, changed(replays, change), {}};
+  for (FinerSettings& finer : settings) {
+    FinerSolution solution{finer.what, std::move(finer.replays), {}};
     for (const Replay& replay : solution.replays) solution.motions.push_back(store.run(replay, candidate));
     if (all_finite(solution.motions)) solutions.push_back(std::move(solution));
   }

@@ -16,16 +16,24 @@ struct SolverCheck {
                                           ///< of its logarithm where it was searched so, else in its unit
 };
 
+/// Replays under finer settings of the solver.
+struct FinerSettings {
+  std::string what;  ///< "half_step", "four_times_iterations"
+  std::vector<Replay> replays;
+};
+
+/// Half the step, and four times the iterations at a tenth of the tolerance.
+std::vector<FinerSettings> finer_settings(const std::vector<Replay>& replays);
+
 /// Motions of a candidate under finer settings of the solver.
 struct FinerSolution {
-  std::string what;  ///< "half_step", "four_times_iterations"
+  std::string what;
   std::vector<Replay> replays;
   std::vector<ReplayResult> motions;
 };
 
-/// Half the step, and four times the iterations at a tenth of the tolerance, from the store where it has
-/// them. What diverges is left out.
-std::vector<FinerSolution> finer_solutions(const std::vector<Replay>& replays,
+/// From the store where it has them. What diverges is left out.
+std::vector<FinerSolution> finer_solutions(std::vector<FinerSettings> settings,
                                            const ReplayCandidate& candidate, const MotionStore& store);
 
 /// How far `finer_motions` are from `motions`, and the change of the parameters that explains it.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <string_view>
 #include <type_traits>
 
@@ -218,6 +219,20 @@ ReplayResult MotionStore::run(const Replay& replay, const ReplayCandidate& candi
   ReplayResult only;
   run(replay, {candidate}, [&](std::size_t, ReplayResult result) { only = std::move(result); });
   return only;
+}
+
+void MotionStore::prepare(const std::vector<WantedMotion>& wanted) const {
+  std::map<const Replay*, std::vector<ReplayCandidate>> batches;
+  for (const WantedMotion& motion : wanted) batches[motion.replay].push_back(motion.candidate);
+  std::vector<const Replay*> single;
+  for (const auto& [replay, candidates] : batches)
+    if (candidates.size() == 1)
+      single.push_back(replay);
+    else
+      run(*replay, candidates, [](std::size_t, const ReplayResult&) {});
+  if (single.empty()) return;
+  data::for_each_in_parallel(single.size(), single.front()->settings.threads,
+                             [&](std::size_t k) { run(*single[k], batches.at(single[k]).front()); });
 }
 
 }  // namespace flash::sysid

@@ -5,6 +5,12 @@
 
 namespace flash::sysid {
 
+/// The motion of a candidate in a replay.
+struct WantedMotion {
+  const Replay* replay;
+  ReplayCandidate candidate;
+};
+
 /// A folder of simulated motions, so that the same candidates can be scored again without simulating them:
 /// against another recording of the same motion, under another objective, in a search with more values. A
 /// motion is kept at the steps around its keyframes only, in double precision, in a file of its own named by
@@ -24,6 +30,10 @@ class MotionStore {
 
   /// That of one candidate.
   ReplayResult run(const Replay& replay, const ReplayCandidate& candidate) const;
+
+  /// Simulates what the folder lacks of motions that are asked for next: those of a replay as a batch, and
+  /// replays of which one motion is wanted side by side.
+  void prepare(const std::vector<WantedMotion>& wanted) const;
 
  private:
   std::string folder_;

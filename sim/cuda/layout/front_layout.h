@@ -33,7 +33,6 @@ struct FrontLayout {
   int first_panel_row;             ///< in FrontPlan::panel_rows, with children
   int below_at;                    ///< row, a multiple of 4
   int row_tiles, column_tiles;     ///< of its columns in the factor, row of tiles after row of tiles
-  int vector_at;                   ///< of what it passes up in a forward solve, three numbers a vertex below
   int children[2];                 ///< -1 for none
   int first_tile;                  ///< of its columns in the factor
   long update_at;  ///< of its update matrix: columns of `update_leading` numbers, behind zeros

@@ -1,11 +1,11 @@
 #include "sim/cuda/layout/front_plan.h"
 
 #include <algorithm>
-#include <map>
 #include <numeric>
 #include <stdexcept>
 
 #include "sim/cuda/layout/dissection.h"
+#include "sim/cuda/layout/places.h"
 
 namespace flash::sim::cuda {
 namespace {
@@ -110,37 +110,13 @@ std::vector<Node> by_height(std::vector<Node> nodes) {
   return sorted;
 }
 
-/// Memory that is given back: the lowest place where a piece fits.
-class Places {
- public:
-  long take(long size) {
-    long at = 0;
-    for (const auto& [begin, end] : used_) {
-      if (begin - at >= size) break;
-      at = end;
-    }
-    if (size > 0) used_[at] = at + size;
-    total_ = std::max(total_, at + size);
-    return at;
-  }
-  void give_back(long at, long size) {
-    if (size > 0) used_.erase(at);
-  }
-  long total() const { return total_; }
-
- private:
-  std::map<long, long> used_;
-  long total_ = 0;
-};
-
 /// The fronts' tiles one after the other. What a front passes up lives until its parent is done.
 void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
-  Places updates, vectors;
+  Places updates;
   // Zeros, for the columns that a child lacks.
   int longest = 0;
   for (const Node& node : nodes) longest = std::max(longest, below(node));
   updates.take(rounded_up(longest, 8));
-  vectors.take(plan.nothing_passed() + 1);
   std::size_t front = 0;
   for (const FrontLevel& level : plan.levels) {
     const std::size_t end = level.first_front + level.front_count;
@@ -150,19 +126,15 @@ void place_memory(const std::vector<Node>& nodes, FrontPlan& plan) {
       plan.factor_tiles += layout.row_tiles * layout.column_tiles;
       layout.update_leading = rounded_up(3 * layout.row_count, 8);
       layout.update_at = updates.take(3L * layout.row_count * layout.update_leading);
-      layout.vector_at = static_cast<int>(vectors.take(3L * layout.row_count));
     }
     for (; front < end; ++front)
       for (const int child : nodes[front].children) {
         if (child < 0) continue;
         const FrontLayout& layout = plan.fronts[child];
         updates.give_back(layout.update_at, 3L * layout.row_count * layout.update_leading);
-        vectors.give_back(layout.vector_at, 3L * layout.row_count);
       }
   }
   plan.update_size = updates.total();
-  // Chunks read beyond the last number.
-  plan.vector_size = static_cast<int>(vectors.total()) + 2 * solve_tile_width;
 }
 
 void add_levels(const std::vector<Node>& nodes, const FrontSettings& settings, FrontPlan& plan) {
@@ -217,7 +189,7 @@ void add_layouts(const std::vector<Node>& nodes, FrontPlan& plan) {
     layout.first_entry = static_cast<int>(plan.entries.size());
     for (int row = 0; row < solve_tile_width * layout.row_tiles; ++row) {
       const int below = row - layout.below_at;
-      int entry = 0;
+      int entry = -1;
       if (row < 3 * node.column_count)
         entry = 3 * node.first_column + row;
       else if (below >= 0 && below < 3 * layout.row_count)

@@ -20,14 +20,13 @@ struct FrontPlan {
   /// matrix of each child, -1 where it has none, and where the column of that place begins, 0 where it has
   /// none.
   std::vector<int> panel_rows;
-  std::vector<int> entries;  ///< of each row of a front: number of its entry in a vector, 0 in padding
+  std::vector<int> entries;  ///< of each row of a front: number of its entry in a vector, -1 in padding
   std::vector<BlockPlace> blocks;
 
   /// Where the vector of a solve holds a zero.
   int nothing_passed() const { return 6 * size; }
   int factor_tiles = 0;     ///< stored of an environment's factor
   long update_size = 0;     ///< for update matrices
-  int vector_size = 0;      ///< numbers that a solve works on (solve_chunk.h)
   int shared_panel = 0;     ///< numbers of on-chip memory for the panels of a level
   long factor_entries = 0;  ///< that are not zero by structure
   double factor_flops = 0;  ///< additions and multiplications of a factorization with its inverses

@@ -13,7 +13,14 @@ static_assert(chunk_width == 32);  // one each lane of a warp
 /// A piece of a front's columns W that a warp multiplies by, with all that it needs to know of it: forward
 /// its columns are the inputs and its rows the results, backward the other way round.
 struct alignas(16) SolveChunk {
-  enum { ends = 1, ends_level = 2 };
+  enum {
+    ends = 1,
+    ends_level = 2,
+    next_is_shared =
+        4,  ///< with ends_level: blocks of the team need of each other what they have, in the next level
+    own_to_all = 8,     ///< results that stay in the front go to all blocks of the team
+    passed_to_all = 16  ///< those that it passes up do
+  };
 
   // To have it sent to the chip.
   int first_tile = 0;   ///< of the factor

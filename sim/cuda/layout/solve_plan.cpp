@@ -1,11 +1,19 @@
 #include "sim/cuda/layout/solve_plan.h"
 
 #include <algorithm>
+#include <span>
+
+#include "sim/cuda/layout/front_owners.h"
+#include "sim/cuda/layout/places.h"
 
 namespace flash::sim::cuda {
 namespace {
 
-using Task = std::vector<SolveChunk>;  ///< chunks that add up to one set of results
+/// Chunks that add up to one set of results.
+struct Task {
+  int owner;  ///< front_owners
+  std::vector<SolveChunk> chunks;
+};
 
 /// The tiles of a front from `row` and `column` on, as many as `rows` and `columns` lie in.
 void take_tiles(const FrontLayout& front, int row, int rows, int column, int columns, int result_table,
@@ -16,60 +24,130 @@ void take_tiles(const FrontLayout& front, int row, int rows, int column, int col
   chunk.columns = chunk_columns(columns > solve_tile_width && c + 1 < front.column_tiles, result_table);
 }
 
+/// A front as a team solves with it.
+struct TeamFront {
+  const FrontLayout& front;
+  int owner;           ///< front_owners
+  bool passes_to_all;  ///< whether what it passes up is for all blocks
+  int vector_at;       ///< of what it passes up in a forward solve, three numbers a vertex below
+
+  int columns() const { return 3 * front.column_count; }
+  int end() const { return front.below_at + 3 * front.row_count; }
+};
+
+struct TeamFronts {
+  std::vector<TeamFront> fronts;
+  int vector_size;
+};
+
+/// What a front passes up lives until its parent is done. What one block works on has memory of its own,
+/// since blocks do not wait for each other there.
+std::vector<int> vector_places(const FrontPlan& plan, const std::vector<int>& owners, int team_blocks,
+                               int& vector_size) {
+  std::vector<Places> places(static_cast<std::size_t>(team_blocks) + 1);
+  const auto places_of = [&](std::size_t front) -> Places& {
+    return places[static_cast<std::size_t>(owners[front] + 1)];
+  };
+  const auto size_of = [&](std::size_t front) { return 3L * plan.fronts[front].row_count; };
+  std::vector<int> at(plan.fronts.size());
+  for (const FrontLevel& level : plan.levels) {
+    const auto first = static_cast<std::size_t>(level.first_front),
+               end = first + static_cast<std::size_t>(level.front_count);
+    for (std::size_t f = first; f < end; ++f) at[f] = static_cast<int>(places_of(f).take(size_of(f)));
+    for (std::size_t f = first; f < end; ++f)
+      for (const int child : plan.fronts[f].children)
+        if (const auto c = static_cast<std::size_t>(child); child >= 0)
+          places_of(c).give_back(at[c], size_of(c));
+  }
+  std::vector<int> begin;
+  int next = plan.nothing_passed() + 1;
+  for (const Places& own : places) {
+    begin.push_back(next);
+    next += static_cast<int>(own.total());
+  }
+  for (std::size_t f = 0; f < at.size(); ++f) at[f] += begin[static_cast<std::size_t>(owners[f] + 1)];
+  // Chunks read beyond the last number.
+  vector_size = next + 2 * solve_tile_width;
+  return at;
+}
+
+TeamFronts team_fronts(const FrontPlan& plan, int team_blocks) {
+  const std::vector<int> owners = front_owners(plan, team_blocks);
+  std::vector<bool> passes_to_all(plan.fronts.size(), false);
+  for (std::size_t f = 0; f < plan.fronts.size(); ++f)
+    for (const int child : plan.fronts[f].children)
+      if (child >= 0) passes_to_all[static_cast<std::size_t>(child)] = owners[f] == all_blocks;
+  TeamFronts team;
+  const std::vector<int> at = vector_places(plan, owners, team_blocks, team.vector_size);
+  for (std::size_t f = 0; f < plan.fronts.size(); ++f)
+    team.fronts.push_back({plan.fronts[f], owners[f], passes_to_all[f], at[f]});
+  return team;
+}
+
 /// What becomes of `rows` rows of a front, from `row` on.
-Task forward_task(const FrontPlan& plan, const FrontLayout& front, int row, int rows) {
-  const int columns = 3 * front.column_count, below = 3 * front.row_count;
+Task forward_task(const FrontPlan& plan, const TeamFront& own, int row, int rows) {
+  const FrontLayout& front = own.front;
+  const int columns = own.columns();
   // Above the diagonal there are zeros.
   const int end = row + rows > front.below_at ? columns : std::min(columns, row + rows);
   const auto in_chunk = [&](int at) { return std::clamp(at - row, 0, rows); };
   SolveChunk chunk;
   chunk.own_at = 3 * front.first_column + row;
   chunk.own_count = in_chunk(columns);
-  chunk.passed_at = front.vector_at - front.below_at + row;
+  chunk.passed_at = own.vector_at - front.below_at + row;
   chunk.passed_begin = in_chunk(front.below_at);
-  chunk.passed_end = in_chunk(front.below_at + below);
-  Task task;
+  chunk.passed_end = in_chunk(own.end());
+  Task task{own.owner, {}};
   for (int column = 0; column < end; column += chunk_width) {
     const bool last = column + chunk_width >= end;
     chunk.flags = last ? SolveChunk::ends : 0;
+    if (own.owner == all_blocks) chunk.flags |= SolveChunk::own_to_all;
+    if (own.passes_to_all) chunk.flags |= SolveChunk::passed_to_all;
     chunk.inputs = std::min(chunk_width, end - column);
     chunk.input_table = front.first_entry + column;
     chunk.right_at = 3 * (plan.size + front.first_column) + column;
     take_tiles(front, row, rows, column, chunk.inputs, last ? front.first_entry + row : -1, chunk);
-    task.push_back(chunk);
+    task.chunks.push_back(chunk);
   }
   return task;
 }
 
-/// The solution of `columns` columns of a front, from `column` on. `entries`: SolvePlan::entries.
-Task backward_task(const FrontPlan& plan, int entries, const FrontLayout& front, int column, int columns) {
-  const int end = front.below_at + 3 * front.row_count;
+/// The solution of `columns` columns of a front, from `column` on, for all blocks. `entries`:
+/// SolvePlan::entries.
+Task backward_task(const FrontPlan& plan, int entries, const TeamFront& own, int column, int columns) {
+  const FrontLayout& front = own.front;
   SolveChunk chunk;
   chunk.own_at = 3 * (plan.size + front.first_column) + column;
-  chunk.own_count = std::min(columns, 3 * front.column_count - column);
-  Task task;
+  chunk.own_count = std::min(columns, own.columns() - column);
+  Task task{own.owner, {}};
   // Above the diagonal there are zeros.
-  for (int row = column; row < end; row += chunk_width) {
-    chunk.flags = row + chunk_width >= end ? SolveChunk::ends : 0;
-    chunk.inputs = std::min(chunk_width, end - row);
+  for (int row = column; row < own.end(); row += chunk_width) {
+    chunk.flags = SolveChunk::own_to_all | (row + chunk_width >= own.end() ? SolveChunk::ends : 0);
+    chunk.inputs = std::min(chunk_width, own.end() - row);
     chunk.input_table = entries + front.first_entry + row;
     take_tiles(front, row, chunk.inputs, column, columns, -1, chunk);
-    task.push_back(chunk);
+    task.chunks.push_back(chunk);
   }
   return task;
 }
 
-using Shares = std::vector<std::vector<SolveChunk>>;  ///< of each warp
+using Shares = std::vector<std::vector<SolveChunk>>;  ///< of each warp of a team, by turns of its blocks
 
-/// A level's tasks for each warp: the longest first, each to the warp with the least to do.
-Shares share_out(std::vector<Task> tasks, std::size_t warps) {
-  std::stable_sort(tasks.begin(), tasks.end(),
-                   [](const Task& a, const Task& b) { return a.size() > b.size(); });
-  Shares shares(warps);
+/// A level's tasks for each warp: those of one block first, and the longest first, each to the warp with the
+/// least to do.
+Shares share_out(std::vector<Task> tasks, int team_blocks) {
+  std::stable_sort(tasks.begin(), tasks.end(), [](const Task& a, const Task& b) {
+    const bool a_shared = a.owner == all_blocks, b_shared = b.owner == all_blocks;
+    return a_shared != b_shared ? b_shared : a.chunks.size() > b.chunks.size();
+  });
+  Shares shares(static_cast<std::size_t>(block_warps * team_blocks));
   for (const Task& task : tasks) {
-    const auto least = std::min_element(shares.begin(), shares.end(),
-                                        [](const auto& a, const auto& b) { return a.size() < b.size(); });
-    least->insert(least->end(), task.begin(), task.end());
+    const bool shared = task.owner == all_blocks;
+    const auto step = static_cast<std::size_t>(shared ? 1 : team_blocks);
+    auto least = static_cast<std::size_t>(shared ? 0 : task.owner);
+    for (std::size_t w = least; w < shares.size(); w += step)
+      if (shares[w].size() < shares[least].size()) least = w;
+    shares[least].insert(shares[least].end(), task.chunks.begin(), task.chunks.end());
   }
   return shares;
 }
@@ -80,32 +158,40 @@ std::size_t longest(const Shares& shares) {
   return most;
 }
 
+/// As if one block worked on them.
+std::vector<Task> of_one_block(std::vector<Task> tasks) {
+  for (Task& task : tasks) task.owner = 0;
+  return tasks;
+}
+
 /// Adds a level in tasks of whichever width has the warps of one block wait least for each other: for any
-/// team the same, since chunks of other columns are rounded otherwise.
+/// team the same, since chunks of other columns are rounded otherwise. `next_is_shared`: as in SolveChunk.
 template <typename Cut>
-void add_level(const Cut& cut, Shares& warps) {
-  const auto most = [&](int width) { return longest(share_out(cut(width), block_warps)); };
+void add_level(const Cut& cut, int team_blocks, bool next_is_shared, Shares& warps) {
+  const auto most = [&](int width) { return longest(share_out(of_one_block(cut(width)), 1)); };
   const int width = most(solve_tile_width) < most(chunk_width) ? solve_tile_width : chunk_width;
-  Shares shares = share_out(cut(width), warps.size());
+  Shares shares = share_out(cut(width), team_blocks);
   for (std::size_t w = 0; w < warps.size(); ++w) {
     while (shares[w].empty() || shares[w].size() % chunks_together != 0) shares[w].emplace_back();
-    shares[w].back().flags |= SolveChunk::ends_level;
+    shares[w].back().flags |= SolveChunk::ends_level | (next_is_shared ? SolveChunk::next_is_shared : 0);
     warps[w].insert(warps[w].end(), shares[w].begin(), shares[w].end());
   }
 }
 
-std::vector<Gather> gathers_of(const FrontPlan& plan) {
+std::vector<Gather> gathers_of(const FrontPlan& plan, const TeamFronts& team) {
   const int none = plan.nothing_passed(), rows = static_cast<int>(plan.entries.size());
   // Copies go by whole chunks, beyond the last row.
   std::vector<Gather> gathers(2 * plan.entries.size() + chunk_width, {none, none});
-  for (int row = 0; row < rows; ++row) gathers[rows + row].first = plan.entries[row];
+  // Padding has zeros, which the scale of a chunk does not follow.
+  for (int row = 0; row < rows; ++row)
+    if (plan.entries[row] >= 0) gathers[rows + row].first = plan.entries[row];
   for (const FrontLayout& front : plan.fronts) {
     const int vertices = front.column_count + front.row_count, columns = 3 * front.column_count;
     for (int entry = 0; entry < 3 * vertices; ++entry) {
       const auto from = [&](int k) {
         if (front.children[k] < 0) return none;
         const int place = plan.child_rows[front.first_map + k * vertices + entry / 3];
-        return place < 0 ? none : plan.fronts[front.children[k]].vector_at + 3 * place + entry % 3;
+        return place < 0 ? none : team.fronts[front.children[k]].vector_at + 3 * place + entry % 3;
       };
       const int row = entry < columns ? entry : front.below_at + entry - columns;
       gathers[front.first_entry + row] = {from(0), from(1)};
@@ -116,33 +202,44 @@ std::vector<Gather> gathers_of(const FrontPlan& plan) {
 
 }  // namespace
 
-SolvePlan plan_solve(const FrontPlan& plan, int warps_of_team) {
+SolvePlan plan_solve(const FrontPlan& plan, int team_blocks) {
+  const TeamFronts team = team_fronts(plan, team_blocks);
   SolvePlan solve;
-  solve.gathers = gathers_of(plan);
+  solve.vector_size = team.vector_size;
+  solve.gathers = gathers_of(plan, team);
   solve.entries = static_cast<int>(plan.entries.size());
-  Shares warps(static_cast<std::size_t>(warps_of_team));
-  for (const FrontLevel& level : plan.levels)
+  const auto fronts_of = [&](std::size_t level) {
+    return std::span(team.fronts)
+        .subspan(static_cast<std::size_t>(plan.levels[level].first_front),
+                 static_cast<std::size_t>(plan.levels[level].front_count));
+  };
+  const auto is_shared = [&](std::size_t level) {
+    const auto fronts = fronts_of(level);
+    return std::any_of(fronts.begin(), fronts.end(),
+                       [](const TeamFront& f) { return f.owner == all_blocks; });
+  };
+  const std::size_t levels = plan.levels.size();
+  Shares warps(static_cast<std::size_t>(block_warps * team_blocks));
+  for (std::size_t l = 0; l < levels; ++l)
     add_level(
         [&](int rows) {
           std::vector<Task> tasks;
-          for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
-            for (int row = 0; row < plan.fronts[f].below_at + 3 * plan.fronts[f].row_count; row += rows)
-              tasks.push_back(forward_task(plan, plan.fronts[f], row, rows));
+          for (const TeamFront& front : fronts_of(l))
+            for (int row = 0; row < front.end(); row += rows)
+              tasks.push_back(forward_task(plan, front, row, rows));
           return tasks;
         },
-        warps);
-  for (std::size_t l = plan.levels.size(); l-- > 0;) {
-    const FrontLevel& level = plan.levels[l];
+        team_blocks, l + 1 == levels || is_shared(l) || is_shared(l + 1), warps);
+  for (std::size_t l = levels; l-- > 0;)
     add_level(
         [&](int columns) {
           std::vector<Task> tasks;
-          for (int f = level.first_front; f < level.first_front + level.front_count; ++f)
-            for (int column = 0; column < 3 * plan.fronts[f].column_count; column += columns)
-              tasks.push_back(backward_task(plan, solve.entries, plan.fronts[f], column, columns));
+          for (const TeamFront& front : fronts_of(l))
+            for (int column = 0; column < front.columns(); column += columns)
+              tasks.push_back(backward_task(plan, solve.entries, front, column, columns));
           return tasks;
         },
-        warps);
-  }
+        team_blocks, is_shared(l), warps);
   for (const auto& chunks : warps) {
     solve.starts.push_back(static_cast<int>(solve.chunks.size()));
     solve.chunks.insert(solve.chunks.end(), chunks.begin(), chunks.end());

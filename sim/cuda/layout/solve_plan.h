@@ -16,9 +16,12 @@ struct SolvePlan {
   /// entry.
   std::vector<Gather> gathers;
   int entries = 0;
+  int vector_size = 0;  ///< numbers that a solve works on (solve_chunk.h)
 };
 
-/// For a team of so many warps. What is added up to a number does not depend on how many there are.
-SolvePlan plan_solve(const FrontPlan& fronts, int warps = block_warps);
+/// For a team of so many blocks. What is added up to a number does not depend on how many there are. Of what
+/// is on chip each block has a copy; each solves fronts of its own (front_owners.h) until all blocks share
+/// some.
+SolvePlan plan_solve(const FrontPlan& fronts, int team_blocks = 1);
 
 }  // namespace flash::sim::cuda

@@ -21,7 +21,7 @@ TEST(SolverCheck, FinerSolutionsMoveAResolvedMotionLittle) {
   const std::vector<Replay> replays = {short_lift(folder)};
   const MotionStore store(folder / "motions");
   const ReplayCandidate candidate = candidate_at({2e-4}, bending_grid());
-  const std::vector<FinerSolution> finer = finer_solutions(replays, candidate, store);
+  const std::vector<FinerSolution> finer = finer_solutions(finer_settings(replays), candidate, store);
   ASSERT_EQ(finer.size(), 2u);
   EXPECT_EQ(finer[0].what, "half_step");
   EXPECT_EQ(finer[1].what, "four_times_iterations");

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <limits>
 #include <numeric>
 #include <random>
 
@@ -59,61 +60,138 @@ Eigen::VectorXd solve_by_fronts(const FrontPlan& plan, const std::vector<Eigen::
   return x;
 }
 
-/// A team at its chunks, as front_solve.cuh: the warps of a level in the order told.
-Eigen::VectorXd solve_by_chunks(const FrontPlan& plan, const SolvePlan& solve,
-                                const std::vector<Eigen::MatrixXd>& columns, const Eigen::VectorXd& right,
-                                const std::vector<int>& order) {
-  constexpr int w = solve_tile_width;
-  std::vector<Eigen::MatrixXd> tiles(plan.factor_tiles);
-  for (std::size_t f = 0; f < plan.fronts.size(); ++f)
-    for (int r = 0; r < plan.fronts[f].row_tiles; ++r)
-      for (int c = 0; c < plan.fronts[f].column_tiles; ++c)
-        tiles[plan.fronts[f].first_tile + r * plan.fronts[f].column_tiles + c] =
-            columns[f].block<w, w>(w * r, w * c);
-  // Of a tile that is not read stands anything.
-  const Eigen::MatrixXd anything = Eigen::MatrixXd::Constant(w, w, 1e3);
-  std::vector<double> vector(plan.vector_size, 1e3);
-  vector[plan.nothing_passed()] = 0;
-  std::copy(right.begin(), right.end(), vector.begin() + right.size());
-  std::vector<int> next(solve.starts.begin(), solve.starts.end() - 1);
-  for (std::size_t level = 0; level < 2 * plan.levels.size(); ++level)
-    for (const int warp : order) {
-      const bool backward = level >= plan.levels.size();
-      Eigen::VectorXd sum = Eigen::VectorXd::Zero(chunk_width);
-      for (bool more = true; more;) {
-        const SolveChunk& chunk = solve.chunks[next[warp]++];
-        more = (chunk.flags & SolveChunk::ends_level) == 0;
-        if (chunk.inputs == 0) continue;
-        Eigen::VectorXd inputs = Eigen::VectorXd::Zero(chunk_width);
-        for (int k = 0; k < chunk.inputs; ++k) {
-          const int at = chunk.input_table + k;
-          inputs[k] = backward ? vector[solve.gathers[at].first]
-                               : vector[chunk.right_at + k] + vector[solve.gathers[at].first] +
-                                     vector[solve.gathers[at].second];
+/// A number that a block has written for the others, which see it once the team has waited for all.
+struct Sent {
+  int at;
+  double number;
+};
+
+/// A team at its chunks, as front_solve.cuh: each block has a vector of its own, and the blocks of a team go
+/// one after the other, in the order told, up to where they need of each other what they have. The warps of a
+/// block go in that order too.
+class Team {
+ public:
+  Team(const FrontPlan& plan, const SolvePlan& solve, const std::vector<Eigen::MatrixXd>& columns,
+       const Eigen::VectorXd& right, int blocks, bool reversed, bool at_once = false)
+      : plan_(plan),
+        solve_(solve),
+        blocks_(blocks),
+        reversed_(reversed),
+        at_once_(at_once),
+        tiles_(plan.factor_tiles) {
+    constexpr int w = solve_tile_width;
+    for (std::size_t f = 0; f < plan.fronts.size(); ++f)
+      for (int r = 0; r < plan.fronts[f].row_tiles; ++r)
+        for (int c = 0; c < plan.fronts[f].column_tiles; ++c)
+          tiles_[plan.fronts[f].first_tile + r * plan.fronts[f].column_tiles + c] =
+              columns[f].block<w, w>(w * r, w * c);
+    // What a block has not been told is no number.
+    std::vector<double> vector(solve.vector_size, std::numeric_limits<double>::quiet_NaN());
+    vector[plan.nothing_passed()] = 0;
+    std::copy(right.begin(), right.end(), vector.begin() + right.size());
+    vectors_.assign(blocks, vector);
+    next_.assign(solve.starts.begin(), solve.starts.end() - 1);
+    levels_.assign(blocks, 0);
+  }
+
+  /// The solutions that the blocks come to.
+  std::vector<Eigen::VectorXd> solve() {
+    const int end = static_cast<int>(2 * plan_.levels.size());
+    while (levels_.front() < end) {
+      for (const int block : in_order(blocks_))
+        while (!run_level(block) && levels_[block] < end) {
         }
-        for (int row = 0; row < 2; ++row)
-          for (int column = 0; column < 2; ++column) {
-            const int input = backward ? row : column, result = backward ? column : row;
-            if (input == 1 && chunk.inputs <= w) continue;
-            const bool read = (row == 0 || chunk.next_row > 0) && (column == 0 || chunk.columns % 2 != 0);
-            Eigen::MatrixXd left = read ? tiles[chunk.first_tile + row * chunk.next_row + column] : anything;
-            if (backward) left.transposeInPlace();
-            sum.segment<w>(result * w) += left * inputs.segment<w>(input * w);
-          }
-        if ((chunk.flags & SolveChunk::ends) == 0) continue;
-        for (int r = 0; r < chunk_width; ++r) {
-          if (r < chunk.own_count) {
-            vector[chunk.own_at + r] = sum[r];
-          } else if (r >= chunk.passed_begin && r < chunk.passed_end) {
-            const Gather& gather = solve.gathers[chunk.columns / 2 + r];
-            vector[chunk.passed_at + r] = sum[r] + vector[gather.first] + vector[gather.second];
-          }
+      for (const Sent& sent : sent_)
+        for (auto& vector : vectors_) vector[sent.at] = sent.number;
+      sent_.clear();
+    }
+    std::vector<Eigen::VectorXd> solutions;
+    const Eigen::Index size = 3L * plan_.size;
+    for (const auto& vector : vectors_)
+      solutions.emplace_back(Eigen::Map<const Eigen::VectorXd>(vector.data() + size, size));
+    return solutions;
+  }
+
+ private:
+  std::vector<int> in_order(int count) const {
+    std::vector<int> order(count);
+    std::iota(order.begin(), order.end(), 0);
+    if (reversed_) std::reverse(order.begin(), order.end());
+    return order;
+  }
+
+  /// Returns whether the team waits for all behind it.
+  bool run_level(int block) {
+    int flags = 0;
+    for (const int warp : in_order(block_warps)) flags = run_warp(block, warp * blocks_ + block);
+    ++levels_[block];
+    return (flags & SolveChunk::next_is_shared) != 0 || levels_[block] == std::ssize(plan_.levels);
+  }
+
+  int run_warp(int block, int warp) {
+    constexpr int w = solve_tile_width;
+    const bool backward = levels_[block] >= std::ssize(plan_.levels);
+    std::vector<double>& vector = vectors_[block];
+    // Of a tile that is not read stands anything.
+    const Eigen::MatrixXd anything = Eigen::MatrixXd::Constant(w, w, 1e3);
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(chunk_width);
+    while (true) {
+      const SolveChunk& chunk = solve_.chunks[next_[warp]++];
+      Eigen::VectorXd inputs = Eigen::VectorXd::Zero(chunk_width);
+      for (int k = 0; k < chunk.inputs; ++k) {
+        const int at = chunk.input_table + k;
+        inputs[k] = backward ? vector[solve_.gathers[at].first]
+                             : vector[chunk.right_at + k] + vector[solve_.gathers[at].first] +
+                                   vector[solve_.gathers[at].second];
+      }
+      for (int row = 0; row < 2 && chunk.inputs > 0; ++row)
+        for (int column = 0; column < 2; ++column) {
+          const int input = backward ? row : column, result = backward ? column : row;
+          if (input == 1 && chunk.inputs <= w) continue;
+          const bool read = (row == 0 || chunk.next_row > 0) && (column == 0 || chunk.columns % 2 != 0);
+          Eigen::MatrixXd left = read ? tiles_[chunk.first_tile + row * chunk.next_row + column] : anything;
+          if (backward) left.transposeInPlace();
+          sum.segment<w>(result * w) += left * inputs.segment<w>(input * w);
         }
+      if (chunk.inputs > 0 && (chunk.flags & SolveChunk::ends) != 0) {
+        finish(chunk, block, sum);
         sum.setZero();
       }
+      if ((chunk.flags & SolveChunk::ends_level) != 0) return chunk.flags;
     }
-  return Eigen::Map<const Eigen::VectorXd>(vector.data() + right.size(), right.size());
-}
+  }
+
+  void finish(const SolveChunk& chunk, int block, const Eigen::VectorXd& sum) {
+    std::vector<double>& vector = vectors_[block];
+    const auto set = [&](int at, double number, bool to_all) {
+      vector[at] = number;
+      if (to_all && at_once_)
+        for (auto& other : vectors_) other[at] = number;
+      else if (to_all)
+        sent_.push_back({at, number});
+    };
+    for (int r = 0; r < chunk_width; ++r) {
+      if (r < chunk.own_count) {
+        set(chunk.own_at + r, sum[r], chunk.flags & SolveChunk::own_to_all);
+      } else if (r >= chunk.passed_begin && r < chunk.passed_end) {
+        const Gather& gather = solve_.gathers[chunk.columns / 2 + r];
+        set(chunk.passed_at + r, sum[r] + vector[gather.first] + vector[gather.second],
+            chunk.flags & SolveChunk::passed_to_all);
+      }
+    }
+  }
+
+  const FrontPlan& plan_;
+  const SolvePlan& solve_;
+  int blocks_;
+  bool reversed_;
+  bool at_once_;  ///< what a block writes for the others they see at once, as they may
+  std::vector<Eigen::MatrixXd> tiles_;
+  std::vector<std::vector<double>> vectors_;  ///< of each block
+  std::vector<int> next_;                     ///< chunk of each warp
+  std::vector<int> levels_;                   ///< of each block
+  std::vector<Sent> sent_;
+};
 
 TEST(SolvePlan, ItsChunksComeToTheSolveInWhateverOrderWarpsTakeThem) {
   for (const auto& [name, sheet] : small_plans()) {
@@ -121,19 +199,32 @@ TEST(SolvePlan, ItsChunksComeToTheSolveInWhateverOrderWarpsTakeThem) {
     for (const int leaf_size : {3, 8, 12}) {
       const FrontPlan fronts = plan_fronts(sheet->pattern, sheet->sheet.rest.vertices,
                                            {.leaf_size = leaf_size, .panel_capacity = 12 * 1024});
-      for (const int warps : {block_warps, 8 * block_warps}) {
-        const SolvePlan solve = plan_solve(fronts, warps);
-        const std::vector<Eigen::MatrixXd> columns = random_columns(fronts);
-        const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(3L * fronts.size, -1, 2);
-        std::vector<int> order(static_cast<std::size_t>(warps));
-        std::iota(order.begin(), order.end(), 0);
-        const Eigen::VectorXd x = solve_by_chunks(fronts, solve, columns, right, order);
-        std::reverse(order.begin(), order.end());
-        EXPECT_EQ(x, solve_by_chunks(fronts, solve, columns, right, order));
-        const Eigen::VectorXd expected = solve_by_fronts(fronts, columns, right);
-        EXPECT_LE((x - expected).norm(), 1e-10 * expected.norm());
+      const std::vector<Eigen::MatrixXd> columns = random_columns(fronts);
+      const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(3L * fronts.size, -1, 2);
+      const Eigen::VectorXd expected = solve_by_fronts(fronts, columns, right);
+      const Eigen::VectorXd of_one = Team(fronts, plan_solve(fronts), columns, right, 1, false).solve()[0];
+      EXPECT_LE((of_one - expected).norm(), 1e-10 * expected.norm());
+      for (const int blocks : {1, 2, 4, 8}) {
+        const SolvePlan solve = plan_solve(fronts, blocks);
+        for (const bool reversed : {false, true})
+          for (const bool at_once : {false, true})
+            for (const auto& x : Team(fronts, solve, columns, right, blocks, reversed, at_once).solve())
+              EXPECT_EQ(x, of_one);
       }
     }
+  }
+}
+
+TEST(SolvePlan, SomeHeightsNeedOneBlockAlone) {
+  for (const auto& [name, sheet] : small_plans()) {
+    SCOPED_TRACE(name);
+    const FrontPlan fronts = plan_fronts(sheet->pattern, sheet->sheet.rest.vertices);
+    const SolvePlan solve = plan_solve(fronts, 8);
+    int shared = 0;
+    for (int k = solve.starts[0]; k < solve.starts[1]; ++k)
+      shared += (solve.chunks[static_cast<std::size_t>(k)].flags & SolveChunk::next_is_shared) != 0;
+    EXPECT_GT(shared, 0);
+    EXPECT_LT(shared, static_cast<int>(2 * fronts.levels.size()));
   }
 }
 
