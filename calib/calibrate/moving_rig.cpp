@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/uncertainty/end_knock.h"
 #include "calib/uncertainty/motion_in_time.h"
 #include "data/error.h"
 
@@ -39,9 +40,11 @@ std::string knock_sentence(const KnockedPart& other, std::size_t used) {
   return text;
 }
 
-/// Views that were left out one by one are a knock if they are the last ones: the answer is then of the past.
-void doubt_last_views(Calibration& result, const std::vector<Observation>& all) {
-  constexpr std::size_t kTold = 2, kUnusable = 3;
+/// Views that were left out one by one may be a knock if they are the last ones: the answer is then of the
+/// past. knock: probability of one among the last two to four, where that could be asked.
+void doubt_last_views(Calibration& result, const std::vector<Observation>& all, std::optional<double> knock) {
+  constexpr std::size_t kTold = 2, kUnusable = 3, kAsked = 4;
+  constexpr double kUnlikely = 0.05;
   std::vector<std::size_t> seen;
   for (std::size_t i = 0; i < all.size(); ++i)
     if (!all[i].T_camera_target.empty()) seen.push_back(i);
@@ -56,7 +59,8 @@ void doubt_last_views(Calibration& result, const std::vector<Observation>& all) 
                              " views do not close with those before: if camera or target moved before " +
                              all[seen[seen.size() - last]].image +
                              ", the answer is of where they were; record anew, or take these views out");
-  if (last >= kUnusable) result.usable = false;
+  const bool unlikely = last <= kAsked && knock && *knock < kUnlikely;
+  if (last >= kUnusable && !unlikely) result.usable = false;
 }
 
 /// Of a view in time: -1 for the first of all, 0 for the last.
@@ -166,41 +170,61 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
   return answer;
 }
 
-}  // namespace
-
-Calibration calibrate_moving(const std::vector<Observation>& all, const StillSolver& solve) {
-  Calibration whole = solve(all);
-  doubt_last_views(whole, all);
-  if (!whole.pose_errors) return whole;
-  const double rival = whole.pose_errors->gain;
-  const std::optional<Knock> knock = find_knock(whole.refined, {.unknowns = whole.unknowns}, rival);
-  const std::optional<Drift> drift = drift_of(whole, rival);
-  const bool drifts = drift && (!knock || drift->gain > knock->second);
-  if (drifts && beyond_usual(whole.refined.bundle, drift->motion))
-    return solve_drifting(whole, *drift, all, solve);
-  if (drifts || !knock) {
-    add_slow_drift(whole, rival);
-    return whole;
+/// The solution's poses, and those of views that were left out near the ends. views: that are numbered in
+/// time.
+TimedPoses timed_poses(const Calibration& result, const std::vector<Observation>& all,
+                       const Eigen::Matrix3Xd& points, std::vector<int>& views) {
+  constexpr int kNear = 4;
+  std::vector<int> time(all.size(), -1);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const ViewVerdict& verdict = result.selection.views[i];
+    if (!verdict.used && !verdict.misfit) continue;
+    time[i] = static_cast<int>(views.size());
+    views.push_back(static_cast<int>(i));
   }
-  const auto first = static_cast<std::size_t>(whole.used[knock->pose]);
-  const std::size_t after = whole.used.size() - knock->pose;
+  TimedPoses poses;
+  poses.refined = result.refined;
+  poses.used = result.used.size();
+  poses.shared = std::sqrt(result.pose_errors->share) * result.pose_errors->rotation;
+  for (const int view : result.used) poses.time.push_back(time[static_cast<std::size_t>(view)]);
+  const int count = static_cast<int>(views.size());
+  for (int k = 0; k < count; ++k) {
+    const auto view = static_cast<std::size_t>(views[static_cast<std::size_t>(k)]);
+    if (result.selection.views[view].used || (k >= kNear && k < count - kNear)) continue;
+    append_view(poses.refined.bundle, points, result.selection.observations[view]);
+    poses.time.push_back(k);
+  }
+  poses.left_out.assign(poses.time.size(), 1);
+  std::fill_n(poses.left_out.begin(), poses.used, 0);
+  return poses;
+}
+
+/// The answer of the views on one side of a knock. first: the first view after it.
+Calibration solve_knocked(const Calibration& whole, const Knock& knock, std::size_t first,
+                          const std::vector<Observation>& all, const Eigen::Matrix3Xd& points,
+                          const StillSolver& solve) {
+  std::size_t before = 0, after = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const ViewVerdict& verdict = whole.selection.views[i];
+    if (verdict.used || verdict.misfit) ++(i < first ? before : after);
+  }
   // What holds now counts, unless it is hardly known.
   constexpr std::size_t kEnough = 6;
-  KnockedPart other{.knock = *knock, .view = all[first].image, .before = after >= kEnough};
+  KnockedPart other{.knock = knock, .view = all[first].image, .before = after >= kEnough};
   Calibration answer;
   try {  // the part may have been knocked as well
-    answer = calibrate_moving(side_of(all, first, !other.before), solve);
+    answer = calibrate_moving(side_of(all, first, !other.before), points, solve);
   } catch (const data::InputError&) {
     return whole;  // a part alone may turn about one axis only
   }
-  other.views = static_cast<int>(other.before ? knock->pose : after);
+  other.views = static_cast<int>(other.before ? before : after);
   try {
     other.poses = solve(side_of(all, first, other.before)).poses;
   } catch (const data::InputError&) {
     // said in the sentence
   }
   // Who asks where the camera is now is not served by where it was.
-  if (!other.before && (knock->camera || !knock->told)) answer.usable = false;
+  if (!other.before && (knock.camera || !knock.told)) answer.usable = false;
   for (std::size_t i = 0; i < all.size(); ++i)
     if ((i < first) == other.before && !all[i].T_camera_target.empty())
       answer.views[i].reason = answer.selection.views[i].reason =
@@ -208,6 +232,38 @@ Calibration calibrate_moving(const std::vector<Observation>& all, const StillSol
   answer.warnings.insert(answer.warnings.begin(), knock_sentence(other, answer.used.size()));
   if (!answer.other_part) answer.other_part = std::move(other);  // else that next to the answer
   return answer;
+}
+
+}  // namespace
+
+Calibration calibrate_moving(const std::vector<Observation>& all, const Eigen::Matrix3Xd& points,
+                             const StillSolver& solve) {
+  Calibration whole = solve(all);
+  if (!whole.pose_errors) {
+    doubt_last_views(whole, all, std::nullopt);
+    return whole;
+  }
+  const double rival = whole.pose_errors->gain;
+  const BundleSettings settings{.unknowns = whole.unknowns};
+  const std::optional<Knock> knock = find_knock(whole.refined, settings, rival);
+  const std::optional<Drift> drift = drift_of(whole, rival);
+  std::vector<int> views;
+  const TimedPoses poses = timed_poses(whole, all, points, views);
+  const EndKnock end = find_end_knock(poses, settings);
+  doubt_last_views(whole, all, end.probability);
+  const bool drifts = drift && (!knock || drift->gain > knock->second);
+  if (end.knock && end.knock->gain > (drifts ? drift->gain : knock ? knock->gain : 0))
+    return solve_knocked(whole, *end.knock, static_cast<std::size_t>(views[end.knock->pose]), all, points,
+                         solve);
+  if (drifts && beyond_usual(whole.refined.bundle, drift->motion))
+    return solve_drifting(whole, *drift, all, solve);
+  if (drifts || !knock) {
+    add_slow_drift(whole, rival);
+    whole.covariance += end.covariance;
+    whole.repeatable += end.covariance;
+    return whole;
+  }
+  return solve_knocked(whole, *knock, static_cast<std::size_t>(whole.used[knock->pose]), all, points, solve);
 }
 
 }  // namespace flash::calib

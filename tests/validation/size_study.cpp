@@ -62,7 +62,7 @@ void study(Setup setup, bool wrong_kinematics, bool lens_as_stated, int scenes, 
   constexpr double kChiSquare95 = 12.592;
   CalibrateSettings settings;
   settings.folds = 2;
-  int inside = 0, solved = 0;
+  int inside = 0, solved = 0, whole = 0;
   Vector6d squares = Vector6d::Zero(), variances = Vector6d::Zero();
   const double size_sd = usual_size_sd(protocol_points(setup));
   for (int i = 0; i < scenes; ++i) {
@@ -77,6 +77,7 @@ void study(Setup setup, bool wrong_kinematics, bool lens_as_stated, int scenes, 
     squares += error.cwiseAbs2() / scenes;
     variances += result.covariance.diagonal() / scenes;
     solved += result.usable;
+    whole += result.used.size() == scene.observations.size();
   }
   const auto rms = [](const Vector6d& v, Eigen::Index first, double unit) {
     return unit * std::sqrt(v.segment<3>(first).sum());
@@ -84,10 +85,10 @@ void study(Setup setup, bool wrong_kinematics, bool lens_as_stated, int scenes, 
   std::printf(
       "%-28s | inside %5.1f %% of %d | off %.3f mm %.4f deg | stated %.3f mm %.4f deg | stated over "
       "actual "
-      "%.2f %.2f | usable %d\n",
+      "%.2f %.2f | usable %d, with all views %d\n",
       kind(setup, wrong_kinematics).c_str(), 100.0 * inside / scenes, scenes, rms(squares, 0, 1e3),
       rms(squares, 3, 180 / M_PI), rms(variances, 0, 1e3), rms(variances, 3, 180 / M_PI),
-      rms(variances, 0, 1) / rms(squares, 0, 1), rms(variances, 3, 1) / rms(squares, 3, 1), solved);
+      rms(variances, 0, 1) / rms(squares, 0, 1), rms(variances, 3, 1) / rms(squares, 3, 1), solved, whole);
 }
 
 }  // namespace
