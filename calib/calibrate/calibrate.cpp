@@ -131,7 +131,7 @@ Priors priors_of(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& p
                  const CalibrateSettings& settings) {
   Priors priors{.warp_sd = {usual_warp_sd(points)}};
   const double size_sd = *settings.target_size_sd;
-  if (size_sd > 0 && std::isfinite(size_sd)) priors.scale_sd = {size_sd};
+  if (size_sd > 0 && std::isfinite(size_sd) && !settings.size_as_stated) priors.scale_sd = {size_sd};
   if (settings.lens == LensKnowledge::near) priors.lenses = {lens_prior(camera, settings.lens_covariance)};
   return priors;
 }
@@ -297,7 +297,9 @@ void warn(Calibration& result) {
   bool unusable = false;
   const std::string noisy = unusual_noise(result.refined.noise, unusable);
   if (!noisy.empty()) result.warnings.insert(result.warnings.begin(), noisy);
-  if (unusable) result.usable = false;
+  // Noise that a size makes which is to be kept is that size's.
+  const bool of_size = result.size && result.size->prior_sd == 0 && result.size->far_off();
+  if (unusable && !of_size) result.usable = false;
   if (!result.refined.converged) {
     result.warnings.insert(result.warnings.begin(), "the refinement did not converge");
     result.usable = false;
@@ -350,7 +352,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
 
   RefineSettings refine_settings = settings.refine;
-  refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0;
+  refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0 && !settings.size_as_stated;
   refine_settings.bundle.unknowns.warps = true;
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   refine_settings.bundle.unknowns.joint_zeros = observations.front().joint_motions.cols() > 0;
@@ -391,6 +393,13 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
   const bool plausible = finish(result, observations);
+  // Who keeps a size is answered, however far off it may be.
+  if (settings.size_as_stated) {
+    result.covariance += covariance_of_kept_sizes(result.refined, refine_settings.bundle, sized.sizes,
+                                                  {*settings.target_size_sd})
+                             .topLeftCorner<6, 6>();
+    result.weakest = weakest_direction(result.covariance, usual_distance(observations), "camera");
+  }
   if (given.lens == LensKnowledge::stated)
     check_stated_lens(result, std::move(plain), refine_settings, camera, settings.lens_covariance);
   warn_of_shapes(result, sized.disputed);
