@@ -131,7 +131,12 @@ Priors priors_of(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& p
                  const CalibrateSettings& settings) {
   Priors priors{.warp_sd = {usual_warp_sd(points)}};
   const double size_sd = *settings.target_size_sd;
-  if (size_sd > 0 && std::isfinite(size_sd) && !settings.size_as_stated) priors.scale_sd = {size_sd};
+  // A size that is kept is none of the unknowns, but of what is judged beside it: it may be off by any share.
+  constexpr double kAny = 0.3;
+  if (size_sd == 0 || settings.size_as_stated)
+    priors.scale_sd = {kAny};
+  else if (std::isfinite(size_sd))
+    priors.scale_sd = {size_sd};
   if (settings.lens == LensKnowledge::near) priors.lenses = {lens_prior(camera, settings.lens_covariance)};
   return priors;
 }

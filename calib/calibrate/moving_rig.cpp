@@ -63,6 +63,13 @@ void doubt_last_views(Calibration& result, const std::vector<Observation>& all, 
   if (last >= kUnusable && !unlikely) result.usable = false;
 }
 
+/// A size that was to be kept and is another makes errors that look like motions: here it is an unknown.
+BundleSettings judged_with(const Calibration& result) {
+  BundleSettings settings{.unknowns = result.unknowns};
+  settings.unknowns.scales = true;
+  return settings;
+}
+
 /// Of a view in time: -1 for the first of all, 0 for the last.
 double time_of(std::size_t view, std::size_t count) {
   return static_cast<double>(view) / static_cast<double>(count - 1) - 1;
@@ -76,7 +83,7 @@ std::vector<double> times_of(const Calibration& result) {
 }
 
 std::optional<Drift> drift_of(const Calibration& result, double rival) {
-  return find_drift(result.refined, {.unknowns = result.unknowns}, times_of(result), rival);
+  return find_drift(result.refined, judged_with(result), times_of(result), rival);
 }
 
 /// The views as they would be had camera and target stood where they are at the last one. A motion of the
@@ -99,7 +106,7 @@ std::vector<Observation> without_drift(std::vector<Observation> views, const Cal
 /// Of a drift that was solved for, what is not known: how far it went, and that it need not have kept its
 /// speed.
 void add_drift(Calibration& result, const Drift& drift) {
-  const MotionInTime motions(result.refined, {.unknowns = result.unknowns});
+  const MotionInTime motions(result.refined, judged_with(result));
   const std::vector<double> times = times_of(result);
   std::vector<double> bends;  // between a constant speed and one that ends, or starts, at zero
   for (const double t : times) bends.push_back(t * (1 + t));
@@ -115,7 +122,7 @@ void add_drift(Calibration& result, const Drift& drift) {
 /// is told where it is all but certain, and moves the answer by as much as is stated anyway.
 void add_slow_drift(Calibration& result, double rival) {
   constexpr double kCertain = 0.95;
-  const SlowDrift drift = slow_drift(result.refined, {.unknowns = result.unknowns}, times_of(result), rival);
+  const SlowDrift drift = slow_drift(result.refined, judged_with(result), times_of(result), rival);
   const double grown = result.covariance.ldlt().solve(drift.covariance).trace();
   result.covariance += drift.covariance;
   result.repeatable += drift.covariance;
@@ -150,7 +157,7 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
   try {
     for (int round = 0; round < kRounds; ++round) {
       answer = solve(without_drift(all, answer, drift));
-      const MotionInTime motions(answer.refined, {.unknowns = answer.unknowns});
+      const MotionInTime motions(answer.refined, judged_with(answer));
       const Vector6d left = motions.fit({times_of(answer)}, drift.camera).motion;
       drift.motion += left;
       if (left.norm() < kLittle * drift.motion.norm()) break;
@@ -214,8 +221,17 @@ Calibration solve_knocked(const Calibration& whole, const Knock& knock, std::siz
   Calibration answer;
   try {  // the part may have been knocked as well
     answer = calibrate_moving(side_of(all, first, !other.before), points, solve);
-  } catch (const data::InputError&) {
-    return whole;  // a part alone may turn about one axis only
+  } catch (const data::InputError& error) {  // a part alone may turn about one axis only
+    answer = whole;
+    answer.usable = false;
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "the %s moved by %.1f mm and %.2f deg before %s, and the views %s then alone do not do: ",
+                  mover(knock.camera, knock.told), 1e3 * knock.motion.head<3>().norm(),
+                  knock.motion.tail<3>().norm() / kDegree, other.view.c_str(),
+                  other.before ? "since" : "until");
+    answer.warnings.insert(answer.warnings.begin(), text + std::string(error.what()));
+    return answer;
   }
   other.views = static_cast<int>(other.before ? before : after);
   try {
@@ -244,7 +260,7 @@ Calibration calibrate_moving(const std::vector<Observation>& all, const Eigen::M
     return whole;
   }
   const double rival = whole.pose_errors->gain;
-  const BundleSettings settings{.unknowns = whole.unknowns};
+  const BundleSettings settings = judged_with(whole);
   const std::optional<Knock> knock = find_knock(whole.refined, settings, rival);
   const std::optional<Drift> drift = drift_of(whole, rival);
   std::vector<int> views;
