@@ -41,9 +41,9 @@ std::string knock_sentence(const KnockedPart& other, std::size_t used) {
 }
 
 /// Views that were left out one by one may be a knock if they are the last ones: the answer is then of the
-/// past. knock: probability of one among the last two to four, where that could be asked.
+/// past. knock: probability of one near the ends, where that could be asked.
 void doubt_last_views(Calibration& result, const std::vector<Observation>& all, std::optional<double> knock) {
-  constexpr std::size_t kTold = 2, kUnusable = 3, kAsked = 4;
+  constexpr std::size_t kTold = 2, kUnusable = 3;
   constexpr double kUnlikely = 0.05;
   std::vector<std::size_t> seen;
   for (std::size_t i = 0; i < all.size(); ++i)
@@ -59,7 +59,7 @@ void doubt_last_views(Calibration& result, const std::vector<Observation>& all, 
                              " views do not close with those before: if camera or target moved before " +
                              all[seen[seen.size() - last]].image +
                              ", the answer is of where they were; record anew, or take these views out");
-  const bool unlikely = last <= kAsked && knock && *knock < kUnlikely;
+  const bool unlikely = last <= static_cast<std::size_t>(kEndViews) && knock && *knock < kUnlikely;
   if (last >= kUnusable && !unlikely) result.usable = false;
 }
 
@@ -181,7 +181,6 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
 /// time.
 TimedPoses timed_poses(const Calibration& result, const std::vector<Observation>& all,
                        const Eigen::Matrix3Xd& points, std::vector<int>& views) {
-  constexpr int kNear = 4;
   std::vector<int> time(all.size(), -1);
   for (std::size_t i = 0; i < all.size(); ++i) {
     const ViewVerdict& verdict = result.selection.views[i];
@@ -197,7 +196,7 @@ TimedPoses timed_poses(const Calibration& result, const std::vector<Observation>
   const int count = static_cast<int>(views.size());
   for (int k = 0; k < count; ++k) {
     const auto view = static_cast<std::size_t>(views[static_cast<std::size_t>(k)]);
-    if (result.selection.views[view].used || (k >= kNear && k < count - kNear)) continue;
+    if (result.selection.views[view].used || (k >= kEndViews && k < count - kEndViews)) continue;
     append_view(poses.refined.bundle, points, result.selection.observations[view]);
     poses.time.push_back(k);
   }

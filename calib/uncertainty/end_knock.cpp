@@ -11,7 +11,7 @@
 namespace flash::calib {
 namespace {
 
-constexpr int kFewest = 2, kMost = 4;              // views on the short side
+constexpr int kFewest = 2;                         // views on the short side
 constexpr int kRemaining = 8;                      // on the long side
 constexpr double kOdds = 20;                       // against a knock, before any view is seen
 constexpr double kWrongOdds = 50;                  // against a view that is wrong by itself
@@ -139,7 +139,7 @@ EndKnock find_end_knock(const TimedPoses& poses, const BundleSettings& settings)
   Side likeliest;
   std::vector<std::pair<Side, double>> all;
   for (const bool last : {true, false})
-    for (int count = kFewest; count <= kMost && knocks.views() - count >= kRemaining; ++count) {
+    for (int count = kFewest; count <= kEndViews && knocks.views() - count >= kRemaining; ++count) {
       const double still = std::min(knocks.still({last, count, true}), knocks.still({last, count, false}));
       for (const bool camera : {true, false}) {
         const Side side{last, count, camera};

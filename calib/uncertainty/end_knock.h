@@ -6,6 +6,9 @@
 
 namespace flash::calib {
 
+/// Views on the short side of a knock near an end, at most.
+constexpr int kEndViews = 6;
+
 /// A solution and, beside it, poses of views near the ends of the recording that it left out as they do not
 /// fit.
 struct TimedPoses {
@@ -25,7 +28,7 @@ struct EndKnock {
                                            ///< that is not told
 };
 
-/// Looks for one step of camera or target with two to four views on one side. Two recordings are compared by
+/// Looks for one step of camera or target with two to six views on one side. Two recordings are compared by
 /// their likelihood with all motions integrated out: one in which nothing moved but by the errors that
 /// neighbouring poses of arms in use share, and one in which those few views stand moved alike as well, by a
 /// motion of 3, 10 or 30 mm an axis and as much over the distance in turn. Views that were left out are

@@ -93,6 +93,7 @@ TEST_P(Knocks, BeforeTheLastViewsLeaveTheCameraUnknown) {
     return;
   }
   EXPECT_FALSE(result.other_part->before);
+  EXPECT_EQ(result.other_part->view, "15");
   EXPECT_EQ(result.usable, !camera && result.other_part->knock.told);
 }
 
