@@ -3,8 +3,8 @@
 
 namespace flash::calib {
 
-/// Camera or target of the views from `first` to before `last` stand moved by `motion`, in its own frame, from
-/// where the truth has it. Corners are seen anew, with the scene's noise.
+/// Camera or target of the views from `first` to before `last` stand moved by `motion`, in its own frame,
+/// from where the truth has it. Corners are seen anew, with the scene's noise.
 inline void displace(HandEyeScene& scene, std::size_t first, std::size_t last, bool camera,
                      const Vector6d& motion, unsigned seed) {
   std::mt19937 random(seed);
