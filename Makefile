@@ -19,7 +19,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage plan-promise answer-time size-study use-study
-.PHONY: few-views-study locking reference fuzz sanitize
+.PHONY: few-views-study knock-study locking reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -91,6 +91,10 @@ use-study: configure-test  ## Say what each use of a hand-eye calibration (--for
 few-views-study: configure-test  ## Say whether hand-eye calibration states its uncertainty truly from 4, 5, 6 and 8 views, over 200 fresh scenes of each kind
 	cmake --build $(BUILD) -j $(JOBS) --target few_views_study
 	$(BUILD)/tests/few_views_study
+
+knock-study: configure-test  ## Say whether hand-eye calibration sees knocks near either end of a recording, and none where nothing moved
+	cmake --build $(BUILD) -j $(JOBS) --target knock_study
+	$(BUILD)/tests/knock_study
 
 random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study

@@ -36,6 +36,7 @@ struct HandEyeOptions {
   bool time_offset = false;
   calib::LensKnowledge lens = calib::LensKnowledge::near;
   std::optional<double> target_size_sd = {};
+  bool size_as_stated = false;
   std::string parent, child = "camera";
   std::string ros, urdf, easy_handeye2, camera_info;
   std::string out, report;
@@ -249,6 +250,7 @@ int run_handeye(const HandEyeOptions& options) {
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.closed_forms = calib::opencv_closed_forms();
   settings.target_size_sd = options.target_size_sd;
+  settings.size_as_stated = options.size_as_stated;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = options.time_offset;
   const calib::ImageCalibration solved = solve(options, setup, dataset, settings, phases);
@@ -311,7 +313,7 @@ void add_handeye_verb(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"workspace", "image", "two-arms"}))
       ->default_str("workspace");
   add_lens_options(*verb, options->lens);
-  add_target_size_options(*verb, options->target_size_sd);
+  add_target_size_options(*verb, options->target_size_sd, options->size_as_stated);
   verb->add_flag(
       "--time-offset", options->time_offset,
       "Solve for a constant time between pictures and poses, where the poses are a stream over time "

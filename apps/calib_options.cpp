@@ -56,20 +56,24 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
   group.add_option("--cache", choice.cache, "Folder that keeps corners found, for the next run");
 }
 
-void add_target_size_options(CLI::App& verb, std::optional<double>& sd) {
-  CLI::Option* known = verb.add_option("--target-size-sd", sd,
-                                       "How well the size of the target is known, one standard deviation as "
-                                       "a share of it; 0: as stated. Else 0.3 %, and a ruler that is read "
-                                       "to a millimetre across its longer side")
-                           ->check(number_between(0, 1));
+void add_target_size_options(CLI::App& verb, std::optional<double>& sd, bool& as_stated) {
+  const CLI::Option* known =
+      verb.add_option("--target-size-sd", sd,
+                      "How well the size of the target is known, one standard deviation as "
+                      "a share of it; 0: as stated, to the last digit. Else 0.3 %, and a ruler that is read "
+                      "to a millimetre across its longer side")
+          ->check(number_between(0, 1));
   verb.add_option_function<std::string>(
           "--target-size",
-          [&sd](const std::string& name) {
-            sd = name == "stated" ? 0 : std::numeric_limits<double>::infinity();
+          [&sd, &as_stated, known](const std::string& name) {
+            as_stated = name == "stated";
+            if (!as_stated && known->count() > 0)
+              throw CLI::ExcludesError("--target-size solved", "--target-size-sd");
+            if (!as_stated) sd = std::numeric_limits<double>::infinity();
           },
-          "stated: as it is stated, to the last digit; solved: not known at all")
-      ->check(CLI::IsMember({"stated", "solved"}))
-      ->excludes(known);
+          "stated: not solved for, and what it may be off is in the stated deviations; solved: not known at "
+          "all")
+      ->check(CLI::IsMember({"stated", "solved"}));
 }
 
 void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens) {

@@ -43,7 +43,7 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice);
 void add_robot_options(CLI::App& group, DatasetChoice& choice);
 
 /// --target-size-sd, --target-size stated|solved
-void add_target_size_options(CLI::App& verb, std::optional<double>& sd);
+void add_target_size_options(CLI::App& verb, std::optional<double>& sd, bool& as_stated);
 
 /// --stated-intrinsics, --refine-intrinsics
 void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens);

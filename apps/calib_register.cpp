@@ -34,6 +34,7 @@ struct RegisterOptions {
   bool without_images = false, no_depth = false;
   calib::LensKnowledge lens = calib::LensKnowledge::near;
   std::optional<double> target_size_sd = {};
+  bool size_as_stated = false;
   std::string out;
 };
 
@@ -68,6 +69,7 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   const std::vector<calib::Detection> detections = detect_all(dataset, target, choice, options.common);
   calib::CalibrateSettings settings;
   settings.target_size_sd = options.target_size_sd;
+  settings.size_as_stated = options.size_as_stated;
   settings.lens = options.lens;
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.threads = options.common.threads;
@@ -99,8 +101,10 @@ std::string name_of(const std::string& path) {
 }
 
 calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
-  return calib::solve_cell(members,
-                           {.refine = {}, .target_size_sd = options.target_size_sd, .lens = options.lens});
+  return calib::solve_cell(members, {.refine = {},
+                                     .target_size_sd = options.target_size_sd,
+                                     .size_as_stated = options.size_as_stated,
+                                     .lens = options.lens});
 }
 
 calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
@@ -243,7 +247,7 @@ void add_register_verb(CLI::App& app, Action& action) {
                     "Point in the first base where the uncertainty is stated [m]");
   verb->add_flag("--without-images", options->without_images, "Compose the transforms; do not solve jointly");
   add_lens_options(*verb, options->lens);
-  add_target_size_options(*verb, options->target_size_sd);
+  add_target_size_options(*verb, options->target_size_sd, options->size_as_stated);
   verb->add_option("--depth-scale", options->depth_scale,
                    "Metres per count of the depth pictures of --cameras")
       ->check(positive_number())

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "calib/calibrate/compare_methods.h"
+#include "calib/calibrate/misfit_views.h"
 #include "calib/calibrate/moving_rig.h"
 #include "calib/calibrate/plausibility.h"
 #include "calib/geometry/projection.h"
@@ -26,6 +27,15 @@ std::vector<Eigen::Isometry3d> target_poses(const std::vector<Observation>& obse
   poses.reserve(observations.size());
   for (const Observation& o : observations) poses.push_back(o.T_camera_target.front());
   return poses;
+}
+
+/// Of the target.
+double usual_distance(const std::vector<Observation>& observations) {
+  std::vector<double> distances;
+  distances.reserve(observations.size());
+  for (const Observation& o : observations)
+    distances.push_back(o.T_camera_target.front().translation().norm());
+  return data::median(distances);
 }
 
 /// left_out: the views that were, with their reasons; one is named.
@@ -62,49 +72,6 @@ void expect_convention(Setup setup, const std::vector<Observation>& observations
       "%.0f mm, and no other convention explains them; check that each image stands beside its pose",
       stated.rotation / kDegree, 1e3 * stated.translation);
   throw data::InputError(text);
-}
-
-/// Squared length of each correction in its own noise levels: near chi-square with six degrees of freedom. No
-/// robot is taken to be better than 0.1 mm and 0.1 mrad.
-std::vector<double> squared_corrections(const Refinement& refined) {
-  constexpr double kLeast = 1e-4;
-  std::vector<double> squared;
-  for (const RobotPose& pose : refined.bundle.poses) {
-    const auto arm = static_cast<std::size_t>(pose.arm);
-    const Eigen::Vector3d& pivot = refined.bundle.pivots[arm];
-    squared.push_back((pose.correction * pivot - pivot).squaredNorm() /
-                          std::pow(std::max(kLeast, refined.noise.translation[arm]), 2) +
-                      rotation_log(pose.correction.linear()).squaredNorm() /
-                          std::pow(std::max(kLeast, refined.noise.rotation[arm]), 2));
-  }
-  return squared;
-}
-
-/// Drops the view whose correction no longer looks like those of most views; false where there is none.
-bool drop_worst(Calibration& result, std::vector<Observation>& observations, double surprise) {
-  const std::vector<double> squared = squared_corrections(result.refined);
-  const auto worst = static_cast<std::size_t>(
-      std::distance(squared.begin(), std::max_element(squared.begin(), squared.end())));
-  constexpr double kMedianOfChiSquare6 = 5.348;
-  const double usual = std::max(data::median(squared) / kMedianOfChiSquare6, 1e-12);
-  // The corrections of few views share twelve unknowns with their own noise levels.
-  surprise *= std::pow(1 + 8 / std::max(1.0, 6 * static_cast<double>(squared.size()) - 12), 2);
-  // Corrections far inside the corner noise say nothing.
-  if (squared[worst] < surprise * std::max(usual, 0.05)) return false;
-  const Vector6d xi =
-      motion_between(Eigen::Isometry3d::Identity(), result.refined.bundle.poses[worst].correction);
-  char text[160];
-  std::snprintf(
-      text, sizeof text,
-      "would need its robot pose corrected by %.2f deg and %.1f mm, %.0f times what most views need",
-      xi.tail<3>().norm() / kDegree, 1e3 * xi.head<3>().norm(), std::sqrt(squared[worst] / (6 * usual)));
-  ViewVerdict& verdict = result.selection.views[static_cast<std::size_t>(result.used[worst])];
-  verdict.used = false;
-  verdict.misfit = true;
-  verdict.reason = text;
-  observations.erase(observations.begin() + static_cast<std::ptrdiff_t>(worst));
-  result.used.erase(result.used.begin() + static_cast<std::ptrdiff_t>(worst));
-  return true;
 }
 
 /// The solution's bundle with the poses of the answer.
@@ -164,7 +131,12 @@ Priors priors_of(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& p
                  const CalibrateSettings& settings) {
   Priors priors{.warp_sd = {usual_warp_sd(points)}};
   const double size_sd = *settings.target_size_sd;
-  if (size_sd > 0 && std::isfinite(size_sd)) priors.scale_sd = {size_sd};
+  // A size that is kept is none of the unknowns, but of what is judged beside it: it may be off by any share.
+  constexpr double kAny = 0.3;
+  if (size_sd == 0 || settings.size_as_stated)
+    priors.scale_sd = {kAny};
+  else if (std::isfinite(size_sd))
+    priors.scale_sd = {size_sd};
   if (settings.lens == LensKnowledge::near) priors.lenses = {lens_prior(camera, settings.lens_covariance)};
   return priors;
 }
@@ -174,14 +146,16 @@ Priors priors_of(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& p
 Bundle refine_and_drop(Calibration& result, std::vector<Observation>& observations,
                        const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                        const RefineSettings& refine_settings, const CalibrateSettings& settings) {
-  for (;;) {
+  for (bool dropping = true;;) {
     const std::vector<PoseLoop> loops = pose_loops(result.setup, observations);
     const HandEyePoses seed = better_of(loops, shah(loops), result.selection.robust_seed.poses);
     Bundle plain = make_bundle(result.setup, camera, points, observations, seed);
     plain.priors = priors_of(camera, points, settings);
     result.refined = refine(plain, refine_settings);
     const bool few = observations.size() <= static_cast<std::size_t>(settings.least_views);
-    if (few || !drop_worst(result, observations, settings.surprise)) return plain;
+    if (dropping && !few && drop_worst(result, observations, settings.surprise)) continue;
+    dropping = false;
+    if (!readmit(result, observations, points, refine_settings.bundle)) return plain;
   }
 }
 
@@ -328,7 +302,9 @@ void warn(Calibration& result) {
   bool unusable = false;
   const std::string noisy = unusual_noise(result.refined.noise, unusable);
   if (!noisy.empty()) result.warnings.insert(result.warnings.begin(), noisy);
-  if (unusable) result.usable = false;
+  // Noise that a size makes which is to be kept is that size's.
+  const bool of_size = result.size && result.size->prior_sd == 0 && result.size->far_off();
+  if (unusable && !of_size) result.usable = false;
   if (!result.refined.converged) {
     result.warnings.insert(result.warnings.begin(), "the refinement did not converge");
     result.usable = false;
@@ -357,13 +333,10 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
 bool finish(Calibration& result, const std::vector<Observation>& used) {
   report_views(result);
   std::vector<Eigen::Isometry3d> robot;
-  std::vector<double> distances;
-  for (const Observation& observation : used) {
-    robot.push_back(observation.T_base_gripper);
-    distances.push_back(observation.T_camera_target.front().translation().norm());
-  }
+  robot.reserve(used.size());
+  for (const Observation& observation : used) robot.push_back(observation.T_base_gripper);
   result.diversity = rotation_diversity(robot);
-  result.weakest = weakest_direction(result.covariance, data::median(distances), "camera");
+  result.weakest = weakest_direction(result.covariance, usual_distance(used), "camera");
   warn(result);
   const std::string implausible = implausibility(result, used);
   if (implausible.empty()) return true;
@@ -384,7 +357,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   std::vector<Observation> observations = prepare(result, all, symmetries, settings);
 
   RefineSettings refine_settings = settings.refine;
-  refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0;
+  refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0 && !settings.size_as_stated;
   refine_settings.bundle.unknowns.warps = true;
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   refine_settings.bundle.unknowns.joint_zeros = observations.front().joint_motions.cols() > 0;
@@ -425,6 +398,13 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
   const bool plausible = finish(result, observations);
+  // Who keeps a size is answered, however far off it may be.
+  if (settings.size_as_stated) {
+    result.covariance += covariance_of_kept_sizes(result.refined, refine_settings.bundle, sized.sizes,
+                                                  {*settings.target_size_sd})
+                             .topLeftCorner<6, 6>();
+    result.weakest = weakest_direction(result.covariance, usual_distance(observations), "camera");
+  }
   if (given.lens == LensKnowledge::stated)
     check_stated_lens(result, std::move(plain), refine_settings, camera, settings.lens_covariance);
   warn_of_shapes(result, sized.disputed);
@@ -439,7 +419,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& all,
                       const CalibrateSettings& settings) {
-  return calibrate_moving(all, [&](const std::vector<Observation>& views) {
+  return calibrate_moving(all, points, [&](const std::vector<Observation>& views) {
     return solve(setup, camera, points, symmetries, views, settings);
   });
 }

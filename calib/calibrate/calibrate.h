@@ -32,6 +32,7 @@ struct CalibrateSettings {
   /// Of the target's size over the stated one, before a picture is taken; 0: as stated; infinity: not known;
   /// none: usual_size_sd.
   std::optional<double> target_size_sd = {};
+  bool size_as_stated = false;  ///< it is not solved for, and what it may be off counts in the covariance
   LensKnowledge lens = LensKnowledge::near;
   LensCovariance lens_covariance = LensCovariance::Zero();  ///< as it was stated; zero: nothing was
   int threads = 1;  ///< of held-out residuals and splits; 0: one a processor

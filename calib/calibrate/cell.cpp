@@ -178,22 +178,26 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
 
 Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& given) {
   Cell cell{.joint = true};
-  const bool as_stated = given.target_size_sd == 0.0;
+  const bool as_stated = given.target_size_sd == 0.0 || given.size_as_stated;
   const bool unknown_sizes = given.target_size_sd && std::isinf(*given.target_size_sd);
   RefineSettings settings = given.refine;
   settings.bundle.unknowns.scales = !as_stated;
   settings.bundle.unknowns.warps = true;
   settings.bundle.unknowns.intrinsics = given.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   Bundle start = cell_bundle(members, &cell.notices);
+  std::vector<double> size_sd = start.priors.scale_sd;
+  if (given.target_size_sd) size_sd.assign(start.targets.size(), *given.target_size_sd);
   settings.bundle.unknowns.joint_zeros = !start.joint_zeros.empty();
   if (given.lens == LensKnowledge::unknown) start.priors.lenses.clear();
   if (as_stated || unknown_sizes)
     start.priors.scale_sd.clear();
-  else if (given.target_size_sd)
-    start.priors.scale_sd.assign(start.targets.size(), *given.target_size_sd);
-  const SizedRefinement sized = refine_sizes(refine(std::move(start), settings), settings);
+  else
+    start.priors.scale_sd = size_sd;
+  SizedRefinement sized = refine_sizes(refine(std::move(start), settings), settings);
   const Refinement& refined = sized.refined;
-  const SystematicUncertainty& systematic = sized.systematic;
+  SystematicUncertainty& systematic = sized.systematic;
+  if (given.size_as_stated)
+    systematic.covariance += covariance_of_kept_sizes(refined, settings.bundle, sized.sizes, size_sd);
   cell.sizes = sized.sizes;
   cell.usable = !sized.disputed || as_stated;
   const bool told = std::all_of(cell.sizes.begin(), cell.sizes.end(),

@@ -60,6 +60,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
 struct CellSettings {
   RefineSettings refine;
   std::optional<double> target_size_sd = {};  ///< as in CalibrateSettings
+  bool size_as_stated = false;                ///< likewise
   LensKnowledge lens = LensKnowledge::near;
 };
 

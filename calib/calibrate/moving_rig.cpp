@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include "calib/uncertainty/end_knock.h"
 #include "calib/uncertainty/motion_in_time.h"
 #include "data/error.h"
 
@@ -39,9 +40,11 @@ std::string knock_sentence(const KnockedPart& other, std::size_t used) {
   return text;
 }
 
-/// Views that were left out one by one are a knock if they are the last ones: the answer is then of the past.
-void doubt_last_views(Calibration& result, const std::vector<Observation>& all) {
+/// Views that were left out one by one may be a knock if they are the last ones: the answer is then of the
+/// past. knock: probability of one near the ends, where that could be asked.
+void doubt_last_views(Calibration& result, const std::vector<Observation>& all, std::optional<double> knock) {
   constexpr std::size_t kTold = 2, kUnusable = 3;
+  constexpr double kUnlikely = 0.05;
   std::vector<std::size_t> seen;
   for (std::size_t i = 0; i < all.size(); ++i)
     if (!all[i].T_camera_target.empty()) seen.push_back(i);
@@ -56,7 +59,15 @@ void doubt_last_views(Calibration& result, const std::vector<Observation>& all) 
                              " views do not close with those before: if camera or target moved before " +
                              all[seen[seen.size() - last]].image +
                              ", the answer is of where they were; record anew, or take these views out");
-  if (last >= kUnusable) result.usable = false;
+  const bool unlikely = last <= static_cast<std::size_t>(kEndViews) && knock && *knock < kUnlikely;
+  if (last >= kUnusable && !unlikely) result.usable = false;
+}
+
+/// A size that was to be kept and is another makes errors that look like motions: here it is an unknown.
+BundleSettings judged_with(const Calibration& result) {
+  BundleSettings settings{.unknowns = result.unknowns};
+  settings.unknowns.scales = true;
+  return settings;
 }
 
 /// Of a view in time: -1 for the first of all, 0 for the last.
@@ -72,7 +83,7 @@ std::vector<double> times_of(const Calibration& result) {
 }
 
 std::optional<Drift> drift_of(const Calibration& result, double rival) {
-  return find_drift(result.refined, {.unknowns = result.unknowns}, times_of(result), rival);
+  return find_drift(result.refined, judged_with(result), times_of(result), rival);
 }
 
 /// The views as they would be had camera and target stood where they are at the last one. A motion of the
@@ -95,7 +106,7 @@ std::vector<Observation> without_drift(std::vector<Observation> views, const Cal
 /// Of a drift that was solved for, what is not known: how far it went, and that it need not have kept its
 /// speed.
 void add_drift(Calibration& result, const Drift& drift) {
-  const MotionInTime motions(result.refined, {.unknowns = result.unknowns});
+  const MotionInTime motions(result.refined, judged_with(result));
   const std::vector<double> times = times_of(result);
   std::vector<double> bends;  // between a constant speed and one that ends, or starts, at zero
   for (const double t : times) bends.push_back(t * (1 + t));
@@ -111,7 +122,7 @@ void add_drift(Calibration& result, const Drift& drift) {
 /// is told where it is all but certain, and moves the answer by as much as is stated anyway.
 void add_slow_drift(Calibration& result, double rival) {
   constexpr double kCertain = 0.95;
-  const SlowDrift drift = slow_drift(result.refined, {.unknowns = result.unknowns}, times_of(result), rival);
+  const SlowDrift drift = slow_drift(result.refined, judged_with(result), times_of(result), rival);
   const double grown = result.covariance.ldlt().solve(drift.covariance).trace();
   result.covariance += drift.covariance;
   result.repeatable += drift.covariance;
@@ -146,7 +157,7 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
   try {
     for (int round = 0; round < kRounds; ++round) {
       answer = solve(without_drift(all, answer, drift));
-      const MotionInTime motions(answer.refined, {.unknowns = answer.unknowns});
+      const MotionInTime motions(answer.refined, judged_with(answer));
       const Vector6d left = motions.fit({times_of(answer)}, drift.camera).motion;
       drift.motion += left;
       if (left.norm() < kLittle * drift.motion.norm()) break;
@@ -166,41 +177,69 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
   return answer;
 }
 
-}  // namespace
-
-Calibration calibrate_moving(const std::vector<Observation>& all, const StillSolver& solve) {
-  Calibration whole = solve(all);
-  doubt_last_views(whole, all);
-  if (!whole.pose_errors) return whole;
-  const double rival = whole.pose_errors->gain;
-  const std::optional<Knock> knock = find_knock(whole.refined, {.unknowns = whole.unknowns}, rival);
-  const std::optional<Drift> drift = drift_of(whole, rival);
-  const bool drifts = drift && (!knock || drift->gain > knock->second);
-  if (drifts && beyond_usual(whole.refined.bundle, drift->motion))
-    return solve_drifting(whole, *drift, all, solve);
-  if (drifts || !knock) {
-    add_slow_drift(whole, rival);
-    return whole;
+/// The solution's poses, and those of views that were left out near the ends. views: that are numbered in
+/// time.
+TimedPoses timed_poses(const Calibration& result, const std::vector<Observation>& all,
+                       const Eigen::Matrix3Xd& points, std::vector<int>& views) {
+  std::vector<int> time(all.size(), -1);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const ViewVerdict& verdict = result.selection.views[i];
+    if (!verdict.used && !verdict.misfit) continue;
+    time[i] = static_cast<int>(views.size());
+    views.push_back(static_cast<int>(i));
   }
-  const auto first = static_cast<std::size_t>(whole.used[knock->pose]);
-  const std::size_t after = whole.used.size() - knock->pose;
+  TimedPoses poses;
+  poses.refined = result.refined;
+  poses.used = result.used.size();
+  poses.shared = std::sqrt(result.pose_errors->share) * result.pose_errors->rotation;
+  for (const int view : result.used) poses.time.push_back(time[static_cast<std::size_t>(view)]);
+  const int count = static_cast<int>(views.size());
+  for (int k = 0; k < count; ++k) {
+    const auto view = static_cast<std::size_t>(views[static_cast<std::size_t>(k)]);
+    if (result.selection.views[view].used || (k >= kEndViews && k < count - kEndViews)) continue;
+    append_view(poses.refined.bundle, points, result.selection.observations[view]);
+    poses.time.push_back(k);
+  }
+  poses.left_out.assign(poses.time.size(), 1);
+  std::fill_n(poses.left_out.begin(), poses.used, 0);
+  return poses;
+}
+
+/// The answer of the views on one side of a knock. first: the first view after it.
+Calibration solve_knocked(const Calibration& whole, const Knock& knock, std::size_t first,
+                          const std::vector<Observation>& all, const Eigen::Matrix3Xd& points,
+                          const StillSolver& solve) {
+  std::size_t before = 0, after = 0;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const ViewVerdict& verdict = whole.selection.views[i];
+    if (verdict.used || verdict.misfit) ++(i < first ? before : after);
+  }
   // What holds now counts, unless it is hardly known.
   constexpr std::size_t kEnough = 6;
-  KnockedPart other{.knock = *knock, .view = all[first].image, .before = after >= kEnough};
+  KnockedPart other{.knock = knock, .view = all[first].image, .before = after >= kEnough};
   Calibration answer;
   try {  // the part may have been knocked as well
-    answer = calibrate_moving(side_of(all, first, !other.before), solve);
-  } catch (const data::InputError&) {
-    return whole;  // a part alone may turn about one axis only
+    answer = calibrate_moving(side_of(all, first, !other.before), points, solve);
+  } catch (const data::InputError& error) {  // a part alone may turn about one axis only
+    answer = whole;
+    answer.usable = false;
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "the %s moved by %.1f mm and %.2f deg before %s, and the views %s then alone do not do: ",
+                  mover(knock.camera, knock.told), 1e3 * knock.motion.head<3>().norm(),
+                  knock.motion.tail<3>().norm() / kDegree, other.view.c_str(),
+                  other.before ? "since" : "until");
+    answer.warnings.insert(answer.warnings.begin(), text + std::string(error.what()));
+    return answer;
   }
-  other.views = static_cast<int>(other.before ? knock->pose : after);
+  other.views = static_cast<int>(other.before ? before : after);
   try {
     other.poses = solve(side_of(all, first, other.before)).poses;
   } catch (const data::InputError&) {
     // said in the sentence
   }
   // Who asks where the camera is now is not served by where it was.
-  if (!other.before && (knock->camera || !knock->told)) answer.usable = false;
+  if (!other.before && (knock.camera || !knock.told)) answer.usable = false;
   for (std::size_t i = 0; i < all.size(); ++i)
     if ((i < first) == other.before && !all[i].T_camera_target.empty())
       answer.views[i].reason = answer.selection.views[i].reason =
@@ -208,6 +247,38 @@ Calibration calibrate_moving(const std::vector<Observation>& all, const StillSol
   answer.warnings.insert(answer.warnings.begin(), knock_sentence(other, answer.used.size()));
   if (!answer.other_part) answer.other_part = std::move(other);  // else that next to the answer
   return answer;
+}
+
+}  // namespace
+
+Calibration calibrate_moving(const std::vector<Observation>& all, const Eigen::Matrix3Xd& points,
+                             const StillSolver& solve) {
+  Calibration whole = solve(all);
+  if (!whole.pose_errors) {
+    doubt_last_views(whole, all, std::nullopt);
+    return whole;
+  }
+  const double rival = whole.pose_errors->gain;
+  const BundleSettings settings = judged_with(whole);
+  const std::optional<Knock> knock = find_knock(whole.refined, settings, rival);
+  const std::optional<Drift> drift = drift_of(whole, rival);
+  std::vector<int> views;
+  const TimedPoses poses = timed_poses(whole, all, points, views);
+  const EndKnock end = find_end_knock(poses, settings);
+  doubt_last_views(whole, all, end.probability);
+  const bool drifts = drift && (!knock || drift->gain > knock->second);
+  if (end.knock && end.knock->gain > (drifts ? drift->gain : knock ? knock->gain : 0))
+    return solve_knocked(whole, *end.knock, static_cast<std::size_t>(views[end.knock->pose]), all, points,
+                         solve);
+  if (drifts && beyond_usual(whole.refined.bundle, drift->motion))
+    return solve_drifting(whole, *drift, all, solve);
+  if (drifts || !knock) {
+    add_slow_drift(whole, rival);
+    whole.covariance += end.covariance;
+    whole.repeatable += end.covariance;
+    return whole;
+  }
+  return solve_knocked(whole, *knock, static_cast<std::size_t>(whole.used[knock->pose]), all, points, solve);
 }
 
 }  // namespace flash::calib

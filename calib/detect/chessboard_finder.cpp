@@ -12,7 +12,8 @@ using Corners = std::vector<Eigen::Vector2d>;
 
 constexpr double kLargestDisc = 9;     // of a crossing [px]; beyond it little is gained
 constexpr double kSmallestDisc = 2.5;  // [px]
-constexpr int kSearchWidth = 800;      // of the picture that is searched [px]
+constexpr int kSearchWidth = 800;      // of the picture that is searched for squares [px]
+constexpr int kSectorsWidth = 1600;    // and of that searched by sectors [px]
 constexpr double kLeastShare = 0.8;    // of the corners must show a crossing
 constexpr double kSmoothing = 2;       // of a picture whose crossings show another pattern on top [px]
 
@@ -82,9 +83,9 @@ struct SmallPicture {
   double scale;
   Eigen::Array2d origin;
 
-  SmallPicture(const GreyImage& image, const cv::Rect& part)
+  SmallPicture(const GreyImage& image, const cv::Rect& part, int width = kSearchWidth)
       : pixels(as_mat(image)(part)),
-        scale(std::min(1.0, static_cast<double>(kSearchWidth) / part.width)),
+        scale(std::min(1.0, static_cast<double>(width) / part.width)),
         origin(part.x, part.y) {
     if (scale < 1) cv::resize(pixels, pixels, {}, scale, scale, cv::INTER_AREA);
   }
@@ -143,19 +144,15 @@ cv::Rect surroundings(const GreyImage& image, const Grid& board) {
   return cv::Rect(low.x(), low.y(), size.x(), size.y()) & whole_of(image);
 }
 
-Corners find_sectors(const GreyImage& image, const Target& target, int flags = 0) {
-  std::vector<cv::Point2f> corners;
-  const bool found = cv::findChessboardCornersSB(as_mat(image), {target.columns, target.rows}, corners,
-                                                 cv::CALIB_CB_NORMALIZE_IMAGE | flags);
-  return found ? to_eigen(corners) : Corners();
-}
-
-Corners glance_at_sectors(const GreyImage& image, const Target& target) {
-  const SmallPicture small(image, whole_of(image));
+/// By OpenCV's sectors, in a picture of that width: the time goes with its pixels. Where they are fewer than
+/// the picture's own, its corners are seeds.
+Corners find_sectors(const GreyImage& image, const Target& target, int width, int flags = 0) {
+  const SmallPicture small(image, whole_of(image), width);
   std::vector<cv::Point2f> corners;
   const bool found = cv::findChessboardCornersSB(small.pixels, {target.columns, target.rows}, corners,
-                                                 cv::CALIB_CB_NORMALIZE_IMAGE);
-  return found ? small.in_image(corners) : Corners();
+                                                 cv::CALIB_CB_NORMALIZE_IMAGE | flags);
+  if (!found) return {};
+  return small.scale < 1 ? small.in_image(corners) : to_eigen(corners);
 }
 
 GreyImage smoothed(const GreyImage& image) {
@@ -240,12 +237,15 @@ Grid grid_of(const GreyImage& image, const Target& target, Corners corners) {
 /// The classic search takes seconds where it fails, as it does on boards that a wide lens bends: the whole
 /// picture is searched only where sectors find nothing.
 Board find_board(const GreyImage& image, const Target& target, Search search) {
-  Corners sectors = search == Search::glance ? glance_at_sectors(image, target) : find_sectors(image, target),
-          classic;
+  const int width = search == Search::glance ? kSearchWidth : kSectorsWidth;
+  Corners sectors = find_sectors(image, target, width), classic;
   const bool exhausted = search == Search::glance || sectors.empty();
   if (search == Search::thorough && sectors.empty()) {
     classic = find_classic(image, target, whole_of(image));
-    if (classic.empty()) sectors = find_sectors(image, target, cv::CALIB_CB_EXHAUSTIVE);
+    if (classic.empty()) sectors = find_sectors(image, target, kSectorsWidth, cv::CALIB_CB_EXHAUSTIVE);
+    // Squares of a few pixels are lost in a smaller picture.
+    if (classic.empty() && sectors.empty() && image.width > kSectorsWidth)
+      sectors = find_sectors(image, target, image.width);
   }
   Board board{.grids = {}, .by_sectors = !sectors.empty(), .exhausted = exhausted};
   for (Corners* corners : {&classic, &sectors})

@@ -2,14 +2,17 @@
 
 #include <opencv2/imgcodecs.hpp>
 
+#include "calib/detect/cut_off_picture.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/png_reader.h"
+#include "data/text.h"
 
 namespace flash::calib {
 
 GreyImage load_grey_image(const std::string& path) {
-  if (data::read_file(path).starts_with("\x89PNG")) {  // whose decoder would tell the terminal what is wrong
+  const std::string file = data::read_file(path);
+  if (file.starts_with("\x89PNG")) {  // whose decoder would tell the terminal what is wrong
     data::RawPng png;
     try {
       png = data::read_png(path, data::PngSamples::grey);
@@ -18,6 +21,9 @@ GreyImage load_grey_image(const std::string& path) {
     }
     return {png.width, png.height, std::move(png.bytes)};
   }
+  if (is_cut_off_jpeg(file) || is_cut_off_bmp(file))
+    throw data::InputError(path + ": the picture is cut off: found " + data::format_count(file.size()) +
+                           " bytes, expected more; copy it anew");
   cv::Mat picture;
   try {
     picture = cv::imread(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "calib/geometry/pose_from_pixels.h"
 #include "calib/geometry/projection.h"
 
 namespace flash::calib {
@@ -45,6 +46,23 @@ Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eige
     bundle.views.push_back(std::move(view));
   }
   return bundle;
+}
+
+void append_view(Bundle& bundle, const Eigen::Matrix3Xd& target_points, const Observation& observation) {
+  BundleView view = make_view(target_points, observation);
+  view.pose = static_cast<int>(bundle.poses.size());
+  RobotPose pose;
+  pose.T_base_gripper = observation.T_base_gripper;
+  pose.velocity = observation.velocity;
+  pose.joint_motions = observation.joint_motions;
+  const Eigen::Isometry3d T = fitted_pose(bundle.intrinsics.front(), true_points(bundle, view), view.pixels,
+                                          observation.T_camera_target.front());
+  const Eigen::Isometry3d &X = bundle.cameras.front(), &Z = bundle.targets.front();
+  pose.correction =
+      pose.T_base_gripper.inverse() *
+      (bundle.setup == Setup::eye_in_hand ? Z * T.inverse() * X.inverse() : X * T * Z.inverse());
+  bundle.poses.push_back(pose);
+  bundle.views.push_back(std::move(view));
 }
 
 Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside) {

@@ -94,6 +94,10 @@ Eigen::Matrix3Xd true_points(const Bundle& bundle, const BundleView& view);
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
                    const std::vector<Observation>& observations, const HandEyePoses& seed);
 
+/// Adds a view that does not fit to a solution of one camera and arm: its pose is corrected to where its
+/// corners say.
+void append_view(Bundle& bundle, const Eigen::Matrix3Xd& target_points, const Observation& observation);
+
 /// The bundle with the views of the poses whose `fold` is `part`, or of all others.
 Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside);
 

@@ -76,7 +76,10 @@ const MotionInTime::Level& MotionInTime::level(const Shares& shares) const {
   NoiseLevels noise = noise_;
   for (double& sigma : noise.rotation) sigma *= std::pow(kShare, shares.first);
   for (double& sigma : noise.translation) sigma *= std::pow(kShare, shares.second);
-  return levels_.emplace(shares, Level(model_, to_components(noise))).first->second;
+  Level& found = levels_.emplace(shares, Level(model_, to_components(noise))).first->second;
+  found.rotation = noise.rotation.front();
+  found.translation = noise.translation.front();
+  return found;
 }
 
 std::pair<MotionInTime::Shares, double> MotionInTime::least_deviance(
@@ -147,6 +150,36 @@ MotionInTime::Fit MotionInTime::fit(const std::vector<std::vector<double>>& shap
     return level.deviance - fall;
   });
   return {motion_at(level(shares), fall), still_ - least};
+}
+
+double MotionInTime::misfit(const std::vector<double>& shape) const {
+  const Joint solved = joint(level({0, 0}), {shape}, true);
+  return solved.pull.dot(solved.information.ldlt().solve(solved.pull));
+}
+
+double MotionInTime::deviance(const std::vector<UncertainMotion>& motions, bool camera) const {
+  std::vector<std::vector<double>> shapes;
+  shapes.reserve(motions.size());
+  for (const UncertainMotion& motion : motions) shapes.push_back(motion.shape);
+  // In units of its standard deviations a motion m has the prior m^2: |I + D L D| and
+  // p^T D (I + D L D)^-1 D p.
+  return least_deviance([&](const Level& level) {
+           Eigen::VectorXd sd(6 * static_cast<Eigen::Index>(motions.size()));
+           for (std::size_t k = 0; k < motions.size(); ++k) {
+             const auto at = 6 * static_cast<Eigen::Index>(k);
+             const UncertainMotion& motion = motions[k];
+             sd.segment<3>(at).setConstant(std::hypot(motion.shift_sd, motion.of_noise * level.translation));
+             sd.segment<3>(at + 3).setConstant(std::hypot(motion.turn_sd, motion.of_noise * level.rotation));
+           }
+           const Joint solved = joint(level, shapes, camera);
+           Eigen::MatrixXd scaled = sd.asDiagonal() * solved.information * sd.asDiagonal();
+           scaled.diagonal().array() += 1;
+           const Eigen::VectorXd pull = sd.cwiseProduct(solved.pull);
+           const Eigen::LDLT<Eigen::MatrixXd> factor(scaled);
+           return level.deviance - pull.dot(factor.solve(pull)) +
+                  factor.vectorD().array().abs().max(1e-300).log().sum();
+         })
+      .second;
 }
 
 Matrix6d MotionInTime::shift_of_camera(const std::vector<double>& shape, const std::vector<double>& solved,

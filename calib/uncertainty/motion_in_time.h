@@ -10,6 +10,13 @@
 
 namespace flash::calib {
 
+/// A motion of a shape in time that is normal about none, with these standard deviations an axis.
+struct UncertainMotion {
+  std::vector<double> shape;
+  double turn_sd = 0, shift_sd = 0;  ///< [rad], [m]
+  double of_noise = 0;               ///< beside these, that many of the robot's own in both
+};
+
 /// What a solution's views say of a camera or a target that did not stand still: at pose i its frame stood
 /// moved by shape[i] * motion, (dt, dtheta) [m, rad], from where the solution has it. The motion's six
 /// unknowns are added to the linearised solution. Its likelihood is the largest over how much smaller the
@@ -26,6 +33,13 @@ class MotionInTime {
   };
   /// Several shapes together; empty where they determine nothing.
   Fit fit(const std::vector<std::vector<double>>& shapes, bool camera) const;
+
+  /// Squared length, in its own standard deviations, of the motion that a shape wants at the noise as it is:
+  /// chi-square with six degrees of freedom where there was none.
+  double misfit(const std::vector<double>& shape) const;
+
+  /// -2 log likelihood with such motions integrated out, up to a constant that is the same for all.
+  double deviance(const std::vector<UncertainMotion>& motions, bool camera) const;
 
   /// By how much X moves, along its own axes, where a motion of unit size and that shape took place, but is
   /// not solved for; `solved`: another that is, or none.
@@ -45,7 +59,8 @@ class MotionInTime {
     std::vector<Eigen::MatrixXd> grams;
     Eigen::MatrixXd all;  ///< their sum, and what is known beforehand
     Eigen::LDLT<Eigen::MatrixXd> shared;
-    double deviance = 0;  ///< -2 log likelihood without a motion, up to a constant
+    double deviance = 0;                   ///< -2 log likelihood without a motion, up to a constant
+    double rotation = 0, translation = 0;  ///< the robot's noise [rad], [m]
   };
   struct Joint {
     Eigen::MatrixXd cross;        ///< of shared unknowns and motions

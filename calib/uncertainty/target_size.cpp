@@ -87,6 +87,32 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
   return result;
 }
 
+Eigen::MatrixXd covariance_of_kept_sizes(const Refinement& refined, const BundleSettings& settings,
+                                         const std::vector<TargetSize>& sizes,
+                                         const std::vector<double>& sd) {
+  BundleSettings with_scales = settings;
+  with_scales.unknowns.scales = true;
+  Bundle bundle = refined.bundle;
+  bundle.priors.scale_sd.clear();
+  const std::vector<int> scales = shared_columns(bundle, with_scales.unknowns).scales;
+  Eigen::MatrixXd information =
+      solve_linear(linearize(bundle, refined.noise, with_scales), to_components(refined.noise)).information;
+  std::vector<Eigen::Index> kept;  // columns of the other unknowns
+  for (Eigen::Index column = 0; column < information.cols(); ++column)
+    if (std::find(scales.begin(), scales.end(), static_cast<int>(column)) == scales.end())
+      kept.push_back(column);
+  const Eigen::LDLT<Eigen::MatrixXd> others(information(kept, kept));
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(refined.covariance.rows(), refined.covariance.cols());
+  for (std::size_t target = 0; target < sizes.size(); ++target) {
+    const Eigen::VectorXd shift = others.solve(information(kept, scales[target]));
+    double variance = sd[target] * sd[target];
+    if (const auto& wanted = sizes[target].wanted)
+      variance += std::max(0.0, std::pow(wanted->estimate - 1, 2) - std::pow(wanted->sd, 2) - variance);
+    covariance += variance * shift * shift.transpose();
+  }
+  return covariance;
+}
+
 std::string size_sentence(const TargetSize& size) {
   char known[40] = "was to be kept", text[320];
   if (size.prior_sd > 0) std::snprintf(known, sizeof known, "is known to %.2g %%", 100 * size.prior_sd);

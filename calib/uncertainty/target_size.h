@@ -40,6 +40,12 @@ struct SizedRefinement {
 /// variances. refined: the solution where it does not; settings: those it was made with.
 SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings);
 
+/// Covariance of the shared unknowns that comes of sizes that are kept as stated, each known to `sd` of it:
+/// how they follow a size, times what it may be off. By what pictures want beyond that and their own
+/// deviation, it is off as well.
+Eigen::MatrixXd covariance_of_kept_sizes(const Refinement& refined, const BundleSettings& settings,
+                                         const std::vector<TargetSize>& sizes, const std::vector<double>& sd);
+
 /// "the estimated size of the target is 1.0400 +- 0.0080 (2 sd) of the stated one ...", of a size that is far
 /// off.
 std::string size_sentence(const TargetSize& size);

@@ -133,10 +133,13 @@ def shuffled(poses):
     return [[pose[0], *place] for pose, place in zip(poses, places)]
 
 
-def knocked(poses):
-    """The camera in the hand moves by 8 mm before the ninth picture, which looks as if the gripper had moved."""
-    return [pose if i >= 8 else [pose[0], *(x + y for x, y in zip(pose[1:4], rotate(pose[4:], (0.006, -0.004, 0.0035)))),
-                                *pose[4:]] for i, pose in enumerate(poses)]
+def knocked_before(picture):
+    """The camera in the hand moves by 8 mm before that picture, which looks as if the gripper had moved."""
+    def knocked(poses):
+        return [pose if i >= picture else
+                [pose[0], *(x + y for x, y in zip(pose[1:4], rotate(pose[4:], (0.006, -0.004, 0.0035)))), *pose[4:]]
+                for i, pose in enumerate(poses)]
+    return knocked
 
 
 def drifting(poses):
@@ -249,8 +252,15 @@ def traps():
     yield Trap("no intrinsics", "in_hand", without_intrinsics, 2, "flash-calib intrinsics")
     yield Trap("no target", "in_hand", without_target, 2, "names no target", "--target chessboard:9x6:0.025")
     yield Trap("half a target", "in_hand", option("--target", "chessboard:9x6"), 2, "chessboard:COLUMNSxROWS:SQUARE")
-    yield Trap("a knock half-way", "in_hand", poses_changed(knocked), 0, "the camera moved by", "before 008.png",
+    yield Trap("a knock half-way", "in_hand", poses_changed(knocked_before(8)), 0, "the camera moved by", "before 008.png",
                ", ".join(f"{i:03d}.png" for i in range(8)) + ": not used: before the knock at 008.png", used=8)
+    yield Trap("a knock after the first pictures", "in_hand", poses_changed(knocked_before(3)), 0, "the camera moved by",
+               "before 003.png", used=13)
+    yield Trap("a knock before the last pictures", "in_hand", poses_changed(knocked_before(13)), 3, "the camera moved by",
+               "before 013.png", "where the camera is now is not known")
+    yield Trap("squares 25 % too large, kept", "in_hand",
+               both(option("--target", "chessboard:9x6:0.03125"), option("--target-size", "stated")), 0,
+               "which was to be kept", used=16)
     yield Trap("a slow slip", "in_hand", poses_changed(drifting), 3, "the camera moved all the time, by", used=16)
     yield Trap("all pictures cut off", "in_hand", all_pictures_cut, 2, "none of 16 pictures", "000.png")
     yield Trap("a misspelt setup", "in_hand", option("--setup", "eye-in-hnad"), 2, "--setup", "eye-in-hand,eye-to-hand")

@@ -3,6 +3,7 @@
 
 #include "calib/calibrate/calibrate.h"
 #include "tests/calib/arm_scene.h"
+#include "tests/calib/knocked_scene.h"
 
 namespace flash::calib {
 namespace {
@@ -24,20 +25,7 @@ Calibration calibrated(const HandEyeScene& scene) {
 
 /// From a view on the camera or the target has moved by `motion`, in its own frame.
 void knock(HandEyeScene& scene, std::size_t first, bool camera, const Vector6d& motion) {
-  std::mt19937 random(9);
-  std::normal_distribution<double> normal;
-  HandEyePoses after = scene.truth;
-  (camera ? after.X : after.Z) = moved(camera ? after.X : after.Z, motion);
-  for (std::size_t i = first; i < scene.observations.size(); ++i) {
-    Observation& o = scene.observations[i];
-    const Eigen::Isometry3d& pose = scene.true_poses[i];
-    const Eigen::Isometry3d T =
-        after.X.inverse() * (scene.settings.setup == Setup::eye_in_hand ? pose.inverse() : pose) * after.Z;
-    for (Eigen::Index k = 0; k < scene.points.cols(); ++k)
-      o.pixels.col(k) = project(to_vector(scene.camera), T * scene.points.col(k)) +
-                        0.1 * Eigen::Vector2d(normal(random), normal(random));
-    o.T_camera_target = {T};
-  }
+  displace(scene, first, scene.observations.size(), camera, motion, 9);
 }
 
 struct Case {
@@ -105,7 +93,32 @@ TEST_P(Knocks, BeforeTheLastViewsLeaveTheCameraUnknown) {
     return;
   }
   EXPECT_FALSE(result.other_part->before);
+  EXPECT_EQ(result.other_part->view, "15");
   EXPECT_EQ(result.usable, !camera && result.other_part->knock.told);
+}
+
+// Ten millimetres before the last or after the first two to four views. The answer is of most views: where
+// the camera is now is not known if it, or one of the two, was knocked before the last ones.
+TEST_P(Knocks, WithFewViewsOnOneSideAreTold) {
+  const auto& [setup, camera] = GetParam();
+  Vector6d motion = Vector6d::Zero();
+  motion.head<3>() << 0.0075, -0.005, 0.00433;  // 10 mm
+  for (const std::size_t views : {2U, 3U, 4U})
+    for (const bool last : {true, false}) {
+      HandEyeScene scene = scene_of(setup, 7200 + static_cast<unsigned>(views));
+      const std::size_t count = scene.observations.size();
+      displace(scene, last ? count - views : 0, last ? count : views, camera, motion, 9);
+      const Calibration result = calibrated(scene);
+      ASSERT_TRUE(result.other_part) << views << last;
+      const KnockedPart& other = *result.other_part;
+      EXPECT_EQ(other.before, !last);
+      EXPECT_EQ(other.view, std::to_string(last ? count - views : views));
+      EXPECT_EQ(other.views, static_cast<int>(views));
+      EXPECT_EQ(result.usable, !last || (other.knock.told && !other.knock.camera));
+      EXPECT_TRUE(!other.knock.told || other.knock.camera == camera);
+      const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+      EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
+    }
 }
 
 TEST_P(Knocks, AreNotSeenWhereThereAreNone) {

@@ -107,6 +107,63 @@ TEST_P(TargetSizes, SizeFarOffIsNamedAndRefusedUnlessItIsStatedToBeRight) {
       << stated.warnings.front();
 }
 
+/// As `--target-size stated` does.
+Calibration kept(const HandEyeScene& scene) {
+  CalibrateSettings settings;
+  settings.size_as_stated = true;
+  settings.folds = 2;
+  return calibrate(scene.settings.setup, scene.camera, scene.points, grid_symmetries(scene.points),
+                   scene.observations, settings);
+}
+
+// Sizes as prints have them, on seeds that nothing was chosen on: X follows its size, and its deviations say
+// so.
+TEST_P(TargetSizes, SizeThatIsKeptAlwaysGivesAnAnswerThatHoldsWhatItMayBeOff) {
+  constexpr double kChiSquare999 = 22.458;  // six degrees of freedom
+  const double sd = usual_size_sd(board_points());
+  for (unsigned seed = 7101; seed < 7113; ++seed) {
+    std::mt19937 random(seed);
+    const double size = 1 + sd * std::normal_distribution<double>()(random);
+    const HandEyeScene scene = scene_of(GetParam(), size, seed);
+    const Calibration result = kept(scene);
+    EXPECT_TRUE(result.usable) << seed;
+    EXPECT_EQ(result.refined.bundle.scales.front(), 1);
+    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), kChiSquare999) << seed;
+  }
+  // What pictures want far beyond the prior counts as well.
+  for (const double size : {0.8, 0.97, 1.03, 1.08, 1.2}) {
+    const HandEyeScene scene = scene_of(GetParam(), size, 7113);
+    const Calibration result = kept(scene);
+    EXPECT_TRUE(result.usable) << size << ": " << result.warnings.front();
+    EXPECT_FALSE(result.other_part || result.drift) << size;  // its errors are no motion
+    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
+    EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), kChiSquare999) << size;
+  }
+}
+
+// The derivative by the size against a difference: of two solutions at the same noise.
+TEST_P(TargetSizes, WhatASizeMayBeOffMovesTheAnswerAlongItsOwnDeviation) {
+  constexpr double kStep = 1e-3, kSd = 0.004;
+  const Calibration result = kept(scene_of(GetParam(), 1, 7121));
+  RefineSettings settings;
+  settings.bundle.unknowns = result.unknowns;
+  settings.estimate_noise = settings.estimate_pivots = false;
+  settings.noise = result.refined.noise;
+  const auto camera = [&](double size) {
+    Bundle bundle = result.refined.bundle;
+    bundle.scales = {size};
+    return refine(std::move(bundle), settings).bundle.cameras.front();
+  };
+  const Vector6d shift = kSd / (2 * kStep) * motion_between(camera(1 - kStep), camera(1 + kStep));
+  TargetSize size = *result.size;
+  size.wanted.reset();
+  const Matrix6d more =
+      covariance_of_kept_sizes(result.refined, settings.bundle, {size}, {kSd}).topLeftCorner<6, 6>();
+  // Robust weights follow the size as well.
+  EXPECT_LT((more - shift * shift.transpose()).norm(), 0.1 * more.norm());
+}
+
 // The linearised prior against differences of its residual, (s - 1) / sd.
 TEST(SizePrior, StandsInTheLinearModelAsItsResidualDoes) {
   Bundle bundle = seeded_bundle(scene_of(Setup::eye_in_hand, 1, 25));

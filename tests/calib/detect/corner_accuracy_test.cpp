@@ -76,14 +76,14 @@ int view_count() {
 
 /// Errors of each refiner over random views, against where the camera model projects the target's points.
 std::map<std::string, Errors> measure(const Series& series, const data::CameraIntrinsics& camera,
-                                      const RenderSettings& settings = {}) {
+                                      const RenderSettings& settings = {}, int views = view_count()) {
   const Target target = parse_target(series.target);
   const Renderer renderer(target, camera, settings);
   const Rectifier rectifier(camera);
   const Finder finder = make_finder(target, rectifier);
   std::mt19937 random(7);
   std::map<std::string, Errors> errors;
-  for (int view = 0; view < view_count(); ++view) {
+  for (int view = 0; view < views; ++view) {
     const Eigen::Isometry3d pose =
         random_view(target, camera, series.least_distance, series.most_distance, series.tilt, random);
     const Found found = finder(renderer.draw(pose, random));
@@ -107,6 +107,26 @@ TEST_P(CornerAccuracy, HasNoBiasOnRenderedTruth) {
   EXPECT_EQ(found->second.views, view_count());
   EXPECT_LT(found->second.bias().cwiseAbs().maxCoeff(), 0.02);  // what the project promises
   EXPECT_LT(found->second.rms(), 0.03);  // noise of 2 grey levels leaves 0.004 to 0.012
+}
+
+// Larger pictures are searched at a smaller size. Where corners are is found at their own: the same noise of
+// 2 grey levels leaves the same share of a pixel.
+TEST(CornersOfLargePictures, AreAsExactAsThoseOfSmallOnes) {
+  data::CameraIntrinsics camera = small_camera();
+  constexpr int kLarger = 5;
+  camera.width *= kLarger;
+  camera.height *= kLarger;
+  for (double* length : {&camera.fx, &camera.fy}) *length *= kLarger;
+  for (double* place : {&camera.cx, &camera.cy}) *place = kLarger * (*place + 0.5) - 0.5;
+  const std::map<std::string, Errors> errors =
+      measure({"chessboard:9x6:0.025", 0.35, 0.7, 0.8}, camera, {}, 2);
+  const auto found = errors.find(kImageModel);
+  ASSERT_NE(found, errors.end());
+  EXPECT_EQ(found->second.points, 2 * 54);
+  EXPECT_LT(found->second.bias().cwiseAbs().maxCoeff(), 0.02);
+  EXPECT_LT(found->second.rms(), 0.03);
+  // Squares of ten pixels are five in the smaller picture: too few.
+  EXPECT_FALSE(measure({"chessboard:9x6:0.025", 7, 8, 0.3}, camera, {}, 1).empty());
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, CornerAccuracy,

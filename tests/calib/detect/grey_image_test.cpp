@@ -44,6 +44,45 @@ TEST(GreyImage, PngIsTheSameAsOpenCvReadsIt) {
   }
 }
 
+cv::Mat noise() {
+  cv::Mat picture(120, 160, CV_8UC3);
+  cv::randu(picture, cv::Scalar::all(0), cv::Scalar::all(256));
+  return picture;
+}
+
+// Wherever a picture ends before its end: an end marker within a thumbnail, a comment or a restart is none.
+TEST(GreyImage, PicturesThatAreCutOffAreNamedWhereverTheyEnd) {
+  const data::TemporaryFolder folder;
+  cv::imwrite(folder / "base.jpg", noise());
+  cv::imwrite(folder / "restarts.jpg", noise(), {cv::IMWRITE_JPEG_RST_INTERVAL, 4});
+  cv::imwrite(folder / "progressive.jpg", noise(), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
+  cv::imwrite(folder / "rows.bmp", noise());
+  cv::imwrite(folder / "rows.png", noise());
+  std::string with_comment = data::read_file(folder / "base.jpg");
+  with_comment.insert(2, std::string("\xff\xfe\x00\x06\xff\xd9\xff\xd9", 8));
+  folder.write("comment.jpg", with_comment);
+  for (const char* name :
+       {"base.jpg", "restarts.jpg", "progressive.jpg", "comment.jpg", "rows.bmp", "rows.png"}) {
+    const std::string whole = data::read_file(folder / name);
+    EXPECT_EQ(load_grey_image(folder / name).width, 160) << name;
+    EXPECT_EQ(load_grey_image(folder.write(std::string("more_") + name, whole + "\r\n and more")).width, 160)
+        << name;
+    // Of a PNG the last twelve bytes say no more than that it ends.
+    const bool png = std::string(name).ends_with("png");
+    for (const std::size_t missing :
+         {png ? 20 : std::size_t{1}, whole.size() / 10, whole.size() / 2, 9 * whole.size() / 10}) {
+      const std::string path =
+          folder.write(std::string("cut_") + name, whole.substr(0, whole.size() - missing));
+      testing::internal::CaptureStderr();
+      const std::string said = data::input_error_of([&] { load_grey_image(path); });
+      EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+      EXPECT_NE(said.find(std::string("cut_") + name + ": "), std::string::npos) << said;
+      EXPECT_NE(said.find(png ? "ends within its data" : "the picture is cut off: found "), std::string::npos)
+          << said << missing;
+    }
+  }
+}
+
 TEST(GreyImage, WhatIsWrongWithAPngIsSaidOnce) {
   const data::TemporaryFolder folder;
   cv::Mat picture(200, 200, CV_8UC1);
