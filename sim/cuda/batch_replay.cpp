@@ -323,8 +323,9 @@ struct BatchReplay::Memory {
       for (int k = 0; k < most_obstacles_each; ++k)
         for (const int vertex : layout.order) {
           const Eigen::Index row = static_cast<Eigen::Index>(k) * layout.size + vertex;
-          all.push_back(row < e.bristles.rows() ? Point{e.bristles(row, 0), e.bristles(row, 1), e.bristles(row, 2), 0}
-                                                : Point{});
+          all.push_back(row < e.bristles.rows()
+                            ? Point{e.bristles(row, 0), e.bristles(row, 1), e.bristles(row, 2), 0}
+                            : Point{});
         }
     }
     bristles = DeviceArray<Point>(all);
@@ -455,8 +456,9 @@ Points BatchReplay::bristles(int environment) const {
   const int obstacles = m.obstacle_counts[static_cast<std::size_t>(environment)];
   Points all(static_cast<Eigen::Index>(obstacles) * m.layout.size, 3);
   for (int k = 0; k < obstacles; ++k)
-    all.middleRows(static_cast<Eigen::Index>(k) * m.layout.size, m.layout.size) = m.points(
-        m.bristles, static_cast<std::size_t>(environment) * m.numbers.most_obstacles_each + static_cast<std::size_t>(k));
+    all.middleRows(static_cast<Eigen::Index>(k) * m.layout.size, m.layout.size) =
+        m.points(m.bristles, static_cast<std::size_t>(environment) * m.numbers.most_obstacles_each +
+                                 static_cast<std::size_t>(k));
   return all;
 }
 

@@ -160,7 +160,8 @@ __device__ inline void read_touches(const ContactSet& contacts, int i, int count
 }
 __device__ inline void carry_bristles(const ObstacleStep<double>& obstacles, const StepProblem& step, int i,
                                       VertexTouch* touches) {
-  carry_bristles(obstacles, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
+  carry_bristles(
+      obstacles, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
 }
 /// What holds a vertex that is listed, as contact_of says. `touches`: what read_touches gave.
 __device__ inline VertexContact read_contact(const ContactSet& contacts, int i,
@@ -187,8 +188,8 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
     carry_bristles(obstacles, step, i, touches);
-    response.line_friction = friction_potential_of(obstacles, start, point,
-                                                   read_contact(*line, i, obstacles, touches), touches);
+    response.line_friction =
+        friction_potential_of(obstacles, start, point, read_contact(*line, i, obstacles, touches), touches);
   }
   const double clearance = clearance_of(obstacles, start, point);
   contacts.clearance[i] = clearance;

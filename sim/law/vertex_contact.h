@@ -110,8 +110,11 @@ FLASH_HOST_DEVICE inline Symmetric3 slip_stiffness_of(const ObstacleStep<double>
 /// surfaces each rubs against its own slip, which enters the normal forces of the others. Between two the
 /// vertex moves along their edge alone, between three not at all.
 template <typename Room>
-FLASH_HOST_DEVICE inline VertexContact decide_contact(
-    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& point, const Vector3<double>& needed, VertexTouch* touches, Room& room) {
+FLASH_HOST_DEVICE inline VertexContact decide_contact(const ObstacleStep<double>& step,
+                                                      const Vector3<double>& start,
+                                                      const Vector3<double>& point,
+                                                      const Vector3<double>& needed, VertexTouch* touches,
+                                                      Room& room) {
   VertexContact contact;
   int touching = 0;
   for (int k = 0; k < step.count; ++k) {
@@ -151,15 +154,17 @@ FLASH_HOST_DEVICE inline VertexContact decide_contact(
 }
 
 /// Energy of friction of a vertex at `point`, at the normal forces of its contact [J].
-FLASH_HOST_DEVICE inline double friction_potential_of(
-    const ObstacleStep<double>& step, const Vector3<double>& start, const Vector3<double>& point, const VertexContact& contact, const VertexTouch* touches) {
+FLASH_HOST_DEVICE inline double friction_potential_of(const ObstacleStep<double>& step,
+                                                      const Vector3<double>& start,
+                                                      const Vector3<double>& point,
+                                                      const VertexContact& contact,
+                                                      const VertexTouch* touches) {
   if (contact.friction_bound == 0) return 0;
   double potential = 0;
   for (int k = 0; k < step.count; ++k) {
     if (!touches[k].holds) continue;
     const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
-    const double slip =
-        norm(along_plane(gap.normal, touches[k].bristle + point - start - gap.surface_moved));
+    const double slip = norm(along_plane(gap.normal, touches[k].bristle + point - start - gap.surface_moved));
     potential += step.obstacles[k].friction * touches[k].normal_force * friction_energy(slip, step.time_step);
   }
   return potential;

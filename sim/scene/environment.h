@@ -66,8 +66,8 @@ struct State {
   data::Points positions;   ///< [m]
   data::Points velocities;  ///< [m/s]
   /// Deflection of the bristles of friction, as a share of that at which they slide: a vector whose length is
-  /// 1 at most, against the friction force. A row for each vertex on the first obstacle, then on the next. None:
-  /// zero.
+  /// 1 at most, against the friction force. A row for each vertex on the first obstacle, then on the next.
+  /// None: zero.
   data::Points bristles = {};
   std::vector<HeldVertices> held;  ///< by each hold of the environment
 };

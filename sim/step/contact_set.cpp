@@ -98,7 +98,8 @@ VertexTouch* add_touches(const ContactStep& step, const Points& positions, int i
   VertexTouch* touches = contacts.touches.data() + first;
   const ObstacleStep<double> view = step.view();
   find_touches(view, step.start(i), vector3(positions, i), touches);
-  carry_bristles(view, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
+  carry_bristles(
+      view, [&](int obstacle) { return step.bristle(obstacle, i); }, touches);
   return touches;
 }
 
@@ -159,7 +160,8 @@ Points bristles_at_end(const ContactStep& step, const ContactSet& contacts) {
     const std::span<const VertexTouch> touches = contacts.touches_of(k);
     for (int obstacle = 0; obstacle < view.count; ++obstacle)
       bristles.row(obstacle * vertices + i) =
-          vector3d(bristle_at_end(view.obstacles[obstacle], touches[static_cast<size_t>(obstacle)])).transpose();
+          vector3d(bristle_at_end(view.obstacles[obstacle], touches[static_cast<size_t>(obstacle)]))
+              .transpose();
   }
   return bristles;
 }

@@ -18,8 +18,8 @@ void project_to_feasible(const ContactStep& step, const ContactSet& contacts, da
     } else {
       const VertexConstraint& constraint = contacts.constraints[k];
       if (constraint.freedom == Freedom::held) continue;
-      place = feasible_place(step.view_of(i), step.start(i), constraint,
-                             contacts.touches_of(k).data(), point, room);
+      place = feasible_place(step.view_of(i), step.start(i), constraint, contacts.touches_of(k).data(), point,
+                             room);
     }
     positions.row(i) = vector3d(place).transpose();
   }

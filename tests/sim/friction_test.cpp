@@ -110,8 +110,7 @@ TEST(Friction, ASheetOnATurningTableTurnsWithIt) {
   data::Trajectory turning;
   for (int n = 0; n <= steps; ++n) {
     turning.times.push_back(n * time_step);
-    turning.poses.push_back(
-        Eigen::Isometry3d(Eigen::AngleAxisd(angle(n * time_step), Vector3d::UnitZ())));
+    turning.poses.push_back(Eigen::Isometry3d(Eigen::AngleAxisd(angle(n * time_step), Vector3d::UnitZ())));
   }
   Environment environment = environment_of(sheet);
   environment.materials[0].friction = 3 * friction;
@@ -145,10 +144,9 @@ TEST(Friction, WhatLeansOnASlidingWallDoesNotCreep) {
   Environment environment = environment_of(sheet);
   environment.gravity = Vector3d(0.8 * gravity, 0, -gravity);
   environment.materials[0].friction = 0.5;
-  environment.obstacles = {{Plane{}},
-                           {Plane{Vector3d(environment.state.positions.col(0).maxCoeff(), 0, 0),
-                                  -Vector3d::UnitX()},
-                            {0.3}}};
+  environment.obstacles = {
+      {Plane{}},
+      {Plane{Vector3d(environment.state.positions.col(0).maxCoeff(), 0, 0), -Vector3d::UnitX()}, {0.3}}};
   environment.obstacles[1].frame = add_frame(environment, along, time_step);
   Solver solver(sheet, {.time_step = time_step, .tolerance = 1e-8});
   run(solver, environment, steps / 3);

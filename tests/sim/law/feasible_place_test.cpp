@@ -77,9 +77,13 @@ TEST(FeasiblePlace, ASlipThatTurnedIsStopped) {
   const Vector3<double> start = step.start(0), iterate{1e-3, 0, 0};
   std::vector<VertexTouch> touches(1);
   find_touches(step.view(), start, iterate, touches.data());
-  carry_bristles(step.view(), [](int) { return Vector3<double>{0.2, -0.3, 0}; }, touches.data());
-  const VertexContact contact =
-      decide_contact(step.view(), start, iterate, {0, 0, 1}, touches.data(), room);
+  carry_bristles(
+      step.view(),
+      [](int) {
+        return Vector3<double>{0.2, -0.3, 0};
+      },
+      touches.data());
+  const VertexContact contact = decide_contact(step.view(), start, iterate, {0, 0, 1}, touches.data(), room);
   ASSERT_EQ(contact.freedom, Freedom::slip);
   const auto place = [&](const Vector3<double>& point) {
     return vector3d(feasible_place(step.view(), start, contact, touches.data(), point, room));

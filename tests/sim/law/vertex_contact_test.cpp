@@ -20,17 +20,15 @@ struct Decided {
   VertexContact contact;
 
   Decided(const ContactStep& step, const data::Points& positions, const data::Points& force, int i)
-      : view(step.view()),
-        start(step.start(i)),
-        point(vector3(positions, i)),
-        needed(vector3(force, i)) {
+      : view(step.view()), start(step.start(i)), point(vector3(positions, i)), needed(vector3(force, i)) {
     for (int k = 0; k < view.count; ++k) bristles.push_back(step.bristle(k, i));
     decide();
   }
   void decide() {
     touches.assign(static_cast<std::size_t>(view.count), {});
     find_touches(view, start, point, touches.data());
-    carry_bristles(view, [&](int k) { return bristles[static_cast<std::size_t>(k)]; }, touches.data());
+    carry_bristles(
+        view, [&](int k) { return bristles[static_cast<std::size_t>(k)]; }, touches.data());
     ContactRoom room(touches.size());
     contact = decide_contact(view, start, point, needed, touches.data(), room);
   }
