@@ -37,21 +37,25 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<d
   for (int round = 0; round < rounds; ++round) {
     double moved = 0;
     bool outside = true;
+    int count = 0;
     for (int k = 0; k < step.count; ++k) {
       const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
-      room.normals[k] = gap.normal;
-      room.right[k] = -gap.distance;
+      double depth = -gap.distance;
       if (touches != nullptr && lands(touches[k], gap)) {
         point = point - gap.distance * gap.normal;
         moved = larger_of(moved, gap.distance);
-        room.right[k] = 0;
+        depth = 0;
       }
-      outside = outside && room.right[k] <= 0;
+      outside = outside && depth <= 0;
+      // What is nearest of a box that the way misses may be its far side.
+      if (step.obstacles[k].shape == ObstacleShape::box && depth < -touching_gap) continue;
+      room.normals[count] = gap.normal;
+      room.right[count++] = depth;
     }
     if (moved == 0 && outside) break;
-    solve_lcp(step.count, &room.normals[0], &room.normals[0], &room.right[0], &room.solution[0]);
+    solve_lcp(count, &room.normals[0], &room.normals[0], &room.right[0], &room.solution[0]);
     Vector3<double> way{};
-    for (int k = 0; k < step.count; ++k) way = way + room.solution[k] * room.normals[k];
+    for (int c = 0; c < count; ++c) way = way + room.solution[c] * room.normals[c];
     point = point + way;
     if (larger_of(moved, norm(way)) <= resting_slip) break;
   }
@@ -77,16 +81,17 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> stopped_place(const ObstacleStep<d
 /// The feasible place nearest to a trial `point` of a vertex, by its contact in the linear problem. A slip
 /// that turned against its direction is stopped at no slip, where it has to decide again.
 template <typename Room>
-FLASH_HOST_DEVICE inline Vector3<double> feasible_place(
-    const ObstacleStep<double>& step, const Vector3<double>& start, const VertexContact& contact,
-    const VertexTouch* touches, const Vector3<double>& point, Room& room) {
+FLASH_HOST_DEVICE inline Vector3<double> feasible_place(const ObstacleStep<double>& step,
+                                                        const Vector3<double>& start,
+                                                        const VertexContact& contact,
+                                                        const VertexTouch* touches,
+                                                        const Vector3<double>& point, Room& room) {
   constexpr double sliding = 0.999;  // squared length of the direction of what slides
   const Vector3<double> place = projected_out(step, start, touches, point, room);
   if (contact.freedom != Freedom::slip || dot(contact.slip_direction, contact.slip_direction) < sliding)
     return place;
   const Vector3<double> slip = slip_against(step, start, place, touches);
-  return dot(slip, contact.slip_direction) >= 0 ? place
-                                                : stopped_place(step, start, touches, place, room);
+  return dot(slip, contact.slip_direction) >= 0 ? place : stopped_place(step, start, touches, place, room);
 }
 
 }  // namespace FLASH_LEVEL
