@@ -101,6 +101,13 @@ def check(sysid, folder):
         assert told and sum(1 for _ in motions.rglob("*")) == kept
         job.kill()
 
+    # The same tracks, as motion capture wrote them, become the same recording.
+    imported = ("import", "--markers", folder / "twin/tracks.csv", "--on-support", "base", "--mesh", MESH, "--clamp-x", ":0")
+    expect(run(*imported, "-o", folder / "imported"), 0)
+    expect(run("grid", folder / "imported", "--asset", silicone, "--mesh", MESH, *SEARCH, "-o", folder / "again"), 0)
+    again = json.loads((folder / "again/summary.json").read_text())["parameters"]["young"]
+    assert again["interval95"] == [low, high], (again["interval95"], low, high)
+
     sheet = folder / "sheet.json"
     sheet.write_text(json.dumps({"mesh": "sheet:0.1x0.1:0.02", "mechanical_props": {
         "obj_mass": 0.01, "young": 100, "poisson": 0.3, "constitutive": "TRI_COROTATED", "bending": 1e-5}}))
@@ -122,6 +129,11 @@ def check(sysid, folder):
                         object={"mesh": MESH, "start": {"T_base_object": [5, 0, 0, 0, 0, 0, 1]}}),
           "--asset", silicone, *SEARCH[:2]), 'markers: marker "corner" is 4.9 m from the object'),
         (("grid", like, "--asset", silicone, *SEARCH[:2], "--clamp-slopes"), "--clamp-slopes: found a solid"),
+        ((*imported[:-2],), "--markers needs what is clamped"),
+        ((*imported, "--gravity", "9.81"), '--gravity: found "9.81", expected x,y,z'),
+        ((*imported, "--crop-z", "0:"), "--crop-z: found --markers"),
+        ((*imported[:-1], "9:"), "import: recording.json: supports[0].select: no vertex"),
+        (("import", "--mesh", MESH), "expected --trajectory, or --markers"),
         (("plan", like, "--asset", silicone), "object.mesh: found a solid, expected a sheet"),
         (("replay", like, "--asset", silicone, "--hold", "bending=1"), "found a solid"),
         (("synth", "--asset", silicone, "--marker-noise", "1e-4"), "--like"),
