@@ -36,6 +36,18 @@ data::MarkerTracks thinned(const TrackImportSettings& settings) {
   return tracks;
 }
 
+/// What moves, and is seen to.
+void check_use(const data::Recording& recording, const TrackImportSettings& settings) {
+  const std::size_t held = data::select_vertices(recording, recording.supports[0].select, "supports").size();
+  if (held == static_cast<std::size_t>(recording.mesh.vertices.rows()))
+    throw data::InputError("--clamp-x, --clamp-y, --clamp-z: hold all " + data::format_count(held) +
+                           " vertices of the object, expected some that move");
+  if (recording.keyframes.size() < 2)
+    throw data::InputError(
+        (settings.every > 1 ? "--every: leaves one time of " : "--markers: found one time in ") +
+        settings.tracks + ", expected two or more");
+}
+
 }  // namespace
 
 data::Recording import_tracks(const TrackImportSettings& settings) {
@@ -77,7 +89,7 @@ data::Recording import_tracks(const TrackImportSettings& settings) {
   const std::string staged_json = (folder / "recording.json").string();
   data::write_atomically(staged_json, data::format_json(json));
   try {
-    data::load_recording(staged_json);
+    check_use(data::load_recording(staged_json), settings);
   } catch (const data::InputError& error) {
     // The user knows the options, not a file that is gone.
     std::string what = error.what();

@@ -57,6 +57,12 @@ TEST_F(TrackImport, LeavesNothingBehindWhereItFails) {
   EXPECT_NE(message().find("import: recording.json: supports[0].select: no vertex"), std::string::npos);
   settings_.clamp = {};
   settings_.clamp.max.x() = 0;
+  settings_.every = 5;
+  EXPECT_NE(message().find("--every: leaves one time of "), std::string::npos);
+  settings_.every = 1;
+  settings_.clamp = {};
+  EXPECT_NE(message().find("hold all 24 vertices of the object"), std::string::npos);
+  settings_.clamp.max.x() = 0;
   settings_.on_support = {"bass"};
   EXPECT_NE(message().find("did you mean \"base\"?"), std::string::npos);
   settings_.on_support = {"base"};
