@@ -100,13 +100,14 @@ data::Selection parse_grasp(const std::string& text) {
   return grasp;
 }
 
-data::CropBox parse_crop(const std::array<std::string, 3>& ranges) {
-  data::CropBox crop;
-  parse_range(ranges[0], "crop-x", 0, crop);
-  parse_range(ranges[1], "crop-y", 1, crop);
-  parse_range(ranges[2], "crop-z", 2, crop);
-  return crop;
+data::CropBox parse_box(const std::array<std::string, 3>& ranges, const std::string& name) {
+  data::CropBox box;
+  for (const int axis : {0, 1, 2})
+    parse_range(ranges[static_cast<std::size_t>(axis)], (name + "-" + "xyz"[axis]).c_str(), axis, box);
+  return box;
 }
+
+data::CropBox parse_crop(const std::array<std::string, 3>& ranges) { return parse_box(ranges, "crop"); }
 
 void read_options(const ImportOptions& options, sysid::ImportSettings& settings) {
   if (options.mesh.empty()) throw data::InputError("import: expected --mesh, as sheet:0.3x0.24:0.01");

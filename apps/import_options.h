@@ -26,6 +26,9 @@ data::Selection parse_grasp(const std::string& text);
 /// The box of the three ranges "LOW:HIGH". Throws data::InputError that names --crop-x, --crop-y or --crop-z.
 data::CropBox parse_crop(const std::array<std::string, 3>& ranges);
 
+/// The same of --NAME-x, --NAME-y and --NAME-z.
+data::CropBox parse_box(const std::array<std::string, 3>& ranges, const std::string& name);
+
 /// Puts sheet, grasp, crop, trajectory, frames and their times into `settings`. Throws data::InputError that
 /// names the option, also where a folder holds no frames or where `settings` has no camera for depth images.
 void read_options(const ImportOptions& options, sysid::ImportSettings& settings);

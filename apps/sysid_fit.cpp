@@ -152,6 +152,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   const data::Asset asset =
       load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recordings.front());
   for (const data::Recording& recording : recordings) check_kind(asset, recording);
+  check_options(options.replay, asset);
   Start start = start_of(options, found);
   sysid::GridSettings& grid = start.grid;
   const int threads = thread_count(options.common);
@@ -181,6 +182,8 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   sysid::check_job(replays, sysid::count_candidates(grid.axes),
                    sysid::estimate_memory(replays, grid, asked.solver_check));
   for (const std::string& notice : notices) say(options.common, notice);
+  // Before the long part. Axes, which that part finds, are not compared.
+  for (const std::string& line : other_settings(options.start, sysid::fingerprint(replays, grid))) warn(line);
   asked.ranges = grid.axes;
   const std::string grid_file = (fs::path(options.out) / "grid.json").string();
   if (options.resume && fs::exists(grid_file)) {
@@ -193,7 +196,6 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   }
   end_after_signal();
   const sysid::Fingerprint print = sysid::fingerprint(replays, grid);
-  for (const std::string& line : other_settings(options.start, print)) warn(line);
   sysid::ResultsStore store(options.out, grid.axes, names, print,
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace

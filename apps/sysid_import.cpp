@@ -13,6 +13,7 @@
 #include "data/error.h"
 #include "data/text.h"
 #include "sysid/capture/import.h"
+#include "sysid/capture/import_tracks.h"
 
 namespace flash {
 namespace {
@@ -26,6 +27,9 @@ struct ImportVerbOptions {
   std::string offset;
   std::string shape = "clamp", tool_at = "corner";
   double within = 0, table_height = 0, heading_degrees = 0;
+  sysid::TrackImportSettings tracks;
+  std::array<std::string, 3> clamp;  // along x, y and z "LOW:HIGH" [m]
+  std::string gravity;
 };
 
 // One bound for all axes, or x,y,z.
@@ -44,22 +48,23 @@ Eigen::Vector3d parse_bounds(const std::string& text) {
   return bounds;
 }
 
-int run_import(const CLI::App& verb, ImportVerbOptions options) {
-  sysid::ImportSettings& settings = options.settings;
-  settings.overwrite = settings.accept_unusable = options.common.force;
-  if (!options.offset.empty()) settings.nuisance.offset = parse_bounds(options.offset);
-  settings.tool_at_patch = options.tool_at == "patch";
-  if (options.shape == "point") settings.shape = data::GraspShape::point;
-  if (options.shape == "pinch") settings.shape = data::GraspShape::pinch;
-  if (verb.count("--grasp-within") > 0) options.texts.within = options.within;
-  if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
-  if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;
-  read_options(options.texts, settings);
+Eigen::Vector3d parse_gravity(const std::string& text) {
+  const std::vector<std::string_view> words = data::split(text, ",");
+  Eigen::Vector3d gravity;
+  for (int k = 0; k < 3; ++k) {
+    const auto number =
+        words.size() == 3 ? data::parse_number(words[static_cast<std::size_t>(k)]) : std::nullopt;
+    if (!number || !std::isfinite(*number))
+      throw data::InputError("--gravity: found \"" + text + "\", expected x,y,z in m/s^2, as 0,0,-9.81");
+    gravity[k] = *number;
+  }
+  return gravity;
+}
 
-  const data::Recording recording = sysid::import_recording(settings);
-  for (const std::string& notice : recording.notices) say(options.common, notice);
-  const std::string path = (fs::path(settings.out) / "recording.json").string();
-  if (options.common.json) {
+int tell_import(const data::Recording& recording, const std::string& out, const CommonOptions& options) {
+  const std::string path = (fs::path(out) / "recording.json").string();
+  for (const std::string& notice : recording.notices) say(options, notice);
+  if (options.json) {
     std::cout << nlohmann::ordered_json{{"schema", "flash-sysid-import/1"},
                                         {"recording", path},
                                         {"keyframes", recording.keyframes.size()},
@@ -72,12 +77,55 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   return exit_done;
 }
 
+// A part that is clamped, from the tracks of its markers.
+int import_markers(const CLI::App& verb, ImportVerbOptions options) {
+  for (const char* name : {"--times", "--grasp", "--grasp-within", "--tool-at", "--grasp-shape", "--crop-x",
+                           "--crop-y", "--crop-z", "--table-z", "--heading", "--start-yaw-bound",
+                           "--table-height-bound", "--offset-bound", "--yaw-bound", "--time-offset-bound"})
+    if (verb.count(name) > 0)
+      throw data::InputError(std::string(name) +
+                             ": found --markers, expected clouds or depth images beside it");
+  sysid::TrackImportSettings& settings = options.tracks;
+  const sysid::ImportSettings& shared = options.settings;
+  if (options.clamp == std::array<std::string, 3>{})
+    throw data::InputError(
+        "import: --markers needs what is clamped, one or more of --clamp-x, --clamp-y and --clamp-z, as "
+        "--clamp-x :0");
+  settings.clamp = parse_box(options.clamp, "clamp");
+  if (!options.gravity.empty()) settings.gravity = parse_gravity(options.gravity);
+  if (verb.count("--kind") > 0) settings.kind = shared.kind;
+  settings.mesh_spec = options.texts.mesh;
+  settings.asset = shared.asset;
+  settings.name = shared.name;
+  settings.out = shared.out;
+  settings.overwrite = options.common.force;
+  return tell_import(sysid::import_tracks(settings), settings.out, options.common);
+}
+
+int run_import(const CLI::App& verb, ImportVerbOptions options) {
+  if (!options.tracks.tracks.empty()) return import_markers(verb, std::move(options));
+  if (options.texts.trajectory.empty())
+    throw data::InputError("import: expected --trajectory, or --markers in place of clouds");
+  sysid::ImportSettings& settings = options.settings;
+  settings.overwrite = settings.accept_unusable = options.common.force;
+  if (!options.offset.empty()) settings.nuisance.offset = parse_bounds(options.offset);
+  settings.tool_at_patch = options.tool_at == "patch";
+  if (options.shape == "point") settings.shape = data::GraspShape::point;
+  if (options.shape == "pinch") settings.shape = data::GraspShape::pinch;
+  if (verb.count("--grasp-within") > 0) options.texts.within = options.within;
+  if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
+  if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;
+  read_options(options.texts, settings);
+
+  return tell_import(sysid::import_recording(settings), settings.out, options.common);
+}
+
 }  // namespace
 
 void add_import_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<ImportVerbOptions>();
   CLI::App* verb = app.add_subcommand(
-      "import", "Make a recording from a folder of clouds, or of depth images, and a trajectory");
+      "import", "Make a recording from clouds or depth images and a trajectory, or from tracks of markers");
   ImportOptions& texts = options->texts;
   sysid::ImportSettings& settings = options->settings;
   CLI::Option* clouds =
@@ -94,15 +142,36 @@ void add_import_verb(CLI::App& app, Action& action) {
   verb->add_option("--depth-scale", settings.depth_scale, "Metres per count of the depth images")
       ->check(positive_number())
       ->capture_default_str();
-  verb->add_option("--trajectory", texts.trajectory, "Poses of the gripper, T_base_gripper, TUM or CSV")
-      ->required();
+  CLI::Option* trajectory =
+      verb->add_option("--trajectory", texts.trajectory, "Poses of the gripper, T_base_gripper, TUM or CSV");
+  sysid::TrackImportSettings& tracks = options->tracks;
+  CLI::Option* markers = verb->add_option("--markers", tracks.tracks,
+                                          "Tracks of markers on a part that is clamped, in place of clouds: "
+                                          "CSV t,marker,x,y,z [s, m]");
+  for (CLI::Option* other : {clouds, depth, trajectory}) markers->excludes(other);
+  verb->add_option("--placed", tracks.placed,
+                   "Where markers are on the part at rest, CSV marker,x,y,z [m]; three or more tell its pose")
+      ->needs(markers);
+  verb->add_option("--on-support", tracks.on_support, "Markers that stay where they are, A,B,...")
+      ->delimiter(',')
+      ->needs(markers);
+  for (const int axis : {0, 1, 2})
+    verb->add_option(std::string("--clamp-") + "xyz"[axis], options -> clamp[static_cast<std::size_t>(axis)],
+                     "The part is clamped in LOW:HIGH of its rest shape [m], either may be empty")
+        ->needs(markers);
+  verb->add_option("--gravity", options->gravity,
+                   "Gravity in the frame of the markers, x,y,z [m/s^2]; without it 0,0,-9.81")
+      ->needs(markers);
+  verb->add_option("--every", tracks.every, "Keep one of so many times of the tracks")
+      ->check(whole_number(1, 1'000'000))
+      ->needs(markers);
   verb->add_option(
       "--times", texts.times,
       "Times of the frames: rate:HZ, rate:HZ:START, or a CSV with one time a frame; without it rate:10");
-  verb->add_option(
-          "--mesh", texts.mesh,
-          "Mesh of the sheet, sheet:WIDTHxHEIGHT:CELL [m] or a file; from corner 0,0 or 1,1, seen from "
-          "above, the width is on the right hand")
+  verb->add_option("--mesh", texts.mesh,
+                   "Mesh of the sheet, sheet:WIDTHxHEIGHT:CELL [m], of the part with --markers, as "
+                   "box:LENGTHxWIDTHxHEIGHT:CELL, or a file; from corner 0,0 or 1,1, seen from "
+                   "above, the width is on the right hand")
       ->required();
   verb->add_option("--grasp", texts.grasp,
                    "What is grasped: corner, corner:I,J, vertices:A,B,... or position")
@@ -149,7 +218,9 @@ void add_import_verb(CLI::App& app, Action& action) {
       "  flash-sysid import clouds --trajectory tcp.tum --times rate:10 --mesh sheet:0.278x0.278:0.01 "
       "--grasp corner "
       "\\\n"
-      "    --crop-z 0.075: --offset-bound 0.06 -o recording");
+      "    --crop-z 0.075: --offset-bound 0.06 -o recording\n"
+      "  flash-sysid import --markers tracks.csv --placed placed.csv --on-support base1,base2,base3 \\\n"
+      "    --mesh box:0.1x0.03x0.03:0.015 --clamp-x :0 -o recording");
   verb->callback(
       [verb, options, &action] { action = [verb, options] { return run_import(*verb, *options); }; });
 }

@@ -50,6 +50,10 @@ void set_sigma(const std::string& assignment, sysid::Objective& objective) {
     throw data::InputError(
         "--sigma: \"" + assignment +
         "\": expected cloud, contour, markers or force = a positive number, as force=0.02");
+  constexpr double kLargest = 0.1;  // [m]
+  if (sigma != &objective.force_sigma && *value >= kLargest)
+    throw data::InputError("--sigma: " + assignment + ": found " + data::format_short(*value) +
+                           " m, expected below 0.1 m; a millimetre is 0.001");
   *sigma = *value;
 }
 
@@ -305,6 +309,12 @@ void check_kind(const data::Asset& asset, const data::Recording& recording) {
                           std::string("found ") + (solid ? "TETRAHEDRON" : "TRIANGLE") + ", expected " +
                               (solid ? "TRIANGLE" : "TETRAHEDRON") + ", as object.mesh of " +
                               recording.source + " is a " + (solid ? "sheet" : "solid"));
+}
+
+void check_options(const ReplayOptions& options, const data::Asset& asset) {
+  if (asset.element_type == data::ElementType::tetrahedron && options.clamp_slopes)
+    throw data::InputError(
+        "--clamp-slopes: found a solid, expected a sheet: a solid has no slopes of its own");
 }
 
 sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sheet,

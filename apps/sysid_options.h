@@ -89,6 +89,9 @@ data::Asset load_asset_for(const std::string& path, const data::Recording& recor
 /// round.
 void check_kind(const data::Asset& asset, const data::Recording& recording);
 
+/// Throws InputError where an option is of sheets alone and the object is a solid.
+void check_options(const ReplayOptions& options, const data::Asset& asset);
+
 /// The asset's material; what was understood, with `fixed` in place of the asset's values, is appended to
 /// `notices`.
 sysid::MaterialBase material_base(const data::Asset& asset, const sim::Sheet& sheet,

@@ -145,6 +145,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   const data::Recording recording = data::load_recording(options.recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
   check_kind(asset, recording);
+  check_options(options.replay, asset);
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
   simulated.device = device;
   simulated.element_order = asset.element_order;

@@ -47,17 +47,23 @@ std::string edge_of(const sysid::ParameterFinding& finding) {
   return edge.empty() ? "" : "; " + edge;
 }
 
-// "1.59 mm from the observed points, on cells of no size (extrapolated)".
-std::string score_text(const sysid::Summary& summary, double score) {
+// "1.59 mm from the observed points, on cells of no size (extrapolated)". Of markers alone it is their own
+// distance, not what noise stated for them makes of it beside other terms.
+std::string score_text(const sysid::Summary& summary, const sysid::SummaryRecording& recording) {
   const auto setting = [&](const char* name) {
     const auto found = summary.settings.find(name);
     return found == summary.settings.end() ? std::string() : found->second;
   };
   char number[32];
-  std::snprintf(number, sizeof number, "%.2f mm", 1000 * score);
   const std::string observed = setting("observed");
-  return number + (observed == "cloud" ? " from the observed points" : " over " + observed) + ", on " +
-         setting("score_of");
+  const bool of_markers = observed == "markers" && recording.markers;
+  std::snprintf(number, sizeof number, "%.2f mm",
+                1000 * (of_markers ? recording.markers->miss : recording.score));
+  return number +
+         (of_markers            ? " from the markers, root mean square"
+          : observed == "cloud" ? " from the observed points"
+                                : " over " + observed) +
+         ", on " + setting("score_of");
 }
 
 void print_solver_check(const sysid::Summary& summary) {
@@ -76,7 +82,7 @@ void print_answer(const sysid::Summary& summary, const std::string& out) {
   }
   for (const sysid::SummaryRecording& recording : summary.recordings)
     std::printf("%-16s %s; offset %.1f %.1f %.1f mm, clock %.0f ms\n",
-                data::message_line(recording.name).c_str(), score_text(summary, recording.score).c_str(),
+                data::message_line(recording.name).c_str(), score_text(summary, recording).c_str(),
                 1000 * recording.offset.x(), 1000 * recording.offset.y(), 1000 * recording.offset.z(),
                 1000 * recording.time_offset);
   print_solver_check(summary);

@@ -305,6 +305,16 @@ ResolvedSolid resolve_solid(const Asset& asset, double rest_volume) {
                           format_short(m.poissons_ratio) + ", density = " + format_short(m.density) +
                           " kg/m^3, mass = " + format_short(m.density * rest_volume) + " kg" +
                           (asset.object_mass ? " (obj_mass, the total, spread evenly over vertices)" : ""));
+  std::string unused;
+  const auto name_unused = [&](bool given, const char* name) {
+    if (given) unused += (unused.empty() ? "" : ", ") + std::string(name);
+  };
+  name_unused(asset.thickness.has_value(), "thickness");
+  name_unused(asset.bending_rigidity.has_value(), "bending_rigidity");
+  name_unused(asset.published_bending.has_value(), "bending");
+  name_unused(asset.bending_model.has_value(), "bending_model");
+  if (!unused.empty())
+    solid.notices.push_back(asset.source + ": " + unused + ": of sheets alone, not used for a solid");
   return solid;
 }
 

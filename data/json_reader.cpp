@@ -110,6 +110,8 @@ void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t
 }  // namespace
 
 nlohmann::json parse_json(const std::string& text, const std::string& source) {
+  if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+    throw InputError(source + ": found text in UTF-16, expected UTF-8: save it so");
   check_depth(text, source);
   try {
     return nlohmann::json::parse(text, NamesOnce(source));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <numbers>
+#include <set>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
@@ -325,11 +326,22 @@ void check_grasps(const Recording& recording) {
 }
 
 /// Each takes a vertex at least.
-void check_supports(const Recording& recording) {
+void check_supports(Recording& recording) {
+  std::set<int> held;
   for (std::size_t k = 0; k < recording.supports.size(); ++k)
-    select_vertices(recording, recording.supports[k].select, "supports[" + std::to_string(k) + "]");
-  for (std::size_t k = 0; k < recording.loads.size(); ++k)
-    select_vertices(recording, recording.loads[k].select, "loads[" + std::to_string(k) + "]");
+    for (const int vertex :
+         select_vertices(recording, recording.supports[k].select, "supports[" + std::to_string(k) + "]"))
+      held.insert(vertex);
+  for (std::size_t k = 0; k < recording.loads.size(); ++k) {
+    const std::string name = "loads[" + std::to_string(k) + "]";
+    const std::vector<int> loaded = select_vertices(recording, recording.loads[k].select, name);
+    const auto count = std::count_if(loaded.begin(), loaded.end(), [&](int i) { return held.contains(i); });
+    if (count > 0)
+      recording.notices.push_back(recording.source + ": " + name + ": " +
+                                  format_count(static_cast<std::size_t>(count)) + " of its " +
+                                  format_count(loaded.size()) +
+                                  " vertices are held by supports, whose share of the weight moves nothing");
+  }
 }
 
 }  // namespace

@@ -31,6 +31,21 @@ bool seen_at_start(const Recording& recording) {
   return first != recording.keyframes.end() && first->time == 0;
 }
 
+/// Throws where a marker is farther from the box around the object at rest than half of its diagonal. It
+/// would turn with a face that it cannot stand on.
+void check_near_object(const Recording& recording, const std::string& name, const Eigen::Vector3d& place) {
+  constexpr double kStalk = 0.5;  // longest, in diagonals
+  const Eigen::Vector3d low = recording.mesh.vertices.colwise().minCoeff(),
+                        high = recording.mesh.vertices.colwise().maxCoeff();
+  const double away = (place - place.cwiseMax(low).cwiseMin(high)).norm(), diagonal = (high - low).norm();
+  if (away <= kStalk * diagonal) return;
+  throw input_error(recording.source, "markers",
+                    "marker \"" + name + "\" is " + format_short(away) +
+                        " m from the object at its start, which is " + format_short(diagonal) +
+                        " m across, expected at most half of that: are its tracks in metres and in the base "
+                        "frame, and is object.start right?");
+}
+
 }  // namespace
 
 void read_markers(const JsonObject& file, Recording& recording) {
@@ -149,6 +164,7 @@ void place_markers(Recording& recording) {
                             "\" is missing, expected its place on the object, as it is not seen when the "
                             "recording starts");
     }
+    check_near_object(recording, name, *at);
   }
 }
 

@@ -79,6 +79,11 @@ std::string format_count(std::size_t count) {
 }
 
 bool LineReader::next(std::string_view& line) {
+  constexpr std::string_view mark = "\xef\xbb\xbf";  // spreadsheets put it before all
+  if (number_ == 0 && rest_.starts_with(mark)) {
+    rest_.remove_prefix(mark.size());
+    offset_ = mark.size();
+  }
   if (rest_.empty()) return false;
   const std::size_t end = rest_.find('\n');
   line = rest_.substr(0, end);

@@ -30,7 +30,7 @@ std::string format_clock(double seconds);
 /// "2,113".
 std::string format_count(std::size_t count);
 
-/// Lines of a text one by one, with their number (from 1); a trailing carriage return is dropped.
+/// Lines of a text, by number from 1, without a trailing carriage return or a byte order mark before all.
 class LineReader {
  public:
   explicit LineReader(std::string_view text) : rest_(text) {}

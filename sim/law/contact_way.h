@@ -36,10 +36,11 @@ struct OtherObstacles {
   int count = 0;
   int own = -1;
 
-  /// Whether one of them covers `point` at the end of the step [m].
+  /// Whether one of them covers `point` at the end of the step, or comes so close that a seam of two of them
+  /// is covered [m].
   FLASH_HOST_DEVICE bool cover(const Vector3<Real>& point) const {
     for (int k = 0; k < count; ++k)
-      if (k != own && gap_to(obstacles[k], point).distance < 0) return true;
+      if (k != own && gap_to(obstacles[k], point).distance < Real(0.5 * grazing)) return true;
     return false;
   }
 };
@@ -128,42 +129,75 @@ struct LocalWay {
   int grazed_axis = -1;  ///< of an open face in whose plane it lies; -1: there is none
 };
 
-/// Whether another obstacle covers the face of a box across `axis` where the way comes upon it. The point
-/// asked for lies just beyond that face and inside all others.
+/// Axes of a box, or of its faces that a way meets.
+struct Axes {
+  bool in[3] = {false, false, false};
+
+  FLASH_HOST_DEVICE Axes with(int axis) const {
+    Axes more = *this;
+    more.in[axis] = true;
+    return more;
+  }
+};
+
+/// Whether another obstacle covers what lies just beyond the faces of a box across `axes`, on the side of the
+/// start of the way, where the way comes upon them.
 template <typename Real>
-FLASH_HOST_DEVICE inline bool face_is_covered(const MovingObstacle<Real>& box,
-                                              const OtherObstacles<Real>& others, const LocalWay<Real>& way,
-                                              int axis) {
+FLASH_HOST_DEVICE inline bool is_covered_beyond(const MovingObstacle<Real>& box,
+                                                const OtherObstacles<Real>& others, const LocalWay<Real>& way,
+                                                const Axes& axes) {
   Vector3<Real> beyond{};
   for (int k = 0; k < 3; ++k) {
     const Real inner = larger_of(Real(0), box.half_extents[k] - 2 * grazing);
     const auto inside = [&](Real x) { return x > inner ? inner : x < -inner ? -inner : x; };
     const Real first = inside(way.from[k]);
-    beyond[k] = first + Real(1e-3) * (inside(way.to[k]) - first);
+    beyond[k] = axes.in[k] ? with_sign(box.half_extents[k] + Real(grazing), way.from[k])
+                           : first + Real(1e-3) * (inside(way.to[k]) - first);
   }
-  beyond[axis] = with_sign(box.half_extents[axis] + Real(grazing), way.from[axis]);
   return others.cover(place_from(box.end, beyond));
 }
 
+template <typename Real>
+FLASH_HOST_DEVICE inline bool face_is_covered(const MovingObstacle<Real>& box,
+                                              const OtherObstacles<Real>& others, const LocalWay<Real>& way,
+                                              int axis) {
+  return is_covered_beyond(box, others, way, Axes{}.with(axis));
+}
+
+/// Whether others fill all that is about the corner between the box and the faces across `covered` and
+/// `axis`; they do without `axis`.
+template <typename Real>
+FLASH_HOST_DEVICE inline bool is_filled_about(const MovingObstacle<Real>& box,
+                                              const OtherObstacles<Real>& others, const LocalWay<Real>& way,
+                                              const Axes& covered, int axis) {
+  const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+  const Axes alone = Axes{}.with(axis);
+  return is_covered_beyond(box, others, way, alone) &&
+         (!covered.in[a] || is_covered_beyond(box, others, way, alone.with(a))) &&
+         (!covered.in[b] || is_covered_beyond(box, others, way, alone.with(b)));
+}
+
 /// The way of a vertex in the frame of a box. One in the plane of an open face is taken out of the box there.
-/// One that comes from beside a covered face is taken to the middle of the box, where that face does not
-/// count. Of two covered faces one counts: the way lies in their edge, not in the box.
+/// One that comes from beside covered faces is taken to the middle of the box, where they do not count. Where
+/// the corner between two of them is open, one counts: the way lies in their edge, not in the boxes.
 template <typename Real>
 FLASH_HOST_DEVICE inline LocalWay<Real> local_way(const MovingObstacle<Real>& box,
                                                   const OtherObstacles<Real>& others,
                                                   const Vector3<Real>& start, const Vector3<Real>& end) {
   LocalWay<Real> way{place_in(box.start, start), place_in(box.end, end)};
   const LocalWay<Real> straight = way;
-  bool covered = false;
+  Axes covered;
   const Vector3<Real> excess = excess_over(box.half_extents, way.from);
   for (int axis = 0; axis < 3; ++axis) {
     const Real side = with_sign(Real(1), straight.from[axis]), half = box.half_extents[axis];
     if (magnitude(side * straight.from[axis] - half) > grazing ||
         magnitude(side * straight.to[axis] - half) > grazing)
       continue;
-    const bool from_beside = larger_of(excess[(axis + 1) % 3], excess[(axis + 2) % 3]) >= -grazing;
-    if (!covered && from_beside && face_is_covered(box, others, straight, axis)) {
-      covered = true;
+    const int a = (axis + 1) % 3, b = (axis + 2) % 3;
+    const bool from_beside =
+        (!covered.in[a] && excess[a] >= -grazing) || (!covered.in[b] && excess[b] >= -grazing);
+    if (from_beside && is_filled_about(box, others, straight, covered, axis)) {
+      covered = covered.with(axis);
       way.from[axis] = way.to[axis] = 0;
     } else {
       way.grazed_axis = axis;

@@ -37,21 +37,25 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<d
   for (int round = 0; round < rounds; ++round) {
     double moved = 0;
     bool outside = true;
+    int count = 0;
     for (int k = 0; k < step.count; ++k) {
       const SurfaceGap<double> gap = gap_in_step(step, k, start, point);
-      room.normals[k] = gap.normal;
-      room.right[k] = -gap.distance;
+      double depth = -gap.distance;
       if (touches != nullptr && lands(touches[k], gap)) {
         point = point - gap.distance * gap.normal;
         moved = larger_of(moved, gap.distance);
-        room.right[k] = 0;
+        depth = 0;
       }
-      outside = outside && room.right[k] <= 0;
+      outside = outside && depth <= 0;
+      // What is nearest of a box that the way misses may be its far side.
+      if (step.obstacles[k].shape == ObstacleShape::box && depth < -touching_gap) continue;
+      room.normals[count] = gap.normal;
+      room.right[count++] = depth;
     }
     if (moved == 0 && outside) break;
-    solve_lcp(step.count, &room.normals[0], &room.normals[0], &room.right[0], &room.solution[0]);
+    solve_lcp(count, &room.normals[0], &room.normals[0], &room.right[0], &room.solution[0]);
     Vector3<double> way{};
-    for (int k = 0; k < step.count; ++k) way = way + room.solution[k] * room.normals[k];
+    for (int c = 0; c < count; ++c) way = way + room.solution[c] * room.normals[c];
     point = point + way;
     if (larger_of(moved, norm(way)) <= resting_slip) break;
   }

@@ -31,7 +31,9 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
     const double vertices = vertices_of(replay);
     solver = std::max(solver, solver_bytes(replay));
     motion += 2 * motion_bytes(replay);  // in its batch, and until all recordings are scored
-    keyframes += static_cast<double>(replay.observations.size());
+    keyframes += static_cast<double>(
+        std::count_if(replay.observations.begin(), replay.observations.end(),
+                      [](const Observation& observation) { return observation.weight > 0; }));
     kept += kept_steps(replay) * vertices * bytes_per_position;
   }
   const double candidates = count_candidates(settings.axes);
@@ -52,7 +54,8 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
   // one.
   const double own = candidates * kept, half_cell = finer * vertices_finer * kept;
   const double about_estimate = (kAtEstimate + kOfErrors * (solver_check ? vertices_finer : 1)) * kept;
-  estimate.kept = own + std::max(own, 2 * half_cell) + about_estimate + kLikelihood * keyframes;
+  estimate.keyframes = kLikelihood * keyframes;
+  estimate.kept = own + std::max(own, 2 * half_cell) + about_estimate + estimate.keyframes;
   return estimate;
 }
 

@@ -1,9 +1,39 @@
 #include "sysid/replay/half_cell.h"
 
+#include <set>
+
+#include "data/halved_tets.h"
 #include "data/procedural_mesh.h"
+#include "data/tet_faces.h"
 #include "data/text.h"
 
 namespace flash::sysid {
+namespace {
+
+/// The recording of a solid whose tetrahedra came from a file, each split in eight. What was selected by
+/// vertices takes the edges between them too.
+data::Recording with_halved_tets(const data::Recording& recording) {
+  data::Recording finer = recording;
+  const data::HalvedTets halves = data::halved({recording.mesh.vertices, recording.tetrahedra});
+  finer.tetrahedra = halves.mesh.tetrahedra;
+  finer.mesh = {halves.mesh.vertices, data::outer_faces(finer.tetrahedra)};
+  const auto add_middles = [&](data::Selection& select) {
+    const std::set<int> chosen(select.vertices.begin(), select.vertices.end());
+    const auto count = static_cast<int>(recording.mesh.vertices.rows());
+    for (std::size_t k = 0; k < halves.edges.size(); ++k)
+      if (chosen.contains(halves.edges[k][0]) && chosen.contains(halves.edges[k][1]))
+        select.vertices.push_back(count + static_cast<int>(k));
+  };
+  for (data::RecordedGrasp& grasp : finer.grasps) add_middles(grasp.select);
+  for (data::RecordedSupport& support : finer.supports) add_middles(support.select);
+  for (data::RecordedLoad& load : finer.loads) add_middles(load.select);
+  finer.start = (finer.mesh.vertices * finer.base_from_object.linear().transpose()).rowwise() +
+                finer.base_from_object.translation().transpose();
+  return finer;
+}
+
+}  // namespace
+
 std::string scaled_cell(const std::string& specification, double factor) {
   if (!data::is_made_on_the_spot(specification)) return "";
   const std::vector<std::string_view> words = data::split(specification, ":");
@@ -17,9 +47,13 @@ std::string scaled_cell(const std::string& specification, double factor) {
 
 std::optional<Replay> on_half_the_cell(const Replay& replay) {
   ReplaySettings settings = replay.settings;
+  if (!replay.recording.start_mesh.empty()) return std::nullopt;
   settings.mesh = scaled_cell(replay.recording.mesh_spec, 0.5);
-  if (settings.mesh.empty() || !replay.recording.start_mesh.empty()) return std::nullopt;
-  return make_replay(replay, settings);
+  if (!settings.mesh.empty()) return make_replay(replay, settings);
+  if (!replay.recording.is_solid()) return std::nullopt;
+  Replay finer = replay;
+  finer.recording = with_halved_tets(replay.recording);
+  return make_replay(finer, settings);
 }
 
 }  // namespace flash::sysid

@@ -10,8 +10,9 @@ namespace flash::sysid {
 /// anything else.
 std::string scaled_cell(const std::string& specification, double factor);
 
-/// The same recording on cells of half the size, keyframes weighing as they do; empty where the sheet is not
-/// given by a specification or lies in a shape of its own.
+/// The same recording on cells of half the size, keyframes weighing as they do: meshed anew by its
+/// specification, or the tetrahedra of a file split. Empty for a sheet from a file, and in a shape of its
+/// own.
 std::optional<Replay> on_half_the_cell(const Replay& replay);
 
 }  // namespace flash::sysid

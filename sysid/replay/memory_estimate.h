@@ -10,6 +10,7 @@ struct MemoryEstimate {
   double simulation = 0;  ///< solvers, one a thread, and the scored steps of all that are in work at once
   double steps = 0;       ///< the part of `simulation` that grows with the number of steps and keyframes
   double kept = 0;        ///< motions over the grid and about its finer mesh, where rollouts are kept
+  double keyframes = 0;   ///< the part of `kept` that grows with the number of keyframes alone
   double total() const { return program + simulation + kept; }
 };
 

@@ -101,7 +101,11 @@ Json recordings_of(const Summary& summary) {
                     {"noise_m", number(recording.misfit.noise)},
                     {"misfit_m", number(recording.misfit.size)},
                     {"explained_m", number(recording.misfit.explained)},
-                    {"fits", model_fits(recording.misfit)},
+                    {"fits", model_fits(recording)},
+                    {"markers", recording.markers ? Json{{"miss_m", recording.markers->miss},
+                                                         {"motion_m", recording.markers->motion},
+                                                         {"noise_m", recording.markers->noise}}
+                                                  : Json(nullptr)},
                     {"keyframes", recording.misfit.keyframes},
                     {"worth", number(recording.misfit.worth)},
                     {"horizon_s", optional(recording.horizon_s)},

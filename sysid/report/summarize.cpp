@@ -78,11 +78,22 @@ SummaryRecording summarize_recording(const Replay& replay, const RecordingScore&
   return recording;
 }
 
-/// "lift: the model does not fit: ..."; empty where it fits.
+std::string mm(double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; }
+
+/// "it misses the markers by 12.4 mm, ...".
+std::string miss_of(const MarkerFit& markers) {
+  return "it misses the markers by " + mm(markers.miss) + ", of the " + mm(markers.motion) +
+         " that they move, where noise of " + mm(markers.noise) +
+         " along an axis (--sigma markers) explains " + mm(markers.most_noise());
+}
+
+/// "lift: the model does not fit: ..."; empty where it fits, and where the answer cannot be used.
 std::string warning_of_misfit(const SummaryRecording& recording, const std::string& object) {
   const Misfit& misfit = recording.misfit;
-  if (model_fits(misfit)) return "";
-  const auto mm = [](double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; };
+  if (model_fits(recording) || (recording.markers && recording.markers->explains_nothing())) return "";
+  if (recording.markers && !recording.markers->follows())
+    return recording.name + ": the model does not fit: " + miss_of(*recording.markers) +
+           ". The intervals allow for it, but are those of a model that does not fit";
   std::string worth;
   if (misfit.worth < misfit.keyframes)
     worth = "; " + std::to_string(misfit.keyframes) + " keyframes are worth " +
@@ -148,6 +159,11 @@ std::string reason_unusable(const Summary& summary, const CandidateResult& best)
   if (best.status != CandidateStatus::ok)
     return "the estimate did not converge (residual " + data::format_short(best.residual_max) +
            "): raise --iterations or lower --time-step";
+  for (const SummaryRecording& recording : summary.recordings)
+    if (recording.markers && recording.markers->explains_nothing())
+      return recording.name +
+             ": the model explains less than half of what was seen: " + miss_of(*recording.markers) +
+             ". Are gravity, mesh, start and the markers' frame right?";
   const auto is_searched_material = [](const ParameterFinding& finding) { return is_material(finding.name); };
   const auto is_known = [&](const ParameterFinding& finding) {
     return is_searched_material(finding) && finding.identifiable != Identifiable::no;
@@ -202,6 +218,14 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
       : robust.kind == RobustKind::huber ? "Huber, " + data::format_short(1000 * robust.huber_delta) + " mm"
                                          : "mean";
   texts["observed"] = observed_terms(replays, settings.score.objective);
+}
+
+std::optional<MarkerFit> markers_of(const Fit& fit, std::size_t r, double noise) {
+  if (r >= fit.replays.size() || r >= fit.motions.size()) return {};
+  const Replay& replay = fit.replays[r];
+  const RecordingScore& score = fit.score.recordings[r];
+  return marker_fit_of(replay, fit.motions[r].motion,
+                       {score.offset, score.yaw, score.time_offset, replay.pivot, replay.up}, noise);
 }
 
 /// Every so many draws, of the parameters that were searched.
@@ -260,6 +284,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     const Misfit misfit = r < answer.misfits.size() ? answer.misfits[r] : Misfit{};
     summary.recordings.push_back(
         summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
+    summary.recordings.back().markers = markers_of(answer.fit, r, settings.score.objective.marker_sigma);
     if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
   }
   const std::string object = settings.base.solid ? "object" : "cloth";

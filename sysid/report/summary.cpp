@@ -64,9 +64,14 @@ Json to_json(const SummaryRecording& recording) {
   json["misfit_reach_s"] = number(recording.misfit.reach_time);
   json["misfit_reach_m"] = number(recording.misfit.reach_sheet);
   json["misfit_gain"] = number(recording.misfit.gain);
-  json["model_fits"] = model_fits(recording.misfit);
+  json["model_fits"] = model_fits(recording);
   json["keyframes"] = recording.misfit.keyframes;
   json["keyframes_worth"] = number(recording.misfit.worth);
+  json["markers"] = recording.markers ? Json{{"sightings", recording.markers->sightings},
+                                             {"miss_m", recording.markers->miss},
+                                             {"motion_m", recording.markers->motion},
+                                             {"noise_m", recording.markers->noise}}
+                                      : Json(nullptr);
   json["horizon_s"] = optional(recording.horizon_s);
   json["frames"] = Json::array();
   for (const SummaryFrame& frame : recording.frames)
@@ -141,7 +146,7 @@ ParameterFinding read_finding(const std::string& name, const data::JsonObject& j
 SummaryRecording read_recording(const data::JsonObject& json) {
   json.expect_fields({"name", "sha256", "offset", "yaw", "time_offset", "nuisance", "score", "noise_m",
                       "misfit_m", "misfit_explained_m", "misfit_reach_s", "misfit_reach_m", "misfit_gain",
-                      "model_fits", "keyframes", "keyframes_worth", "horizon_s", "frames"});
+                      "model_fits", "keyframes", "keyframes_worth", "markers", "horizon_s", "frames"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -157,7 +162,13 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   misfit.reach_time = score_of(json, "misfit_reach_s");
   misfit.reach_sheet = score_of(json, "misfit_reach_m");
   misfit.gain = score_of(json, "misfit_gain");
-  misfit.found = !json.boolean("model_fits", true);
+  if (json.has("markers")) {
+    const data::JsonObject markers = json.object("markers");
+    markers.expect_fields({"sightings", "miss_m", "motion_m", "noise_m"});
+    recording.markers = {markers.integer("sightings"), score_of(markers, "miss_m"),
+                         score_of(markers, "motion_m"), score_of(markers, "noise_m")};
+  }
+  misfit.found = !json.boolean("model_fits", true) && (!recording.markers || recording.markers->follows());
   misfit.keyframes = json.integer("keyframes");
   misfit.worth = score_of(json, "keyframes_worth");
   recording.horizon_s = json.optional_number("horizon_s");
@@ -322,9 +333,11 @@ double duration_of(const SummaryRecording& recording) {
   return std::max(0.0, last - first);
 }
 
-bool model_fits(const Misfit& misfit) {
+bool model_fits(const SummaryRecording& recording) {
   constexpr double kTold = 1e-5;  // [m]
-  return !misfit.found || misfit.size < misfit.explained + kTold;
+  const Misfit& misfit = recording.misfit;
+  return (!misfit.found || misfit.size < misfit.explained + kTold) &&
+         (!recording.markers || recording.markers->follows());
 }
 
 std::string summary_text(const Summary& summary) {

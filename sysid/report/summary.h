@@ -8,6 +8,7 @@
 
 #include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
+#include "sysid/infer/marker_fit.h"
 #include "sysid/infer/solver_check.h"
 
 namespace flash::sysid {
@@ -34,6 +35,7 @@ struct SummaryRecording {
   std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
   double score = 0;                                  ///< [m]
   Misfit misfit;                                     ///< error of the model itself
+  std::optional<MarkerFit> markers;                  ///< of what was tracked
   std::optional<double> horizon_s;                   ///< predictable until here [s]
   std::vector<SummaryFrame> frames;
 };
@@ -54,8 +56,9 @@ struct NextExperiment {
                                                         ///< with it: of its logarithm or in its unit
 };
 
-/// Whether no misfit was found, or repeatability explains it, to 0.01 mm.
-bool model_fits(const Misfit& misfit);
+/// Whether no misfit was found, or repeatability explains it, to 0.01 mm; and whether noise explains what is
+/// missed of markers.
+bool model_fits(const SummaryRecording& recording);
 
 /// All that a search found: the file summary.json (schema "flash-sysid-summary/2").
 struct Summary {

@@ -49,6 +49,12 @@ TEST(JsonReader, SyntaxErrorsNameLineAndColumn) {
   EXPECT_NE(input_error_of([] { parse_json("", "f.json"); }), "");
 }
 
+TEST(JsonReader, ByteOrderMarksAreReadOrNamed) {
+  EXPECT_EQ(parse_json("\xef\xbb\xbf{\"a\": 1}", "a.json")["a"], 1);
+  EXPECT_EQ(input_error_of([] { parse_json(std::string("\xff\xfe{\0", 4), "a.json"); }),
+            "a.json: found text in UTF-16, expected UTF-8: save it so");
+}
+
 TEST(JsonReader, DeepNestingIsRefusedBeforeTheStackEnds) {
   const auto nested = [](std::size_t levels) {
     return R"({"text": "[[[[\"[", "list":)" + std::string(levels, '[') + std::string(levels, ']') + '}';

@@ -45,6 +45,19 @@ class TrackedSolid : public testing::Test {
   std::string tracks_;
 };
 
+TEST_F(TrackedSolid, RefusesAMarkerFarFromTheObject) {
+  tracks_ = "t,marker,x,y,z\n5,tip,1.1,0.01,10.03\n5,base,1,0,0\n5.5,tip,1.1,0.01,0.02\n";
+  EXPECT_EQ(message(),
+            "markers: marker \"tip\" is 10.01 m from the object at its start, which is 0.1039 m across, "
+            "expected at "
+            "most half of that: are its tracks in metres and in the base frame, and is object.start right?");
+  // A stalk of half the diagonal, 52 mm, is the longest.
+  tracks_ = "t,marker,x,y,z\n5,tip,1.1,0.01,0.071\n5,base,1,0,0\n5.5,tip,1.1,0.01,0.02\n";
+  EXPECT_EQ(message(), "");
+  tracks_ = "t,marker,x,y,z\n5,tip,1.1,0.01,0.073\n5,base,1,0,0\n5.5,tip,1.1,0.01,0.02\n";
+  EXPECT_NE(message(), "");
+}
+
 TEST_F(TrackedSolid, LoadsTetrahedraSupportsLoadsAndTracks) {
   const Recording recording = load();
   EXPECT_TRUE(recording.is_solid());
@@ -112,6 +125,20 @@ TEST_F(TrackedSolid, MarkerSeenLateNeedsItsPlace) {
   folder_.write("placed.csv", "marker,x,y,z\ntip,0.1,0.01,0.02\n");
   json_["markers"]["placed"] = "placed.csv";
   EXPECT_EQ(*load().markers.at[1], Vector3d(0.1, 0.01, 0.02));
+}
+
+TEST_F(TrackedSolid, SaysThatALoadHangsOnWhatIsHeld) {
+  EXPECT_TRUE(load().notices.empty());
+  json_["loads"][0]["select"] = json::parse(R"({"vertices": [0, 6, 23]})");
+  ASSERT_EQ(load().notices.size(), 1u);
+  EXPECT_NE(load().notices[0].find("loads[0]: 2 of its 3 vertices are held by supports"), std::string::npos);
+}
+
+TEST_F(TrackedSolid, ReadsTablesThatASpreadsheetMarked) {
+  tracks_ = "\xef\xbb\xbf" + tracks_;
+  EXPECT_EQ(load().keyframes.size(), 2u);
+  tracks_ += "5.4,tip,1,0,0\n";
+  EXPECT_NE(message().find("tracks.csv: line 5: "), std::string::npos);
 }
 
 TEST_F(TrackedSolid, BadTablesAreNamedByLine) {

@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <random>
 
 #include "data/procedural_mesh.h"
+#include "sim/scene/solid.h"
+#include "tests/sim/lot.h"
 #include "tests/sim/obstacle_depth.h"
 #include "tests/sim/sheet_scene.h"
 
@@ -14,28 +15,6 @@ namespace {
 
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
-
-/// Draws that do not depend on the standard library's distributions. A call draws for one argument only, or
-/// for several in braces: compilers differ in the order of the others.
-class Lot {
- public:
-  explicit Lot(unsigned long seed) : generator_(seed) {}
-  double uniform(double low, double high) {
-    return low + (high - low) * static_cast<double>(generator_() >> 11) * 0x1p-53;
-  }
-  double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
-  int below(int count) { return static_cast<int>(generator_() % static_cast<unsigned long>(count)); }
-  bool chance(double share) { return uniform(0, 1) < share; }
-  Vector3d direction() {
-    Vector3d v;
-    do v = {uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)};
-    while (v.norm() > 1 || v.norm() < 0.1);
-    return v.normalized();
-  }
-
- private:
-  std::mt19937_64 generator_;
-};
 
 std::string draw_mesh(Lot& lot, double& side) {
   static constexpr const char* patterns[] = {"one_way", "alternating", "alternating_by_row", "jittered"};
@@ -66,6 +45,32 @@ data::SheetMaterial draw_material(Lot& lot) {
   if (lot.chance(0.2)) material.air_drag = lot.uniform(0, 5);
   if (lot.chance(0.1)) material.stiffness_damping = lot.log_uniform(1e-4, 1e-2);
   return material;
+}
+
+/// A block of tetrahedra, linear or quadratic, in place of a sheet.
+void draw_solid(Lot& lot, double& side, RandomScene& scene) {
+  using data::Constitutive;
+  static constexpr Constitutive laws[] = {Constitutive::tet_arap, Constitutive::tet_corotated,
+                                          Constitutive::tet_neohookean};
+  side = lot.uniform(0.05, 0.2);
+  const double width = side * lot.uniform(0.3, 1), height = side * lot.uniform(0.2, 1);
+  const double cell = std::cbrt(side * width * height / lot.uniform(2, 30));
+  const auto cells = [&](double length) { return std::max(1, static_cast<int>(std::lround(length / cell))); };
+  const bool quadratic = lot.chance(0.3);
+  scene.sheet = make_solid(data::tet_box({side, width, height}, {cells(side), cells(width), cells(height)}),
+                           {}, quadratic ? data::ElementOrder::quadratic : data::ElementOrder::linear);
+  char text[100];
+  std::snprintf(text, sizeof text, "box:%.4fx%.4fx%.4f:%.5f%s", side, width, height, cell,
+                quadratic ? ", quadratic" : "");
+  scene.mesh = text;
+  data::SolidMaterial& material = scene.environment.solids[0];
+  material.constitutive = laws[lot.below(3)];
+  material.youngs_modulus = lot.log_uniform(1e3, 1e8);
+  material.poissons_ratio = lot.uniform(0, 0.49);
+  material.density = lot.log_uniform(50, 3000);
+  material.friction = lot.chance(0.2) ? 0 : lot.uniform(0, 1.2);
+  if (lot.chance(0.2)) material.air_drag = lot.uniform(0, 5);
+  if (lot.chance(0.1)) material.stiffness_damping = lot.log_uniform(1e-4, 1e-2);
 }
 
 /// A path in straight stretches, each at a speed of its own.
@@ -292,11 +297,18 @@ bool goes_through(const Environment& environment, const Obstacle& obstacle, cons
   return false;
 }
 
+/// Of each vertex of a sheet, or of a solid [kg].
+Eigen::VectorXd masses(const RandomScene& scene) {
+  const auto solid = scene.environment.solids.find(0);
+  if (solid != scene.environment.solids.end()) return solid->second.density * scene.sheet.vertex_volume;
+  return scene.environment.materials[0].areal_density * scene.sheet.vertex_area;
+}
+
 double moved_energy(const Environment& environment, const StepReport& report) {
   double loads = 0;
   for (const Load& load : environment.loads)
     loads -= load.force.dot(environment.state.positions.row(load.vertex));
-  return report.kinetic + report.membrane + report.bending + report.gravitational + loads;
+  return report.kinetic + report.membrane + report.bending + report.solid + report.gravitational + loads;
 }
 
 }  // namespace
@@ -321,6 +333,21 @@ RandomScene random_scene(unsigned long seed, double round_share) {
   draw_scene(lot, side, scene);
   constexpr double below_sheets = 0.08;  // [m]
   round_off(seed, round_share, below_sheets, scene);
+  return scene;
+}
+
+RandomScene random_solid_scene(unsigned long seed, double round_share) {
+  Lot lot(seed);
+  RandomScene scene;
+  scene.kind = static_cast<SceneKind>(lot.below(static_cast<int>(SceneKind::last) + 1));
+  double side = 0;
+  draw_solid(lot, side, scene);
+  scene.settings.time_step = lot.log_uniform(0.001, 0.03);
+  scene.environment.state.positions = scene.sheet.rest.vertices;
+  scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
+  draw_scene(lot, side, scene);
+  constexpr double below_solids = 0.08;  // [m]
+  round_off(seed, round_share, below_solids, scene);
   return scene;
 }
 
@@ -373,13 +400,13 @@ SceneFindings observe(RandomScene scene) {
       inside[k][i] =
           depth_in(environment, environment.obstacles[k], environment.state.positions.row(i), 0) > 1e-9;
 
+  const Eigen::VectorXd mass = masses(scene);
   double energy = 0, put_in = 0;
   bool energy_known = false;
   for (int step = 0; step < scene.steps; ++step) {
     const State before = environment.state;
     if (!energy_known) {
       // The elastic energy of the start is that of the rest shape.
-      const Eigen::VectorXd mass = environment.materials[0].areal_density * scene.sheet.vertex_area;
       energy = 0.5 * (mass.asDiagonal() * before.velocities).cwiseProduct(before.velocities).sum();
       for (int i = 0; i < mass.size(); ++i)
         energy -= mass[i] * environment.gravity.dot(before.positions.row(i));
@@ -436,7 +463,6 @@ SceneFindings observe(RandomScene scene) {
     put_in += std::max(work, 0.0);
     const double falls = std::max(0.0, [&] {
       double drop = 0;
-      const Eigen::VectorXd mass = environment.materials[0].areal_density * scene.sheet.vertex_area;
       for (int i = 0; i < mass.size(); ++i)
         drop += mass[i] * environment.gravity.dot(after.positions.row(i) - before.positions.row(i));
       return drop;
@@ -444,7 +470,7 @@ SceneFindings observe(RandomScene scene) {
     put_in += falls;
     if (report.converged && scene.kind != SceneKind::deep) {
       // What the weight does over a nanometre is rounding.
-      const double weight = environment.materials[0].areal_density * scene.sheet.vertex_area.sum() * 9.81;
+      const double weight = mass.sum() * 9.81;
       found.energy_gain = std::max(found.energy_gain, gain);
       found.energy_gain_share = std::max(found.energy_gain_share, gain / std::max(put_in, 1e-9 * weight));
     }

@@ -24,6 +24,9 @@ struct RandomScene {
 /// capsules or spheres instead.
 RandomScene random_scene(unsigned long seed, double round_share = 0);
 
+/// The same of a block of tetrahedra, of one of three laws, from foam to hard rubber.
+RandomScene random_solid_scene(unsigned long seed, double round_share = 0);
+
 /// What an observer finds who knows positions, velocities, forces and obstacles alone.
 struct SceneFindings {
   int steps = 0, unconverged = 0, halved = 0;

@@ -8,17 +8,39 @@
 #include "data/parallel.h"
 #include "tests/sim/random_scenes.h"
 
+namespace {
+
+std::string material_of(const flash::sim::RandomScene& scene) {
+  char text[200];
+  const auto solid = scene.environment.solids.find(0);
+  if (solid != scene.environment.solids.end()) {
+    std::snprintf(text, sizeof text, "%s, E %.3g Pa, nu %.3f, friction %.2f, law %d", scene.mesh.c_str(),
+                  solid->second.youngs_modulus, solid->second.poissons_ratio, solid->second.friction,
+                  static_cast<int>(solid->second.constitutive));
+    return text;
+  }
+  const auto& material = scene.environment.materials[0];
+  std::snprintf(text, sizeof text,
+                "E t %.3g N/m, D %.3g N m, friction %.2f, membrane law %d, bending model %d",
+                material.membrane_stiffness, material.bending_rigidity, material.friction,
+                static_cast<int>(material.constitutive), static_cast<int>(material.bending_model));
+  return text;
+}
+
+}  // namespace
+
 // What an observer finds in many random scenes, by kind and in all. Arguments: first seed, number of scenes,
-// then --list to name those with something to say, --deep for sheets that start across obstacles, --round and
-// the share of boxes and cylinders that are capsules and spheres instead.
+// then --list to name those with something to say, --deep for sheets that start across obstacles, --solid for
+// blocks of tetrahedra, --round and the share of boxes and cylinders that are capsules and spheres instead.
 int main(int argc, char** argv) {
   using namespace flash;
   const unsigned long first = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const std::size_t count = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1000;
-  bool list = false, deep = false;
+  bool list = false, deep = false, solid = false;
   double round_share = 0;
   for (int k = 3; k < argc; ++k) {
     list = list || std::string(argv[k]) == "--list";
+    solid = solid || std::string(argv[k]) == "--solid";
     deep = deep || std::string(argv[k]) == "--deep";
     if (std::string(argv[k]) == "--round" && k + 1 < argc) round_share = std::strtod(argv[k + 1], nullptr);
   }
@@ -26,8 +48,9 @@ int main(int argc, char** argv) {
   std::vector<sim::RandomScene> scenes(count);
   std::vector<sim::SceneFindings> findings(count);
   data::for_each_in_parallel(count, 0, [&](std::size_t k) {
-    scenes[k] =
-        deep ? sim::random_deep_start(first + k, round_share) : sim::random_scene(first + k, round_share);
+    scenes[k] = deep    ? sim::random_deep_start(first + k, round_share)
+                : solid ? sim::random_solid_scene(first + k, round_share)
+                        : sim::random_scene(first + k, round_share);
     findings[k] = sim::observe(scenes[k]);
   });
 
@@ -40,19 +63,14 @@ int main(int argc, char** argv) {
   std::map<std::string, Sum> sums;
   for (std::size_t k = 0; k < count; ++k) {
     const sim::SceneFindings& found = findings[k];
-    const auto& material = scenes[k].environment.materials[0];
     const bool gains = found.energy_gain_share > 1e-2, unseen = found.unseen_depth > 1e-4;
     if (list && (found.unconverged > 0 || !found.finite || gains || found.crossed > 0 || unseen || deep))
       std::printf(
-          "%lu %s: h %.4f s, E t %.3g N/m, D %.3g N m, friction %.2f, membrane law %d, bending model %d: "
-          "%d steps not converged (residual %.2g), energy gain %.2g, %d crossed, unseen %.2g m, %d inside, "
-          "shot "
-          "%.1f m/s%s\n",
-          first + k, to_string(scenes[k].kind), scenes[k].settings.time_step, material.membrane_stiffness,
-          material.bending_rigidity, material.friction, static_cast<int>(material.constitutive),
-          static_cast<int>(material.bending_model), found.unconverged, found.residual_max,
-          found.energy_gain_share, found.crossed, found.unseen_depth, found.inside, found.shot_speed,
-          found.finite ? "" : ", not finite");
+          "%lu %s: h %.4f s, %s: %d steps not converged (residual %.2g), energy gain %.2g, %d crossed, "
+          "unseen %.2g m, %d inside, shot %.1f m/s%s\n",
+          first + k, to_string(scenes[k].kind), scenes[k].settings.time_step, material_of(scenes[k]).c_str(),
+          found.unconverged, found.residual_max, found.energy_gain_share, found.crossed, found.unseen_depth,
+          found.inside, found.shot_speed, found.finite ? "" : ", not finite");
     for (const std::string& key : {std::string(to_string(scenes[k].kind)), std::string("~ all")}) {
       Sum& sum = sums[key];
       ++sum.scenes;

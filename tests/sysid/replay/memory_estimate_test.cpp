@@ -21,6 +21,10 @@ TEST(MemoryEstimate, WhatCannotFitOrEndIsRefusedWithTheRightAdvice) {
   replays.front().steps = 1'000'000;
   EXPECT_NE(advice(1, 1e8).find("a longer --time-step"), std::string::npos);
   EXPECT_EQ(advice(1, 0), "");
+  MemoryEstimate tracked;
+  tracked.kept = tracked.keyframes = 1e9;
+  EXPECT_NE(data::input_error_of([&] { check_job(replays, 1, tracked, 1e8); }).find("use fewer keyframes: "),
+            std::string::npos);
 }
 
 }  // namespace

@@ -1,0 +1,61 @@
+#include "sysid/replay/half_cell.h"
+
+#include <gtest/gtest.h>
+
+#include "data/procedural_mesh.h"
+#include "sysid/observe/score.h"
+#include "tests/sysid/tracked_beam.h"
+
+namespace flash::sysid {
+namespace {
+
+std::string vtk_text(const data::TetMesh& mesh) {
+  std::string text = "# vtk DataFile Version 3.0\nbeam\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS " +
+                     std::to_string(mesh.vertices.rows()) + " double\n";
+  for (const auto row : mesh.vertices.rowwise())
+    text += std::to_string(row[0]) + " " + std::to_string(row[1]) + " " + std::to_string(row[2]) + "\n";
+  const std::string count = std::to_string(mesh.tetrahedra.rows());
+  text += "CELLS " + count + " " + std::to_string(5 * mesh.tetrahedra.rows()) + "\n";
+  for (const auto row : mesh.tetrahedra.rowwise()) {
+    text += "4";
+    for (const int vertex : row) text += " " + std::to_string(vertex);
+    text += "\n";
+  }
+  text += "CELL_TYPES " + count + "\n";
+  for (Eigen::Index t = 0; t < mesh.tetrahedra.rows(); ++t) text += "10\n";
+  return text;
+}
+
+TEST(HalfCell, SplitsTheTetrahedraOfAFile) {
+  const data::TemporaryFolder folder;
+  ReplaySettings settings;
+  settings.solver.time_step = 1;
+  settings.element_order = data::ElementOrder::quadratic;
+  data::Recording recording = tracked_beam(folder, {0, 4, 4.5}, 0, 1, settings, beam_material());
+  const data::TetMesh coarse = data::tet_box({0.1, 0.03, 0.03}, {4, 1, 1});
+  settings.mesh = folder.write("beam.vtk", vtk_text(coarse));
+  // By vertices, the wall of four becomes one of nine.
+  data::Selection wall;
+  wall.vertices = data::select_vertices(recording, recording.supports[0].select, "supports");
+  recording.supports[0].select = wall;
+  const Replay replay = make_replay(recording, settings);
+  ASSERT_EQ(replay.recording.supports[0].select.vertices.size(), 4u);
+  const std::optional<Replay> finer = on_half_the_cell(replay);
+  ASSERT_TRUE(finer);
+  EXPECT_EQ(finer->recording.tetrahedra.rows(), 8 * coarse.tetrahedra.rows());
+  EXPECT_EQ(finer->recording.supports[0].select.vertices.size(), 9u);
+  EXPECT_NEAR(finer->sheet().vertex_volume.sum(), replay.sheet().vertex_volume.sum(), 1e-15);
+
+  // Its sag is nearer to that of the beam that was tracked, of cells of half the size.
+  const auto miss = [&](const Replay& of) {
+    Motion motion;
+    run(of, {{{}, {}, beam_material()}}, scored_steps(of),
+        [&](std::size_t, ReplayResult result) { motion = std::move(result.motion); });
+    return keyframe_scores(of.surface.triangles, motion, of.observations, {}, {})[2];
+  };
+  EXPECT_LT(miss(*finer), 0.4 * miss(replay));
+  EXPECT_TRUE(on_half_the_cell(*finer));
+}
+
+}  // namespace
+}  // namespace flash::sysid
