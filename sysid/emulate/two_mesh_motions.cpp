@@ -1,7 +1,6 @@
 #include "sysid/emulate/two_mesh_motions.h"
 
 #include "data/parallel.h"
-#include "sysid/replay/half_cell.h"
 #include "sysid/replay/surface_distance.h"
 
 namespace flash::sysid {
@@ -144,21 +143,19 @@ std::optional<MotionInterpolant> motion_interpolant(const Replay& replay, const 
   return MotionInterpolant(grid.axes, *motions);
 }
 
-std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const MotionInterpolant& motions,
-                                              const std::vector<Axis>& axes, const GridSettings& grid,
-                                              const MotionStore& store, const std::function<void()>& told) {
-  std::optional<Replay> fine = on_half_the_cell(replay);
-  if (!fine) return std::nullopt;
-  auto differences = motions_over(*fine, axes, grid, store, told);
+std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Replay& fine,
+                                              const MotionInterpolant& motions, const std::vector<Axis>& axes,
+                                              const GridSettings& grid, const MotionStore& store,
+                                              const std::function<void()>& told) {
+  auto differences = motions_over(fine, axes, grid, store, told);
   if (!differences) return std::nullopt;
   const auto matrix =
-      std::make_shared<const Eigen::SparseMatrix<double>>(prolongation(replay.surface, fine->surface));
+      std::make_shared<const Eigen::SparseMatrix<double>>(prolongation(replay.surface, fine.surface));
   const std::vector<std::vector<double>> points = cartesian_product(axes);
   data::for_each_in_parallel(points.size(), replay.settings.threads, [&](std::size_t i) {
     add((*differences)[i], -1, prolonged(motions.at(points[i]), *matrix));
   });
-  return ModelledReplay{std::move(*fine),
-                        TwoMeshMotions(motions, MotionInterpolant(axes, *differences), matrix)};
+  return ModelledReplay{fine, TwoMeshMotions(motions, MotionInterpolant(axes, *differences), matrix)};
 }
 
 }  // namespace flash::sysid

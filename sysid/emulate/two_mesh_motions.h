@@ -72,11 +72,11 @@ std::optional<MotionInterpolant> motion_interpolant(const Replay& replay, const 
                                                     const MotionStore& store,
                                                     const std::function<void()>& told = {});
 
-/// `motions` with what they lack of a mesh of half the cell, which is simulated at the points of `axes`.
-/// Empty where one diverged, or where the sheet cannot be meshed anew.
-std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const MotionInterpolant& motions,
-                                              const std::vector<Axis>& axes, const GridSettings& grid,
-                                              const MotionStore& store,
+/// `motions` with what they lack of a finer mesh, that of `fine`, which is simulated at the points of `axes`.
+/// Empty where one diverged.
+std::optional<ModelledReplay> with_finer_mesh(const Replay& replay, const Replay& fine,
+                                              const MotionInterpolant& motions, const std::vector<Axis>& axes,
+                                              const GridSettings& grid, const MotionStore& store,
                                               const std::function<void()>& told = {});
 
 }  // namespace flash::sysid

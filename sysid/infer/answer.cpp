@@ -9,6 +9,7 @@
 #include "sysid/infer/held.h"
 #include "sysid/infer/verdict.h"
 #include "sysid/observe/horizon.h"
+#include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 namespace {
@@ -67,6 +68,10 @@ Extent cells_around(const std::vector<double>& candidate, const std::vector<Axis
   return extent;
 }
 
+std::vector<Replay> finer_replays(const std::vector<Replay>& replays, const AnswerSettings& settings) {
+  return settings.solver_check ? on_half_the_cell(replays) : std::vector<Replay>();
+}
+
 /// The motions at every point of `axes`; with `finer` axes (none: empty) those of a finer mesh at theirs.
 /// Empty where one diverged or there is no finer mesh.
 std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
@@ -75,12 +80,15 @@ std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>&
   GridSettings grid = task.grid;
   grid.axes = axes;
   const std::function<void()> motion = [&] { task.tell_motion(); };
-  for (const Replay& replay : task.replays) {
+  if (!finer.empty() && task.finer.empty()) return std::nullopt;
+  for (std::size_t r = 0; r < task.replays.size(); ++r) {
+    const Replay& replay = task.replays[r];
     const auto motions =
         motion_interpolant(replay, grid, task.store, told_own ? motion : std::function<void()>());
     if (!motions) return std::nullopt;
-    auto model = finer.empty() ? ModelledReplay{replay, TwoMeshMotions(*motions)}
-                               : with_finer_mesh(replay, *motions, finer, grid, task.store, motion);
+    auto model = finer.empty()
+                     ? ModelledReplay{replay, TwoMeshMotions(*motions)}
+                     : with_finer_mesh(replay, task.finer[r], *motions, finer, grid, task.store, motion);
     if (!model) return std::nullopt;
     emulator.models.push_back(std::move(*model));
   }
@@ -298,7 +306,8 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
                                const std::vector<double>& start, const Extent& around,
                                const AnswerSettings& settings, const TellWork& told) {
   const MotionStore store(grid.rollouts);
-  const Task task{replays, grid, grid.axes, settings, store, told};
+  const std::vector<Replay> finer = finer_replays(replays, settings);
+  const Task task{replays, finer, grid, grid.axes, settings, store, told};
   Extent extent = around;
   std::vector<double> at = start;
   std::vector<KnownError> held;
@@ -350,7 +359,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         "some candidates diverged: the answer leaves out the values of a parameter at which they did");
   const std::vector<Axis> ranges =
       settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
-  const Task task{replays, usable, ranges, settings, store, told};
+  const std::vector<Replay> finer = finer_replays(replays, settings);
+  const Task task{replays, finer, usable, ranges, settings, store, told};
   std::optional<Emulator> emulator;
   if (settings.solver_check) emulator = emulator_over(task, usable.axes, thinned(usable.axes), false);
   if (!emulator) emulator = emulator_over(task, usable.axes, {}, false);

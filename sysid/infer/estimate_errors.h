@@ -21,8 +21,9 @@ inline constexpr int motions_at_estimate = 4 + emulator_draws;
 /// What all steps of an answer need.
 struct Task {
   const std::vector<Replay>& replays;
-  const GridSettings& grid;         ///< axes: of which every candidate has a motion
-  const std::vector<Axis>& ranges;  ///< in which the answer is sought, with the cells of the search
+  const std::vector<Replay>& finer;  ///< on half the cell; empty where there are none, or none are asked for
+  const GridSettings& grid;          ///< axes: of which every candidate has a motion
+  const std::vector<Axis>& ranges;   ///< in which the answer is sought, with the cells of the search
   const AnswerSettings& settings;
   const MotionStore& store;
   const TellWork& told;

@@ -1,6 +1,7 @@
 #include "sysid/replay/half_cell.h"
 
 #include <set>
+#include <utility>
 
 #include "data/halved_tets.h"
 #include "data/procedural_mesh.h"
@@ -54,6 +55,16 @@ std::optional<Replay> on_half_the_cell(const Replay& replay) {
   Replay finer = replay;
   finer.recording = with_halved_tets(replay.recording);
   return make_replay(finer, settings);
+}
+
+std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays) {
+  std::vector<Replay> halves;
+  for (const Replay& replay : replays) {
+    std::optional<Replay> half = on_half_the_cell(replay);
+    if (!half) return {};
+    halves.push_back(std::move(*half));
+  }
+  return halves;
 }
 
 }  // namespace flash::sysid

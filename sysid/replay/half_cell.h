@@ -1,6 +1,7 @@
 #pragma once
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sysid/replay/replay.h"
 
@@ -14,5 +15,8 @@ std::string scaled_cell(const std::string& specification, double factor);
 /// specification, or the tetrahedra of a file split. Empty for a sheet from a file, and in a shape of its
 /// own.
 std::optional<Replay> on_half_the_cell(const Replay& replay);
+
+/// Of all of them; empty where one has none.
+std::vector<Replay> on_half_the_cell(const std::vector<Replay>& replays);
 
 }  // namespace flash::sysid

@@ -6,6 +6,7 @@
 
 #include "sysid/emulate/sensitivity.h"
 #include "sysid/emulate/two_mesh_motions.h"
+#include "sysid/replay/half_cell.h"
 #include "tests/sysid/short_lift.h"
 
 namespace flash::sysid {
@@ -49,7 +50,8 @@ struct Lift {
 TEST(TwoMeshMotions, IsTheFinerSimulationWhereThatWasMade) {
   const Lift lift;
   const MotionStore store(lift.grid.rollouts);
-  const auto model = with_finer_mesh(lift.replay, *motion_interpolant(lift.replay, lift.grid, store),
+  const auto model = with_finer_mesh(lift.replay, *on_half_the_cell(lift.replay),
+                                     *motion_interpolant(lift.replay, lift.grid, store),
                                      thinned(lift.grid.axes), lift.grid, store);
   ASSERT_TRUE(model);
   const data::TriangleMesh& fine = model->replay.recording.mesh;
@@ -75,7 +77,8 @@ TEST(TwoMeshMotions, OneFinerSimulationMovesEveryMotionByWhatItHasBeyondTheOwn) 
   const MotionStore store(lift.grid.rollouts);
   const MotionInterpolant own = *motion_interpolant(lift.replay, lift.grid, store);
   const std::vector<Axis> point = {{"bending", {2e-4}, true}};
-  const auto model = with_finer_mesh(lift.replay, own, point, lift.grid, store);
+  const auto model =
+      with_finer_mesh(lift.replay, *on_half_the_cell(lift.replay), own, point, lift.grid, store);
   ASSERT_TRUE(model);
   const auto beyond = [&](double bending) {
     Motion difference = model->model.at({bending}, 1);
