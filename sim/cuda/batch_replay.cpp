@@ -88,6 +88,7 @@ ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& envir
           {environment.gravity.x(), environment.gravity.y(), environment.gravity.z()},
           weight_factor,
           m.areal_density * plan.sheet.vertex_area.norm() * weight_factor,
+          2 * m.bending_rigidity * bending_operator(plan, m).flat_energy,
           motion,
           static_cast<int>(environment.obstacles.size()),
           stand_beside(environment.obstacles)};

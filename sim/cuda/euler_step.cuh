@@ -131,7 +131,7 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
                       sums[falls] - sums[work];
   const double there =
       sums[kinetic_at_start] + stored_at_start + fmax(0.0, sums[falls]) + fmax(0.0, sums[work]);
-  const double rounding = 1e-9 * sums[mass_sum] * material.weight_factor +
+  const double rounding = material.bending_rounding + 1e-9 * sums[mass_sum] * material.weight_factor +
                           1e-14 * material.membrane_stiffness * sums[mass_sum] / material.areal_density;
   const double allowed = energy_tolerance * there + sums[unbalanced] + contact.bristles + rounding;
   const bool finite = isfinite(sums[kinetic]);

@@ -100,10 +100,12 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
   const double gain =
       report.kinetic - kinetic_at_start + stored_at_end - stored_at_start - falls - report.work;
   const double there = kinetic_at_start + stored_at_start + std::max(0.0, falls) + std::max(0.0, report.work);
-  // The allowance covers the rounding of positions and the work of the weight over a nanometre.
+  // The allowance covers the rounding of positions and of bending, at the start and at the end, and the work
+  // of the weight over a nanometre.
   double rounding = 1e-9 * mass.sum() * problem.gravity;
   for (const BodyLaw& law : problem.laws) {
     const double body_mass = rows_of(law.place.body, mass).sum();
+    if (law.solid == nullptr) rounding += 2 * law.material.bending_rigidity * law.bending.flat_energy;
     rounding += law.solid != nullptr
                     ? 1e-14 * law.solid->youngs_modulus * body_mass / law.solid->density
                     : 1e-14 * law.material.membrane_stiffness * body_mass / law.material.areal_density;

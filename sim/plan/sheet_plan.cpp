@@ -59,6 +59,8 @@ std::shared_ptr<const BendingOperator> make_bending_operator(const SheetPlan& pl
       model == data::BendingModel::plate ? plate_bending_stiffness(alone, poissons_ratio, 1e-6, weave)
                                          : isometric;
   bending->largest_entry = stiffness.coeffs().abs().maxCoeff();
+  const data::Points flat = alone.rest.vertices.rowwise() - alone.rest.vertices.row(0);
+  bending->flat_energy = 0.5 * data::Points(stiffness * flat).cwiseProduct(flat).cwiseAbs().sum();
   std::vector<int> as_numbered(body.vertex_count);
   std::iota(as_numbered.begin(), as_numbered.end(), 0);
   bending->stiffness = row_groups(stiffness, as_numbered);

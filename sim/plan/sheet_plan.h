@@ -30,7 +30,8 @@ struct BendingOperator {
   RowGroups stiffness;              ///< from the body's first vertex on; empty for the hinge model
   RowGroups elimination_stiffness;  ///< the same in elimination order of all vertices
   double largest_entry = 0;         ///< of the stiffness, in magnitude [1/m^2]
-  std::vector<double> stand_in;     ///< one number a block of the pattern: a sparser stiffness to factorize
+  double flat_energy = 0;        ///< of the flat sheet, which has none but by rounding: magnitudes added up
+  std::vector<double> stand_in;  ///< one number a block of the pattern: a sparser stiffness to factorize
 };
 
 /// Bending operators made so far for the bodies of a sheet, shared by its environments.

@@ -1,6 +1,7 @@
 // Closed forms of implicit Euler that any solver of it must show.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/batch.h"
@@ -29,6 +30,45 @@ TEST(Dynamics, FreeFallFollowsTheDiscreteLaw) {
         velocity * (steps * h) + RowVector3d(0, 0, -g) * (h * h * steps * (steps + 1) / 2);
     const data::Points expected = sheet.rest.vertices.rowwise() + moved;
     EXPECT_LT((environment.state.positions - expected).cwiseAbs().maxCoeff(), 1e-11);
+  }
+}
+
+// What the bending of a clamped patch is rounded by is more than what the first step of a gentle lift takes.
+TEST(Dynamics, AMicrometreIsAStepOfAFineMeshToo) {
+  Sheet sheet = make_sheet(data::rectangle({.width = 0.2,
+                                            .height = 0.025,
+                                            .cells_x = 128,
+                                            .cells_y = 16,
+                                            .pattern = data::DiagonalPattern::alternating_by_row}));
+  Environment environment = environment_of(sheet);
+  data::SheetMaterial& material = environment.materials[0];
+  material.membrane_stiffness = 16.6;
+  material.bending_rigidity = 7.66e-5;
+  material.friction = 0.19;
+  environment.obstacles.push_back({Plane{}});
+  std::vector<data::Trajectory> gripper(1);
+  for (const double t : {0.0, 0.01}) {
+    gripper[0].times.push_back(t);
+    gripper[0].poses.push_back(Eigen::Isometry3d(Eigen::Translation3d(1.15e-4 * t * Vector3d(-0.5, 0, 1))));
+  }
+  environment.schedule = make_schedule(gripper, 0.0, 0.01, 1);
+  Hold end{.name = "gripper", .frame = 0};
+  for (int i = 0; i < int(sheet.rest.vertices.rows()); ++i)
+    if (sheet.rest.vertices(i, 0) > 0.15) end.vertices.push_back(i);
+  for (RestTriangle& triangle : sheet.triangles)
+    triangle.stiff = std::all_of(triangle.vertices.begin(), triangle.vertices.end(),
+                                 [&](int i) { return sheet.rest.vertices(i, 0) > 0.15; });
+  environment.holds.push_back(end);
+  const auto plan = make_sheet_plan(sheet);
+  for (const double angle : {0.1, 0.3, 0.5, 0.7, 0.9, 1.1}) {
+    const Eigen::Matrix3d turn = Eigen::AngleAxisd(angle, Vector3d::UnitZ()).toRotationMatrix();
+    Environment turned = environment;
+    turned.state.positions = sheet.rest.vertices * turn.transpose();
+    turned.state.positions.rowwise() += RowVector3d(0.4, 0.3, 0);
+    Solver solver(plan, {.time_step = 0.01});
+    const StepReport report = solver.step(turned);
+    EXPECT_TRUE(report.converged);
+    EXPECT_EQ(report.substeps, 1);
   }
 }
 
