@@ -10,9 +10,9 @@
 #include <thread>
 #include <tuple>
 
-#include "sim/cuda/device_arena.h"
 #include "sim/cuda/device_plan.h"
 #include "sim/cuda/replay_kernel.h"
+#include "sim/cuda/team_memory.h"
 #include "sim/law/membrane.h"
 #include "sim/step/moving_obstacles.h"
 
@@ -152,65 +152,6 @@ struct FlatMotions {
   }
 };
 
-/// What a team needs besides the sheet.
-struct TeamSizes {
-  const FrontPlan& fronts;
-  int vector_size;  ///< FrontTables::vector_size
-  const SheetLayout& layout;
-  bool damped;
-  int most_held, most_obstacles;
-};
-
-TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
-  const auto number = [](long count) { return static_cast<std::size_t>(count); };
-  const std::size_t size = number(sizes.layout.size), triangles = number(sizes.layout.triangle_count),
-                    hinges = number(sizes.layout.hinge_count), held = number(sizes.most_held);
-  TeamMemory m{};
-  for (int k = 0; k < 3; ++k) {
-    m.positions[k] = arena.take<Point>(size);
-    m.forces[k] = arena.take<double>(3 * size);
-  }
-  for (float** vector : {&m.gradient, &m.direction, &m.change, &m.residual, &m.image})
-    *vector = arena.take<float>(3 * size);
-  m.solved = arena.take<float>(number(sizes.vector_size));
-  m.search = arena.take<Four<float>>(size);
-  m.shares = arena.take<float>(36 * triangles);
-  m.updates = arena.take<float>(number(sizes.fronts.update_size));
-  m.block_rows = arena.take<float>(number(sizes.layout.slice_starts.back()) * slice_numbers);
-  m.blocks = arena.take<float>(9 * number(sizes.layout.block_count));
-  m.factor = arena.take<__half>(solve_tile_numbers * number(sizes.fronts.factor_tiles));
-  m.triangle_gradients = arena.take<double>(9 * triangles);
-  m.hinge_gradients = arena.take<double>(12 * hinges);
-  m.hinge_matrix = arena.take<float>(12 * hinges);
-  m.hinge_products = arena.take<float>(hinges);
-  if (sizes.damped) {
-    m.start_metrics = arena.take<double>(3 * triangles);
-    m.start_angles = arena.take<double>(hinges);
-    m.bent = arena.take<Point>(size);
-    m.damped = arena.take<double>(3 * size);
-  }
-  for (double*& residual : m.residuals) residual = arena.take<double>(3 * size);
-  m.held_axes = arena.take<int>(size);
-  m.restrictions = arena.take<VertexRestriction>(sizes.most_obstacles > 0 ? size : held);
-  m.restriction_of = arena.take<int>(size);
-  if (const std::size_t obstacles = number(sizes.most_obstacles); obstacles > 0) {
-    const auto records = [&]<typename Record>(std::size_t layers) -> VertexRecords<Record> {
-      return {arena.take<double>(VertexRecords<Record>::numbers_each * size * layers),
-              static_cast<int>(size)};
-    };
-    for (ContactSet& contacts : m.contacts)
-      contacts = {arena.take<int>(size), records.operator()<ContactRecord>(1),
-                  records.operator()<TouchRecord>(obstacles), arena.take<double>(size)};
-    m.obstacles = arena.take<MovingObstacle<double>>(obstacles);
-    m.own_blocks = arena.take<float>(9 * size);
-    m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),
-                 arena.take<float>(3 * size * most_directions), arena.take<double>(small_numbers)};
-  }
-  m.hold_starts = arena.take<double>(3 * held);
-  m.clocks = arena.take<long long>(replay_phases + 1);
-  return m;
-}
-
 }  // namespace
 
 struct BatchReplay::Memory {
@@ -255,7 +196,7 @@ struct BatchReplay::Memory {
     upload_bristles(environments, most_obstacles_each);
     team_blocks = settings.team_blocks > 0 ? settings.team_blocks : team_blocks_for(plan.fronts, count);
     plan.share_out_solves(front_plan, team_blocks);
-    lay_out_teams({front_plan, plan.fronts.vector_size, layout, damped, most_held, most_obstacles_each});
+    lay_out_teams({plan.fronts, layout, damped, most_held, most_obstacles_each});
     steps = DeviceArray<int>(environments.size());
 
     numbers.fronts = plan.fronts;
