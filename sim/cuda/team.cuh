@@ -31,20 +31,8 @@ __device__ inline int warp() { return static_cast<int>(threadIdx.x / 32); }
 // A launch has the teams along x and the blocks of each, a cluster, along y.
 
 __device__ inline int team_index() { return static_cast<int>(blockIdx.x); }
-__device__ inline int block_of_team() {
-#ifdef FLASH_ONE_BLOCK
-  return 0;
-#else
-  return static_cast<int>(blockIdx.y);
-#endif
-}
-__device__ inline int team_blocks() {
-#ifdef FLASH_ONE_BLOCK
-  return 1;
-#else
-  return static_cast<int>(gridDim.y);
-#endif
-}
+__device__ inline int block_of_team() { return static_cast<int>(blockIdx.y); }
+__device__ inline int team_blocks() { return static_cast<int>(gridDim.y); }
 
 // Warps of a team by turns of its blocks: so few vertices are spread over all of them.
 
