@@ -311,6 +311,15 @@ double moved_energy(const Environment& environment, const StepReport& report) {
   return report.kinetic + report.membrane + report.bending + report.solid + report.gravitational + loads;
 }
 
+/// At rest in its rest shape, among drawn obstacles of which a share is rounded.
+void set_scene(Lot& lot, unsigned long seed, double side, double round_share, RandomScene& scene) {
+  scene.environment.state.positions = scene.sheet.rest.vertices;
+  scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
+  draw_scene(lot, side, scene);
+  constexpr double below = 0.08;  // [m]
+  round_off(seed, round_share, below, scene);
+}
+
 }  // namespace
 
 const char* to_string(SceneKind kind) {
@@ -328,11 +337,7 @@ RandomScene random_scene(unsigned long seed, double round_share) {
   scene.sheet = make_sheet(data::parse_mesh_spec(scene.mesh));
   scene.settings.time_step = lot.log_uniform(0.001, 0.03);
   scene.environment.materials[0] = draw_material(lot);
-  scene.environment.state.positions = scene.sheet.rest.vertices;
-  scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
-  draw_scene(lot, side, scene);
-  constexpr double below_sheets = 0.08;  // [m]
-  round_off(seed, round_share, below_sheets, scene);
+  set_scene(lot, seed, side, round_share, scene);
   return scene;
 }
 
@@ -343,11 +348,7 @@ RandomScene random_solid_scene(unsigned long seed, double round_share) {
   double side = 0;
   draw_solid(lot, side, scene);
   scene.settings.time_step = lot.log_uniform(0.001, 0.03);
-  scene.environment.state.positions = scene.sheet.rest.vertices;
-  scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
-  draw_scene(lot, side, scene);
-  constexpr double below_solids = 0.08;  // [m]
-  round_off(seed, round_share, below_solids, scene);
+  set_scene(lot, seed, side, round_share, scene);
   return scene;
 }
 

@@ -5,16 +5,21 @@
 namespace flash::sim {
 namespace {
 
+/// What holds of a scene, whether solved or not.
+void expect_sound(const SceneFindings& found, unsigned long seed) {
+  EXPECT_TRUE(found.finite) << seed;
+  EXPECT_LT(found.unseen_depth, 1e-4) << seed;
+  EXPECT_LT(found.free_depth, 1e-9) << seed;
+  EXPECT_EQ(found.crossed, 0) << seed;
+  EXPECT_LT(found.energy_gain_share, 1e-2) << seed;
+}
+
 /// Forty of the scenes of `make random-scenes`, which draws a thousand.
 TEST(RandomScenes, AreSolvedOrSaidNotToBe) {
   int unsolved = 0;
   for (unsigned long seed = 20001; seed <= 20040; ++seed) {
     const SceneFindings found = observe(random_scene(seed));
-    EXPECT_TRUE(found.finite) << seed;
-    EXPECT_LT(found.unseen_depth, 1e-4) << seed;
-    EXPECT_LT(found.free_depth, 1e-9) << seed;
-    EXPECT_EQ(found.crossed, 0) << seed;
-    EXPECT_LT(found.energy_gain_share, 1e-2) << seed;
+    expect_sound(found, seed);
     if (found.unconverged > 0) {
       ++unsolved;
     } else {
@@ -29,11 +34,7 @@ TEST(RandomScenes, WithRoundObstaclesAreSolvedOrSaidNotToBe) {
   int unsolved = 0;
   for (unsigned long seed = 20101; seed <= 20130; ++seed) {
     const SceneFindings found = observe(random_scene(seed, 1));
-    EXPECT_TRUE(found.finite) << seed;
-    EXPECT_LT(found.unseen_depth, 1e-4) << seed;
-    EXPECT_LT(found.free_depth, 1e-9) << seed;
-    EXPECT_EQ(found.crossed, 0) << seed;
-    EXPECT_LT(found.energy_gain_share, 1e-2) << seed;
+    expect_sound(found, seed);
     unsolved += found.unconverged > 0;
   }
   EXPECT_LE(unsolved, 1);
@@ -51,11 +52,7 @@ TEST(RandomScenes, OfSolidsAreSolvedOrSaidNotToBe) {
   int unsolved = 0;
   for (unsigned long seed = 20201; seed <= 20230; ++seed) {
     const SceneFindings found = observe(random_solid_scene(seed));
-    EXPECT_TRUE(found.finite) << seed;
-    EXPECT_LT(found.unseen_depth, 1e-4) << seed;
-    EXPECT_LT(found.free_depth, 1e-9) << seed;
-    EXPECT_EQ(found.crossed, 0) << seed;
-    EXPECT_LT(found.energy_gain_share, 1e-2) << seed;
+    expect_sound(found, seed);
     unsolved += found.unconverged > 0;
   }
   EXPECT_LE(unsolved, 1);
