@@ -12,6 +12,7 @@
 #include "data/worst.h"
 #include "sim/batch.h"
 #include "sim/cpu/block_cholesky.h"
+#include "sim/cuda/layout/step_cost.h"
 #include "sim/step/elastic_energy.h"
 
 namespace flash::sim {
@@ -120,6 +121,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   settings.kept_steps = {benchmark.steps / 2};
   settings.threads = benchmark.threads;
   settings.device = benchmark.device;
+  settings.cuda_devices = benchmark.cuda_devices;
 
   struct Counts {
     long iterations = 0, solves = 0, factorizations = 0, converged = 0;
@@ -153,6 +155,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
                         counts[i].residual_max = data::worst(counts[i].residual_max, step.residual);
                       }
                       if (i == middle) x = batch.kept_positions(e, 0);
+                      if (e == 0) result.phase_shares = batch.phases();
                     });
   result.wall_seconds = seconds_since(start);
   result.vertices = plan->pattern.size;
@@ -176,6 +179,13 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   result.slowest_bending_rigidity = slowest_material.bending_rigidity;
   if (benchmark.device == Device::cuda) {
     result.step_milliseconds = 1e3 * result.wall_seconds / benchmark.steps;
+    const cuda::FrontPlan fronts = cuda::plan_fronts(plan->pattern, plan->sheet.rest.vertices);
+    const cuda::SheetLayout layout =
+        cuda::lay_out(*plan, bending_operator(*plan, lift_material(benchmark, 0)), fronts);
+    const cuda::PartCost least = cuda::whole_step(cuda::step_cost(*plan, fronts, layout), result.iterations,
+                                                  result.factorizations, result.solves);
+    result.least_bytes = least.bytes;
+    result.least_flops = least.flops;
     return result;
   }
   result.step_milliseconds =

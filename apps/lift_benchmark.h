@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "sim/batch.h"
 #include "sim/cpu/instruction_level.h"
-#include "sim/device.h"
 
 namespace flash::sim {
 
@@ -17,6 +17,7 @@ struct LiftBenchmark {
   int threads = 1;
   InstructionLevel level = highest_instruction_level();  ///< of the kernels
   Device device = Device::cpu;
+  std::vector<int> cuda_devices{};                                   ///< as in BatchSettings
   double time_step = 0.01;                                           ///< [s]
   double tolerance = 1e-3;                                           ///< on |r| / |M g|
   double membrane_stiffness_min = 10, membrane_stiffness_max = 300;  ///< E t [N/m]
@@ -48,6 +49,8 @@ struct LiftBenchmarkResult {
   double solves = 0, factorizations = 0;  ///< a step
   std::vector<BenchmarkPhase>
       phases;  ///< of the CPU: their sum leaves contact, line search and the rest of step_milliseconds
+  std::vector<PhaseShare> phase_shares;     ///< of a device
+  double least_bytes = 0, least_flops = 0;  ///< of a step of one environment on a device, without contact
 };
 
 /// Throws data::InputError where a range ends below its start, or where the solvers at work need more memory

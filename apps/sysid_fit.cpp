@@ -146,7 +146,6 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   stop_on_signals();
   check_out(options);
   const auto begin = std::chrono::steady_clock::now();
-  const sim::Device device = choose_device(options.common);
   const std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
   const sysid::SearchFolder found = sysid::load_search_folder(options.start);
   const data::Asset asset =
@@ -158,8 +157,8 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   const int threads = thread_count(options.common);
   grid.threads = threads;
   sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
-  replay.device = device;
   replay.element_order = asset.element_order;
+  place_simulation(options.common, asset, replay);
   if (replay.mesh.empty()) replay.mesh = mesh_of(found.summary);
   std::vector<sysid::Replay> replays;
   std::vector<std::string> names;
@@ -200,7 +199,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace
                                                    : sysid::Existing::refuse);
-  Search search{asset, std::move(replays), grid, asked, {}, device, options.out, begin};
+  Search search{asset, std::move(replays), grid, asked, {}, replay.device, options.out, begin};
   search.plan = !options.no_plan;
   return run_search(search, store, options.common);
 }

@@ -106,7 +106,6 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   stop_on_signals();
   check_options(options);
   const auto begin = std::chrono::steady_clock::now();
-  const sim::Device device = choose_device(options.common);
   const std::string grid_file = (fs::path(options.out) / "grid.json").string();
   const bool goes_on = options.resume && fs::exists(grid_file);
   std::vector<data::Recording> recordings = load_recordings(options.recordings, options.common);
@@ -116,8 +115,8 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   check_options(options.replay, asset);
   const int threads = thread_count(options.common);
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, threads);
-  simulated.device = device;
   simulated.element_order = asset.element_order;
+  place_simulation(options.common, asset, simulated);
   std::vector<sysid::Replay> replays = make_replays(recordings, simulated, options.common);
 
   std::vector<std::string> notices;
@@ -145,12 +144,13 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
           data::format_count(static_cast<std::size_t>(replays.front().sheet().rest.vertices.rows())) +
           " vertices, " + std::to_string(threads) + " threads, about " +
           data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) +
-          " MB of memory, on the " + (device == sim::Device::cuda ? "CUDA device" : "CPU"));
+          " MB of memory, on the " + (simulated.device == sim::Device::cuda ? "CUDA device" : "CPU"));
   sysid::AnswerSettings asked;
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
   asked.horizon = !options.no_horizon;
   asked.solver_check = !options.no_solver_check;
-  Search search{asset, std::move(replays), settings, asked, options.map, device, options.out, begin};
+  Search search{asset,       std::move(replays), settings,    asked,
+                options.map, simulated.device,   options.out, begin};
   search.plan = !options.no_plan;
   return run_search(search, store, options.common);
 }

@@ -103,8 +103,9 @@ void add_seed_option(CLI::App& verb, CommonOptions& options) {
 }
 
 void add_device_option(CLI::App& verb, CommonOptions& options) {
-  verb.add_option("--device", options.device, "Where the simulation runs")
-      ->check(CLI::IsMember({"auto", "cpu", "cuda"}))
+  verb.add_option("--device", options.device,
+                  "Where the simulation runs: cpu, cuda, cuda:1, cuda:0,2, cuda:all, or auto: a CUDA device "
+                  "where there is one")
       ->capture_default_str();
 }
 
@@ -258,16 +259,22 @@ int thread_count(const CommonOptions& options) {
                              : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
-sim::Device choose_device(const CommonOptions& options) {
-  if (options.device != "cuda") return sim::Device::cpu;
-  if (const std::string why = sim::why_no_cuda(); !why.empty())
-    throw data::InputError("--device cuda: " + why + "; use --device cpu or auto");
-  return sim::Device::cuda;
+void place_simulation(const CommonOptions& options, const data::Asset& asset,
+                      sysid::ReplaySettings& settings) {
+  const bool open = options.device == "auto", solid = asset.element_type == data::ElementType::tetrahedron;
+  const sim::DeviceChoice choice = sim::choose_device(open && solid ? "cpu" : options.device);
+  settings.device = choice.device;
+  settings.cuda_devices = choice.cuda_devices;
+  if (!open) return;
+  const std::string why = solid ? "no device simulates solids" : sim::why_no_cuda();
+  say(options, choice.device == sim::Device::cuda ? "the simulations run on the first CUDA device"
+                                                  : "the simulations run on the CPU: " + why);
 }
 
 void require_cpu(const CommonOptions& options) {
-  if (options.device == "cuda")
-    throw data::InputError("--device cuda: this verb simulates on the CPU alone; use --device cpu or auto");
+  if (options.device.starts_with("cuda"))
+    throw data::InputError("--device " + options.device +
+                           ": this verb simulates on the CPU alone; use --device cpu or auto");
 }
 
 std::vector<data::Recording> load_recordings(const std::vector<std::string>& paths,

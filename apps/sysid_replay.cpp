@@ -141,13 +141,15 @@ nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const s
 
 int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   stop_on_signals();
-  const sim::Device device = choose_device(options.common);
   const data::Recording recording = data::load_recording(options.recording);
   const data::Asset asset = load_asset_for(options.asset, recording);
   check_kind(asset, recording);
   check_options(options.replay, asset);
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
-  simulated.device = device;
+  const sim::DeviceChoice device =
+      sim::choose_device(options.common.device == "auto" ? "cpu" : options.common.device);
+  simulated.device = device.device;
+  simulated.cuda_devices = device.cuda_devices;
   simulated.element_order = asset.element_order;
   const sysid::Replay replay = sysid::make_replay(recording, simulated);
   if (options.common.verbose)

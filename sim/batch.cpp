@@ -1,12 +1,15 @@
 #include "sim/batch.h"
 
 #include <algorithm>
+#include <mutex>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "data/error.h"
 #include "data/parallel.h"
+#include "sim/cuda/phase_clock.h"
 #include "sim/device_batch.h"
 
 namespace flash::sim {
@@ -22,6 +25,8 @@ struct Batch::Storage {
   std::ptrdiff_t vertices = 0, holds = 0;
   std::vector<double> positions, velocities, kept, hold_forces;
   std::vector<StepStats> stats;
+  std::vector<double> phase_ticks;  ///< of a device
+  std::mutex of_ticks;
 
   std::ptrdiff_t steps() const { return settings.steps - settings.first_step; }
 
@@ -57,6 +62,11 @@ struct Batch::Storage {
     };
     results.kept = [&](int e, int index, const Points& x) {
       std::copy(x.data(), x.data() + x.size(), kept_at(e, index));
+    };
+    results.timed = [&](std::span<const double> ticks) {
+      const std::scoped_lock lock(of_ticks);
+      phase_ticks.resize(ticks.size());
+      for (std::size_t k = 0; k < ticks.size(); ++k) phase_ticks[k] += ticks[k];
     };
     results.finished = [&](int e) {
       show(e);
@@ -219,6 +229,15 @@ View<double> Batch::hold_forces() const {
 std::span<const StepStats> Batch::stats(int environment) const {
   const auto steps = static_cast<std::size_t>(storage_->steps());
   return std::span(storage_->stats).subspan(environment * steps, steps);
+}
+
+std::vector<PhaseShare> Batch::phases() const {
+  const std::vector<double>& ticks = storage_->phase_ticks;
+  const double all = std::accumulate(ticks.begin(), ticks.end(), 0.0);
+  std::vector<PhaseShare> shares;
+  for (std::size_t k = 0; k < ticks.size(); ++k)
+    shares.push_back({cuda::replay_phase_names[k], ticks[k] / all});
+  return shares;
 }
 
 Eigen::Map<const Points> Batch::kept_positions(int environment, int index) const {

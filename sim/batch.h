@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sim/device.h"
@@ -27,6 +28,12 @@ struct StepStats {
   bool converged = false;
 };
 
+/// A phase of a step, and its share of the time of the processors at work.
+struct PhaseShare {
+  std::string name;
+  double share = 0;
+};
+
 struct BatchSettings {
   SolverSettings solver{};
   int steps = 0;                  ///< last step of the whole replay
@@ -34,6 +41,7 @@ struct BatchSettings {
   int first_step = 0;             ///< step at which the states of the environments stand
   int threads = 1;                ///< 0: one a processor; on a device they take the results
   Device device = Device::cpu;
+  std::vector<int> cuda_devices{};  ///< by number, which share the environments; empty: the first
 };
 
 /// Steps after which a solver forgets what it holds besides the state of its environment. A replay that goes
@@ -69,6 +77,9 @@ class Batch {
   View<double> kept_positions() const;  ///< environments x kept steps x vertices x 3 [m]
   View<double> hold_forces() const;     ///< hold on sheet: environments x steps x holds x 3 [N]
   std::span<const StepStats> stats(int environment) const;  ///< a step each, from first_step on
+
+  /// Where the time of the steps went on a device; empty on the CPU.
+  std::vector<PhaseShare> phases() const;
 
   /// Positions of one environment at the kept step `index` of settings.kept_steps [m].
   Eigen::Map<const data::Points> kept_positions(int environment, int index) const;

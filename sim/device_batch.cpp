@@ -9,6 +9,7 @@
 #include "data/parallel.h"
 #include "sim/cuda/most_obstacles.h"
 #ifdef FLASH_HAVE_CUDA
+#include "sim/cuda/devices.h"
 #include "sim/cuda/hold_motion.h"
 #include "sim/cuda/out_of_memory.h"
 #endif
@@ -100,6 +101,7 @@ void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, const
   replay.advance(group.count);
   replay.synchronize(settings.solver.stop);
   if (settings.solver.stop != nullptr && *settings.solver.stop) throw data::Stopped();
+  results.timed(replay.phase_ticks());
 
   const auto kept_begin =
       std::upper_bound(settings.kept_steps.begin(), settings.kept_steps.end(), group.first);
@@ -144,6 +146,23 @@ void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& gro
   }
 }
 
+/// Runs a group on all devices at the same time. Each takes every so many-th environment: neighbours in a
+/// search take about as long.
+void run_on_devices(const std::shared_ptr<const SheetPlan>& plan, const Group& group,
+                    const BatchSettings& settings, std::vector<Environment>& environments,
+                    const DeviceResults& results) {
+  const std::vector<int> devices =
+      settings.cuda_devices.empty() ? std::vector<int>{0} : settings.cuda_devices;
+  const std::size_t count = std::min(devices.size(), group.environments.size());
+  std::vector<Group> parts(count, Group{group.first, group.count, {}});
+  for (std::size_t k = 0; k < group.environments.size(); ++k)
+    parts[k % count].environments.push_back(group.environments[k]);
+  data::for_each_in_parallel(count, static_cast<int>(count), [&](std::size_t part) {
+    cuda::use_device(devices[part]);
+    run_in_waves(plan, parts[part], settings, environments, results);
+  });
+}
+
 }  // namespace
 
 void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment>& environments,
@@ -154,7 +173,7 @@ void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector
   for (auto groups = grouped(*plan, environments, at, end, settings.solver.time_step); !groups.empty();
        groups = grouped(*plan, environments, at, end, settings.solver.time_step))
     for (const Group& group : groups) {
-      run_in_waves(plan, group, settings, environments, results);
+      run_on_devices(plan, group, settings, environments, results);
       for (const int e : group.environments) at[static_cast<std::size_t>(e)] += group.count;
       if (group.first + group.count < end) continue;
       data::for_each_in_parallel(group.environments.size(), settings.threads,

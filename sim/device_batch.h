@@ -24,14 +24,15 @@ struct DeviceSteps {
 struct DeviceResults {
   std::function<void(const DeviceSteps&)> stepped;
   std::function<void(int environment, int index, const data::Points& positions)> kept;
-  std::function<void(int environment)> finished;  ///< its state is that at the end
+  std::function<void(int environment)> finished;             ///< its state is that at the end
+  std::function<void(std::span<const double> ticks)> timed;  ///< ticks of processors in each phase of a step
 };
 
-/// Takes environments from the step `first` on `steps` further on the CUDA device. Those with the same
-/// bending operator, whose holds close in the same steps, run together, as many as fit into the device's
-/// memory. What an environment gets does not depend on the others, bitwise. Throws data::InputError where
-/// the device cannot do what an environment asks for, data::Stopped once settings.solver.stop is set, and
-/// std::runtime_error with the device's message.
+/// Takes environments from the step `first` on `steps` further on the CUDA devices. Those with the same
+/// bending operator, whose holds close in the same steps, run together, as many as fit into a device's
+/// memory. What an environment gets depends neither on the others nor on how many devices there are, bitwise.
+/// Throws data::InputError where the device cannot do what an environment asks for, data::Stopped once
+/// settings.solver.stop is set, and std::runtime_error with the device's message.
 void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment>& environments,
                        const BatchSettings& settings, int first, int steps, const DeviceResults& results);
 

@@ -11,6 +11,7 @@
 #include <tuple>
 
 #include "sim/cuda/device_plan.h"
+#include "sim/cuda/devices.h"
 #include "sim/cuda/replay_kernel.h"
 #include "sim/cuda/team_memory.h"
 #include "sim/law/membrane.h"
@@ -156,6 +157,7 @@ struct FlatMotions {
 
 struct BatchReplay::Memory {
   ReplaySettings settings;
+  int device = device_in_use();
   int count, step;
   FrontPlan front_plan;
   SheetLayout layout;
@@ -241,6 +243,12 @@ struct BatchReplay::Memory {
   }
 
   std::size_t size() const { return layout.order.size(); }
+
+  /// For what is queued; whoever comes next on this thread works with the device.
+  void wait() const {
+    use_device(device);
+    check(cudaStreamSynchronize(stream));
+  }
 
   void upload_state(const std::vector<ReplayEnvironment>& environments) {
     std::vector<Point> x, v, forces;
@@ -353,7 +361,7 @@ struct BatchReplay::Memory {
     require(more >= 0 && more <= settings.steps - step, "it cannot advance beyond its last step");
     if (more == 0) return;
     const int end = step + more;
-    check(cudaStreamSynchronize(stream));
+    wait();
     const std::vector<int> stand(static_cast<std::size_t>(count), step);
     steps.write(0, stand.data(), stand.size());
     numbers.end_step = end;
@@ -363,7 +371,7 @@ struct BatchReplay::Memory {
 
   /// A part of an array with a point for each vertex.
   Points points(const DeviceArray<Point>& array, std::size_t part) const {
-    check(cudaStreamSynchronize(stream));
+    wait();
     const std::vector<Point> all = array.read(part * size(), size());
     Points result(layout.size, 3);
     for (int i = 0; i < layout.size; ++i) result.row(layout.order[i]) << all[i].x, all[i].y, all[i].z;
@@ -389,7 +397,7 @@ void BatchReplay::synchronize(const std::atomic<bool>* stop) {
   while (stop != nullptr && !*stop && cudaStreamQuery(m.stream) == cudaErrorNotReady)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   if (stop != nullptr && *stop) *m.stop = 1;
-  cuda::check(cudaStreamSynchronize(m.stream));
+  m.wait();
 }
 
 Points BatchReplay::positions(int environment) const {
@@ -411,7 +419,7 @@ Points BatchReplay::bristles(int environment) const {
 
 Points BatchReplay::kept_positions(int environment, int index) const {
   const Memory& m = *memory_;
-  cuda::check(cudaStreamSynchronize(m.stream));
+  m.wait();
   const std::size_t place =
       static_cast<std::size_t>(environment) * m.settings.kept_steps.size() + static_cast<std::size_t>(index);
   const std::vector<double> numbers = m.kept.read(place * 3 * m.size(), 3 * m.size());
@@ -420,32 +428,28 @@ Points BatchReplay::kept_positions(int environment, int index) const {
 
 std::vector<double> BatchReplay::hold_forces(int environment) const {
   const Memory& m = *memory_;
-  cuda::check(cudaStreamSynchronize(m.stream));
+  m.wait();
   const std::size_t each =
       3 * static_cast<std::size_t>(m.numbers.stats_each) * static_cast<std::size_t>(m.numbers.hold_count);
   return m.hold_forces.read(static_cast<std::size_t>(environment) * each, each);
 }
 
-std::vector<double> BatchReplay::phases() const {
+std::vector<double> BatchReplay::phase_ticks() const {
   const Memory& m = *memory_;
-  cuda::check(cudaStreamSynchronize(m.stream));
-  std::vector<double> shares(replay_phases, 0.0);
-  double all = 0;
+  m.wait();
+  std::vector<double> ticks(replay_phases, 0.0);
   for (const TeamMemory& team : m.team_memory.read(0, m.team_memory.size())) {
     long long clocks[replay_phases];
     copy_to_end(clocks, team.clocks, sizeof(clocks), cudaMemcpyDeviceToHost);
-    for (int k = 0; k < replay_phases; ++k) {
-      shares[static_cast<std::size_t>(k)] += static_cast<double>(clocks[k]);
-      all += static_cast<double>(clocks[k]);
-    }
+    for (int k = 0; k < replay_phases; ++k)
+      ticks[static_cast<std::size_t>(k)] += static_cast<double>(clocks[k]);
   }
-  for (double& share : shares) share /= all;
-  return shares;
+  return ticks;
 }
 
 std::vector<ReplayStep> BatchReplay::stats(int environment) const {
   const Memory& m = *memory_;
-  cuda::check(cudaStreamSynchronize(m.stream));
+  m.wait();
   const auto each = static_cast<std::size_t>(m.numbers.stats_each);
   std::vector<ReplayStep> steps;
   for (const ReplayStats& s : m.stats.read(static_cast<std::size_t>(environment) * each, each))

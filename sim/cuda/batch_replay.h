@@ -98,9 +98,8 @@ class BatchReplay {
   /// Forces of the holds on the sheet, mean over each step: steps from first_step on x holds x 3 [N].
   std::vector<double> hold_forces(int environment) const;
   std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on
-  /// Shares of the teams' time spent on evaluation, matrix, preconditioner, factorization, directions,
-  /// contact, rest.
-  std::vector<double> phases() const;
+  /// Ticks that the teams' first processors spent in each ReplayPhase.
+  std::vector<double> phase_ticks() const;
 
  private:
   struct Memory;

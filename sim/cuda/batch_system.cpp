@@ -9,16 +9,6 @@
 
 namespace flash::sim::cuda {
 
-std::string why_no_device() {
-  int count = 0;
-  const cudaError_t status = cudaGetDeviceCount(&count);
-  if (status != cudaSuccess) return cudaGetErrorString(status);
-  if (count == 0) return "no device";
-  constexpr int least_memory = 99 * 1024;
-  if (most_memory() < least_memory) return "the device has less than 99 KB of memory on chip for a block";
-  return "";
-}
-
 struct BatchSystem::Memory {
   int count;
   FactorPrecision precision;

@@ -1,6 +1,5 @@
 #pragma once
 #include <memory>
-#include <string>
 #include <vector>
 
 #include "data/mesh.h"
@@ -9,9 +8,6 @@
 #include "sim/plan/sheet_plan.h"
 
 namespace flash::sim::cuda {
-
-/// Why no device can be used, in a line; empty where one can.
-std::string why_no_device();
 
 /// The linear problems of the Newton iterations of many environments of one sheet, on the device: elastic
 /// energies and their derivatives, the matrix, its preconditioner and conjugate gradients. A block of threads

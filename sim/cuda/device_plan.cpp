@@ -90,6 +90,8 @@ void DevicePlan::share_out_solves(const FrontPlan& plan, int team_blocks) {
   fronts.chunks = upload(solve.chunks, chunks_);
   fronts.chunk_starts = upload(solve.starts, ints_);
   fronts.gathers = upload(solve.gathers, gathers_);
+  fronts.parted = upload(solve.parted, gathers_);
+  fronts.parted_count = static_cast<int>(solve.parted.size());
   fronts.vector_size = solve.vector_size;
 }
 

@@ -167,8 +167,8 @@ __device__ int run_chunks(unsigned first_slot, const Vector& vector, float (&sum
 #pragma unroll
   for (int k = 0; k < width; ++k)
     if (lane() < chunks[k].y) {
-      inputs[k] = vector[from[k].x];
-      if (!backward) inputs[k] += vector[from[k].y] + vector[chunks[k].z + lane()];
+      inputs[k] = vector[from[k].x] + vector[from[k].y];
+      if (!backward) inputs[k] += vector[chunks[k].z + lane()];
     }
   float largest[width];
 #pragma unroll
@@ -240,6 +240,21 @@ __device__ void run_both_ways(const FrontTables& tables, const __half* factor, c
   wait_for_copies<0>();
 }
 
+/// Adds up what of the solution comes in two parts, in each copy.
+template <bool on_chip>
+__device__ void add_second_parts(const FrontTables& tables, float* vector) {
+  const int first = on_chip ? static_cast<int>(threadIdx.x) : team_rank(),
+            step = on_chip ? block_threads : team_size();
+  for (int k = first; k < tables.parted_count; k += step) {
+    const Gather parts = tables.parted[k];
+    vector[parts.first] += vector[parts.second];
+  }
+  if (on_chip)
+    __syncthreads();
+  else
+    synchronize_team();
+}
+
 /// x <- (L L^T)^-1 x, x behind the first 3 a vertex of `vector`, whose layout is that of solve_chunk.h.
 /// `chip`: solve_memory. `on_chip`: whether `vector` is there too.
 template <int parts, bool on_chip>
@@ -252,6 +267,7 @@ __device__ void solve(const FrontTables& tables, const __half* factor, float* ve
   else
     run_both_ways<parts, 1>(tables, factor, SolveVector<on_chip>{vector}, chip);
   synchronize_team();
+  add_second_parts<on_chip>(tables, vector);
 }
 
 }  // namespace flash::sim::cuda

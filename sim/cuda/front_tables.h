@@ -17,6 +17,8 @@ struct FrontTables {
   const SolveChunk* chunks;
   const int* chunk_starts;
   const Gather* gathers;
+  const Gather* parted;  ///< SolvePlan::parted
+  int parted_count;
 };
 
 }  // namespace flash::sim::cuda

@@ -18,6 +18,10 @@ enum class ReplayPhase {
   rest
 };
 inline constexpr int replay_phases = 9;
+inline constexpr const char* replay_phase_names[replay_phases] = {
+    "energies and gradients", "matrix",  "preconditioner",
+    "factorization",          "solves",  "products",
+    "vectors of directions",  "contact", "rest"};
 
 #ifdef __CUDACC__
 /// Ticks of a team's first processor spent in each phase, and behind them when the present one began.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "sysid/emulate/focused_axes.h"
 #include "sysid/emulate/two_mesh_motions.h"
 
 namespace flash::sysid {
@@ -49,10 +50,11 @@ MemoryEstimate estimate_memory(const std::vector<Replay>& replays, const GridSet
     estimate.simulation =
         std::max(estimate.simulation, solver_finer * threads * solver + vertices_finer * at_once * motion);
   }
-  const double finer = solver_check ? count_candidates(thinned(settings.axes)) : 0;
+  const std::vector<Axis> emulated = most_focused(settings.axes);
+  const double finer = solver_check ? count_candidates(thinned(emulated)) : 0;
   // Twice while splines are made of what was simulated, first of the search's own mesh, then of the finer
   // one.
-  const double own = candidates * kept, half_cell = finer * vertices_finer * kept;
+  const double own = count_candidates(emulated) * kept, half_cell = finer * vertices_finer * kept;
   const double about_estimate = (kAtEstimate + kOfErrors * (solver_check ? vertices_finer : 1)) * kept;
   estimate.keyframes = kLikelihood * keyframes;
   estimate.kept = own + std::max(own, 2 * half_cell) + about_estimate + estimate.keyframes;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "data/text.h"
+#include "sysid/emulate/focused_axes.h"
 #include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
@@ -329,7 +330,7 @@ AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solv
   constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
   std::size_t motions =
       motions_at_estimate + 4 + kHeld + kRounds * (own + motions_at_estimate + (solver_check ? finer : 0));
-  if (solver_check) motions += cartesian_product(thinned(grid.axes)).size();
+  if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
   const int looks = 2 * (own > 0 ? 1 + kRounds : 1);
   return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
 }
@@ -359,6 +360,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         "some candidates diverged: the answer leaves out the values of a parameter at which they did");
   const std::vector<Axis> ranges =
       settings.ranges.empty() ? usable.axes : in_own_coordinates(settings.ranges);
+  usable.axes = focused(usable.axes, best);
   const std::vector<Replay> finer = finer_replays(replays, settings);
   const Task task{replays, finer, usable, ranges, settings, store, told};
   std::optional<Emulator> emulator;

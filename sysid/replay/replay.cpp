@@ -329,6 +329,7 @@ void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, c
   settings.kept_steps = kept;
   settings.threads = replay.settings.threads;
   settings.device = replay.settings.device;
+  settings.cuda_devices = replay.settings.cuda_devices;
   sim::replay_in_batches(
       replay.plan, candidates.size(), replay.settings.envs, settings,
       [&](std::size_t i) { return make_environment(replay, candidates[i]); },

@@ -31,6 +31,7 @@ struct ReplaySettings {
   int envs = 64;        ///< candidates simulated side by side, at most
   int threads = 1;
   sim::Device device = sim::Device::cpu;  ///< where candidates are simulated
+  std::vector<int> cuda_devices{};        ///< which share them; empty: the first
 };
 
 /// How the sheet lay and how it was grasped: what the recording leaves open and what changes the motion.

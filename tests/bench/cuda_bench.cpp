@@ -8,42 +8,33 @@
 #include <string>
 
 #include "sim/cuda/batch_system.h"
-#include "sim/cuda/layout/sheet_layout.h"
+#include "sim/cuda/devices.h"
+#include "sim/cuda/layout/step_cost.h"
 #include "tests/bench/device_bench.h"
 #include "tests/bench/towel.h"
 
 namespace flash::sim::cuda {
 namespace {
 
-/// The least that a part has to do for an environment; what environments share is free.
 struct Part {
   const char* name;
-  double bytes, flops;
+  PartCost cost;
   std::function<void(BatchSystem&)> run;
 
-  double floor() const { return std::max(bytes / bandwidth, flops / single_rate); }
+  double floor() const { return std::max(cost.bytes / bandwidth, cost.flops / single_rate); }
 };
 
 std::vector<Part> parts_of(const Towel& towel, FactorPrecision precision) {
   const FrontPlan fronts = plan_fronts(towel.plan->pattern, towel.plan->sheet.rest.vertices);
-  const SheetLayout layout = lay_out(*towel.plan, towel.bending(), fronts);
-  const double stored = precision == FactorPrecision::half ? 2 : 4, vertices = layout.size,
-               triangles = layout.triangle_count, entries = static_cast<double>(fronts.factor_entries),
-               blocks = static_cast<double>(layout.block_count),
-               edge_blocks = 2.0 * static_cast<double>(towel.plan->edge_count) + vertices,
-               columns = static_cast<double>(layout.step_columns.size());
-  const double scalar_flops = 24 * columns, block_flops = 18 * edge_blocks;
-  // Flops of a triangle counted in its formulas: 300 for a gradient, 900 for a Hessian; twice as dear in
-  // double precision.
+  const StepCost cost = step_cost(*towel.plan, fronts, lay_out(*towel.plan, towel.bending(), fronts),
+                                  precision == FactorPrecision::half ? 2 : 4);
   return {
-      {"energies and gradients", 32 * vertices + 24 * vertices, 2 * (300 * triangles + scalar_flops),
-       &BatchSystem::evaluate},
-      {"matrix", 32 * vertices + 36 * edge_blocks, 2 * 900 * triangles, &BatchSystem::assemble_matrix},
-      {"preconditioner", 32 * vertices + 36 * blocks, 2 * 900 * triangles,
-       &BatchSystem::assemble_preconditioner},
-      {"factorization", 36 * blocks + stored * entries, fronts.factor_flops, &BatchSystem::factorize},
-      {"solve", 2 * stored * entries + 24 * vertices, 4 * entries, &BatchSystem::solve},
-      {"product", 36 * edge_blocks + 24 * vertices, block_flops + scalar_flops, &BatchSystem::multiply},
+      {"energies and gradients", cost.evaluation, &BatchSystem::evaluate},
+      {"matrix", cost.matrix, &BatchSystem::assemble_matrix},
+      {"preconditioner", cost.preconditioner, &BatchSystem::assemble_preconditioner},
+      {"factorization", cost.factorization, &BatchSystem::factorize},
+      {"solve", cost.solve, &BatchSystem::solve},
+      {"product", cost.product, &BatchSystem::multiply},
   };
 }
 
@@ -94,9 +85,10 @@ void time_parts(int vertices, int environments, FactorPrecision precision) {
   for (const Part& part : parts) {
     const double seconds = seconds_of(batch, part), each = seconds / environments;
     std::printf("%-24s %10.4f %12.3f %12.4f %8.1f %8.0f %8.0f\n", part.name, 1e3 * seconds, 1e6 * each,
-                1e6 * part.floor(), each / part.floor(), part.bytes / each * 1e-9, part.flops / each * 1e-9);
+                1e6 * part.floor(), each / part.floor(), part.cost.bytes / each * 1e-9,
+                part.cost.flops / each * 1e-9);
   }
-  const Part directions = {"directions", 0, 0, [](BatchSystem& b) { b.find_directions(0); }};
+  const Part directions = {"directions", {}, [](BatchSystem& b) { b.find_directions(0); }};
   const double seconds = seconds_of(batch, directions);
   double solves = 0;
   for (const int count : batch.solves()) solves += count;
@@ -118,8 +110,8 @@ void print_floors(int vertices) {
   const std::vector<Part> parts = parts_of(towel, FactorPrecision::single),
                           half = parts_of(towel, FactorPrecision::half);
   for (std::size_t k = 0; k < parts.size(); ++k)
-    std::printf("%-24s %10.0f %10.2f %12.0f %10.2f\n", parts[k].name, 1e-3 * parts[k].bytes,
-                1e-6 * parts[k].flops, 1e-3 * half[k].bytes, 1e6 * parts[k].floor());
+    std::printf("%-24s %10.0f %10.2f %12.0f %10.2f\n", parts[k].name, 1e-3 * parts[k].cost.bytes,
+                1e-6 * parts[k].cost.flops, 1e-3 * half[k].cost.bytes, 1e6 * parts[k].floor());
 }
 
 }  // namespace

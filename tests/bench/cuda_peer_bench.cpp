@@ -8,6 +8,7 @@
 
 #include "data/procedural_mesh.h"
 #include "sim/cuda/batch_system.h"
+#include "sim/cuda/devices.h"
 #include "tests/bench/corner_lift.h"
 #include "tests/bench/device_bench.h"
 

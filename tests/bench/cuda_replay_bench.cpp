@@ -5,11 +5,13 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <numeric>
 #include <random>
 #include <string>
 
 #include "sim/cuda/batch_system.h"
-#include "sim/cuda/layout/sheet_layout.h"
+#include "sim/cuda/devices.h"
+#include "sim/cuda/layout/step_cost.h"
 #include "tests/bench/corner_lift.h"
 #include "tests/bench/device_bench.h"
 #include "tests/bench/towel.h"
@@ -39,33 +41,27 @@ std::vector<ReplayEnvironment> lifts(const Towel& towel, int count, int steps, d
   return environments;
 }
 
-/// The least that the parts of a step have to move and compute, by its counts: as flash_cuda_bench has them,
-/// the factor in half precision.
+/// The least that the parts of a step take, by its counts, the factor in half precision.
 struct Floor {
-  double bytes = 0, flops = 0, seconds = 0;
+  PartCost cost;
+  double seconds = 0;
 
-  void add(double times, double part_bytes, double part_flops) {
-    bytes += times * part_bytes;
-    flops += times * part_flops;
-    seconds += times * std::max(part_bytes / bandwidth, part_flops / single_rate);
+  void add(double times, const PartCost& part) {
+    cost = cost + times * part;
+    seconds += times * std::max(part.bytes / bandwidth, part.flops / single_rate);
   }
 };
 
 Floor floor_of(const Towel& towel, double iterations, double factorizations, double solves) {
   const FrontPlan fronts = plan_fronts(towel.plan->pattern, towel.plan->sheet.rest.vertices);
-  const SheetLayout layout = lay_out(*towel.plan, towel.bending(), fronts);
-  const double vertices = layout.size, triangles = layout.triangle_count,
-               entries = static_cast<double>(fronts.factor_entries),
-               blocks = static_cast<double>(layout.block_count),
-               edge_blocks = 2.0 * static_cast<double>(towel.plan->edge_count) + vertices,
-               scalar_flops = 24 * static_cast<double>(layout.step_columns.size());
+  const StepCost cost = step_cost(*towel.plan, fronts, lay_out(*towel.plan, towel.bending(), fronts));
   Floor floor;
-  floor.add(iterations + 1, 32 * vertices + 24 * vertices, 2 * (300 * triangles + scalar_flops));
-  floor.add(iterations, 32 * vertices + 36 * edge_blocks, 2 * 900 * triangles);
-  floor.add(factorizations, 32 * vertices + 36 * blocks, 2 * 900 * triangles);
-  floor.add(factorizations, 36 * blocks + 2 * entries, fronts.factor_flops);
-  floor.add(solves, 4 * entries + 24 * vertices, 4 * entries);
-  floor.add(solves, 36 * edge_blocks + 24 * vertices, 18 * edge_blocks + scalar_flops);
+  floor.add(iterations + 1, cost.evaluation);
+  floor.add(iterations, cost.matrix);
+  floor.add(factorizations, cost.preconditioner);
+  floor.add(factorizations, cost.factorization);
+  floor.add(solves, cost.solve);
+  floor.add(solves, cost.product);
   return floor;
 }
 
@@ -125,11 +121,13 @@ void time_replay(const Towel& towel, int environments, int steps, int stale_fact
               static_cast<int>(towel.positions.rows()), environments, replay.teams(), replay.team_blocks(),
               1e3 * seconds, iterations / count, factorizations / count, solves / count, substeps / count,
               100 * converged / count, 1e6 * each, 1e6 * floor.seconds, each / floor.seconds,
-              floor.bytes / each / bandwidth, floor.flops / each / single_rate);
+              floor.cost.bytes / each / bandwidth, floor.cost.flops / each / single_rate);
   std::printf(
       "         share of evaluation, matrix, preconditioner, factorization, solves, products, directions, "
       "contact, rest:");
-  for (const double share : replay.phases()) std::printf(" %.3f", share);
+  const std::vector<double> ticks = replay.phase_ticks();
+  const double all_ticks = std::accumulate(ticks.begin(), ticks.end(), 0.0);
+  for (const double each_ticks : ticks) std::printf(" %.3f", each_ticks / all_ticks);
   std::printf(
       "\n         slowest: E t %.4g N/m, D %.3g N m: %.2f iterations a step, %d in step %d, %.3f substeps\n",
       all[slowest.environment].material.membrane_stiffness,

@@ -109,6 +109,37 @@ TEST(DeviceBatch, EqualsItsEnvironmentsAloneBitForBit) {
   }
 }
 
+TEST(DeviceBatch, IsTheSameOnSeveralDevicesBitForBit) {
+  SKIP_WITHOUT_DEVICE();
+  const std::vector<int> all = choose_device("cuda:all").cuda_devices;
+  if (all.size() < 2) GTEST_SKIP() << "one CUDA device, needs two";
+  const auto plan = sheet();
+  const auto environments = lifts(*plan, 9);
+  const Batch on_first = run(plan, environments, settings_on(Device::cuda));
+  for (const std::vector<int>& devices : {all, std::vector<int>{all.back()}}) {
+    BatchSettings settings = settings_on(Device::cuda);
+    settings.cuda_devices = devices;
+    const Batch shared_out = run(plan, environments, settings);
+    for (int e = 0; e < shared_out.size(); ++e) {
+      EXPECT_EQ(shared_out.state(e).positions, on_first.state(e).positions);
+      EXPECT_EQ(shared_out.state(e).velocities, on_first.state(e).velocities);
+      EXPECT_EQ(shared_out.kept_positions(e, 3), on_first.kept_positions(e, 3));
+    }
+  }
+}
+
+TEST(DeviceBatch, SaysWhereItsTimeGoes) {
+  SKIP_WITHOUT_DEVICE();
+  const auto plan = sheet();
+  const Batch batch = run(plan, lifts(*plan, 2), settings_on(Device::cuda));
+  double all = 0;
+  for (const PhaseShare& phase : batch.phases()) {
+    EXPECT_GE(phase.share, 0) << phase.name;
+    all += phase.share;
+  }
+  EXPECT_NEAR(all, 1, 1e-12);
+}
+
 TEST(DeviceBatch, EndsSoonAfterItIsStopped) {
   SKIP_WITHOUT_DEVICE();
   const auto plan = sheet();

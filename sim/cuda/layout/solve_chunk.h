@@ -4,7 +4,8 @@
 namespace flash::sim::cuda {
 
 // Plain numbers, laid out on the host and read by kernels as they are. A solve works on one vector: y of the
-// forward solve, three numbers a vertex; right-hand side and solution, as many; then what fronts pass up.
+// forward solve, three numbers a vertex; right-hand side and solution, as many; a zero; what fronts pass up;
+// second parts of results.
 
 /// Inputs and results of a chunk at most: two tiles of the factor each.
 inline constexpr int chunk_width = 2 * solve_tile_width;
@@ -48,7 +49,7 @@ inline constexpr int chunks_ahead = 4;
 /// Chunks that a warp works on side by side at most. A level has a multiple of so many of each warp.
 inline constexpr int chunks_together = 2;
 
-/// Two numbers of the vector that are added up; FrontPlan::nothing_passed for none.
+/// Places of two numbers of the vector that are added up; FrontPlan::nothing_passed for none.
 struct alignas(8) Gather {
   int first, second;
 };

@@ -1,6 +1,7 @@
 #include "sim/cuda/layout/solve_plan.h"
 
 #include <algorithm>
+#include <array>
 #include <span>
 
 #include "sim/cuda/layout/front_owners.h"
@@ -37,13 +38,13 @@ struct TeamFront {
 
 struct TeamFronts {
   std::vector<TeamFront> fronts;
-  int vector_size;
+  int vector_end;  ///< behind what they pass up
 };
 
 /// What a front passes up lives until its parent is done. What one block works on has memory of its own,
 /// since blocks do not wait for each other there.
 std::vector<int> vector_places(const FrontPlan& plan, const std::vector<int>& owners, int team_blocks,
-                               int& vector_size) {
+                               int& vector_end) {
   std::vector<Places> places(static_cast<std::size_t>(team_blocks) + 1);
   const auto places_of = [&](std::size_t front) -> Places& {
     return places[static_cast<std::size_t>(owners[front] + 1)];
@@ -66,8 +67,7 @@ std::vector<int> vector_places(const FrontPlan& plan, const std::vector<int>& ow
     next += static_cast<int>(own.total());
   }
   for (std::size_t f = 0; f < at.size(); ++f) at[f] += begin[static_cast<std::size_t>(owners[f] + 1)];
-  // Chunks read beyond the last number.
-  vector_size = next + 2 * solve_tile_width;
+  vector_end = next;
   return at;
 }
 
@@ -78,7 +78,7 @@ TeamFronts team_fronts(const FrontPlan& plan, int team_blocks) {
     for (const int child : plan.fronts[f].children)
       if (child >= 0) passes_to_all[static_cast<std::size_t>(child)] = owners[f] == all_blocks;
   TeamFronts team;
-  const std::vector<int> at = vector_places(plan, owners, team_blocks, team.vector_size);
+  const std::vector<int> at = vector_places(plan, owners, team_blocks, team.vector_end);
   for (std::size_t f = 0; f < plan.fronts.size(); ++f)
     team.fronts.push_back({plan.fronts[f], owners[f], passes_to_all[f], at[f]});
   return team;
@@ -152,6 +152,41 @@ Shares share_out(std::vector<Task> tasks, int team_blocks) {
   return shares;
 }
 
+/// Numbers whose sum comes in two parts.
+class Parts {
+ public:
+  /// `first`: where second parts may stand.
+  Parts(const FrontPlan& plan, int first)
+      : none_(plan.nothing_passed()), next_(first), second_(static_cast<std::size_t>(none_), none_) {}
+
+  /// Where the other parts of `count` numbers from `at` on stand.
+  int take(int at, int count) {
+    const int first = next_;
+    for (int k = 0; k < count; ++k) second_[static_cast<std::size_t>(at + k)] = next_++;
+    return first;
+  }
+  /// The other part of a number, nothing_passed where it comes in one.
+  int second(int at) const { return second_[static_cast<std::size_t>(at)]; }
+  int end() const { return next_; }
+
+ private:
+  int none_, next_;
+  std::vector<int> second_;
+};
+
+/// The two halves of a task, of which no result is passed up. Each adds up a part of the results, so that two
+/// warps can work on them at the same time.
+std::array<Task, 2> halves(const Task& task, Parts& parts) {
+  const auto middle = task.chunks.begin() + (std::ssize(task.chunks) + 1) / 2;
+  std::array<Task, 2> half = {Task{task.owner, {task.chunks.begin(), middle}},
+                              Task{task.owner, {middle, task.chunks.end()}}};
+  half[0].chunks.back().flags |= SolveChunk::ends;
+  const SolveChunk& end = task.chunks.back();
+  const int second = parts.take(end.own_at, end.own_count);
+  for (SolveChunk& chunk : half[1].chunks) chunk.own_at = second;
+  return half;
+}
+
 std::size_t longest(const Shares& shares) {
   std::size_t most = 0;
   for (const auto& share : shares) most = std::max(most, share.size());
@@ -164,13 +199,35 @@ std::vector<Task> of_one_block(std::vector<Task> tasks) {
   return tasks;
 }
 
+/// Long tasks become halves where one takes half as long as the warps of one block have work, or longer: the
+/// more blocks there are, the more they wait for it.
+std::vector<Task> with_halves(const std::vector<Task>& tasks, Parts& parts) {
+  constexpr std::size_t long_task = chunks_together + 1;
+  std::size_t most = 0, all_chunks = 0;
+  for (const Task& task : tasks) {
+    most = std::max(most, task.chunks.size());
+    all_chunks += task.chunks.size();
+  }
+  if (most < long_task || 2 * most * block_warps < all_chunks) return tasks;
+  std::vector<Task> all;
+  for (const Task& task : tasks) {
+    const SolveChunk& end = task.chunks.back();
+    if (task.chunks.size() >= long_task && end.passed_begin >= end.passed_end) {
+      for (Task& half : halves(task, parts)) all.push_back(std::move(half));
+    } else {
+      all.push_back(task);
+    }
+  }
+  return all;
+}
+
 /// Adds a level in tasks of whichever width has the warps of one block wait least for each other: for any
 /// team the same, since chunks of other columns are rounded otherwise. `next_is_shared`: as in SolveChunk.
 template <typename Cut>
-void add_level(const Cut& cut, int team_blocks, bool next_is_shared, Shares& warps) {
+void add_level(const Cut& cut, int team_blocks, bool next_is_shared, Parts& parts, Shares& warps) {
   const auto most = [&](int width) { return longest(share_out(of_one_block(cut(width)), 1)); };
   const int width = most(solve_tile_width) < most(chunk_width) ? solve_tile_width : chunk_width;
-  Shares shares = share_out(cut(width), team_blocks);
+  Shares shares = share_out(with_halves(cut(width), parts), team_blocks);
   for (std::size_t w = 0; w < warps.size(); ++w) {
     while (shares[w].empty() || shares[w].size() % chunks_together != 0) shares[w].emplace_back();
     shares[w].back().flags |= SolveChunk::ends_level | (next_is_shared ? SolveChunk::next_is_shared : 0);
@@ -178,13 +235,13 @@ void add_level(const Cut& cut, int team_blocks, bool next_is_shared, Shares& war
   }
 }
 
-std::vector<Gather> gathers_of(const FrontPlan& plan, const TeamFronts& team) {
+std::vector<Gather> gathers_of(const FrontPlan& plan, const TeamFronts& team, const Parts& parts) {
   const int none = plan.nothing_passed(), rows = static_cast<int>(plan.entries.size());
   // Copies go by whole chunks, beyond the last row.
   std::vector<Gather> gathers(2 * plan.entries.size() + chunk_width, {none, none});
   // Padding has zeros, which the scale of a chunk does not follow.
   for (int row = 0; row < rows; ++row)
-    if (plan.entries[row] >= 0) gathers[rows + row].first = plan.entries[row];
+    if (const int entry = plan.entries[row]; entry >= 0) gathers[rows + row] = {entry, parts.second(entry)};
   for (const FrontLayout& front : plan.fronts) {
     const int vertices = front.column_count + front.row_count, columns = 3 * front.column_count;
     for (int entry = 0; entry < 3 * vertices; ++entry) {
@@ -205,8 +262,7 @@ std::vector<Gather> gathers_of(const FrontPlan& plan, const TeamFronts& team) {
 SolvePlan plan_solve(const FrontPlan& plan, int team_blocks) {
   const TeamFronts team = team_fronts(plan, team_blocks);
   SolvePlan solve;
-  solve.vector_size = team.vector_size;
-  solve.gathers = gathers_of(plan, team);
+  Parts parts(plan, team.vector_end);
   solve.entries = static_cast<int>(plan.entries.size());
   const auto fronts_of = [&](std::size_t level) {
     return std::span(team.fronts)
@@ -229,7 +285,7 @@ SolvePlan plan_solve(const FrontPlan& plan, int team_blocks) {
               tasks.push_back(forward_task(plan, front, row, rows));
           return tasks;
         },
-        team_blocks, l + 1 == levels || is_shared(l) || is_shared(l + 1), warps);
+        team_blocks, l + 1 == levels || is_shared(l) || is_shared(l + 1), parts, warps);
   for (std::size_t l = levels; l-- > 0;)
     add_level(
         [&](int columns) {
@@ -239,7 +295,11 @@ SolvePlan plan_solve(const FrontPlan& plan, int team_blocks) {
               tasks.push_back(backward_task(plan, solve.entries, front, column, columns));
           return tasks;
         },
-        team_blocks, is_shared(l), warps);
+        team_blocks, is_shared(l), parts, warps);
+  solve.gathers = gathers_of(plan, team, parts);
+  for (int at = 3 * plan.size; at < 6 * plan.size; ++at)
+    if (parts.second(at) != plan.nothing_passed()) solve.parted.push_back({at, parts.second(at)});
+  solve.vector_size = parts.end() + 2 * solve_tile_width;  // chunks read beyond the last number
   for (const auto& chunks : warps) {
     solve.starts.push_back(static_cast<int>(solve.chunks.size()));
     solve.chunks.insert(solve.chunks.end(), chunks.begin(), chunks.end());

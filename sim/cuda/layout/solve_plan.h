@@ -12,10 +12,13 @@ namespace flash::sim::cuda {
 struct SolvePlan {
   std::vector<SolveChunk> chunks;  ///< of one warp after the other
   std::vector<int> starts;         ///< of each warp, and the end
-  /// By rows of fronts as FrontPlan::entries: what children pass up to it, then, from `entries` on, its
-  /// entry.
+  /// By rows of fronts as FrontPlan::entries: what children pass up to it, then, from `entries` on, the parts
+  /// of its entry.
   std::vector<Gather> gathers;
   int entries = 0;
+  /// Numbers of the solution that come in two parts, which are added up at last: where that of the solution
+  /// is, and the other one.
+  std::vector<Gather> parted;
   int vector_size = 0;  ///< numbers that a solve works on (solve_chunk.h)
 };
 

@@ -10,6 +10,7 @@
 
 #include "sim/cuda/batch_replay.h"
 #include "sim/cuda/batch_system.h"
+#include "sim/cuda/devices.h"
 #include "sim/cuda/hold_motion.h"
 #include "sim/cuda/most_obstacles.h"
 #include "sim/newton/solver.h"

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "sim/cuda/batch_system.h"
+#include "sim/cuda/devices.h"
 #include "sim/newton/solver.h"
 #include "tests/sim/cuda/meshes.h"
 #include "tests/sim/sheet_scene.h"

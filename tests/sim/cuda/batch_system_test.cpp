@@ -1,6 +1,7 @@
 // What the kernels of a device compute, against those of the processor.
 #ifdef FLASH_HAVE_CUDA
 #include "sim/cuda/batch_system.h"
+#include "sim/cuda/devices.h"
 
 #include <gtest/gtest.h>
 

@@ -107,6 +107,8 @@ class Team {
     }
     std::vector<Eigen::VectorXd> solutions;
     const Eigen::Index size = 3L * plan_.size;
+    for (auto& vector : vectors_)
+      for (const Gather& parts : solve_.parted) vector[parts.first] += vector[parts.second];
     for (const auto& vector : vectors_)
       solutions.emplace_back(Eigen::Map<const Eigen::VectorXd>(vector.data() + size, size));
     return solutions;
@@ -140,9 +142,8 @@ class Team {
       Eigen::VectorXd inputs = Eigen::VectorXd::Zero(chunk_width);
       for (int k = 0; k < chunk.inputs; ++k) {
         const int at = chunk.input_table + k;
-        inputs[k] = backward ? vector[solve_.gathers[at].first]
-                             : vector[chunk.right_at + k] + vector[solve_.gathers[at].first] +
-                                   vector[solve_.gathers[at].second];
+        inputs[k] = vector[solve_.gathers[at].first] + vector[solve_.gathers[at].second];
+        if (!backward) inputs[k] += vector[chunk.right_at + k];
       }
       for (int row = 0; row < 2 && chunk.inputs > 0; ++row)
         for (int column = 0; column < 2; ++column) {
