@@ -28,11 +28,16 @@ def point_of(run):
     return run["least_flops"] / run["least_bytes"], run["least_flops"] / seconds
 
 
+def ticks(low, high, digits):
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    return [digit * 10.0 ** power for power in powers for digit in digits if low <= digit * 10.0 ** power <= high]
+
+
 def picture(bench):
     bytes_per_second, peak = bench["rates"]["copied_bytes"], bench["rates"]["single_flops"]
     points = [(run, *point_of(run)) for run in bench["runs"]]
     ridge = peak / bytes_per_second
-    x_low, x_high = min(0.8, *(0.5 * x for _, x, _ in points)), 5 * ridge
+    x_low, x_high = 0.7 * min(x for _, x, _ in points), 2 * ridge
     y_low, y_high = 0.5 * min(y for _, _, y in points), 2 * peak
 
     def x_at(value):
@@ -46,13 +51,13 @@ def picture(bench):
            f'<rect width="{WIDTH}" height="{HEIGHT}" fill="white"/>',
            f'<text x="{LEFT}" y="22" font-size="15">Lifts on one {bench["rates"]["name"]}</text>']
     for low, high, at, is_x in ((x_low, x_high, x_at, True), (y_low, y_high, y_at, False)):
-        for power in range(math.ceil(math.log10(low)), math.floor(math.log10(high)) + 1):
-            place = at(10.0 ** power)
+        for value in ticks(low, high, (1, 2, 5) if is_x else (1,)):
+            place = at(value)
             if is_x:
-                line, text = f'x1="{place:.1f}" x2="{place:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"', f"{10.0 ** power:g}"
+                line, text = f'x1="{place:.1f}" x2="{place:.1f}" y1="{TOP}" y2="{HEIGHT - BOTTOM}"', f"{value:g}"
                 label = f'x="{place:.1f}" y="{HEIGHT - BOTTOM + 18}" text-anchor="middle"'
             else:
-                line, text = f'x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{place:.1f}" y2="{place:.1f}"', f"{10.0 ** power / 1e9:g}"
+                line, text = f'x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{place:.1f}" y2="{place:.1f}"', f"{value / 1e9:g}"
                 label = f'x="{LEFT - 6}" y="{place + 4:.1f}" text-anchor="end"'
             out += [f'<line {line} stroke="#ddd"/>', f"<text {label}>{text}</text>"]
     out += [f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{HEIGHT - 16}" text-anchor="middle">operations per byte</text>',
@@ -63,15 +68,24 @@ def picture(bench):
             f'<text x="{x_at(ridge) - 8:.1f}" y="{y_at(peak) - 8:.1f}" text-anchor="middle">'
             f"{1e-12 * bytes_per_second:.2f} TB/s, {1e-12 * peak:.0f} TFLOP/s</text>"]
     sizes = sorted({run["vertices"] for run, _, _ in points})
+    counts = sorted({run["environments"] for run, _, _ in points})
+
+    def radius(count):
+        return 3 + 2.5 * counts.index(count)
+
     for run, x, y in points:
         colour = COLOURS[sizes.index(run["vertices"]) % len(COLOURS)]
-        out += [f'<circle cx="{x_at(x):.1f}" cy="{y_at(y):.1f}" r="4.5" fill="{colour}"/>',
-                f'<text x="{x_at(x) + 8:.1f}" y="{y_at(y) + 4:.1f}" fill="{colour}">{run["environments"]}</text>']
+        out.append(f'<circle cx="{x_at(x):.1f}" cy="{y_at(y):.1f}" r="{radius(run["environments"])}" '
+                   f'fill="{colour}" fill-opacity="0.35" stroke="{colour}"/>')
     for k, size in enumerate(sizes):
         y = TOP + 20 * k + 10
         out += [f'<circle cx="{WIDTH - RIGHT + 20}" cy="{y}" r="4.5" fill="{COLOURS[k % len(COLOURS)]}"/>',
                 f'<text x="{WIDTH - RIGHT + 30}" y="{y + 4}">{size:,} vertices</text>']
-    out += [f'<text x="{WIDTH - RIGHT + 20}" y="{TOP + 20 * len(sizes) + 14}">figures: environments</text>', "</svg>"]
+    for k, count in enumerate(counts):
+        y = TOP + 20 * len(sizes) + 26 * k + 26
+        out += [f'<circle cx="{WIDTH - RIGHT + 20}" cy="{y}" r="{radius(count)}" fill="none" stroke="#444"/>',
+                f'<text x="{WIDTH - RIGHT + 38}" y="{y + 4}">{count:,} environment{"s" if count > 1 else ""}</text>']
+    out.append("</svg>")
     return "\n".join(out) + "\n"
 
 

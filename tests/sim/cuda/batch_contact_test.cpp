@@ -245,9 +245,10 @@ double drift(const Scene& scene, double tolerance) {
 
 TEST(BatchContact, TrajectoriesAreThoseOfTheProcessorAndCloserAsTheToleranceFalls) {
   SKIP_WITHOUT_DEVICE();
-  int soon_apart = 0;
+  int soon_apart = 0, compared = 0;
   for (const Scene& scene : scenes()) {
     for (const double tolerance : {1e-3, 1e-5}) {
+      ++compared;
       SCOPED_TRACE(scene.name + ", tolerance " + std::to_string(tolerance));
       const Trajectory device =
                            by_device(scene.plan, {for_device(scene)}, settings_of(scene.steps, tolerance))[0],
@@ -269,7 +270,8 @@ TEST(BatchContact, TrajectoriesAreThoseOfTheProcessorAndCloserAsTheToleranceFall
                   100 * tolerance * weight + 1e-2 * processor.forces[k].norm());
     }
   }
-  EXPECT_LE(soon_apart, 1);
+  // Which ones a threshold parts at once is chance; all but a tenth are compared over several steps.
+  EXPECT_LE(10 * soon_apart, compared);
 }
 
 TEST(BatchContact, ABatchEqualsAloneBitwiseRunAfterRun) {
