@@ -13,8 +13,14 @@ double brute_distance(const data::TriangleMesh& mesh, const Eigen::Vector3d& poi
 /// 1983).
 double brute_winding(const data::TriangleMesh& mesh, const Eigen::Vector3d& point);
 
-/// The shares of a straight way after which it goes through a triangle, ascending.
-std::vector<double> brute_crossings(const data::TriangleMesh& mesh, const Eigen::Vector3d& from,
-                                    const Eigen::Vector3d& to);
+/// Where a straight way goes through a triangle: the share of the way before it, and the triangle's normal.
+struct BruteCrossing {
+  double share;
+  Eigen::Vector3d normal;
+};
+
+/// All of them, in order.
+std::vector<BruteCrossing> brute_crossings(const data::TriangleMesh& mesh, const Eigen::Vector3d& from,
+                                           const Eigen::Vector3d& to);
 
 }  // namespace flash::sim

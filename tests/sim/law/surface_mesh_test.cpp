@@ -69,10 +69,10 @@ TEST(SurfaceMesh, EveryCrossingOfAWayIsFound) {
   for (int sample = 0; sample < 3000; ++sample) {
     const Vector3d from = 2 * Vector3d::Random(), to = 2 * Vector3d::Random();
     const std::vector<SurfaceCrossing> crossings = crossings_of(surface, vector(from), vector(to));
-    const std::vector<double> expected = brute_crossings(mesh, from, to);
+    const std::vector<BruteCrossing> expected = brute_crossings(mesh, from, to);
     ASSERT_EQ(crossings.size(), expected.size()) << sample;
     for (std::size_t k = 0; k < expected.size(); ++k)
-      EXPECT_NEAR(crossings[k].share, expected[k], 1e-10) << sample;
+      EXPECT_NEAR(crossings[k].share, expected[k].share, 1e-10) << sample;
     found += static_cast<int>(expected.size());
   }
   EXPECT_GT(found, 1000);
