@@ -9,6 +9,7 @@ CMAKE_ARGS ?=
 SEED ?= 10001
 SCENES ?= 1000
 ROUND ?= 0.3
+MESHES ?= 0.3
 RUNS ?= 20
 
 PYTHON ?= /usr/bin/python3
@@ -98,11 +99,11 @@ knock-study: configure-test  ## Say whether hand-eye calibration sees knocks nea
 
 random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on, of solids with SOLIDS=1; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
-	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --round $(ROUND) $(if $(SOLIDS),--solid) --list
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --round $(ROUND) --mesh $(MESHES) $(if $(SOLIDS),--solid) --list
 
 deep-starts: configure-test  ## Simulate SCENES random sheets that start across obstacles; say how fast they come out
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
-	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --round $(ROUND) --list
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --round $(ROUND) --mesh $(MESHES) --list
 
 locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever over Poisson's ratio and mesh
 	cmake --build $(BUILD) -j $(JOBS) --target locking_study

@@ -23,6 +23,7 @@
 #include "sim/oracle/projective.h"
 #include "sim/scene/scene.h"
 #include "sim/scene/solid.h"
+#include "sim/step/between_vertices.h"
 
 namespace flash::sim {
 namespace {
@@ -198,6 +199,22 @@ std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) 
 
 constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
 
+/// Of bodies that a mesh comes through between their vertices, at the end of a run.
+std::vector<std::string> coming_through_warnings(const std::vector<SceneBody>& bodies) {
+  constexpr double told = 1e-3;  // [m]
+  std::vector<std::string> warnings;
+  for (const SceneBody& body : bodies) {
+    const ComingThrough deepest = deepest_between_vertices(body.sheet, body.environment);
+    if (deepest.depth <= told) continue;
+    warnings.push_back(
+        body.name + ": " + body.environment.obstacles[static_cast<std::size_t>(deepest.obstacle)].name +
+        " comes through between its vertices by " + data::format_short(1e3 * deepest.depth) +
+        " mm at the end: contact is that of vertices; take smaller cells, or give the obstacle a "
+        "margin");
+  }
+  return warnings;
+}
+
 std::set<int> frames_to_write(const data::Scene& scene, int steps) {
   std::set<int> frames;
   if (scene.keyframe_times.empty())
@@ -339,6 +356,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   for (std::size_t b = 0; b < bodies.size() && !summary.interrupted && summary.steps > 0; ++b)
     for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
       summary.warnings.push_back(bodies[b].name + ": " + warning);
+  for (const std::string& warning : coming_through_warnings(bodies)) summary.warnings.push_back(warning);
   summary.held_penetration_max = held.penetration.depth;
   summary.start_penetration_max = started.penetration.depth;
   if (held.penetration.depth > told_depth)

@@ -137,12 +137,30 @@ SceneCapsule read_capsule(const JsonObject& object, bool has_length) {
   return capsule;
 }
 
+/// Where a box or a mesh is: at a pose, or along a trajectory.
+void read_place(const JsonObject& object, auto& shape) {
+  if (object.has("pose")) shape.pose = read_pose(object, "pose");
+  shape.trajectory = read_trajectory(object);
+  if (object.has("pose") && !shape.trajectory.times.empty())
+    throw object.error("pose", "either pose or a trajectory or keyframes");
+}
+
+SceneMesh read_mesh(const JsonObject& object) {
+  object.expect_fields({"shape", "file", "scale", "margin", "pose", "trajectory", "keyframes", "friction"});
+  SceneMesh mesh;
+  mesh.file = existing_file(object, "file");
+  mesh.scale = object.positive("scale", mesh.scale);
+  if (object.has("margin")) mesh.margin = object.not_negative("margin");
+  read_place(object, mesh);
+  return mesh;
+}
+
 void read_obstacles(const JsonObject& file, Scene& scene) {
   for (const auto& [name, object] : file.members("obstacles")) {
     SceneObstacle obstacle;
     obstacle.name = name;
     const std::string shape =
-        read_choice(object, "shape", "", {"plane", "box", "cylinder", "sphere", "capsule"});
+        read_choice(object, "shape", "", {"plane", "box", "cylinder", "sphere", "capsule", "mesh"});
     if (shape == "plane") {
       object.expect_fields({"shape", "point", "normal", "friction"});
       obstacle.shape = read_plane(object);
@@ -158,15 +176,14 @@ void read_obstacles(const JsonObject& file, Scene& scene) {
       object.expect_fields(
           {"shape", "point", "axis", "half_length", "radius", "trajectory", "keyframes", "friction"});
       obstacle.shape = read_capsule(object, true);
+    } else if (shape == "mesh") {
+      obstacle.shape = read_mesh(object);
     } else {
       object.expect_fields({"shape", "size", "pose", "trajectory", "keyframes", "friction"});
       SceneBox box;
       box.size = object.vector("size", 3);
       if (!(box.size.array() > 0).all()) throw object.error("size", "three lengths above 0");
-      if (object.has("pose")) box.pose = read_pose(object, "pose");
-      box.trajectory = read_trajectory(object);
-      if (object.has("pose") && !box.trajectory.times.empty())
-        throw object.error("pose", "either pose or a trajectory or keyframes");
+      read_place(object, box);
       obstacle.shape = box;
     }
     obstacle.friction = read_friction(object);

@@ -57,10 +57,19 @@ struct SceneCapsule {
   Trajectory trajectory;                            ///< of a frame in which it stands; empty: it stays
 };
 
+/// A surface of triangles.
+struct SceneMesh {
+  std::string file;                                        ///< resolved path
+  double scale = 1.0;                                      ///< of its coordinates, to metres
+  std::optional<double> margin;                            ///< how far off the triangles it is met [m]
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();  ///< T_base_mesh
+  Trajectory trajectory;                                   ///< T_base_mesh(t); empty: stays at `pose`
+};
+
 /// Rigid surface. `planecollisions` become obstacles like any other.
 struct SceneObstacle {
   std::string name;
-  std::variant<ScenePlane, SceneBox, SceneCylinder, SceneCapsule> shape;
+  std::variant<ScenePlane, SceneBox, SceneCylinder, SceneCapsule, SceneMesh> shape;
   std::optional<double> friction;  ///< empty: the material's
 };
 

@@ -20,6 +20,9 @@ std::string why_not_on_device(const Environment& environment) {
   if (!environment.solids.empty()) return "solids (element_type TETRAHEDRON) are simulated on the CPU alone";
   if (!environment.point_masses.empty()) return "point masses (attached_mass) are simulated on the CPU alone";
   if (environment.materials.size() > 1) return "several bodies in one environment";
+  if (std::any_of(environment.obstacles.begin(), environment.obstacles.end(),
+                  [](const Obstacle& obstacle) { return std::holds_alternative<Mesh>(obstacle.shape); }))
+    return "obstacles of shape mesh are met on the CPU alone";
   if (environment.obstacles.size() > most_obstacles)
     return "more than " + std::to_string(most_obstacles) + " obstacles: found " +
            std::to_string(environment.obstacles.size());

@@ -376,6 +376,13 @@ FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_after_box(
   return let_out(gap, depth, time_step, way_out);
 }
 
+/// Those of meshes stand in sim/law/mesh_gap.
+SurfaceGap<double> gap_after_mesh(const MovingObstacle<double>& obstacle, const Vector3<double>& start,
+                                  const Vector3<double>& point, double time_step,
+                                  const WayOut<double>& way_out);
+double depth_along_mesh(const MovingObstacle<double>& obstacle, const Vector3<double>& start,
+                        const Vector3<double>& way);
+
 /// How a vertex that comes from `start` [m] at the start of the step stands at `point` at its end. The way
 /// between them is straight, seen from the obstacle:
 /// - a point in a box, or behind it, stands against the face through which its way entered; one behind the
@@ -401,6 +408,9 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after(const MovingObstacle<Real>& 
     return gap_after_cylinder(obstacle, start, point, time_step, way_out);
   if (obstacle.shape == ObstacleShape::capsule)
     return gap_after_capsule(obstacle, start, point, time_step, way_out);
+  if constexpr (meets_meshes<Real>)
+    if (obstacle.shape == ObstacleShape::mesh)
+      return gap_after_mesh(obstacle, start, point, time_step, way_out);
   return gap_after_box(obstacle, others, start, point, slid, time_step, way_out);
 }
 
@@ -414,13 +424,13 @@ struct MetSurface {
 };
 
 /// The surface of a plane or a box that the straight way from `start` to `end`, seen from the obstacle,
-/// meets, also where it ends on it or leaves it by an edge beside. None for a cylinder and a capsule, and
-/// where the way starts inside.
+/// meets, also where it ends on it or leaves it by an edge beside. None for all others, and where the way
+/// starts inside.
 template <typename Real>
 FLASH_HOST_DEVICE inline MetSurface<Real> met_surface(const MovingObstacle<Real>& obstacle,
                                                       const OtherObstacles<Real>& others,
                                                       const Vector3<Real>& start, const Vector3<Real>& end) {
-  if (obstacle.shape == ObstacleShape::cylinder || obstacle.shape == ObstacleShape::capsule) return {};
+  if (obstacle.shape != ObstacleShape::plane && obstacle.shape != ObstacleShape::box) return {};
   if (obstacle.shape == ObstacleShape::plane) {
     const Real from = dot(obstacle.start.z, start - obstacle.start.origin),
                to = dot(obstacle.end.z, end - obstacle.end.origin);
@@ -452,6 +462,8 @@ FLASH_HOST_DEVICE inline MetSurface<Real> met_surface(const MovingObstacle<Real>
 template <typename Real>
 FLASH_HOST_DEVICE inline Real depth_along(const MovingObstacle<Real>& obstacle, const Vector3<Real>& start,
                                           const Vector3<Real>& way) {
+  if constexpr (meets_meshes<Real>)
+    if (obstacle.shape == ObstacleShape::mesh) return depth_along_mesh(obstacle, start, way);
   const Vector3<Real> local = place_in(obstacle.start, start),
                       local_direction = direction_in(obstacle.start, way);
   if (obstacle.shape == ObstacleShape::plane)

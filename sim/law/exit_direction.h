@@ -20,18 +20,19 @@ FLASH_HOST_DEVICE inline int exit_directions(const MovingObstacle<double>& obsta
     case ObstacleShape::cylinder:
       return 16;
     case ObstacleShape::capsule:
+    case ObstacleShape::mesh:
       break;
   }
   return 26;
 }
 
 /// The k-th of them: out of a plane, out of the faces of a box, across the axis of a cylinder, out of a
-/// capsule to the neighbours of a cell among 27.
+/// capsule or a mesh to the neighbours of a cell among 27.
 FLASH_HOST_DEVICE inline Vector3<double> exit_direction(const MovingObstacle<double>& obstacle, int k) {
   const Frame<double>& frame = obstacle.start;
   if (obstacle.shape == ObstacleShape::plane) return frame.z;
   if (obstacle.shape == ObstacleShape::box) return (k % 2 == 0 ? 1.0 : -1.0) * frame.axis(k / 2);
-  if (obstacle.shape == ObstacleShape::capsule) {
+  if (obstacle.shape == ObstacleShape::capsule || obstacle.shape == ObstacleShape::mesh) {
     const int cell = k < 13 ? k : k + 1;  // without that in the middle
     const Vector3<double> way = {cell % 3 - 1.0, cell / 3 % 3 - 1.0, cell / 9 - 1.0};  // NOLINT
     return direction_from(frame, (1 / norm(way)) * way);

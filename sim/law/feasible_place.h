@@ -47,8 +47,9 @@ FLASH_CALLED_ON_DEVICE inline Vector3<double> projected_out(const ObstacleStep<d
         depth = 0;
       }
       outside = outside && depth <= 0;
-      // What is nearest of a box that the way misses may be its far side.
-      if (step.obstacles[k].shape == ObstacleShape::box && depth < -touching_gap) continue;
+      // What is nearest of a box or a mesh that the way misses may be its far side.
+      const ObstacleShape shape = step.obstacles[k].shape;
+      if ((shape == ObstacleShape::box || shape == ObstacleShape::mesh) && depth < -touching_gap) continue;
       room.normals[count] = gap.normal;
       room.right[count++] = depth;
     }

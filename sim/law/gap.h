@@ -1,24 +1,37 @@
 #pragma once
+#include <type_traits>
+
 #include "sim/law/vector3.h"
 
 namespace flash::sim {
+
+struct SurfaceMesh;
+
 inline namespace FLASH_LEVEL {
 
-enum class ObstacleShape { plane, box, cylinder, capsule };
+enum class ObstacleShape { plane, box, cylinder, capsule, mesh };
+
+/// Surfaces of a mesh that a vertex can touch at once. Each is an obstacle by itself in a step.
+inline constexpr int most_mesh_surfaces = 3;
+
+struct MeshMemory;
 
 /// An obstacle over one step. A plane stands across the third axis of its frame, through the origin, and its
 /// solid is below. A box stands about the origin, along the axes. A cylinder has its axis along the third. A
 /// capsule is all within `radius` of a stretch of the third axis, `half_length` to either side of the origin;
-/// without length it is a sphere.
+/// without length it is a sphere. A mesh has a frame of its own.
 template <typename Real>
 struct MovingObstacle {
   ObstacleShape shape = ObstacleShape::plane;
   Vector3<Real> half_extents{};  ///< of a box [m]
-  Real radius{};                 ///< of a cylinder or a capsule [m]
+  Real radius{};                 ///< of a cylinder or a capsule; margin of a mesh [m]
   Real half_length{};            ///< of the axis of a capsule [m]
   Frame<Real> start{}, end{};    ///< at the start and at the end of the step
   bool moves = false;            ///< whether the two differ
   Real friction{};               ///< Coulomb coefficient on the body at hand
+  const SurfaceMesh* mesh = nullptr;
+  int surface = 0;               ///< which of those of a mesh that meet at a vertex
+  MeshMemory* memory = nullptr;  ///< of a mesh, for the surfaces of a step; none: each is found anew
 };
 
 /// How a point stands against an obstacle.
@@ -32,6 +45,12 @@ struct SurfaceGap {
   bool starts_inside = false;           ///< whether the vertex starts the step inside
   Real sunk{};  ///< how far the surface that `distance` is to lies below the obstacle's own [m]
 };
+
+/// Meshes are met on the host alone, in double precision (sim/law/mesh_gap).
+template <typename Real>
+inline constexpr bool meets_meshes = std::is_same_v<Real, double> && !on_device;
+
+SurfaceGap<double> gap_to_mesh(const MovingObstacle<double>& obstacle, const Vector3<double>& point);
 
 /// Motion over the step of the obstacle's material that is at `place` at its end.
 template <typename Real>
@@ -118,6 +137,12 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_to(const MovingObstacle<Real>& obs
             .normal = frame.z,
             .surface_moved = material_motion(obstacle, point)};
   SurfaceGap<Real> gap;
+  if constexpr (meets_meshes<Real>)
+    if (obstacle.shape == ObstacleShape::mesh) {
+      gap = gap_to_mesh(obstacle, point);
+      gap.surface_moved = material_motion(obstacle, point);
+      return gap;
+    }
   if (obstacle.shape == ObstacleShape::cylinder) {
     const Vector3<Real> local = place_in(frame, point);
     const Real length = square_root(local.x * local.x + local.y * local.y);

@@ -10,3 +10,14 @@
 #define FLASH_HOST_DEVICE
 #define FLASH_CALLED_ON_DEVICE
 #endif
+
+namespace flash::sim {
+
+/// Whether what is compiled runs on a device.
+#ifdef __CUDA_ARCH__
+inline constexpr bool on_device = true;
+#else
+inline constexpr bool on_device = false;
+#endif
+
+}  // namespace flash::sim

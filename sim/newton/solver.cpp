@@ -83,7 +83,7 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
     return false;
   }
   environment.state.velocities = (w.now.positions - environment.state.positions) / h;
-  environment.state.bristles = bristles_at_end(problem.contacts, w.now.contacts);
+  environment.state.bristles = bristles_at_end(problem.contacts, w.now.contacts, w.now.positions);
   environment.state.positions = w.now.positions;
   return solved;
 }

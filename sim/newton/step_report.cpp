@@ -26,18 +26,19 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
     const VertexConstraint& c = end.contacts.constraints[k];
     add_hold_forces(c, c.reaction, report.hold_forces);
     const std::span<const VertexTouch> touches = end.contacts.touches_of(k);
-    for (size_t obstacle = 0; obstacle < touches.size(); ++obstacle) {
-      const VertexTouch& touch = touches[obstacle];
+    for (size_t t = 0; t < touches.size(); ++t) {
+      const VertexTouch& touch = touches[t];
       if (!touch.holds) continue;
       report.complementarity = worst(report.complementarity, touch.gap);
-      report.obstacle_forces[obstacle] += vector3d(touch.normal_force * touch.normal + touch.friction);
+      report.obstacle_forces[problem.contacts.owners[t]] +=
+          vector3d(touch.normal_force * touch.normal + touch.friction);
     }
   }
   for (int i = 0; i < end.positions.rows(); ++i) {
     const VertexConstraint* c = end.contacts.find(i);
     // One that is held in some axes meets no obstacle in the others: such a step is not solved.
     if (c != nullptr && c->freedom == Freedom::held && is_zero(c->free)) continue;
-    for (size_t k = 0; k < environment.obstacles.size(); ++k) {
+    for (size_t k = 0; k < problem.contacts.obstacles.size(); ++k) {
       const SurfaceGap<double> gap = problem.contacts.gap(static_cast<int>(k), end.positions, i);
       const double depth = gap.starts_inside
                                ? -gap_to(problem.contacts.obstacles[k], vector3(end.positions, i)).distance

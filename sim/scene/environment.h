@@ -14,6 +14,8 @@
 
 namespace flash::sim {
 
+struct SurfaceMesh;
+
 /// Half space below a plane.
 struct Plane {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();    ///< [m]
@@ -40,9 +42,17 @@ struct Capsule {
   double radius = 0.01;                              ///< [m]
 };
 
+/// A surface of triangles (sim/law/surface_mesh), shared by all environments that meet it. A closed one is
+/// the surface of a solid. An open one is met on both sides.
+struct Mesh {
+  std::shared_ptr<const SurfaceMesh> surface;
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  double margin = 0.0;  ///< how far off the triangles it is met; above 0 where it is open [m]
+};
+
 /// A rigid shape that a sheet meets.
 struct Obstacle {
-  std::variant<Plane, Box, Cylinder, Capsule> shape = {};
+  std::variant<Plane, Box, Cylinder, Capsule, Mesh> shape = {};
   std::vector<double> friction =
       {};                  ///< Coulomb coefficient on each body; missing or below zero: the material's
   std::string name = {};   ///< under which the force is told

@@ -2,19 +2,56 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
+#include <memory>
 
 #include "data/asset.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
+#include "data/obstacle_mesh.h"
 #include "data/text.h"
+#include "sim/law/surface_mesh.h"
 #include "sim/scene/solid.h"
 
 namespace flash::sim {
 namespace {
 
-/// The trajectories of a scene, each a frame of its schedule.
-struct Timeline {
+/// How far off its triangles an open mesh is met where the scene does not say [m].
+constexpr double open_margin = 5e-4;
+
+/// Beyond this a mesh is rather in millimetres [m].
+constexpr double largest_mesh = 20;
+
+/// The mesh of an obstacle, without its place.
+Mesh mesh_of(const data::Scene& scene, const data::SceneObstacle& obstacle, const data::SceneMesh& described,
+             std::vector<std::string>& notices) {
+  const data::ObstacleMesh read = data::load_obstacle_mesh(described.file, described.scale);
+  Mesh mesh;
+  mesh.margin = described.margin.value_or(read.closed ? 0.0 : open_margin);
+  if (!read.closed && mesh.margin == 0)
+    throw data::input_error(scene.source, "obstacles." + obstacle.name + ".margin",
+                            "found 0, expected a length above 0 [m], as " + described.file + " is open: " +
+                                data::format_count(static_cast<std::size_t>(read.border_edges)) +
+                                " of its edges have one triangle");
+  mesh.surface = std::make_shared<const SurfaceMesh>(make_surface_mesh(read));
+  const Eigen::Vector3d size =
+      read.mesh.vertices.colwise().maxCoeff() - read.mesh.vertices.colwise().minCoeff();
+  notices.push_back(
+      obstacle.name + ": a" + (read.closed ? " closed" : "n open") + " surface of " +
+      data::format_count(static_cast<std::size_t>(read.mesh.triangles.rows())) + " triangles, " +
+      data::format_short(size.x()) + " x " + data::format_short(size.y()) + " x " +
+      data::format_short(size.z()) + " m" +
+      (mesh.margin > 0 ? ", met " + data::format_short(1e3 * mesh.margin) + " mm off its triangles" : "") +
+      (read.closed ? "" : " on both sides") +
+      (size.maxCoeff() > largest_mesh ? "; is it in millimetres? (\"scale\": 0.001)" : ""));
+  return mesh;
+}
+
+/// What the bodies of a scene share: the trajectories, each a frame of its schedule, and the meshes of its
+/// obstacles by name.
+struct SceneParts {
   std::vector<const data::Trajectory*> trajectories;
+  std::map<std::string, Mesh> meshes;
 
   /// The frame that follows a trajectory of the scene; the base frame where it is empty.
   int frame_of(const data::Trajectory& trajectory) {
@@ -27,7 +64,7 @@ struct Timeline {
 };
 
 Obstacle obstacle_of(const data::Scene& scene, const std::string& object, const data::SceneObstacle& other,
-                     int frame) {
+                     const SceneParts& shared, int frame) {
   Obstacle obstacle;
   obstacle.name = other.name;
   obstacle.frame = frame;
@@ -41,6 +78,11 @@ Obstacle obstacle_of(const data::Scene& scene, const std::string& object, const 
     obstacle.shape = Cylinder{cylinder->point, cylinder->axis, cylinder->radius};
   else if (const auto* capsule = std::get_if<data::SceneCapsule>(&other.shape))
     obstacle.shape = Capsule{capsule->point, capsule->axis, capsule->half_length, capsule->radius};
+  else if (const auto* described = std::get_if<data::SceneMesh>(&other.shape)) {
+    Mesh mesh = shared.meshes.at(other.name);
+    if (frame == base_frame) mesh.pose = described->pose;
+    obstacle.shape = mesh;
+  }
   return obstacle;
 }
 
@@ -86,7 +128,7 @@ Hold support_of(const data::SceneFixed& fixed, const Sheet& sheet, const data::P
 }
 
 void add_supports(const data::Scene& scene, const data::SceneObject& object, const Sheet& sheet,
-                  Timeline& timeline, Environment& environment) {
+                  SceneParts& parts, Environment& environment) {
   const data::Points& start = environment.state.positions;
   const Eigen::Index count = mesh_vertices(sheet);
   for (const data::SceneFixed& fixed : object.fixed) {
@@ -105,20 +147,20 @@ void add_supports(const data::Scene& scene, const data::SceneObject& object, con
     check_vertices(scene, object, "prescribed", prescribed.vertices, count);
     environment.holds.push_back({.name = prescribed.name,
                                  .vertices = with_midsides(sheet, prescribed.vertices),
-                                 .frame = timeline.frame_of(prescribed.trajectory),
+                                 .frame = parts.frame_of(prescribed.trajectory),
                                  .from = prescribed.from,
                                  .to = prescribed.to});
   }
 }
 
-void add_end_effectors(const data::Scene& scene, const std::string& object, Timeline& timeline,
+void add_end_effectors(const data::Scene& scene, const std::string& object, SceneParts& parts,
                        Environment& environment) {
   for (const data::SceneEndEffector& effector : scene.end_effectors) {
-    const int frame = timeline.frame_of(effector.trajectory);
+    const int frame = parts.frame_of(effector.trajectory);
     if (effector.collides) {
       const data::SceneObstacle box{effector.name, data::SceneBox{effector.size, {}, effector.trajectory},
                                     effector.friction};
-      environment.obstacles.push_back(obstacle_of(scene, object, box, frame));
+      environment.obstacles.push_back(obstacle_of(scene, object, box, parts, frame));
     }
     for (const data::SceneGrasp& grasp : effector.grasps)
       if (grasp.object == object)
@@ -163,7 +205,7 @@ void make_solid_body(const data::Asset& asset, SceneBody& body, std::vector<std:
   body.environment.solids[0] = resolved.material;
 }
 
-SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, Timeline& timeline,
+SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, SceneParts& parts,
                     std::vector<std::string>& notices) {
   const data::Asset asset = data::load_asset(object.asset);
   SceneBody body;
@@ -188,11 +230,12 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, T
     const data::Trajectory* path = nullptr;
     if (const auto* box = std::get_if<data::SceneBox>(&other.shape)) path = &box->trajectory;
     if (const auto* capsule = std::get_if<data::SceneCapsule>(&other.shape)) path = &capsule->trajectory;
-    const int frame = path == nullptr ? base_frame : timeline.frame_of(*path);
-    environment.obstacles.push_back(obstacle_of(scene, object.name, other, frame));
+    if (const auto* mesh = std::get_if<data::SceneMesh>(&other.shape)) path = &mesh->trajectory;
+    const int frame = path == nullptr ? base_frame : parts.frame_of(*path);
+    environment.obstacles.push_back(obstacle_of(scene, object.name, other, parts, frame));
   }
-  add_supports(scene, object, body.sheet, timeline, environment);
-  add_end_effectors(scene, object.name, timeline, environment);
+  add_supports(scene, object, body.sheet, parts, environment);
+  add_end_effectors(scene, object.name, parts, environment);
   for (const Hold& hold : environment.holds)
     if (hold.axes != std::array<bool, 3>{true, true, true} && !environment.obstacles.empty())
       notices.push_back(object.name + ": " + hold.name +
@@ -204,11 +247,14 @@ SceneBody make_body(const data::Scene& scene, const data::SceneObject& object, T
 
 std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::vector<std::string>& notices) {
   std::vector<SceneBody> bodies;
-  Timeline timeline;
+  SceneParts parts;
+  for (const data::SceneObstacle& obstacle : scene.obstacles)
+    if (const auto* described = std::get_if<data::SceneMesh>(&obstacle.shape))
+      parts.meshes.emplace(obstacle.name, mesh_of(scene, obstacle, *described, notices));
   for (const data::SceneObject& object : scene.objects)
-    bodies.push_back(make_body(scene, object, timeline, notices));
+    bodies.push_back(make_body(scene, object, parts, notices));
   std::vector<data::Trajectory> trajectories;
-  for (const data::Trajectory* trajectory : timeline.trajectories) trajectories.push_back(*trajectory);
+  for (const data::Trajectory* trajectory : parts.trajectories) trajectories.push_back(*trajectory);
   const auto schedule = make_schedule(trajectories, 0.0, scene.time_step, steps);
   for (SceneBody& body : bodies) body.environment.schedule = schedule;
   if (bodies.size() > 1) notices.push_back("the objects of this scene do not touch each other");

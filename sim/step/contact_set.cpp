@@ -1,6 +1,7 @@
 #include "sim/step/contact_set.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 namespace flash::sim {
 
@@ -15,13 +16,24 @@ ContactStep::ContactStep(const Sheet& sheet_in, const Environment& environment_i
       time(environment_in.state.time + time_step_in),
       time_step(time_step_in),
       way_out(way_out_in),
-      obstacles(moving_obstacles(environment_in, environment_in.state.time, time)),
       several(stand_beside(environment_in.obstacles)) {
+  const std::vector<MovingObstacle<double>> each =
+      moving_obstacles(environment, environment.state.time, time);
+  for (std::size_t k = 0; k < each.size(); ++k) {
+    const int surfaces = surfaces_of(environment.obstacles[k]);
+    if (surfaces > 1) memories_.push_back(std::make_unique<MeshMemory>());
+    for (int surface = 0; surface < surfaces; ++surface) {
+      obstacles.push_back(each[k]);
+      obstacles.back().surface = surface;
+      if (surfaces > 1) obstacles.back().memory = memories_.back().get();
+      owners.push_back(static_cast<int>(k));
+    }
+  }
   for (std::size_t body = 1; body < sheet.bodies.size() && !obstacles.empty(); ++body) {
     others_.push_back(obstacles);
     for (std::size_t k = 0; k < obstacles.size(); ++k)
       others_.back()[k].friction =
-          friction_between(environment, environment.obstacles[k], static_cast<int>(body));
+          friction_between(environment, environment.obstacles[owners[k]], static_cast<int>(body));
   }
 }
 
@@ -48,7 +60,7 @@ double ContactStep::distance_at_start(int obstacle, int i) const {
 ContactSet begin_step(const ContactStep& step, Points& positions) {
   const Environment& environment = step.environment;
   ContactSet contacts;
-  contacts.obstacles = environment.obstacles.size();
+  contacts.obstacles = step.obstacles.size();
   contacts.place.assign(positions.rows(), -1);
   const auto constraint_of_held = [&](int vertex) -> VertexConstraint& {
     if (contacts.place[vertex] < 0) {
@@ -151,17 +163,46 @@ double friction_potential(const ContactStep& step, const ContactSet& contacts, c
   return potential;
 }
 
-Points bristles_at_end(const ContactStep& step, const ContactSet& contacts) {
+namespace {
+
+/// The bristles of a mesh on a vertex in a crease: what they bend by along each of its surfaces that hold it,
+/// as one vector. It is cut as that along which it slides farthest.
+Vector3<double> bristles_in_crease(const ContactStep& step, std::span<const VertexTouch> touches,
+                                   const Vector3<double>& moved) {
+  double farthest = 0;
+  Vector3<double> bent{};
+  for (const VertexTouch& touch : touches) {
+    if (!touch.holds) continue;
+    farthest = std::max(farthest, touch.slip);
+    bent = touch.bristle + moved - touch.surface_moved;
+  }
+  return (1 / friction_length(farthest, step.time_step)) * bent;
+}
+
+}  // namespace
+
+Points bristles_at_end(const ContactStep& step, const ContactSet& contacts, const Points& positions) {
   const Eigen::Index vertices = step.environment.state.positions.rows();
-  Points bristles = Points::Zero(static_cast<Eigen::Index>(step.obstacles.size()) * vertices, 3);
+  Points bristles = Points::Zero(static_cast<Eigen::Index>(step.environment.obstacles.size()) * vertices, 3);
   for (size_t k = contacts.held; k < contacts.constraints.size(); ++k) {
     const int i = contacts.constraints[k].vertex;
     const ObstacleStep<double> view = step.view_of(i);
     const std::span<const VertexTouch> touches = contacts.touches_of(k);
-    for (int obstacle = 0; obstacle < view.count; ++obstacle)
-      bristles.row(obstacle * vertices + i) =
-          vector3d(bristle_at_end(view.obstacles[obstacle], touches[static_cast<size_t>(obstacle)]))
-              .transpose();
+    for (size_t first = 0, count = 0; first < touches.size(); first += count) {
+      const int owner = step.owners[first];
+      count = static_cast<size_t>(surfaces_of(step.environment.obstacles[owner]));
+      const std::span<const VertexTouch> own = touches.subspan(first, count);
+      Vector3<double> bristle{};
+      int held = 0;
+      for (size_t each = 0; each < count; ++each) {
+        if (!own[each].holds) continue;
+        bristle = bristle_at_end(view.obstacles[first], own[each]);
+        ++held;
+      }
+      if (held > 1 && view.obstacles[first].friction > 0)
+        bristle = bristles_in_crease(step, own, vector3(positions, i) - step.start(i));
+      bristles.row(owner * vertices + i) = vector3d(bristle).transpose();
+    }
   }
   return bristles;
 }

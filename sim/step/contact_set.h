@@ -1,9 +1,11 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <memory>
 #include <span>
 #include <vector>
 
+#include "sim/law/mesh_gap.h"
 #include "sim/law/vertex_contact.h"
 #include "sim/scene/environment.h"
 #include "sim/scene/sheet.h"
@@ -19,9 +21,10 @@ struct ContactStep {
 
   const Sheet& sheet;
   const Environment& environment;
-  double time, time_step;  ///< [s]
-  WayOut<double> way_out;  ///< how vertices that start inside an obstacle leave it
-  std::vector<MovingObstacle<double>> obstacles;
+  double time, time_step;                         ///< [s]
+  WayOut<double> way_out;                         ///< how vertices that start inside an obstacle leave it
+  std::vector<MovingObstacle<double>> obstacles;  ///< of a mesh one for each surface that a vertex may touch
+  std::vector<int> owners;  ///< of each of them: the obstacle of the environment that it is part of
   bool several;  ///< whether a box stands beside another obstacle, so that one may continue the other
 
   ObstacleStep<double> view() const;
@@ -32,12 +35,13 @@ struct ContactStep {
   /// Where vertex i is at the start of the step.
   Vector3<double> start(int i) const { return vector3(environment.state.positions, i); }
 
-  /// The bristles of an obstacle on vertex i at the start of the step, as in State.
+  /// The bristles of an obstacle on vertex i at the start of the step, as in State. The surfaces of a mesh
+  /// have theirs in common.
   Vector3<double> bristle(int obstacle, int i) const {
     const State& state = environment.state;
     return state.bristles.rows() == 0
                ? Vector3<double>{}
-               : vector3(state.bristles, obstacle * static_cast<int>(state.positions.rows()) + i);
+               : vector3(state.bristles, owners[obstacle] * static_cast<int>(state.positions.rows()) + i);
   }
 
   /// How vertex i stands against an obstacle, were it at row i of `positions` at the end of the step.
@@ -49,6 +53,7 @@ struct ContactStep {
  private:
   /// The obstacles with their friction on each body after the first.
   std::vector<std::vector<MovingObstacle<double>>> others_;
+  std::vector<std::unique_ptr<MeshMemory>> memories_;  ///< one a mesh
 };
 
 /// A vertex that obstacles or holds keep from moving freely.
@@ -72,7 +77,7 @@ struct ContactRoom {
 struct ContactSet {
   std::vector<VertexConstraint> constraints;
   std::size_t held = 0;              ///< the first `held` constraints are vertices that holds carry
-  std::size_t obstacles = 0;         ///< number of touches of each other constraint
+  std::size_t obstacles = 0;         ///< of the step: number of touches of each other constraint
   std::vector<VertexTouch> touches;  ///< touches of each constraint with every obstacle
   std::vector<int> place;            ///< index of each vertex in `constraints`; -1: nothing holds it
   std::vector<double> clearance;     ///< distance of each vertex to the nearest obstacle [m]
@@ -117,7 +122,8 @@ std::vector<Eigen::Matrix3d> friction_couplings(const ContactStep& step, const C
 /// step [J].
 double friction_potential(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
 
-/// The bristles at the end of the step, as in State; zero where nothing holds a vertex.
-data::Points bristles_at_end(const ContactStep& step, const ContactSet& contacts);
+/// The bristles at the end of the step at `positions`, as in State; zero where nothing holds a vertex.
+data::Points bristles_at_end(const ContactStep& step, const ContactSet& contacts,
+                             const data::Points& positions);
 
 }  // namespace flash::sim

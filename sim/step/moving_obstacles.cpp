@@ -44,6 +44,13 @@ Isometry3d describe(const Capsule& capsule, MovingObstacle<double>& moving) {
   return frame_along(capsule.centre, capsule.axis);
 }
 
+Isometry3d describe(const Mesh& mesh, MovingObstacle<double>& moving) {
+  moving.shape = ObstacleShape::mesh;
+  moving.mesh = mesh.surface.get();
+  moving.radius = mesh.margin;
+  return mesh.pose;
+}
+
 /// The obstacle itself, and where it stands in the frame that carries it.
 std::pair<MovingObstacle<double>, Isometry3d> described(const Obstacle& obstacle, double friction) {
   MovingObstacle<double> moving;
@@ -59,6 +66,10 @@ std::pair<MovingObstacle<double>, Isometry3d> described(const Obstacle& obstacle
 bool stand_beside(const std::vector<Obstacle>& obstacles) {
   const auto is_box = [](const Obstacle& obstacle) { return std::holds_alternative<Box>(obstacle.shape); };
   return obstacles.size() > 1 && std::any_of(obstacles.begin(), obstacles.end(), is_box);
+}
+
+int surfaces_of(const Obstacle& obstacle) {
+  return std::holds_alternative<Mesh>(obstacle.shape) ? most_mesh_surfaces : 1;
 }
 
 Frame<double> frame_of(const Isometry3d& pose) {

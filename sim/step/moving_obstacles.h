@@ -34,6 +34,9 @@ MovingObstacle<double> obstacle_in_frame(const Obstacle& obstacle, double fricti
 /// Whether a box stands beside another obstacle, so that one may continue the other.
 bool stand_beside(const std::vector<Obstacle>& obstacles);
 
+/// As how many obstacles a vertex may meet it at once: a mesh by several surfaces.
+int surfaces_of(const Obstacle& obstacle);
+
 Frame<double> frame_of(const Eigen::Isometry3d& pose);
 
 /// The obstacles of an environment between the times `start` and `end` [s], with the friction on its first

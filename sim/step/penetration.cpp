@@ -23,10 +23,11 @@ Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, co
   for (size_t j = 0; j < contacts.held; ++j) {
     const int i = contacts.constraints[j].vertex;
     for (int k = 0; k < static_cast<int>(step.obstacles.size()); ++k) {
-      if (is_carried_by(step.environment, contacts.constraints[j], k)) continue;
+      const int owner = step.owners[k];
+      if (is_carried_by(step.environment, contacts.constraints[j], owner)) continue;
       const SurfaceGap<double> gap = step.gap(k, positions, i);
       const double depth = gap.sunk - gap.distance;
-      if (depth > deepest.depth) deepest = {depth, i, k};
+      if (depth > deepest.depth) deepest = {depth, i, owner};
     }
   }
   return deepest;
@@ -38,7 +39,8 @@ std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const Con
     const VertexConstraint* constraint = contacts.find(i);
     if (constraint != nullptr && constraint->freedom == Freedom::held) continue;
     for (size_t k = 0; k < step.obstacles.size(); ++k)
-      if (step.distance_at_start(static_cast<int>(k), i) < -inside_depth) inside[k].push_back(i);
+      if (step.obstacles[k].surface == 0 && step.distance_at_start(static_cast<int>(k), i) < -inside_depth)
+        inside[k].push_back(i);
   }
   return inside;
 }
@@ -48,7 +50,7 @@ Penetration deepest_at_start(const ContactStep& step, const std::vector<std::vec
   for (size_t k = 0; k < inside.size(); ++k)
     for (const int i : inside[k]) {
       const double depth = -step.distance_at_start(static_cast<int>(k), i);
-      if (depth > deepest.depth) deepest = {depth, i, static_cast<int>(k)};
+      if (depth > deepest.depth) deepest = {depth, i, step.owners[k]};
     }
   return deepest;
 }

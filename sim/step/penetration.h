@@ -19,7 +19,7 @@ struct Penetration {
 Penetration deepest_held(const ContactStep& step, const ContactSet& contacts, const data::Points& positions);
 
 /// The vertices that start the step inside each obstacle, without those that supports or grippers hold: one
-/// list an obstacle, ascending.
+/// list an obstacle of the step, ascending; of a mesh the first alone has one.
 std::vector<std::vector<int>> vertices_inside(const ContactStep& step, const ContactSet& contacts);
 
 /// The deepest of vertices that start the step inside an obstacle, as vertices_inside finds them.

@@ -120,6 +120,30 @@ TEST_F(SceneFiles, SpheresAndCapsulesAreRead) {
             std::string::npos);
 }
 
+TEST_F(SceneFiles, MeshesAreRead) {
+  folder_.write("chair.obj", "v 0 0 0\n");
+  json file = json::parse(kFlash);
+  file["obstacles"] = json::parse(R"({
+    "chair": {"shape": "mesh", "file": "chair.obj", "scale": 0.001, "pose": [1, 2, 3, 0, 0, 0, 1], "margin": 0.002},
+    "hand": {"shape": "mesh", "file": "chair.obj", "keyframes": [{"t": 0, "translation": [0, 0, 1]}]}})");
+  const Scene scene = load(file.dump());
+  const SceneMesh& chair = std::get<SceneMesh>(scene.obstacles[1].shape);
+  EXPECT_EQ(chair.scale, 0.001);
+  EXPECT_EQ(chair.margin, 0.002);
+  EXPECT_EQ(chair.pose.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_TRUE(chair.file.ends_with("chair.obj"));
+  const SceneMesh& hand = std::get<SceneMesh>(scene.obstacles[2].shape);
+  EXPECT_EQ(hand.margin, std::nullopt);
+  EXPECT_EQ(hand.trajectory.times.size(), 1u);
+
+  const std::string text = file.dump();
+  EXPECT_EQ(changed(text.c_str(), "/obstacles/chair/margin", -1),
+            "obstacles.chair.margin: found -1, expected a number of 0 or above");
+  EXPECT_NE(changed(text.c_str(), "/obstacles/hand/pose", json::parse("[0, 0, 0, 0, 0, 0, 1]"))
+                .find("obstacles.hand.pose: found"),
+            std::string::npos);
+}
+
 TEST_F(SceneFiles, OurAdditionsAreRead) {
   const Scene scene = load(kFlash);
   EXPECT_EQ(scene.steps, 100);
@@ -198,8 +222,9 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
   EXPECT_EQ(changed(kPublished, "/planecollisions/table", {{"point", {0, 0, 0}}}),
             "planecollisions.table.normal: missing, expected a direction, out of the solid");
   EXPECT_EQ(changed(kFlash, "/steps", 5), "steps: found duration beside it, expected one of the two");
-  EXPECT_EQ(changed(kFlash, "/obstacles/rail/shape", "cone"),
-            "obstacles.rail.shape: found \"cone\", expected one of plane, box, cylinder, sphere, capsule");
+  EXPECT_EQ(
+      changed(kFlash, "/obstacles/rail/shape", "cone"),
+      "obstacles.rail.shape: found \"cone\", expected one of plane, box, cylinder, sphere, capsule, mesh");
   EXPECT_EQ(changed(kFlash, "/obstacles/rail/radius", -1),
             "obstacles.rail.radius: found -1, expected a number above 0");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/axes", "w"),

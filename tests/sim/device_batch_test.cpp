@@ -156,6 +156,8 @@ TEST(DeviceBatch, WhatTheDeviceCannotDoIsRefusedByName) {
   EXPECT_EQ(why_not_on_device(environment), "");
   environment.obstacles.resize(9, {Plane{}});
   EXPECT_EQ(why_not_on_device(environment), "more than 8 obstacles: found 9");
+  environment.obstacles = {{Mesh{}}};
+  EXPECT_EQ(why_not_on_device(environment), "obstacles of shape mesh are met on the CPU alone");
   Batch batch(plan, {environment}, settings_on(Device::cuda));
   EXPECT_THROW(batch.advance(1), data::InputError);
 }

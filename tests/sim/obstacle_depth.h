@@ -1,4 +1,6 @@
 #pragma once
+#include "data/mesh.h"
+#include "sim/law/surface_mesh.h"
 #include "sim/scene/environment.h"
 
 namespace flash::sim {
@@ -7,5 +9,8 @@ namespace flash::sim {
 /// shapes' definitions alone [m].
 double depth_in(const Environment& environment, const Obstacle& obstacle, const Eigen::Vector3d& point,
                 double time);
+
+/// The triangles of a surface, each with corners of its own.
+data::TriangleMesh triangles_of(const SurfaceMesh& surface);
 
 }  // namespace flash::sim

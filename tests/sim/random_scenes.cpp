@@ -6,9 +6,11 @@
 
 #include "data/procedural_mesh.h"
 #include "sim/scene/solid.h"
+#include "tests/sim/brute_surface.h"
 #include "tests/sim/lot.h"
 #include "tests/sim/obstacle_depth.h"
 #include "tests/sim/sheet_scene.h"
+#include "tests/sim/surface_shapes.h"
 
 namespace flash::sim {
 namespace {
@@ -239,10 +241,103 @@ void round_off(unsigned long seed, double share, double largest_radius, RandomSc
   }
 }
 
+/// A surface of triangles that fills about the same room as a box: a box, a step, a groove, a ball with
+/// bumps, two boxes that reach into each other, or an open plate.
+Mesh draw_surface(Lot& lot, const Box& box) {
+  const Vector3d half = box.half_extents;
+  const double a = half.x(), b = half.y(), c = half.z(), inner = lot.uniform(-0.5, 0.5);
+  Mesh mesh;
+  switch (lot.below(6)) {
+    case 0:
+      mesh = mesh_shape(box_surface(half, 1 + lot.below(3)));
+      break;
+    case 1:
+      mesh = mesh_shape(prism_surface(
+          {{-a, -c}, {a, -c}, {a, inner * c}, {inner * a, inner * c}, {inner * a, c}, {-a, c}}, 3, b));
+      break;
+    case 2:
+      mesh = mesh_shape(prism_surface({{-a, -c}, {a, -c}, {a, c}, {inner * a, inner * c}, {-a, c}}, 3, b));
+      break;
+    case 3: {
+      data::TriangleMesh ball = ball_surface(1, 1);
+      for (Eigen::Index i = 0; i < ball.vertices.rows(); ++i) ball.vertices.row(i) *= lot.uniform(0.7, 1.3);
+      ball.vertices = ball.vertices * half.asDiagonal();
+      mesh = mesh_shape(ball);
+      break;
+    }
+    case 4:
+      mesh = mesh_shape(joined_surfaces(box_surface(half),
+                                        moved_surface(box_surface({0.4 * a, 0.3 * b, 1.5 * c}),
+                                                      Isometry3d(Eigen::Translation3d(inner * a, 0, 0)))));
+      break;
+    default: {
+      const data::TriangleMesh plate =
+          data::rectangle({.width = 2 * a, .height = 2 * b, .cells_x = 3, .cells_y = 3});
+      mesh = mesh_shape(moved_surface(plate, Isometry3d(Eigen::Translation3d(-a, -b, 0))),
+                        lot.log_uniform(1e-4, 5e-3));
+    }
+  }
+  mesh.pose = box.pose;
+  return mesh;
+}
+
+/// Puts a surface of triangles in place of a share of the boxes and cylinders. It draws from a lot of its
+/// own.
+void triangulate(unsigned long seed, double share, RandomScene& scene) {
+  Lot lot(seed + 2'000'003);
+  for (Obstacle& obstacle : scene.environment.obstacles) {
+    if (!lot.chance(share)) continue;
+    if (const auto* cylinder = std::get_if<Cylinder>(&obstacle.shape)) {
+      Isometry3d pose = Isometry3d::Identity();
+      pose.linear() =
+          Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitY(), cylinder->axis).toRotationMatrix();
+      pose.translation() = cylinder->point;
+      const double radius = cylinder->radius;
+      const int sides = 5 + lot.below(20);
+      const double half_width = lot.uniform(0.1, 0.6);
+      const double margin = lot.chance(0.3) ? lot.log_uniform(1e-4, 5e-3) : 0;
+      obstacle.shape = mesh_shape(rod_surface(radius, half_width, sides), margin, pose);
+    } else if (const auto* box = std::get_if<Box>(&obstacle.shape)) {
+      const Box drawn = *box;
+      obstacle.shape = draw_surface(lot, drawn);
+    }
+  }
+}
+
+/// Whether a straight way goes through triangles, in and out again on the far side. What starts on them
+/// starts a little above.
+bool goes_through_mesh(const Mesh& mesh, Vector3d from, const Vector3d& to) {
+  const data::TriangleMesh all = triangles_of(*mesh.surface);
+  const SurfacePlace start = nearest_on(*mesh.surface, {from.x(), from.y(), from.z()});
+  const Vector3<double>& up = mesh.surface->triangles[static_cast<std::size_t>(start.triangle)].normal;
+  if (start.distance < 1e-7) from += 1e-7 * Vector3d(up.x, up.y, up.z);
+  if (mesh.surface->closed && (brute_winding(all, from) > 0.5 || brute_winding(all, to) > 0.5)) return false;
+  const Vector3d way = to - from;
+  bool within = false;
+  Vector3d entry = Vector3d::Zero();
+  for (const BruteCrossing& crossing : brute_crossings(all, from, to)) {
+    if (!mesh.surface->closed) return true;
+    if (crossing.normal.dot(way) < 0) {
+      if (!within) entry = crossing.normal;
+      within = true;
+    } else if (within) {
+      within = false;
+      if (entry.dot(crossing.normal) < -0.5) return true;
+    }
+  }
+  return false;
+}
+
 /// Whether the straight way from `from` to `to`, seen from the obstacle as it moves, goes through it: in by
 /// one face of a box and out by the one behind, or past the axis of a cylinder.
 bool goes_through(const Environment& environment, const Obstacle& obstacle, const Vector3d& from,
                   const Vector3d& to, double from_time, double to_time) {
+  if (const auto* mesh = std::get_if<Mesh>(&obstacle.shape)) {
+    const auto seen = [&](const Vector3d& x, double time) {
+      return Vector3d((frame_pose(environment, obstacle.frame, time) * mesh->pose).inverse() * x);
+    };
+    return goes_through_mesh(*mesh, seen(from, from_time), seen(to, to_time));
+  }
   bool inside = false;
   for (int k = 0; k <= 400; ++k) {
     const double share = k / 400.0;
@@ -311,13 +406,14 @@ double moved_energy(const Environment& environment, const StepReport& report) {
   return report.kinetic + report.membrane + report.bending + report.solid + report.gravitational + loads;
 }
 
-/// At rest in its rest shape, among drawn obstacles of which a share is rounded.
-void set_scene(Lot& lot, unsigned long seed, double side, double round_share, RandomScene& scene) {
+/// At rest in its rest shape, among drawn obstacles of which shares are other shapes instead.
+void set_scene(Lot& lot, unsigned long seed, double side, const ShapeShares& shares, RandomScene& scene) {
   scene.environment.state.positions = scene.sheet.rest.vertices;
   scene.environment.state.velocities = data::Points::Zero(scene.sheet.rest.vertices.rows(), 3);
   draw_scene(lot, side, scene);
   constexpr double below = 0.08;  // [m]
-  round_off(seed, round_share, below, scene);
+  triangulate(seed, shares.meshes, scene);
+  round_off(seed, shares.round, below, scene);
 }
 
 }  // namespace
@@ -328,7 +424,7 @@ const char* to_string(SceneKind kind) {
   return names[static_cast<int>(kind)];
 }
 
-RandomScene random_scene(unsigned long seed, double round_share) {
+RandomScene random_scene(unsigned long seed, const ShapeShares& shares) {
   Lot lot(seed);
   RandomScene scene;
   scene.kind = static_cast<SceneKind>(lot.below(static_cast<int>(SceneKind::last) + 1));
@@ -337,22 +433,22 @@ RandomScene random_scene(unsigned long seed, double round_share) {
   scene.sheet = make_sheet(data::parse_mesh_spec(scene.mesh));
   scene.settings.time_step = lot.log_uniform(0.001, 0.03);
   scene.environment.materials[0] = draw_material(lot);
-  set_scene(lot, seed, side, round_share, scene);
+  set_scene(lot, seed, side, shares, scene);
   return scene;
 }
 
-RandomScene random_solid_scene(unsigned long seed, double round_share) {
+RandomScene random_solid_scene(unsigned long seed, const ShapeShares& shares) {
   Lot lot(seed);
   RandomScene scene;
   scene.kind = static_cast<SceneKind>(lot.below(static_cast<int>(SceneKind::last) + 1));
   double side = 0;
   draw_solid(lot, side, scene);
   scene.settings.time_step = lot.log_uniform(0.001, 0.03);
-  set_scene(lot, seed, side, round_share, scene);
+  set_scene(lot, seed, side, shares, scene);
   return scene;
 }
 
-RandomScene random_deep_start(unsigned long seed, double round_share) {
+RandomScene random_deep_start(unsigned long seed, const ShapeShares& shares) {
   Lot lot(seed);
   RandomScene scene;
   scene.kind = SceneKind::deep;
@@ -381,7 +477,8 @@ RandomScene random_deep_start(unsigned long seed, double round_share) {
     environment.obstacles.push_back({box});
   }
   constexpr double any_radius = 1;  // [m]
-  round_off(seed, round_share, any_radius, scene);
+  triangulate(seed, shares.meshes, scene);
+  round_off(seed, shares.round, any_radius, scene);
   return scene;
 }
 

@@ -20,12 +20,17 @@ struct RandomScene {
   int steps = 40;
 };
 
-/// The same seed gives the same scene, on every machine. `round_share`: of the boxes and cylinders that are
-/// capsules or spheres instead.
-RandomScene random_scene(unsigned long seed, double round_share = 0);
+/// Of the boxes and cylinders, how many are other shapes instead: surfaces of triangles, and of the rest
+/// capsules and spheres.
+struct ShapeShares {
+  double round = 0, meshes = 0;
+};
+
+/// The same seed gives the same scene, on every machine.
+RandomScene random_scene(unsigned long seed, const ShapeShares& shares = {});
 
 /// The same of a block of tetrahedra, of one of three laws, from foam to hard rubber.
-RandomScene random_solid_scene(unsigned long seed, double round_share = 0);
+RandomScene random_solid_scene(unsigned long seed, const ShapeShares& shares = {});
 
 /// What an observer finds who knows positions, velocities, forces and obstacles alone.
 struct SceneFindings {
@@ -44,7 +49,7 @@ struct SceneFindings {
 
 /// The same for a sheet at rest that starts across such obstacles, from thin boards to blocks it lies
 /// in whole; of kind `deep`.
-RandomScene random_deep_start(unsigned long seed, double round_share = 0);
+RandomScene random_deep_start(unsigned long seed, const ShapeShares& shares = {});
 
 SceneFindings observe(RandomScene scene);
 

@@ -33,17 +33,28 @@ TEST(RandomScenes, AreSolvedOrSaidNotToBe) {
 TEST(RandomScenes, WithRoundObstaclesAreSolvedOrSaidNotToBe) {
   int unsolved = 0;
   for (unsigned long seed = 20101; seed <= 20130; ++seed) {
-    const SceneFindings found = observe(random_scene(seed, 1));
+    const SceneFindings found = observe(random_scene(seed, {.round = 1}));
     expect_sound(found, seed);
     unsolved += found.unconverged > 0;
   }
   EXPECT_LE(unsolved, 1);
   for (unsigned long seed = 1; seed <= 5; ++seed) {
-    const SceneFindings found = observe(random_deep_start(seed, 1));
+    const SceneFindings found = observe(random_deep_start(seed, {.round = 1}));
     EXPECT_TRUE(found.finite) << seed;
     EXPECT_LT(found.unseen_depth, 1e-4) << seed;
     EXPECT_LT(found.free_depth, 1e-9) << seed;
   }
+}
+
+/// The same with surfaces of triangles: boxes, steps, grooves, bumps, rods, and open plates.
+TEST(RandomScenes, WithMeshesAreSolvedOrSaidNotToBe) {
+  int unsolved = 0;
+  for (unsigned long seed = 20301; seed <= 20330; ++seed) {
+    const SceneFindings found = observe(random_scene(seed, {.meshes = 1}));
+    expect_sound(found, seed);
+    unsolved += found.unconverged > 0;
+  }
+  EXPECT_LE(unsolved, 1);
 }
 
 /// Thirty of the blocks of `make random-scenes SOLIDS=1`. One may be crushed against a wall, which nothing

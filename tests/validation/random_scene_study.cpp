@@ -31,26 +31,28 @@ std::string material_of(const flash::sim::RandomScene& scene) {
 
 // What an observer finds in many random scenes, by kind and in all. Arguments: first seed, number of scenes,
 // then --list to name those with something to say, --deep for sheets that start across obstacles, --solid for
-// blocks of tetrahedra, --round and the share of boxes and cylinders that are capsules and spheres instead.
+// blocks of tetrahedra, --round and the share of boxes and cylinders that are capsules and spheres instead,
+// --mesh and that of surfaces of triangles.
 int main(int argc, char** argv) {
   using namespace flash;
   const unsigned long first = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const std::size_t count = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1000;
   bool list = false, deep = false, solid = false;
-  double round_share = 0;
+  sim::ShapeShares shares;
   for (int k = 3; k < argc; ++k) {
     list = list || std::string(argv[k]) == "--list";
     solid = solid || std::string(argv[k]) == "--solid";
     deep = deep || std::string(argv[k]) == "--deep";
-    if (std::string(argv[k]) == "--round" && k + 1 < argc) round_share = std::strtod(argv[k + 1], nullptr);
+    if (std::string(argv[k]) == "--round" && k + 1 < argc) shares.round = std::strtod(argv[k + 1], nullptr);
+    if (std::string(argv[k]) == "--mesh" && k + 1 < argc) shares.meshes = std::strtod(argv[k + 1], nullptr);
   }
 
   std::vector<sim::RandomScene> scenes(count);
   std::vector<sim::SceneFindings> findings(count);
   data::for_each_in_parallel(count, 0, [&](std::size_t k) {
-    scenes[k] = deep    ? sim::random_deep_start(first + k, round_share)
-                : solid ? sim::random_solid_scene(first + k, round_share)
-                        : sim::random_scene(first + k, round_share);
+    scenes[k] = deep    ? sim::random_deep_start(first + k, shares)
+                : solid ? sim::random_solid_scene(first + k, shares)
+                        : sim::random_scene(first + k, shares);
     findings[k] = sim::observe(scenes[k]);
   });
 
