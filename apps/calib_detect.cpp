@@ -6,6 +6,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/result_files.h"
 #include "calib/detect/plane_residual.h"
 #include "data/atomic_file.h"
 #include "data/json_reader.h"
@@ -85,6 +86,7 @@ void print_table(const std::vector<calib::Detection>& detections, const Eigen::M
 int run_detect(const DetectOptions& options) {
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   const calib::Dataset dataset = load_dataset(options.dataset, false, false);
+  expect_own_files({options.out}, files_read(options.dataset, dataset, options.common));
   const calib::Target target = target_of(options.dataset, dataset);
   CalibCommonOptions without_warnings = options.common;  // the table says the same
   without_warnings.quiet = true;

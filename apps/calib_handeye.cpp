@@ -10,6 +10,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/calibrate/calibrate_pairs.h"
 #include "calib/calibrate/extrinsics.h"
@@ -20,6 +21,7 @@
 #include "calib/report/report.h"
 #include "calib/uncertainty/joint_zeros.h"
 #include "data/atomic_file.h"
+#include "data/camera_info.h"
 #include "data/error.h"
 #include "data/folder_lock.h"
 #include "data/json_reader.h"
@@ -64,10 +66,12 @@ std::string report_text(const calib::Calibration& calibration, const calib::Extr
   return calib::render_report(calibration, extrinsics, json, inputs);
 }
 
+/// Rounded; what rounds to zero has no sign.
 std::string fixed(double value, int digits) {
   char text[40];
   std::snprintf(text, sizeof text, "%.*f", digits, value);
-  return text;
+  const bool zero = std::string(text).find_first_not_of("-0.") == std::string::npos;
+  return zero && text[0] == '-' ? text + 1 : text;
 }
 
 /// With as many digits as show the deviation.
@@ -103,14 +107,15 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
                 with_deviation(c.lens.estimate[1], c.lens.sd[1]).c_str(), c.lens.stated[0], c.lens.stated[1]);
     const Eigen::Vector2d warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
     std::printf(
-        "target: %.4f +- %.4f times as large as stated, its middle %.2f +- %.2f and %.2f +- %.2f mm behind "
+        "target: %.4f +- %.4f times as large as stated, its middle %s +- %.2f and %s +- %.2f mm behind "
         "its ends along x and y\n",
-        c.size->estimate, c.size->sd, warp.x(), warp_sd.x(), warp.y(), warp_sd.y());
+        c.size->estimate, c.size->sd, fixed(warp.x(), 2).c_str(), warp_sd.x(), fixed(warp.y(), 2).c_str(),
+        warp_sd.y());
   }
   if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
     std::printf("joints are farther than they say by");
     for (Eigen::Index i = 0; i < zeros->estimate.size(); ++i)
-      std::printf(" %.3f +- %.3f", kDegrees * zeros->estimate[i], kDegrees * zeros->sd[i]);
+      std::printf(" %s +- %.3f", fixed(kDegrees * zeros->estimate[i], 3).c_str(), kDegrees * zeros->sd[i]);
     std::printf(" deg\n");
   }
   const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
@@ -177,6 +182,7 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
   if (pairs) {
     if (options.time_offset)
       throw data::InputError(dataset.source + ": pairs of poses have no time; leave --time-offset out");
+    const Progress progress("solving", options.common);
     solved.calibration = calib::calibrate_pairs(setup, calib::pair_observations(dataset), settings);
   } else {
     const calib::Target target = target_of(options.dataset, dataset);
@@ -194,24 +200,6 @@ calib::ImageCalibration solve(const HandEyeOptions& options, calib::Setup setup,
   }
   phases.end("solving");
   return solved;
-}
-
-/// Files to write, none of them another or what the dataset is read from.
-void expect_own_files(const std::vector<std::string>& outputs, const std::vector<std::string>& inputs) {
-  const auto place = [](const std::string& path) {
-    std::error_code error;
-    const std::filesystem::path whole = std::filesystem::weakly_canonical(path, error);
-    return error ? std::filesystem::path(path) : whole;
-  };
-  for (std::size_t i = 0; i < outputs.size(); ++i) {
-    if (outputs[i].empty()) continue;
-    for (std::size_t j = 0; j < i; ++j)
-      if (!outputs[j].empty() && place(outputs[i]) == place(outputs[j]))
-        throw data::InputError(outputs[i] + ": named twice, each result needs a file of its own");
-    for (const std::string& input : inputs)
-      if (!input.empty() && place(outputs[i]) == place(input))
-        throw data::InputError(outputs[i] + ": the dataset is read from this file");
-  }
 }
 
 /// Frames go into URDF and command lines as they are.
@@ -241,7 +229,7 @@ int run_handeye(const HandEyeOptions& options) {
   expect_frame_names(options.parent, options.child);
   Phases phases;
   const calib::Dataset dataset = load_dataset(options.dataset);
-  expect_own_files(outputs, {dataset.source, dataset.poses_path, dataset.camera_path});
+  expect_own_files(outputs, files_read(options.dataset, dataset, options.common));
   phases.end("reading");
   const calib::Setup setup = setup_of(options, dataset);
   calib::CalibrateSettings settings;
@@ -274,15 +262,16 @@ int run_handeye(const HandEyeOptions& options) {
     const data::FolderLock lock(options.out.empty() ? report : options.out);
     for (const std::string& path : outputs)
       if (!path.empty()) data::check_file_free(path, options.common.force);
-    if (!options.out.empty()) data::write_atomically(options.out, text);
-    if (!report.empty()) data::write_atomically(report, html);
-    if (!options.ros.empty())
-      data::write_atomically(options.ros, calib::ros_static_transform(extrinsics.transform));
-    if (!options.urdf.empty()) data::write_atomically(options.urdf, calib::urdf_joint(extrinsics.transform));
-    if (!options.easy_handeye2.empty())
-      data::write_atomically(options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup));
-    if (!options.camera_info.empty() && extrinsics.pixels)
-      data::save_camera_info(solved.calibration.refined.bundle.intrinsics.front(), options.camera_info);
+    std::vector<data::FileText> files = {
+        {options.out, text},
+        {report, html},
+        {options.ros, calib::ros_static_transform(extrinsics.transform)},
+        {options.urdf, calib::urdf_joint(extrinsics.transform)},
+        {options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup)}};
+    if (extrinsics.pixels)
+      files.push_back({options.camera_info,
+                       data::camera_info_text(solved.calibration.refined.bundle.intrinsics.front())});
+    data::write_together(files);
   }
 
   if (!options.common.quiet) warn_of_unused(solved.calibration);
@@ -293,6 +282,7 @@ int run_handeye(const HandEyeOptions& options) {
     std::cout << text;
   else
     print(solved.calibration, extrinsics);
+  if (exit_code == exit_unusable) say_unusable(solved.calibration.refusals.front());
   return exit_code;
 }
 

@@ -6,6 +6,7 @@
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/result_files.h"
 #include "calib/dataset/lens_file.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/grey_image.h"
@@ -69,6 +70,7 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
 int run_intrinsics(const IntrinsicsOptions& options) {
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   calib::Dataset dataset = load_dataset(options.dataset, false, false);
+  expect_own_files({options.out}, files_read(options.dataset, dataset, options.common));
   const calib::Target target = target_of(options.dataset, dataset);
   dataset.camera.reset();
   calib::IntrinsicsSettings settings;

@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -23,6 +24,10 @@ void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options, const
   group.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
       ->check(thread_number())
       ->capture_default_str();
+  verb.parse_complete_callback([&verb, &options] {
+    const CLI::Option* const config = verb.get_parent()->get_config_ptr();
+    if (config != nullptr && config->count() > 0) options.config = config->results().front();
+  });
 }
 
 void add_robot_options(CLI::App& group, DatasetChoice& choice) {
@@ -101,13 +106,29 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool 
   calib::Dataset dataset = calib::load_dataset(choice.path, options);
   calib::take_picture_size(dataset);
   for (const std::string& guess : dataset.guesses) warn_calib(guess);
+  for (const std::string& notice : dataset.notices) warn_calib(notice);
   return dataset;
+}
+
+std::vector<std::string> files_read(const DatasetChoice& choice, const calib::Dataset& dataset,
+                                    const CalibCommonOptions& options) {
+  std::vector<std::string> files = dataset.files;
+  for (const std::string& path : {choice.target, options.config})
+    if (!path.empty()) files.push_back(path);
+  return files;
+}
+
+void expect_pictures(const calib::Dataset& dataset) {
+  if (std::any_of(dataset.frames.begin(), dataset.frames.end(),
+                  [](const calib::Frame& frame) { return frame.image.empty(); }))
+    throw data::InputError(dataset.source + ": found pairs of poses, expected pictures of the target");
 }
 
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset) {
   if (!choice.target.empty())
     return std::filesystem::exists(choice.target) ? calib::load_target(choice.target)
                                                   : calib::parse_target(choice.target);
+  expect_pictures(dataset);
   if (dataset.target.empty())
     throw data::InputError(dataset.source + ": names no target; add one, as --target chessboard:9x6:0.025");
   return calib::parse_target(dataset.target);
@@ -116,9 +137,11 @@ calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& datas
 std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const calib::Target& target,
                                          const DatasetChoice& choice, const CalibCommonOptions& options,
                                          LeftOut left_out) {
+  expect_pictures(dataset);
   calib::DetectSettings settings;
   settings.threads = options.threads;
   settings.cache = choice.cache;
+  if (!options.quiet) settings.tell = warn_calib;
   Progress progress("looking for the target", options);
   std::vector<calib::Detection> detections =
       calib::detect(dataset, target, settings, [&](int done, int total) {
@@ -150,6 +173,10 @@ void warn_of_left_out(const std::vector<calib::Detection>& detections) {
 
 void say(const CalibCommonOptions& options, const std::string& line) {
   if (!options.quiet) std::cerr << data::message_line(line) << '\n';
+}
+
+void say_unusable(const std::string& reason, const std::string& verdict) {
+  std::cerr << "flash-calib: " << verdict << " (exit code 3): " << data::message_line(reason) << '\n';
 }
 
 void warn_calib(const std::string& line) {

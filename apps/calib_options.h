@@ -19,7 +19,8 @@ struct CalibCommonOptions {
   bool quiet = false;
   bool verbose = false;
   bool force = false;
-  int threads = 0;  ///< 0: one a processor
+  int threads = 0;     ///< 0: one a processor
+  std::string config;  ///< file of options, where there is one
 };
 void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options,
                               const char* force = "Overwrite what is there");
@@ -50,6 +51,13 @@ void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens);
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
 
+/// Files that a run on the dataset reads.
+std::vector<std::string> files_read(const DatasetChoice& choice, const calib::Dataset& dataset,
+                                    const CalibCommonOptions& options);
+
+/// Throws data::InputError where the dataset is pairs of poses.
+void expect_pictures(const calib::Dataset& dataset);
+
 /// The target of the command line or, without one, of the dataset. Throws data::InputError where neither
 /// names one.
 calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& dataset);
@@ -61,6 +69,9 @@ std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const ca
                                          const DatasetChoice& choice, const CalibCommonOptions& options,
                                          LeftOut left_out = LeftOut::told);
 void warn_of_left_out(const std::vector<calib::Detection>& detections);
+
+/// The last line of a verb that ends with exit code 3.
+void say_unusable(const std::string& reason, const std::string& verdict = "the answer cannot be used");
 
 /// What a verb says to people, on stderr, unless --quiet.
 void say(const CalibCommonOptions& options, const std::string& line);

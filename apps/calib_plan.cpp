@@ -9,12 +9,14 @@
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
+#include "apps/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/detect/read_depth.h"
 #include "calib/report/extrinsics_json.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/text.h"
 #include "data/writable.h"
 
 namespace flash {
@@ -61,9 +63,19 @@ void print(const calib::Plan& plan) {
   }
 }
 
+void expect_bounds(const PlanOptions& options) {
+  if (options.lower.empty() || options.upper.empty()) return;
+  for (std::size_t k = 0; k < 3; ++k)
+    if (options.lower[k] > options.upper[k])
+      throw data::InputError("--lower: found " + data::format_short(options.lower[k]) + " along " + "xyz"[k] +
+                             ", expected at most --upper, " + data::format_short(options.upper[k]));
+}
+
 int run_plan(const PlanOptions& options) {
+  expect_bounds(options);
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   const calib::Dataset dataset = load_dataset(options.dataset);
+  expect_own_files({options.out}, files_read(options.dataset, dataset, options.common));
   if (options.setup.empty() && !dataset.setup)
     throw data::InputError(dataset.source +
                            ": says nothing of the setup; add --setup eye-in-hand or eye-to-hand");
@@ -72,20 +84,25 @@ int run_plan(const PlanOptions& options) {
   const calib::Target target = target_of(options.dataset, dataset);
   const std::vector<calib::Detection> detections =
       detect_all(dataset, target, options.dataset, options.common);
-  const calib::ImageCalibration solved =
-      calib::calibrate_images(setup, dataset, target, detections, calib::read_depth(dataset, detections));
+  calib::CalibrateSettings calibrate;
+  if (dataset.lens_covariance) calibrate.lens_covariance = *dataset.lens_covariance;
+  calibrate.threads = options.common.threads;
+  const calib::ImageCalibration solved = calib::calibrate_images(
+      setup, dataset, target, detections, calib::read_depth(dataset, detections), calibrate);
   calib::PlanSettings settings = options.settings;
   if (options.criterion == "determinant") settings.criterion = calib::PlanCriterion::determinant;
   if (!options.lower.empty()) settings.lower = Eigen::Vector3d::Map(options.lower.data());
   if (!options.upper.empty()) settings.upper = Eigen::Vector3d::Map(options.upper.data());
   const calib::Plan plan = calib::plan_poses(solved.calibration, calib::target_points(target), settings);
+  for (const std::string& warning : solved.calibration.warnings) warn_calib(warning);
   const std::string text = data::format_json(plan_json(plan, options));
   if (!options.out.empty()) data::write_atomically(options.out, text);
   if (options.common.json)
     std::cout << text;
   else
     print(plan);
-  return exit_done;
+  if (!solved.calibration.usable) say_unusable(solved.calibration.refusals.front());
+  return solved.calibration.usable ? exit_done : exit_unusable;
 }
 
 }  // namespace
@@ -110,6 +127,7 @@ void add_plan_verb(CLI::App& app, Action& action) {
       ->check(CLI::IsMember({"trace", "determinant"}))
       ->capture_default_str();
   verb->add_option("--seed", options->settings.seed, "Random seed of the candidate poses")
+      ->check(whole_number(0, 1'000'000'000))
       ->capture_default_str();
   verb->add_flag("--no-depth", options->dataset.no_depth, "Leave depth pictures out");
   verb->add_option("-o,--out", options->out, "File for the plan, JSON");

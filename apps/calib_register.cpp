@@ -1,14 +1,17 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
+#include "apps/result_files.h"
 #include "calib/calibrate/calibrate_images.h"
 #include "calib/calibrate/cell.h"
 #include "calib/detect/read_depth.h"
@@ -16,6 +19,7 @@
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
+#include "data/text.h"
 #include "data/writable.h"
 
 namespace flash {
@@ -47,7 +51,7 @@ std::string target_text(const std::string& target, const std::string& calibratio
 /// What the calibrations of the members say against themselves.
 struct Doubts {
   std::vector<std::string> warnings = {};  ///< each with the file or dataset it is of, once
-  bool unusable = false;                   ///< one that the cell stands on cannot be used
+  std::vector<std::string> refusals = {};  ///< why one that the cell stands on cannot be used
 
   void add(const std::string& source, const std::vector<std::string>& more) {
     for (const std::string& warning : more)
@@ -56,10 +60,18 @@ struct Doubts {
   }
 };
 
-calib::CellMember member_of(const std::string& arm, const std::string& camera, const DatasetChoice& choice,
-                            const std::string& setup, const RegisterOptions& options, bool time_offset,
-                            calib::Calibration& calibration) {
-  const calib::Dataset dataset = load_dataset(choice);
+/// A recording of the cell, and which of its arms and cameras it is of.
+struct Recording {
+  std::string source;  ///< the file or dataset that the command line names
+  std::string arm, camera;
+  DatasetChoice choice;
+  std::string setup = {};
+  bool time_offset = false;
+  calib::Dataset dataset = {};
+};
+
+calib::CellMember member_of(const Recording& recording, const RegisterOptions& options, Doubts& doubts) {
+  const auto& [source, arm, camera, choice, setup, time_offset, dataset] = recording;
   const calib::Target target = target_of(choice, dataset);
   if (setup.empty() && !dataset.setup)
     throw data::InputError(choice.path +
@@ -74,16 +86,20 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
   if (dataset.lens_covariance) settings.lens_covariance = *dataset.lens_covariance;
   settings.threads = options.common.threads;
   settings.refine.bundle.unknowns.time_offsets = time_offset;
-  const calib::ImageCalibration solved = calib::calibrate_images(
-      kind, dataset, target, detections, calib::read_depth(dataset, detections), settings);
+  const calib::Calibration calibration =
+      calib::calibrate_images(kind, dataset, target, detections, calib::read_depth(dataset, detections),
+                              settings)
+          .calibration;
   if (!options.common.quiet) {
-    const std::size_t all = solved.calibration.views.size(), used = solved.calibration.used.size();
+    const std::size_t all = calibration.views.size(), used = calibration.used.size();
     if (used < all)
       warn_calib(choice.path + ": " + std::to_string(all - used) + " of " + std::to_string(all) +
-                 " views were not used; flash-calib handeye names them");
+                 (all - used == 1 ? " views was not used" : " views were not used") +
+                 "; flash-calib handeye names them");
   }
-  calibration = solved.calibration;
-  return calib::cell_member(arm, camera, dataset, target, solved.calibration);
+  doubts.add(source, calibration.warnings);
+  for (const std::string& reason : calibration.refusals) doubts.refusals.push_back(source + ": " + reason);
+  return calib::cell_member(arm, camera, dataset, target, calibration);
 }
 
 /// One recording is one witness.
@@ -100,31 +116,42 @@ std::string name_of(const std::string& path) {
   return normal.has_filename() ? normal.stem().string() : normal.parent_path().filename().string();
 }
 
-calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
-  return calib::solve_cell(members, {.refine = {},
-                                     .target_size_sd = options.target_size_sd,
-                                     .size_as_stated = options.size_as_stated,
-                                     .lens = options.lens});
+/// Names of files or folders; those that are alike are told apart by the folders that they lie in, or
+/// numbered.
+std::vector<std::string> names_of(const std::vector<std::string>& paths) {
+  const auto alike = [](const std::vector<std::string>& names) {
+    return std::set<std::string>(names.begin(), names.end()).size() < names.size();
+  };
+  std::vector<std::string> names;
+  for (const std::string& path : paths) names.push_back(name_of(path));
+  if (!alike(names)) return names;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const std::string folder = fs::absolute(paths[i]).lexically_normal().parent_path().filename().string();
+    if (!folder.empty()) names[i] = folder + '/' + names[i];
+  }
+  for (std::size_t i = 0; alike(names) && i < paths.size(); ++i) names[i] += '_' + std::to_string(i + 1);
+  return names;
 }
 
-calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
+/// Of a calibration that says so itself.
+std::string first_of(const std::vector<std::string>& warnings) {
+  return warnings.empty() ? "it ended with exit code 3" : warnings.front();
+}
+
+std::vector<calib::Extrinsics> load_calibrations(const RegisterOptions& options, Doubts& doubts) {
   std::vector<calib::Extrinsics> calibrations;
-  std::vector<std::string> arms;
   for (const std::string& path : options.calibrations) {
     calibrations.push_back(calib::load_extrinsics(path, options.common.force));
     doubts.add(path, calibrations.back().warnings);
-    arms.push_back(name_of(path));
   }
-  const calib::Cell composed = calib::compose_cell(arms, calibrations);
-  if (options.without_images) {
-    for (const calib::Extrinsics& calibration : calibrations)
-      doubts.unusable = doubts.unusable || !calibration.usable;
-    return composed;
-  }
-  const bool for_arms = std::any_of(calibrations.begin(), calibrations.end(),
-                                    [](const calib::Extrinsics& c) { return c.use == calib::Use::two_arms; });
-  if (for_arms && options.lens == calib::LensKnowledge::near) options.lens = calib::LensKnowledge::stated;
-  std::vector<calib::CellMember> members;
+  return calibrations;
+}
+
+/// What the calibrations were made from.
+std::vector<Recording> recordings_of_arms(const std::vector<std::string>& arms,
+                                          const std::vector<calib::Extrinsics>& calibrations,
+                                          const RegisterOptions& options) {
+  std::vector<Recording> recordings;
   for (std::size_t i = 0; i < arms.size(); ++i) {
     const calib::ExtrinsicsInputs& inputs = calibrations[i].inputs;
     DatasetChoice choice;
@@ -147,20 +174,18 @@ calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
     choice.cache = options.cache;
     choice.no_depth = options.no_depth || !inputs.depth;
     if (inputs.depth) choice.depth_scale = inputs.depth->scale;
-    calib::Calibration again;
-    members.push_back(member_of(arms[i], "camera", choice, calib::to_string(calibrations[i].setup), options,
-                                inputs.time_offset.has_value(), again));
-    doubts.add(file, again.warnings);
-    doubts.unusable = doubts.unusable || !again.usable;
+    recordings.push_back({file, arms[i], "camera", choice, calib::to_string(calibrations[i].setup),
+                          inputs.time_offset.has_value()});
   }
-  return solved_cell(members, options);
+  return recordings;
 }
 
-calib::Cell cell_of_cameras(const RegisterOptions& options, Doubts& doubts) {
-  std::vector<calib::CellMember> members;
-  for (const std::string& path : options.cameras) {
+std::vector<Recording> recordings_of_cameras(const RegisterOptions& options) {
+  std::vector<Recording> recordings;
+  const std::vector<std::string> names = names_of(options.cameras);
+  for (std::size_t i = 0; i < names.size(); ++i) {
     DatasetChoice choice;
-    choice.path = path;
+    choice.path = options.cameras[i];
     choice.robot = options.robot.robot;
     choice.base_link = options.robot.base_link;
     choice.tip_link = options.robot.tip_link;
@@ -168,17 +193,48 @@ calib::Cell cell_of_cameras(const RegisterOptions& options, Doubts& doubts) {
     choice.cache = options.cache;
     choice.depth_scale = options.depth_scale;
     choice.no_depth = options.no_depth;
-    calib::Calibration calibration;
-    members.push_back(member_of("base", name_of(path), choice, options.setup, options, false, calibration));
-    doubts.add(path, calibration.warnings);
-    doubts.unusable = doubts.unusable || !calibration.usable;
+    recordings.push_back({choice.path, "base", names[i], choice, options.setup});
   }
-  return solved_cell(members, options);
+  return recordings;
+}
+
+/// All recordings are read before the first is solved: the result must not take the place of one.
+calib::Cell solved_cell(std::vector<Recording> recordings, const RegisterOptions& options, Doubts& doubts) {
+  std::vector<std::string> read = options.calibrations;
+  for (Recording& recording : recordings) {
+    recording.dataset = load_dataset(recording.choice);
+    const std::vector<std::string> files = files_read(recording.choice, recording.dataset, options.common);
+    read.insert(read.end(), files.begin(), files.end());
+  }
+  expect_own_files({options.out}, read);
+  std::vector<calib::CellMember> members;
+  for (const Recording& recording : recordings) members.push_back(member_of(recording, options, doubts));
+  return calib::solve_cell(members, {.refine = {},
+                                     .target_size_sd = options.target_size_sd,
+                                     .size_as_stated = options.size_as_stated,
+                                     .lens = options.lens});
+}
+
+calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
+  const std::vector<std::string> arms = names_of(options.calibrations);
+  const std::vector<calib::Extrinsics> calibrations = load_calibrations(options, doubts);
+  const calib::Cell composed = calib::compose_cell(arms, calibrations);
+  if (options.without_images) {
+    for (std::size_t i = 0; i < calibrations.size(); ++i)
+      if (!calibrations[i].usable)
+        doubts.refusals.push_back(options.calibrations[i] + ": " + first_of(calibrations[i].warnings));
+    return composed;
+  }
+  const bool for_arms = std::any_of(calibrations.begin(), calibrations.end(),
+                                    [](const calib::Extrinsics& c) { return c.use == calib::Use::two_arms; });
+  if (for_arms && options.lens == calib::LensKnowledge::near) options.lens = calib::LensKnowledge::stated;
+  return solved_cell(recordings_of_arms(arms, calibrations, options), options, doubts);
 }
 
 void print(const calib::Cell& cell, const RegisterOptions& options) {
   const auto line = [&](const calib::CellFrame& frame) {
-    const Eigen::Matrix<double, 6, 1> sd = frame.covariance.diagonal().cwiseSqrt();
+    // Along and about the axes of the parent, in which the translation is written.
+    const calib::Vector6d sd = calib::parent_deviations(frame.transform.T, frame.covariance);
     const Eigen::Vector3d t = frame.transform.T.translation();
     std::printf("%s <- %s: (%.5f, %.5f, %.5f) m, +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n",
                 frame.transform.parent.c_str(), frame.transform.child.c_str(), t.x(), t.y(), t.z(),
@@ -209,11 +265,21 @@ int run_register(const RegisterOptions& options) {
   if (options.calibrations.size() + options.cameras.size() < 2)
     throw data::InputError("register: found one calibration, expected two or more");
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
+  std::vector<std::string> named = options.calibrations;
+  named.push_back(options.common.config);
+  expect_own_files({options.out}, named);
+  constexpr double kFarthest = 100;  // [m]
+  for (const double place : options.workspace)
+    if (std::abs(place) > kFarthest)
+      throw data::InputError("--workspace: found " + data::format_short(place) +
+                             ", expected metres from the first base, at most 100");
   Doubts doubts;
-  calib::Cell cell =
-      options.cameras.empty() ? cell_of_arms(options, doubts) : cell_of_cameras(options, doubts);
+  calib::Cell cell = options.cameras.empty() ? cell_of_arms(options, doubts)
+                                             : solved_cell(recordings_of_cameras(options), options, doubts);
   cell.notices.insert(cell.notices.begin(), doubts.warnings.begin(), doubts.warnings.end());
-  const int exit_code = doubts.unusable || !cell.usable ? exit_unusable : exit_done;
+  std::vector<std::string> refusals = doubts.refusals;
+  refusals.insert(refusals.end(), cell.refusals.begin(), cell.refusals.end());
+  const int exit_code = refusals.empty() ? exit_done : exit_unusable;
   std::optional<Eigen::Vector3d> workspace;
   if (!options.workspace.empty())
     workspace = Eigen::Vector3d(options.workspace[0], options.workspace[1], options.workspace[2]);
@@ -226,6 +292,7 @@ int run_register(const RegisterOptions& options) {
     std::cout << text;
   else
     print(cell, options);
+  if (exit_code == exit_unusable) say_unusable(refusals.front());
   return exit_code;
 }
 

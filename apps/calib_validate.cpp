@@ -3,10 +3,12 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
 #include "apps/command_line.h"
+#include "apps/result_files.h"
 #include "calib/calibrate/extrinsics.h"
 #include "calib/check/cloud_check.h"
 #include "calib/check/contradiction.h"
@@ -54,7 +56,11 @@ std::vector<ValidatedView> views_of(const calib::Dataset& dataset, const calib::
   return views;
 }
 
-std::string picture_name(const std::string& image) { return fs::path(image).stem().string() + ".png"; }
+constexpr const char *kResult = "validation.json", *kPattern = "pattern.png", *kProfile = "profile.png";
+
+std::string corner_path(const std::string& folder, const calib::Frame& frame) {
+  return (fs::path(folder) / "corners" / (fs::path(frame.name).stem().string() + ".png")).string();
+}
 
 void draw_views(const std::vector<ValidatedView>& views, const calib::ProjectionCheck& check,
                 const std::string& folder) {
@@ -62,7 +68,7 @@ void draw_views(const std::vector<ValidatedView>& views, const calib::Projection
     if (!views[i].frame->image.empty())
       data::save_png(calib::corner_picture(calib::load_grey_image(views[i].frame->image),
                                            views[i].observation.pixels, check.views[i].projected),
-                     (fs::path(folder) / "corners" / picture_name(views[i].frame->name)).string());
+                     corner_path(folder, *views[i].frame));
 }
 
 std::optional<calib::CloudCheck> check_clouds(const calib::Dataset& dataset,
@@ -124,13 +130,19 @@ nlohmann::ordered_json result_json(const ValidateOptions& options, const std::ve
   return json;
 }
 
-void print_table(const calib::ProjectionCheck& check, const std::optional<calib::CloudCheck>& clouds) {
+/// pixels: pairs of poses have none.
+void print_table(const calib::ProjectionCheck& check, bool pixels,
+                 const std::optional<calib::CloudCheck>& clouds) {
   std::printf("%-24s %10s %10s %9s %9s\n", "view", "corners px", "centre px", "mm", "deg");
+  const auto line = [&](const std::string& name, double corners, double centre, double mm, double deg) {
+    if (pixels)
+      std::printf("%-24s %10.2f %10.2f %9.2f %9.3f\n", name.c_str(), corners, centre, mm, deg);
+    else
+      std::printf("%-24s %10s %10s %9.2f %9.3f\n", name.c_str(), "-", "-", mm, deg);
+  };
   for (const calib::ViewProjection& view : check.views)
-    std::printf("%-24s %10.2f %10.2f %9.2f %9.3f\n", view.image.c_str(), view.corner_rms, view.centre,
-                view.mm, view.deg);
-  std::printf("%-24s %10.2f %10.2f %9.2f %9.3f\n", "rms", check.corner_rms, check.centre_rms, check.mm_rms,
-              check.deg_rms);
+    line(view.image, view.corner_rms, view.centre, view.mm, view.deg);
+  line("rms", check.corner_rms, check.centre_rms, check.mm_rms, check.deg_rms);
   if (!clouds) return;
   std::printf(
       "\nclouds of %zu views laid on each other: %.2f mm thick (rms; a single view %.2f), offsets %.2f mm, "
@@ -138,11 +150,24 @@ void print_table(const calib::ProjectionCheck& check, const std::optional<calib:
       clouds->views.size(), clouds->thickness_mm, clouds->noise_mm, clouds->offset_mm, clouds->shift_mm);
 }
 
+/// The files that --out makes.
+std::vector<std::string> files_written(const calib::Dataset& dataset, const std::string& folder) {
+  if (folder.empty()) return {};
+  std::set<std::string> files;
+  for (const char* name : {kResult, kPattern, kProfile}) files.insert((fs::path(folder) / name).string());
+  for (const calib::Frame& frame : dataset.frames)
+    if (!frame.image.empty()) files.insert(corner_path(folder, frame));
+  return {files.begin(), files.end()};
+}
+
 int run_validate(const ValidateOptions& options) {
   if (!options.out.empty()) data::check_folder_free(options.out, options.common.force);
   const calib::Extrinsics extrinsics = calib::load_extrinsics(options.extrinsics, options.common.force);
   for (const std::string& warning : extrinsics.warnings) warn_calib(options.extrinsics + ": " + warning);
   const calib::Dataset dataset = load_dataset(options.dataset);
+  std::vector<std::string> read = files_read(options.dataset, dataset, options.common);
+  read.push_back(options.extrinsics);
+  expect_own_files(files_written(dataset, options.out), read);
   const bool pairs = dataset.frames.front().T_camera_target.has_value();
   if (dataset.setup && *dataset.setup != extrinsics.setup)
     throw data::InputError(dataset.source + ": found " + calib::to_string(*dataset.setup) + ", expected " +
@@ -177,17 +202,24 @@ int run_validate(const ValidateOptions& options) {
   const std::string text =
       data::format_json(result_json(options, warnings, check, !pairs, clouds, exit_code)) + '\n';
   if (!options.out.empty()) {
-    data::write_atomically((fs::path(options.out) / "validation.json").string(), text);
+    data::write_atomically((fs::path(options.out) / kResult).string(), text);
     draw_views(views, check, options.out);
     if (clouds) {
-      data::save_png(clouds->pattern, (fs::path(options.out) / "pattern.png").string());
-      data::save_png(clouds->profile, (fs::path(options.out) / "profile.png").string());
+      data::save_png(clouds->pattern, (fs::path(options.out) / kPattern).string());
+      data::save_png(clouds->profile, (fs::path(options.out) / kProfile).string());
     }
   }
   if (options.common.json)
     std::cout << text;
   else
-    print_table(check, clouds);
+    print_table(check, !pairs, clouds);
+  if (!contradiction.sentence.empty())
+    say_unusable(contradiction.sentence, "these views contradict the calibration");
+  else if (!extrinsics.usable)
+    say_unusable(
+        options.extrinsics + ": " +
+            (extrinsics.warnings.empty() ? "it ended with exit code 3" : extrinsics.warnings.front()),
+        "the calibration cannot be used");
   return exit_code;
 }
 

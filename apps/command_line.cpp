@@ -189,6 +189,29 @@ std::string present_name(const std::string& word, const std::vector<std::string>
   return "";
 }
 
+/// Two names are near by their letters, not by the strokes before them.
+std::string nearest_option(const std::string& word, const std::vector<std::string>& known) {
+  std::vector<std::string> names;
+  for (const std::string& name : known) names.push_back(name.substr(2));
+  const std::string nearest = data::nearest_name(word.substr(2), names);
+  return nearest.empty() ? "" : "--" + nearest;
+}
+
+/// The first word of the command line that nothing takes.
+std::string word_too_many(const CLI::App& app) {
+  const std::vector<std::string> words = app.remaining(true);
+  return words.empty() ? "" : words.front();
+}
+
+/// An option of one value that has more.
+std::string given_twice(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    if (option->get_items_expected_max() == 1 && option->results().size() > 1) return option->get_name();
+  for (const CLI::App* part : app.get_subcommands(nullptr))
+    if (const std::string name = given_twice(*part); !name.empty()) return name;
+  return "";
+}
+
 /// What CLI11 found wrong with the command line; for a long option that the verb does not have, the nearest.
 std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int argc, char** argv) {
   std::vector<std::string> known;
@@ -203,10 +226,17 @@ std::string wrong_words(const CLI::App& app, const CLI::ParseError& error, int a
       return "--config: found after the verb, expected before it, as " + app.get_name() + " --config FILE " +
              argv[1];
     const std::string present = present_name(word, known);
-    const std::string nearest = present.empty() ? data::nearest_name(word, known) : present;
+    const std::string nearest = present.empty() ? nearest_option(word, known) : present;
     return word + ": unknown option" +
            (nearest.empty() ? " (see --help)" : " (did you mean \"" + nearest + "\"?)");
   }
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr)
+    if (const std::string word = word_too_many(app); !word.empty())
+      return word + ": found a word that no option takes (see --help)";
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr)
+    for (const CLI::App* verb : app.get_subcommands())
+      if (const std::string name = given_twice(*verb); !name.empty())
+        return name + ": given twice, expected once (see --help)";
   return std::string(error.what()) + " (see --help)";
 }
 

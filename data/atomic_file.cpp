@@ -9,6 +9,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <list>
 #include <regex>
 #include <system_error>
 #include <vector>
@@ -26,41 +27,75 @@ constexpr std::uintmax_t kLargestFile = 1'000'000'000;  // [bytes]
   throw std::system_error(errno, std::generic_category(), path);
 }
 
-/// Closes, and removes the temporary file unless it was renamed away.
-struct TemporaryFile {
-  std::string path;
-  int descriptor = -1;
-  ~TemporaryFile() {
-    if (descriptor >= 0) ::close(descriptor);
-    if (!path.empty()) ::unlink(path.c_str());
+/// Beside the file that it becomes by take_place(); else it is removed.
+class TemporaryFile {
+ public:
+  TemporaryFile(const std::string& path, std::string_view contents) : path_(path) {
+    const std::filesystem::file_status there = std::filesystem::status(path);
+    if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there) &&
+        !std::filesystem::is_directory(there))
+      throw InputError(path + ": is a device, a pipe or a socket, and is not written over");
+    const std::filesystem::path parent = std::filesystem::path(path).parent_path();
+    if (!parent.empty()) std::filesystem::create_directories(parent);
+    static std::atomic<unsigned> serial{0};
+    const std::string name =
+        path + "." + std::to_string(::getpid()) + "-" + std::to_string(serial++) + ".tmp";
+    const Descriptor file{::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)};
+    if (file.number < 0) throw_errno(path);
+    name_ = name;
+    if (const int error = write(file.number, contents); error != 0) {
+      remove();
+      errno = error;
+      throw_errno(path);
+    }
   }
+  ~TemporaryFile() { remove(); }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  void take_place() {
+    if (::rename(name_.c_str(), path_.c_str()) != 0) throw_errno(path_);
+    name_.clear();
+  }
+
+ private:
+  struct Descriptor {
+    int number;
+    ~Descriptor() {
+      if (number >= 0) ::close(number);
+    }
+  };
+
+  /// 0, or errno of what went wrong.
+  static int write(int descriptor, std::string_view contents) {
+    while (!contents.empty()) {
+      const ssize_t written = ::write(descriptor, contents.data(), contents.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) return errno;
+      contents.remove_prefix(static_cast<std::size_t>(written));
+    }
+    return ::fsync(descriptor) == 0 ? 0 : errno;
+  }
+
+  void remove() {
+    if (!name_.empty()) ::unlink(name_.c_str());
+    name_.clear();
+  }
+
+  std::string path_, name_;
 };
 
 }  // namespace
 
 void write_atomically(const std::string& path, std::string_view contents) {
-  const std::filesystem::file_status there = std::filesystem::status(path);
-  if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there) &&
-      !std::filesystem::is_directory(there))
-    throw InputError(path + ": is a device, a pipe or a socket, and is not written over");
-  const std::filesystem::path parent = std::filesystem::path(path).parent_path();
-  if (!parent.empty()) std::filesystem::create_directories(parent);
+  TemporaryFile(path, contents).take_place();
+}
 
-  TemporaryFile file;
-  static std::atomic<unsigned> serial{0};
-  const std::string name = path + "." + std::to_string(::getpid()) + "-" + std::to_string(serial++) + ".tmp";
-  file.descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-  if (file.descriptor < 0) throw_errno(path);
-  file.path = name;
-  while (!contents.empty()) {
-    const ssize_t written = ::write(file.descriptor, contents.data(), contents.size());
-    if (written < 0 && errno == EINTR) continue;
-    if (written < 0) throw_errno(path);
-    contents.remove_prefix(static_cast<std::size_t>(written));
-  }
-  if (::fsync(file.descriptor) != 0) throw_errno(path);
-  if (::rename(file.path.c_str(), path.c_str()) != 0) throw_errno(path);
-  file.path.clear();
+void write_together(const std::vector<FileText>& files) {
+  std::list<TemporaryFile> temporary;
+  for (const FileText& file : files)
+    if (!file.path.empty()) temporary.emplace_back(file.path, file.text);
+  for (TemporaryFile& file : temporary) file.take_place();
 }
 
 void remove_leftovers(const std::string& folder) {

@@ -1,6 +1,7 @@
 #pragma once
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace flash::data {
 
@@ -8,6 +9,14 @@ namespace flash::data {
 /// the new one, never half. Missing folders are made. Throws std::system_error naming the path, and
 /// InputError where a device, a pipe or a socket is there.
 void write_atomically(const std::string& path, std::string_view contents);
+
+/// A file that is to be.
+struct FileText {
+  std::string path, text;
+};
+
+/// Several files likewise, those without a path left out: none of them where the disk does not hold all.
+void write_together(const std::vector<FileText>& files);
 
 /// Removes from `folder` the temporary files of writers that were killed. Only while nobody writes there.
 void remove_leftovers(const std::string& folder);

@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "data/atomic_file.h"
+#include "data/camera_info.h"
 #include "data/error.h"
 #include "data/text.h"
 
@@ -23,8 +24,7 @@ YAML::Node load_yaml(const std::string& path) {
   try {
     return YAML::Load(text);
   } catch (const YAML::Exception& error) {
-    throw InputError(path + ": not valid YAML: line " + std::to_string(error.mark.line + 1) + ": " +
-                     error.msg);
+    throw InputError(path + ": not valid YAML: line " + std::to_string(error.mark.line + 1));
   }
 }
 
@@ -48,6 +48,21 @@ std::vector<double> numbers(const YAML::Node& node, const std::string& path, con
     values.push_back(*value);
   }
   return values;
+}
+
+/// rows and cols, where they are said, against the numbers that are there.
+void expect_counts(const YAML::Node& node, std::size_t numbers, const std::string& path,
+                   const std::string& field) {
+  if (!node.IsMap() || !node["rows"] || !node["cols"]) return;
+  const std::optional<long> rows =
+                                node["rows"].IsScalar() ? parse_integer(node["rows"].Scalar()) : std::nullopt,
+                            columns =
+                                node["cols"].IsScalar() ? parse_integer(node["cols"].Scalar()) : std::nullopt;
+  if (rows && columns && *rows > 0 && *columns > 0 &&
+      static_cast<std::size_t>(*rows) * static_cast<std::size_t>(*columns) == numbers)
+    return;
+  throw input_error(path, field,
+                    "found " + std::to_string(numbers) + " numbers, expected as many as rows times cols");
 }
 
 int pixels(const YAML::Node& file, const char* name, const std::string& path) {
@@ -81,15 +96,21 @@ Eigen::Vector2d distort(const std::array<double, 8>& k, const Eigen::Vector2d& p
 CameraIntrinsics load_camera_intrinsics(const std::string& path) {
   const YAML::Node file = load_yaml(path);
   if (!file.IsMap())
-    throw InputError(path + ": expected camera_info fields (image_width, camera_matrix, ...)");
+    throw InputError(path + (file.IsNull() ? ": is empty" : ": holds no names") +
+                     ", expected camera_info fields (image_width, camera_matrix, ...)");
   CameraIntrinsics camera;
   camera.width = pixels(file, "image_width", path);
   camera.height = pixels(file, "image_height", path);
 
   const auto [matrix_name, matrix] = find(file, {"camera_matrix", "cameraMatrix", "K"});
   const std::vector<double> k = numbers(matrix, path, matrix_name);
-  if (k.size() != 9 || k[0] <= 0 || k[4] <= 0 || k[8] != 1 || k[3] != 0 || k[6] != 0 || k[7] != 0)
+  if (k.size() != 9 || k[8] != 1 || k[3] != 0 || k[6] != 0 || k[7] != 0)
     throw input_error(path, matrix_name, "expected 3 x 3: fx 0 cx, 0 fy cy, 0 0 1");
+  expect_counts(matrix, k.size(), path, matrix_name);
+  for (const double focal : {k[0], k[4]})
+    if (!(focal > 0))
+      throw input_error(path, matrix_name,
+                        "found a focal length of " + format_short(focal) + ", expected one above 0");
   if (k[1] != 0) throw input_error(path, matrix_name, "found skew " + format_short(k[1]) + ", expected 0");
   for (const double value : k)
     if (!(std::abs(value) <= kMostPixels))
@@ -128,27 +149,7 @@ CameraIntrinsics load_camera_intrinsics(const std::string& path) {
 }
 
 void save_camera_info(const CameraIntrinsics& camera, const std::string& path, const std::string& name) {
-  const auto list = [](const std::vector<double>& values) {
-    std::string text;
-    for (const double value : values) text += (text.empty() ? "" : ", ") + format_number(value);
-    return "[" + text + "]";
-  };
-  std::vector<double> distortion = camera.distortion;
-  const bool rational = camera.model == DistortionModel::rational_polynomial;
-  distortion.resize(rational ? 8 : 5, 0.0);
-  const auto matrix = [&](const char* key, int rows, int columns, const std::vector<double>& values) {
-    return std::string(key) + ":\n  rows: " + std::to_string(rows) + "\n  cols: " + std::to_string(columns) +
-           "\n  data: " + list(values) + '\n';
-  };
-  std::string text = "image_width: " + std::to_string(camera.width) +
-                     "\nimage_height: " + std::to_string(camera.height) + "\ncamera_name: " + name + '\n';
-  text += matrix("camera_matrix", 3, 3, {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1});
-  text += std::string("distortion_model: ") + (rational ? "rational_polynomial" : "plumb_bob") + '\n';
-  text += matrix("distortion_coefficients", 1, static_cast<int>(distortion.size()), distortion);
-  text += matrix("rectification_matrix", 3, 3, {1, 0, 0, 0, 1, 0, 0, 0, 1});
-  text +=
-      matrix("projection_matrix", 3, 4, {camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0});
-  write_atomically(path, text);
+  write_atomically(path, camera_info_text(camera, name));
 }
 
 std::optional<Eigen::Vector2d> project(const CameraIntrinsics& camera, const Eigen::Vector3d& point) {

@@ -107,6 +107,18 @@ void format(const nlohmann::ordered_json& value, std::size_t indent, std::size_t
   text += '\n' + std::string(indent, ' ') + (value.is_object() ? '}' : ']');
 }
 
+/// "line 3, column 1: found }, which nothing before it allows". byte: counted from 1, that is not understood.
+std::string wrong_at(const std::string& text, std::size_t byte) {
+  if (text.find_first_not_of(" \t\r\n") == std::string::npos) return "it is empty";
+  const std::size_t at = std::min(byte, text.size() + 1) - (byte > 0 ? 1 : 0);
+  const std::string_view before = std::string_view(text).substr(0, at);
+  const std::size_t line_begin = before.rfind('\n') + 1;  // 0 in the first line
+  const std::string place = "line " + std::to_string(1 + std::count(before.begin(), before.end(), '\n')) +
+                            ", column " + std::to_string(at - line_begin + 1);
+  if (at >= text.size()) return place + ": it ends within a value";
+  return place + ": found " + text.substr(at, 1) + ", which nothing before it allows";
+}
+
 }  // namespace
 
 nlohmann::json parse_json(const std::string& text, const std::string& source) {
@@ -115,13 +127,10 @@ nlohmann::json parse_json(const std::string& text, const std::string& source) {
   check_depth(text, source);
   try {
     return nlohmann::json::parse(text, NamesOnce(source));
-  } catch (const nlohmann::json::exception& error) {
-    // "[json.exception.parse_error.101] parse error at line 3, column 5: syntax error while ..."
-    std::string message = error.what();
-    message = message.substr(message.find("] ") + 2);
-    const std::string prefix = "parse error at ";
-    if (message.starts_with(prefix)) message = message.substr(prefix.size());
-    throw InputError(source + ": not valid JSON: " + message);
+  } catch (const nlohmann::json::parse_error& error) {
+    throw InputError(source + ": not valid JSON: " + wrong_at(text, error.byte));
+  } catch (const nlohmann::json::exception&) {
+    throw InputError(source + ": not valid JSON: a number is too large");
   }
 }
 

@@ -55,6 +55,8 @@ void check_file_writable(const std::string& path) {
 
 void check_folder_free(const std::string& path, bool overwrite) {
   const fs::file_status status = status_of(path, path);
+  if (fs::exists(status) && !fs::is_directory(status))
+    throw InputError(path + ": exists already, and is no folder; choose another name");
   if (!overwrite && fs::exists(status) && !(fs::is_directory(status) && fs::is_empty(path)))
     throw exists_already(path);
   check_folder_writable(path);

@@ -219,13 +219,11 @@ std::optional<std::string> cause_of(const Calibration& result, const std::vector
 
 /// Of the lens and the target, which are not what was stated.
 void warn_of_shapes(Calibration& result, bool disputed) {
-  if (result.warp.far_off()) result.warnings.insert(result.warnings.begin(), warp_sentence(result.warp));
-  if (!result.lens.far_off.empty())
-    result.warnings.insert(result.warnings.begin(), lens_sentence(result.lens));
+  if (result.warp.far_off()) tell_first(result, warp_sentence(result.warp));
+  if (!result.lens.far_off.empty()) tell_first(result, lens_sentence(result.lens));
   if (!result.size || !result.size->far_off()) return;
-  result.warnings.insert(result.warnings.begin(), size_sentence(*result.size));
   // Who states a size that is to be kept is told, and served.
-  if (disputed && result.size->prior_sd > 0) result.usable = false;
+  tell_first(result, size_sentence(*result.size), disputed && result.size->prior_sd > 0);
 }
 
 /// A lens that is stated to the last digit, against one that is near to it: pictures that want another one
@@ -246,8 +244,7 @@ void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_
       text, sizeof text,
       "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --stated-intrinsics out",
       1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
-  result.warnings.insert(result.warnings.begin(), lens_differs(lens) + text);
-  if (depends) result.usable = false;
+  tell_first(result, lens_differs(lens) + text, depends);
 }
 
 /// An answer for arms that share a lens keeps it as it is stated. What the lens may be off drops out between
@@ -272,7 +269,7 @@ void add_shared_lens(Calibration& result, Bundle plain, RefineSettings refine_se
       "; it was kept, as arms on one camera share it, and the camera is %.1f mm and %.2f deg from where "
       "it is with the other: calibrate the lens",
       1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
-  result.warnings.insert(result.warnings.begin(), lens_differs(lens) + text);
+  tell_first(result, lens_differs(lens) + text);
 }
 
 void warn(Calibration& result) {
@@ -295,23 +292,28 @@ void warn(Calibration& result) {
   }
   if (missing > 0)
     result.warnings.push_back(std::to_string(missing) + " of " + std::to_string(result.views.size()) +
-                              " views were not used");
+                              (missing == 1 ? " views was not used" : " views were not used"));
   if (result.selection.renumbered > 0)
     result.warnings.push_back(std::to_string(result.selection.renumbered) +
                               " views had the target numbered from its other end; put right");
   bool unusable = false;
   const std::string noisy = unusual_noise(result.refined.noise, unusable);
-  if (!noisy.empty()) result.warnings.insert(result.warnings.begin(), noisy);
   // Noise that a size makes which is to be kept is that size's.
   const bool of_size = result.size && result.size->prior_sd == 0 && result.size->far_off();
-  if (unusable && !of_size) result.usable = false;
-  if (!result.refined.converged) {
-    result.warnings.insert(result.warnings.begin(), "the refinement did not converge");
-    result.usable = false;
-  }
+  if (!noisy.empty()) tell_first(result, noisy, unusable && !of_size);
+  if (!result.refined.converged) tell_first(result, "the refinement did not converge", true);
 }
 
 }  // namespace
+
+void tell_first(Calibration& calibration, std::string sentence, bool refuses) {
+  if (refuses) {
+    calibration.usable = false;
+    calibration.refusals.insert(calibration.refusals.begin(), sentence);
+    sentence += "; the answer cannot be used";
+  }
+  calibration.warnings.insert(calibration.warnings.begin(), std::move(sentence));
+}
 
 bool has_pixels(const Calibration& calibration) { return !calibration.refined.bundle.cameras.empty(); }
 
@@ -340,8 +342,7 @@ bool finish(Calibration& result, const std::vector<Observation>& used) {
   warn(result);
   const std::string implausible = implausibility(result, used);
   if (implausible.empty()) return true;
-  result.warnings.insert(result.warnings.begin(), implausible);
-  result.usable = false;
+  tell_first(result, implausible, true);
   return false;
 }
 
@@ -409,8 +410,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
     check_stated_lens(result, std::move(plain), refine_settings, camera, settings.lens_covariance);
   warn_of_shapes(result, sized.disputed);
   if (!plausible)
-    if (const auto cause = cause_of(result, all, symmetries, settings))
-      result.warnings.insert(result.warnings.begin(), *cause);
+    if (const auto cause = cause_of(result, all, symmetries, settings)) tell_first(result, *cause, true);
   return result;
 }
 

@@ -85,7 +85,11 @@ struct Calibration {
   std::optional<Drift> drift;         ///< the answer is of where camera and target were at the last view
   std::vector<std::string> warnings;  ///< worst first
   bool usable = true;
+  std::vector<std::string> refusals = {};  ///< why it is not usable, worst first; each is a warning as well
 };
+
+/// Puts a sentence before all others. One that refuses says so, and leaves the answer unusable.
+void tell_first(Calibration& calibration, std::string sentence, bool refuses = false);
 
 /// Pose pairs are seen by no camera.
 bool has_pixels(const Calibration& calibration);

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "calib/calibrate/cell_check.h"
 #include "calib/solve/linearization.h"
 #include "data/error.h"
 #include "data/text.h"
@@ -49,6 +50,13 @@ CellMember aligned(CellMember member, const Eigen::Isometry3d& target, std::vect
     notices->push_back(member.camera +
                        " numbers the target from its other end than the first camera; turned");
   return member;
+}
+
+/// As two recordings write one pose, to a tenth of a millimetre. Else each counts its pictures by itself.
+bool same_pose(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  constexpr double kSame = 1e-4;  // [m], [rad]
+  const Vector6d apart = motion_between(a, b);
+  return apart.head<3>().norm() < kSame && apart.tail<3>().norm() < kSame;
 }
 
 /// Places of arms and cameras in the world, filled in as members connect them.
@@ -103,6 +111,7 @@ CellMember cell_member(const std::string& arm, const std::string& camera, const 
   member.symmetries = confusable_symmetries(target);
   member.poses = calibration.poses;
   member.covariance = calibration.covariance;
+  if (!calibration.refined.noise.corner.empty()) member.corner_px = calibration.refined.noise.corner.front();
   for (const int i : calibration.used) {
     const auto view = static_cast<std::size_t>(i);
     member.observations.push_back(calibration.selection.observations[view]);
@@ -127,7 +136,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
   bundle.priors.lenses.resize(cameras.size());
   bundle.priors.warp_sd.resize(layout.targets.size());
   bundle.priors.scale_sd.resize(layout.targets.size());
-  std::map<std::pair<std::size_t, double>, int> pose_of;
+  std::map<std::pair<std::size_t, double>, std::vector<int>> poses_at;
   for (const CellMember& given : members) {
     if (given.setup != bundle.setup)
       throw data::InputError(given.camera + ": found " + to_string(given.setup) + ", expected " +
@@ -150,9 +159,14 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
     bundle.priors.scale_sd[target] = usual_size_sd(member.points);
     for (std::size_t i = 0; i < member.observations.size(); ++i) {
       const Observation& observation = member.observations[i];
-      const auto [entry, fresh] =
-          pose_of.try_emplace({arm, member.stamps[i]}, static_cast<int>(bundle.poses.size()));
-      if (fresh) {
+      std::vector<int>& known = poses_at[{arm, member.stamps[i]}];
+      const auto same = std::find_if(known.begin(), known.end(), [&](int k) {
+        return same_pose(bundle.poses[static_cast<std::size_t>(k)].T_base_gripper,
+                         observation.T_base_gripper);
+      });
+      const int place = same == known.end() ? static_cast<int>(bundle.poses.size()) : *same;
+      if (same == known.end()) {
+        known.push_back(place);
         RobotPose pose;
         pose.arm = static_cast<int>(arm);
         pose.T_base_gripper = observation.T_base_gripper;
@@ -160,7 +174,7 @@ Bundle cell_bundle(const std::vector<CellMember>& members, std::vector<std::stri
         bundle.poses.push_back(pose);
       }
       BundleView view = make_view(member.points, observation);
-      view.pose = entry->second;
+      view.pose = place;
       view.camera = static_cast<int>(camera);
       view.target = static_cast<int>(target);
       bundle.views.push_back(std::move(view));
@@ -199,16 +213,25 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
   if (given.size_as_stated)
     systematic.covariance += covariance_of_kept_sizes(refined, settings.bundle, sized.sizes, size_sd);
   cell.sizes = sized.sizes;
-  cell.usable = !sized.disputed || as_stated;
   const bool told = std::all_of(cell.sizes.begin(), cell.sizes.end(),
                                 [](const TargetSize& size) { return size.wanted.has_value(); });
   if (unknown_sizes && !told)
     throw data::InputError(
         "the data do not tell the size of the targets: the robots move too little; leave --target-size "
         "solved out, or add views farther apart");
-  if (!refined.converged) cell.notices.emplace_back("the joint refinement did not converge");
-  for (const TargetSize& size : cell.sizes)
-    if (size.far_off()) cell.notices.push_back(size_sentence(size));
+  const auto refuse = [&](const std::string& reason) {
+    cell.usable = false;
+    cell.refusals.push_back(reason);
+    cell.notices.push_back(reason + "; the answer cannot be used");
+  };
+  if (!refined.converged) refuse("the joint refinement did not converge");
+  for (const TargetSize& size : cell.sizes) {
+    if (!size.far_off()) continue;
+    if (sized.disputed && !as_stated)
+      refuse(size_sentence(size));
+    else
+      cell.notices.push_back(size_sentence(size));
+  }
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
   for (std::size_t c = 0; c < refined.bundle.cameras.size(); ++c) {
     cell.lenses.push_back(lens_estimate(refined.bundle, settings.bundle.unknowns, systematic.covariance, c));
@@ -251,6 +274,7 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
   for (std::size_t c = 0; c < cameras.size(); ++c)
     cell.cameras.push_back(
         {{parent, cameras[c], refined.bundle.cameras[c]}, camera_factor * block(columns.cameras[c])});
+  for (const std::string& reason : cell_contradictions(members, refined, cell)) refuse(reason);
   cell.noise = refined.noise;
   cell.corner_rms = reprojection_rms(refined.bundle, true);
   cell.chain_rms = reprojection_rms(refined.bundle, false);

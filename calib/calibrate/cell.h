@@ -22,9 +22,10 @@ struct CellMember {
   Eigen::Matrix3Xd points = {};       ///< of the target
   std::vector<Symmetry> symmetries = {};
   std::vector<Observation> observations = {};  ///< in use, T_camera_target the chosen pose alone
-  std::vector<double> stamps = {};             ///< equal stamps of one arm are one pose of it
+  std::vector<double> stamps = {};             ///< equal stamps and poses of one arm are one pose of it
   HandEyePoses poses = {};                     ///< of the calibration by itself
   Matrix6d covariance = Matrix6d::Zero();
+  double corner_px = 0;  ///< noise of its corners, by itself; 0: not known
 };
 
 /// The views in use as a member of a cell.
@@ -43,9 +44,10 @@ struct Cell {
   NoiseLevels noise = {};
   std::vector<TargetSize> sizes = {};     ///< of the targets; none where composed
   std::vector<LensEstimate> lenses = {};  ///< of the cameras; none where composed
-  bool usable = true;                     ///< false: a size is far off, and the answer depends on it
-  double corner_rms = 0, chain_rms = 0;   ///< with and without corrections, 2-D rms per corner [px]
+  bool usable = true;
+  double corner_rms = 0, chain_rms = 0;  ///< with and without corrections, 2-D rms per corner [px]
   std::vector<std::string> notices = {};
+  std::vector<std::string> refusals = {};  ///< why it is not usable; each is a notice as well
 };
 
 /// T_armA_armB = X_A X_B^-1 for every further calibration on one camera that stands still, with the

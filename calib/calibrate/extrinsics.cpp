@@ -112,9 +112,12 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
       extrinsics.covariance(i, j) = value.get<double>();
     }
   }
+  constexpr double kLargest = 1e8;  // [m^2], [rad^2]
+  if (!(extrinsics.covariance.cwiseAbs().maxCoeff() < kLargest))
+    throw object.error("covariance", "numbers below 1e8");
   if (!extrinsics.covariance.isApprox(extrinsics.covariance.transpose(), 1e-6) ||
       extrinsics.covariance.diagonal().minCoeff() < 0)
-    throw object.error("covariance", "a symmetric matrix");
+    throw object.error("covariance", "a symmetric matrix, no variance below 0");
   if (object.has("sigmas")) {
     const data::JsonObject sigmas = object.object("sigmas");
     extrinsics.pixels = sigmas.has("corner_px");

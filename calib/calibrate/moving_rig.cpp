@@ -54,13 +54,13 @@ void doubt_last_views(Calibration& result, const std::vector<Observation>& all, 
   const double left_out = before - static_cast<double>(result.used.size());
   constexpr double kUsual = 0.1;  // share of views that are left out anyway
   if (last < kTold || left_out > kUsual * before) return;
-  result.warnings.insert(result.warnings.begin(),
-                         "the last " + std::to_string(last) +
-                             " views do not close with those before: if camera or target moved before " +
-                             all[seen[seen.size() - last]].image +
-                             ", the answer is of where they were; record anew, or take these views out");
   const bool unlikely = last <= static_cast<std::size_t>(kEndViews) && knock && *knock < kUnlikely;
-  if (last >= kUnusable && !unlikely) result.usable = false;
+  tell_first(result,
+             "the last " + std::to_string(last) +
+                 " views do not close with those before: if camera or target moved before " +
+                 all[seen[seen.size() - last]].image +
+                 ", the answer is of where they were; record anew, or take these views out",
+             last >= kUnusable && !unlikely);
 }
 
 /// A size that was to be kept and is another makes errors that look like motions: here it is an unknown.
@@ -133,7 +133,7 @@ void add_slow_drift(Calibration& result, double rival) {
       "camera, target or robot moved slowly, by %.1f mm and %.2f deg from the first view to the last: "
       "that was added to the stated standard deviations; look for what is loose, or let the arm warm up",
       1e3 * drift.motion.head<3>().norm(), drift.motion.tail<3>().norm() / kDegree);
-  result.warnings.insert(result.warnings.begin(), text);
+  tell_first(result, text);
 }
 
 std::string drift_sentence(const Drift& drift, bool depends) {
@@ -163,16 +163,14 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
       if (left.norm() < kLittle * drift.motion.norm()) break;
     }
   } catch (const data::InputError&) {
-    whole.usable = false;
-    whole.warnings.insert(whole.warnings.begin(), drift_sentence(drift, true));
+    tell_first(whole, drift_sentence(drift, true), true);
     return whole;
   }
   add_drift(answer, drift);
   const Vector6d away = motion_between(answer.poses.X, whole.poses.X);
   const bool depends =
       drift.camera || !drift.told || away.dot(answer.covariance.ldlt().solve(away)) > kChiSquare999;
-  if (depends) answer.usable = false;
-  answer.warnings.insert(answer.warnings.begin(), drift_sentence(drift, depends));
+  tell_first(answer, drift_sentence(drift, depends), depends);
   answer.drift = drift;
   return answer;
 }
@@ -222,14 +220,13 @@ Calibration solve_knocked(const Calibration& whole, const Knock& knock, std::siz
     answer = calibrate_moving(side_of(all, first, !other.before), points, solve);
   } catch (const data::InputError& error) {  // a part alone may turn about one axis only
     answer = whole;
-    answer.usable = false;
     char text[200];
     std::snprintf(text, sizeof text,
                   "the %s moved by %.1f mm and %.2f deg before %s, and the views %s then alone do not do: ",
                   mover(knock.camera, knock.told), 1e3 * knock.motion.head<3>().norm(),
                   knock.motion.tail<3>().norm() / kDegree, other.view.c_str(),
                   other.before ? "since" : "until");
-    answer.warnings.insert(answer.warnings.begin(), text + std::string(error.what()));
+    tell_first(answer, text + std::string(error.what()), true);
     return answer;
   }
   other.views = static_cast<int>(other.before ? before : after);
@@ -238,13 +235,13 @@ Calibration solve_knocked(const Calibration& whole, const Knock& knock, std::siz
   } catch (const data::InputError&) {
     // said in the sentence
   }
-  // Who asks where the camera is now is not served by where it was.
-  if (!other.before && (knock.camera || !knock.told)) answer.usable = false;
   for (std::size_t i = 0; i < all.size(); ++i)
     if ((i < first) == other.before && !all[i].T_camera_target.empty())
       answer.views[i].reason = answer.selection.views[i].reason =
           std::string(other.before ? "before" : "after") + " the knock at " + other.view;
-  answer.warnings.insert(answer.warnings.begin(), knock_sentence(other, answer.used.size()));
+  // Who asks where the camera is now is not served by where it was.
+  const bool past = !other.before && (knock.camera || !knock.told);
+  tell_first(answer, knock_sentence(other, answer.used.size()), past);
   if (!answer.other_part) answer.other_part = std::move(other);  // else that next to the answer
   return answer;
 }

@@ -77,8 +77,6 @@ std::string implausibility(const Calibration& calibration, const std::vector<Obs
     target.push_back(view.T_camera_target.front());
     distance += view.T_camera_target.front().translation().norm() / static_cast<double>(used.size());
   }
-  const double place = std::sqrt(calibration.covariance.topLeftCorner<3, 3>().trace() / 3),
-               turn = std::sqrt(calibration.covariance.bottomRightCorner<3, 3>().trace() / 3);
   const Motion still = motion_of(target);  // of the target in the camera, whose middle a fixed pose would be
   const Motion left{1e-3 * calibration.held_out.mm, kDegree * calibration.held_out.deg};
   if (!(left.over(distance) < settings.held_out * still.over(distance)))
@@ -90,12 +88,18 @@ std::string implausibility(const Calibration& calibration, const std::vector<Obs
         kAdvice);
   if (std::string noisy = implausible_noise(calibration.refined.noise, used, settings); !noisy.empty())
     return noisy;
-  if (!(place < settings.deviation * distance && turn < settings.deviation))
-    return formatted(
-        "the camera's place is known to no better than %.0f mm and %.1f deg, at %.0f mm from the target: "
-        "that is no answer; add views that tilt by 20 to 40 deg about two axes; %s",
-        1e3 * place, turn / kDegree, 1e3 * distance, kAdvice);
-  return {};
+  return unknown_place("the camera", calibration.covariance, distance, settings);
+}
+
+std::string unknown_place(const std::string& what, const Matrix6d& covariance, double distance,
+                          const PlausibilitySettings& settings) {
+  const double place = std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3),
+               turn = std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3);
+  if (place < settings.deviation * distance && turn < settings.deviation) return {};
+  return formatted(
+      "%s's place is known to no better than %.0f mm and %.1f deg, at %.0f mm from the target: "
+      "that is no answer; add views that tilt by 20 to 40 deg about two axes; %s",
+      what.c_str(), 1e3 * place, turn / kDegree, 1e3 * distance, kAdvice);
 }
 
 }  // namespace flash::calib

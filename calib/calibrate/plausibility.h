@@ -30,6 +30,11 @@ struct ArmNoise {
 /// where they are so by more than any arm.
 std::string unusual_noise(const NoiseLevels& noise, bool& unusable, const ArmNoise& arm = {});
 
+/// Empty, or one sentence that says how badly the place of `what` is known. covariance: of its pose, right
+/// perturbation (dt, dtheta) [m, rad]; distance: from the camera to the target [m].
+std::string unknown_place(const std::string& what, const Matrix6d& covariance, double distance,
+                          const PlausibilitySettings& settings = {});
+
 /// The part that is known before views are left out: whether the robot would have to be wrong by about as
 /// much as it moved.
 std::string implausible_noise(const NoiseLevels& noise, const std::vector<Observation>& used,

@@ -88,7 +88,7 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
   std::string cause;
   if (by_target <= kContradicts && by_target <= by_camera)
     cause = "the target is not where it was at the calibration, " + moved_by(poses.Z, target_moved.Z) +
-            ": this proves nothing; --refit-target takes its place from these views";
+            ": these views cannot check the calibration; --refit-target takes its place from them";
   else if (by_camera <= kContradicts)
     cause = "the camera is not where it was at the calibration, " + moved_by(poses.X, camera_moved.X) +
             ": calibrate again";

@@ -104,7 +104,7 @@ PoseList interpreted(const std::vector<Row>& rows, const std::vector<double>& st
     } else {
       pose.pose = pose_of_numbers(row, path, where);
     }
-    distances.push_back(pose.pose.translation().norm());
+    distances.push_back(pose.pose.translation().stableNorm());
   }
   const bool millimetres = beyond_reach(distances);
   if (millimetres)

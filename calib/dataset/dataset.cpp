@@ -93,10 +93,16 @@ std::vector<fs::path> pose_sources(const fs::path& folder) {
   return sources;
 }
 
+/// Of a source of poses: itself, or the files in it.
+std::vector<fs::path> files_of_poses(const fs::path& source) {
+  if (!fs::is_directory(source)) return {source};
+  const std::vector<fs::path> files = pose_files(source, "pose");
+  return files.empty() ? pose_files(source) : files;
+}
+
 PoseList load_poses(const fs::path& source) {
   if (!fs::is_directory(source)) return load_pose_list(source.string());
-  std::vector<fs::path> files = pose_files(source, "pose");
-  if (files.empty()) files = pose_files(source);
+  const std::vector<fs::path> files = files_of_poses(source);
   if (files.empty())
     throw InputError(source.string() + ": found no poses, expected a YAML or text file for each");
   if (data::lower_extension(files.front().string()) == ".txt") {
@@ -243,6 +249,7 @@ void read_target(const fs::path& folder, Dataset& dataset) {
   const nlohmann::json json = data::load_json(file.string());
   const data::JsonObject object(json, file.string());
   object.expect_fields({"setup", "target"});
+  dataset.files.push_back(file.string());
   dataset.target = object.string("target", "");
   const std::string setup = object.string("setup", "");
   if (setup == "eye-in-hand")
@@ -255,6 +262,7 @@ void read_target(const fs::path& folder, Dataset& dataset) {
 
 void read_pairs(const fs::path& file, Dataset& dataset) {
   dataset.poses_path = file.string();
+  dataset.files.push_back(dataset.poses_path);
   for (const PosePair& pair : load_pose_pairs(file.string())) {
     Frame frame;
     frame.stamp = static_cast<double>(dataset.frames.size());
@@ -301,6 +309,7 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
     throw InputError(folder.string() + ": found no pictures, expected images/*.png or *.jpg");
   dataset.camera_path = options.camera.empty() ? find_camera(folder) : options.camera;
   if (!dataset.camera_path.empty()) {
+    dataset.files.push_back(dataset.camera_path);
     dataset.camera = load_intrinsics(dataset.camera_path);
     dataset.lens_covariance = load_lens_covariance(dataset.camera_path);
   }
@@ -315,7 +324,11 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
   std::optional<SerialChain> robot;
   std::size_t poses = 0;
   if (!dataset.poses_path.empty()) {
-    if (!options.robot.empty()) robot = load_urdf(options.robot, options.base_link, options.tip_link);
+    if (!options.robot.empty()) {
+      robot = load_urdf(options.robot, options.base_link, options.tip_link);
+      dataset.files.push_back(options.robot);
+    }
+    for (const fs::path& file : files_of_poses(dataset.poses_path)) dataset.files.push_back(file.string());
     PoseList list = robot ? load_joint_list(dataset.poses_path, *robot) : load_poses(dataset.poses_path);
     poses = list.poses.size();
     if (list.in_order && poses != images.size())
@@ -332,10 +345,11 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
     Frame frame;
     frame.name = image.filename().string();
     frame.image = image.string();
+    dataset.files.push_back(frame.image);
     frame.stamp =
         static_cast<double>(number_in_name(frame.image).value_or(static_cast<long>(dataset.frames.size())));
     const fs::path depth = folder / "depth" / (image.stem().string() + ".png");
-    if (options.depth && fs::exists(depth)) frame.depth = depth.string();
+    if (options.depth && fs::exists(depth)) dataset.files.push_back(frame.depth = depth.string());
     try {
       if (pairing) pairing->pair(frame, image, place, robot ? &*robot : nullptr);
       dataset.frames.push_back(std::move(frame));
@@ -360,8 +374,9 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
 void expect_places(const Dataset& dataset) {
   constexpr double kFarthest = 1e4;  // [m]
   for (const Frame& frame : dataset.frames) {
-    double farthest = frame.T_base_gripper.translation().norm();
-    if (frame.T_camera_target) farthest = std::max(farthest, frame.T_camera_target->translation().norm());
+    double farthest = frame.T_base_gripper.translation().stableNorm();
+    if (frame.T_camera_target)
+      farthest = std::max(farthest, frame.T_camera_target->translation().stableNorm());
     if (!(farthest < kFarthest))
       throw data::input_error(dataset.source, frame.name,
                               "found a pose " + data::format_short(farthest) + " m away, expected metres");

@@ -27,6 +27,7 @@ struct Dataset {
   std::string source;                             ///< the folder or file
   std::string poses_path;                         ///< where the poses come from; empty without poses
   std::string camera_path;                        ///< where the intrinsics come from; empty without
+  std::vector<std::string> files;                 ///< all that it was read from, pictures of no pose too
   std::optional<data::CameraIntrinsics> camera;   ///< as the file says it
   std::optional<LensCovariance> lens_covariance;  ///< where the file states one
   std::vector<Frame> frames;                      ///< in order of stamp

@@ -51,7 +51,9 @@ class NamedNumbers {
  private:
   /// Also of what stands one level deeper, as in {"intrinsics": {"fx": ...}}.
   void add(const YAML::Node& node, int depth = 0) {
-    if (!node.IsMap()) throw data::InputError(path_ + ": expected names and numbers");
+    if (!node.IsMap())
+      throw data::InputError(path_ + (node.IsNull() ? ": is empty" : ": holds no names") +
+                             ", expected names and numbers, as camera_matrix: {data: [...]}");
     for (const auto& entry : node) {
       const YAML::Node value = entry.second;
       if (value.IsMap() && !value["data"]) {
@@ -97,8 +99,11 @@ data::CameraIntrinsics load_named(const std::string& path) {
     camera.cx = *cx;
     camera.cy = *cy;
   }
-  if (!(camera.fx > 0) || !(camera.fy > 0))
-    throw data::input_error(path, "camera matrix", "expected focal lengths above 0");
+  for (const double focal : {camera.fx, camera.fy})
+    if (!(focal > 0))
+      throw data::input_error(
+          path, "camera matrix",
+          "found a focal length of " + data::format_short(focal) + ", expected one above 0");
   std::vector<double> distortion = file.first(kDistortion);
   const auto last = std::find_if(distortion.rbegin(), distortion.rend(), [](double c) { return c != 0; });
   distortion.erase(last.base(), distortion.end());

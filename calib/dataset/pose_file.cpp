@@ -25,7 +25,7 @@ using Columns = std::map<std::string, std::size_t>;
 
 void expect_plausible(const std::vector<RecordedPose>& poses, const std::string& path) {
   std::vector<double> distances;
-  for (const RecordedPose& pose : poses) distances.push_back(pose.pose.translation().norm());
+  for (const RecordedPose& pose : poses) distances.push_back(pose.pose.translation().stableNorm());
   expect_metres(distances, path);
 }
 
@@ -140,6 +140,16 @@ RecordedPose pose_of_line(const CsvLine& line) {
   return pose;
 }
 
+/// In the order of the file.
+std::string names_in(const Columns& columns) {
+  std::vector<std::pair<std::size_t, std::string>> ordered;
+  for (const auto& [name, place] : columns) ordered.emplace_back(place, name);
+  std::sort(ordered.begin(), ordered.end());
+  std::string names;
+  for (const auto& [place, name] : ordered) names += (names.empty() ? "" : ", ") + name;
+  return names;
+}
+
 void expect_columns(const Columns& columns, const std::string& path) {
   const auto all = [&](std::initializer_list<const char*> names) {
     return std::all_of(names.begin(), names.end(), [&](const char* name) { return columns.count(name) > 0; });
@@ -149,13 +159,16 @@ void expect_columns(const Columns& columns, const std::string& path) {
                           return column.first.find("joint") != std::string::npos;
                         });
     throw input_error(path, "header",
-                      std::string("expected the columns tx, ty, tz [m], or tx_mm, ty_mm, tz_mm") +
+                      "found " + names_in(columns) +
+                          ", expected tx, ty, tz [m] (or x, y, z), or tx_mm, ty_mm, tz_mm" +
                           (joints ? "; joints need --robot with their URDF" : ""));
   }
   if (!all({"qx", "qy", "qz", "qw"}) && !all({"rx", "ry", "rz"}) && !all({"rx_deg", "ry_deg", "rz_deg"}) &&
       !all({"rotvec_x", "rotvec_y", "rotvec_z"}))
     throw input_error(path, "header",
-                      "found no rotation, expected qx,qy,qz,qw or rx,ry,rz or rotvec_x,rotvec_y,rotvec_z");
+                      "found " + names_in(columns) +
+                          ", and with them no rotation, expected qx,qy,qz,qw or rx,ry,rz or "
+                          "rotvec_x,rotvec_y,rotvec_z");
 }
 
 /// Reads the lines below a header; `check` looks at its columns, `read` makes a pose of each line.
@@ -257,6 +270,13 @@ Eigen::Isometry3d named_pose(const YAML::Node& node, const std::string& path, co
       field);
 }
 
+std::string names_in(const YAML::Node& node) {
+  if (!node.IsMap()) return "no names";
+  std::string names;
+  for (const auto& entry : node) names += (names.empty() ? "" : ", ") + entry.first.Scalar();
+  return names;
+}
+
 std::vector<PosePair> load_samples(const std::string& path) {
   const YAML::Node file = load_yaml(path);
   const YAML::Node samples = file.IsMap() ? file["samples"] : file;
@@ -267,7 +287,7 @@ std::vector<PosePair> load_samples(const std::string& path) {
     const std::string field = "samples[" + std::to_string(i) + "]";
     const YAML::Node sample = samples[i];
     if (!sample.IsMap() || !sample["robot"] || !sample["tracking"])
-      throw input_error(path, field, "expected robot and tracking");
+      throw input_error(path, field, "found " + names_in(sample) + ", expected robot and tracking");
     pairs.push_back({named_pose(sample["robot"], path, field + ".robot"),
                      named_pose(sample["tracking"], path, field + ".tracking")});
   }
@@ -379,7 +399,7 @@ RecordedPose load_pose_yaml(const std::string& path) {
   } else {
     pose.pose = pose_of_numbers(yaml_numbers(file, path, "pose"), path, "pose");
   }
-  expect_metres({pose.pose.translation().norm()}, path);
+  expect_metres({pose.pose.translation().stableNorm()}, path);
   return pose;
 }
 
@@ -389,8 +409,8 @@ std::vector<PosePair> load_pose_pairs(const std::string& path) {
   if (pairs.empty()) throw InputError(path + ": found no samples");
   std::vector<double> robot, tracking;
   for (const PosePair& pair : pairs) {
-    robot.push_back(pair.T_base_gripper.translation().norm());
-    tracking.push_back(pair.T_camera_target.translation().norm());
+    robot.push_back(pair.T_base_gripper.translation().stableNorm());
+    tracking.push_back(pair.T_camera_target.translation().stableNorm());
   }
   expect_metres(robot, path);
   expect_metres(tracking, path);

@@ -93,7 +93,7 @@ PoseList load_json_poses(const std::string& path) {
     RecordedPose& pose = list.poses.emplace_back();
     const std::string where = "pose " + std::to_string(i);
     pose.pose = pose_of_json(items[i], path, where);
-    distances.push_back(pose.pose.translation().norm());
+    distances.push_back(pose.pose.translation().stableNorm());
     const Json* name = find(items[i], {"image", "file", "filename", "name"});
     const Json* number = find(items[i], {"index", "id", "frame", "t", "timestamp"});
     if (name && name->is_string())

@@ -69,6 +69,10 @@ std::string read_text(const std::string& path) {
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
   std::string text = data::read_file(path);
   if (text.starts_with(kMark)) text.erase(0, kMark.size());
+  if (const std::size_t zero = text.find('\0'); zero != std::string::npos)
+    throw data::InputError(path + ": found a byte 0, expected text, at byte " + std::to_string(zero));
+  // Lines of old end in a carriage return alone.
+  if (text.find('\n') == std::string::npos) std::replace(text.begin(), text.end(), '\r', '\n');
   return text;
 }
 

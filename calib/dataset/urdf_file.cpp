@@ -84,6 +84,7 @@ std::string only(const std::set<std::string>& links, const std::string& path, co
 
 SerialChain load_urdf(const std::string& path, const std::string& base, const std::string& tip) {
   const std::string text = data::read_file(path);
+  if (text.empty()) throw InputError(path + ": is empty, expected a URDF");
   tinyxml2::XMLDocument document;
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
     throw InputError(path + ": line " + std::to_string(document.ErrorLineNum()) + ": expected XML");

@@ -1,10 +1,12 @@
 #include "calib/detect/detection_cache.h"
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <system_error>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
@@ -59,11 +61,18 @@ void write(const Found& found, const std::string& path) {
   data::write_atomically(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
 }
 
+/// What ends no search, as nothing is wrong with the folder itself.
+bool is_full(const std::error_code& code) {
+  return code == std::errc::no_space_on_device || code == std::errc::file_too_large || code.value() == EDQUOT;
+}
+
 }  // namespace
 
 DetectionCache::DetectionCache(std::string folder, const std::optional<data::CameraIntrinsics>& camera,
-                               const Target& target)
-    : folder_(std::move(folder)), points_(static_cast<int>(target_points(target).cols())) {
+                               const Target& target, Tell tell)
+    : folder_(std::move(folder)),
+      points_(static_cast<int>(target_points(target).cols())),
+      tell_(std::move(tell)) {
   if (folder_.empty()) return;
   const auto add = [&](double value) { key_ += data::format_number(value) + ' '; };
   key_ = std::string(FLASH_VERSION) + ' ' + std::to_string(kFinderVersion) + ' ' + target.dictionary + ' ';
@@ -93,7 +102,14 @@ Found DetectionCache::get(const std::string& image, const std::function<Found()>
   const std::string path = (std::filesystem::path(folder_) / (data::sha256(key_ + bytes) + ".json")).string();
   if (std::optional<Found> kept = read(path, points_)) return std::move(*kept);
   Found found = find();
-  if (!found.is_open) write(found, path);
+  try {
+    if (!found.is_open) write(found, path);
+  } catch (const std::system_error& error) {
+    if (!is_full(error.code())) throw;
+    std::call_once(told_, [&] {
+      if (tell_) tell_(folder_ + ": " + error.code().message() + "; what is found is not kept");
+    });
+  }
   return found;
 }
 

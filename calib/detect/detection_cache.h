@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <mutex>
 #include <optional>
 #include <string>
 
@@ -13,9 +14,11 @@ namespace flash::calib {
 /// between threads and between programs.
 class DetectionCache {
  public:
-  /// An empty folder keeps nothing.
+  using Tell = std::function<void(const std::string&)>;
+
+  /// An empty folder keeps nothing. tell: called once where the disk has no room for what is to be kept.
   DetectionCache(std::string folder, const std::optional<data::CameraIntrinsics>& camera,
-                 const Target& target);
+                 const Target& target, Tell tell = {});
 
   /// What is kept for the picture, or what `find` returns; nothing is kept where `find` throws. A file that
   /// cannot be understood is written anew.
@@ -25,6 +28,8 @@ class DetectionCache {
   std::string folder_;
   int points_ = 0;   ///< of the target
   std::string key_;  ///< of everything but the picture
+  Tell tell_;
+  mutable std::once_flag told_;
 };
 
 }  // namespace flash::calib

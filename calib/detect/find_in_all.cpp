@@ -73,7 +73,7 @@ class Lookout {
       : dataset_(dataset),
         target_(target),
         rectifier_(rectifier),
-        cache_(settings.cache, dataset.camera, target),
+        cache_(settings.cache, dataset.camera, target, settings.tell),
         threads_(settings.threads),
         progress_(progress),
         found_(dataset.frames.size()) {}

@@ -192,7 +192,8 @@ std::vector<std::string> next_steps(const Calibration& c) {
         "The robot's poses limit the answer (%.2f px through them, %.2f px without their errors): more views "
         "help, better pictures do not.",
         c.chain_rms, c.corner_rms));
-  steps.emplace_back("Check it on pictures that took no part: flash-calib validate.");
+  steps.emplace_back(std::string("Check it on ") + (has_pixels(c) ? "pictures" : "pairs of poses") +
+                     " that took no part: flash-calib validate.");
   return steps;
 }
 

@@ -31,11 +31,16 @@ LinearModel linearize(const std::vector<PoseLoop>& loops, const HandEyePoses& po
   // Few pairs hardly tell how noisy they are: what robots and trackers usually are, within a factor of three.
   constexpr std::size_t kFew = 8;
   if (loops.size() < kFew) model.noise = {{0.1 * M_PI / 180, 1e-3}, 1};
+  Eigen::Matrix<double, kShared + 1, kShared + 1> rotations, translations;
+  rotations.setZero();
+  translations.setZero();
   for (const PoseLoop& loop : loops) {
     const auto [rotation, translation] = rows_of(loop, poses);
-    model.blocks.push_back({0, 0, 3, rotation.transpose() * rotation});
-    model.blocks.push_back({0, 1, 3, translation.transpose() * translation});
+    rotations += rotation.transpose() * rotation;
+    translations += translation.transpose() * translation;
   }
+  const double count = 3 * static_cast<double>(loops.size());
+  model.blocks = {{0, 0, count, rotations}, {0, 1, count, translations}};
   return model;
 }
 

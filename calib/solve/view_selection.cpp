@@ -19,8 +19,11 @@ bool same_pixels(const Observation& a, const Observation& b) {
 /// The same pair of poses twice, of a set without pictures.
 bool same_pair(const Observation& a, const Observation& b) {
   constexpr double kSame = 1e-12;
+  const auto at_one_place = [](const Eigen::Isometry3d& p, const Eigen::Isometry3d& q) {
+    return (p.translation() - q.translation()).cwiseAbs().maxCoeff() < kSame;
+  };
   return a.pixels.cols() == 0 && b.pixels.cols() == 0 && !a.T_camera_target.empty() &&
-         !b.T_camera_target.empty() &&
+         !b.T_camera_target.empty() && at_one_place(a.T_base_gripper, b.T_base_gripper) &&
          motion_between(a.T_base_gripper, b.T_base_gripper).cwiseAbs().maxCoeff() < kSame &&
          motion_between(a.T_camera_target.front(), b.T_camera_target.front()).cwiseAbs().maxCoeff() < kSame;
 }

@@ -15,6 +15,7 @@ inline CellMember member_of(const HandEyeScene& scene, const std::string& arm,
   member.observations = scene.observations;
   for (std::size_t i = 0; i < scene.observations.size(); ++i) member.stamps.push_back(static_cast<double>(i));
   member.poses = shah(loops_of(scene));
+  member.corner_px = scene.settings.corner_px;
   return member;
 }
 

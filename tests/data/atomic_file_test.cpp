@@ -3,6 +3,12 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <vector>
+
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -31,6 +37,22 @@ TEST(ReadFile, WhatMayNeverEndIsNoInput) {
   std::filesystem::resize_file(large, 1'000'000'001);  // takes no room on the disk
   EXPECT_EQ(input_error_of([&] { read_file(large); }),
             large + ": found 1,000,000,001 bytes, expected at most 1,000,000,000");
+}
+
+TEST(WriteTogether, WritesAllOrNone) {
+  const TemporaryFolder folder;
+  const std::string first = folder.write("first", "old"), second = folder / "new/second";
+  write_together({{first, "1"}, {"", "of no file"}, {second, "2"}});
+  EXPECT_EQ(read_file(first), "1");
+  EXPECT_EQ(read_file(second), "2");
+  EXPECT_THROW(write_together({{first, "3"}, {folder / "new/third", "3"}, {"/proc/none", "3"}}),
+               std::system_error);
+  EXPECT_EQ(read_file(first), "1");
+  std::vector<std::string> left;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder / "."))
+    if (entry.is_regular_file()) left.push_back(entry.path().filename().string());
+  std::sort(left.begin(), left.end());
+  EXPECT_EQ(left, (std::vector<std::string>{"first", "second"}));
 }
 
 TEST(WriteAtomically, ReplacesNoPipeAndNoDevice) {

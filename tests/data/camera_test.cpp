@@ -107,6 +107,10 @@ TEST(Camera, MalformedFilesNameTheField) {
   EXPECT_EQ(changed("camera_matrix", "matrix"), "camera_matrix: missing, expected {rows, cols, data: [...]}");
   EXPECT_EQ(changed("9.0e+02, 0.", "900, 1.5"), "camera_matrix: found skew 1.5, expected 0");
   EXPECT_EQ(changed("0., 0., 1. ]", "0., 0. ]"), "camera_matrix: expected 3 x 3: fx 0 cx, 0 fy cy, 0 0 1");
+  EXPECT_EQ(changed("9.0e+02, 0.", "-900, 0."),
+            "camera_matrix: found a focal length of -900, expected one above 0");
+  EXPECT_EQ(changed("rows: 3", "rows: 4"),
+            "camera_matrix: found 9 numbers, expected as many as rows times cols");
   EXPECT_EQ(changed("1.0e-01", ".nan"), "distortion_coefficients: expected finite numbers in its data");
   EXPECT_EQ(changed("image_height: 720", "image_height: 720\ndistortion_model: equidistant"),
             "distortion_model: found \"equidistant\", expected plumb_bob, rational_polynomial or none");

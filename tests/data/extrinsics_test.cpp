@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "data/atomic_file.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -27,6 +28,15 @@ TEST_F(ExtrinsicsFile, SchemaAndTransformAreEnough) {
   EXPECT_TRUE(pose.usable);
   EXPECT_TRUE(pose.warnings.empty());
   EXPECT_EQ(pose.transform.T.translation(), Eigen::Vector3d(0.5, 0.1, 1));
+}
+
+TEST_F(ExtrinsicsFile, APlaceThatNoCameraHasIsRefused) {
+  const std::string path = write("");
+  std::string text = read_file(path);
+  text.replace(text.find("[0.5"), 4, "[1e300");
+  folder_.write("camera.json", text);
+  EXPECT_EQ(input_error_of([&] { load_camera_pose(path, false); }),
+            path + ": transform.translation: found [1e+300,0.1,1], expected metres, below 10,000");
 }
 
 TEST_F(ExtrinsicsFile, AnAnswerThatCannotBeUsedIsRefusedUnlessAccepted) {

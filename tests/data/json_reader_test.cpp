@@ -45,8 +45,14 @@ TEST(JsonReader, SyntaxErrorsNameLineAndColumn) {
               parse_json("{\n  \"a\": 1,\n}", "f.json");
             }).find("f.json: not valid JSON: line 3, column 1"),
             std::string::npos);
-  EXPECT_NE(input_error_of([] { parse_json("{\"a\": 1e999}", "f.json"); }), "");
-  EXPECT_NE(input_error_of([] { parse_json("", "f.json"); }), "");
+  EXPECT_EQ(input_error_of([] { parse_json("{\"a\": 1e999}", "f.json"); }),
+            "f.json: not valid JSON: a number is too large");
+  for (const char* text : {"", " \n"})
+    EXPECT_EQ(input_error_of([&] { parse_json(text, "f.json"); }), "f.json: not valid JSON: it is empty");
+  EXPECT_EQ(input_error_of([] { parse_json("{", "f.json"); }),
+            "f.json: not valid JSON: line 1, column 2: it ends within a value");
+  EXPECT_EQ(input_error_of([] { parse_json("{\"a\": x}", "f.json"); }),
+            "f.json: not valid JSON: line 1, column 7: found x, which nothing before it allows");
 }
 
 TEST(JsonReader, ByteOrderMarksAreReadOrNamed) {

@@ -26,6 +26,13 @@ TEST(MessageLine, LongWordsAndLinesLoseTheirMiddle) {
   EXPECT_TRUE(cut.starts_with("first word") && cut.ends_with("word last")) << cut;
 }
 
+TEST(MessageLine, BytesThatAreNoLettersBecomeQuestionMarks) {
+  EXPECT_EQ(message_line("a\xff"
+                         "b \xc3\xa9 \xc3 \xe2\x82"),
+            "a?b \xc3\xa9 ? ??");
+  EXPECT_EQ(message_line("\x80\xc0\xaf"), "???");
+}
+
 TEST(MessageLine, NoLetterIsCutInTwo) {
   for (std::size_t shift = 0; shift < 3; ++shift) {
     std::string name(shift, 'x');

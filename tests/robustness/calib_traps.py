@@ -309,8 +309,13 @@ def complaint(trap, calib, work):
     result = json.loads(out.read_text())
     if result["exit_code"] != trap.code:
         return f"the file says exit code {result['exit_code']}"
+    last = done.stderr.splitlines()[-1] if done.stderr else ""
+    refusal = last.removeprefix("flash-calib: the answer cannot be used (exit code 3): ")
+    if (refusal != last) != (trap.code == 3):
+        return f"the last line should {'' if trap.code == 3 else 'not '}say that the answer cannot be used: {last}"
     if trap.code == 3:
-        return ""
+        told = f"{refusal}; the answer cannot be used" in result["warnings"]
+        return "" if told else f"not a warning: {refusal}"
     used = sum(view["used"] for view in result["views"])
     if used != trap.used:
         return f"used {used} views, expected {trap.used}: {[v['reason'] for v in result['views'] if not v['used']]}"

@@ -9,6 +9,7 @@ import re
 import sys
 import tempfile
 
+import documented
 import program
 
 
@@ -61,15 +62,6 @@ def write_hand_eye(folder):
         (folder / f"{name}.samples").write_text(json.dumps({"samples": samples}))
 
 
-def documented(text):
-    """By schema, the names that its row or its section has between backticks."""
-    names = {}
-    for line in text.splitlines():
-        if match := re.match(r"\| `(flash-[a-z-]+/\d+)` \|", line):
-            names[match[1]] = set(re.findall(r"`([a-z0-9_]+)`", line))
-    return names
-
-
 def outputs(options, folder):
     """Name and text of each JSON, and the exit codes that are right with it."""
     asset, recording = program.synthesize(options.sysid, folder)
@@ -114,7 +106,7 @@ def main():
     parser.add_argument("--formats", required=True, type=pathlib.Path, help="docs/formats.md")
     options = parser.parse_args()
     text = options.formats.read_text()
-    known, count = documented(text), 0
+    known, count = documented.fields_by_schema(text), 0
     with tempfile.TemporaryDirectory() as temporary:
         for name, output in outputs(options, pathlib.Path(temporary)):
             fields = json.loads(output)

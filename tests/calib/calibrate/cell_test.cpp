@@ -34,6 +34,52 @@ TEST(Register, TwoArmsOnOneCameraAreWhereTheyAre) {
   EXPECT_LT(chi_square, 84);
 }
 
+TEST(Register, TwoArmsThatAreTakenForOneAreRefused) {
+  const HandEyeScene left = arm_scene(50), right = arm_scene(51);
+  const Cell cell = solve_cell({member_of(left, "arm"), member_of(right, "arm")});
+  EXPECT_FALSE(cell.usable);
+  EXPECT_FALSE(cell.refusals.empty());
+  const Cell told_apart = solve_cell({member_of(left, "left"), member_of(right, "right")});
+  EXPECT_TRUE(told_apart.usable);
+  EXPECT_TRUE(told_apart.refusals.empty());
+}
+
+TEST(Register, ACameraElsewhereThanOneRecordingSaysIsToldOfThat) {
+  // The second recording by itself has the camera 20 mm away, to a tenth of a millimetre.
+  const HandEyeScene scene = arm_scene(52);
+  CellMember one = member_of(scene, "arm", "one"), two = member_of(scene, "arm", "two");
+  two.poses.X = moved(two.poses.X, (Vector6d() << 0.02, 0, 0, 0, 0, 0).finished());
+  two.covariance = 1e-8 * Matrix6d::Identity();
+  const Cell cell = solve_cell({one, two});
+  ASSERT_EQ(cell.refusals.size(), 1U);
+  EXPECT_NE(cell.refusals.front().find("two of arm is"), std::string::npos) << cell.refusals.front();
+}
+
+TEST(Register, RecordingsThatCountTheirPicturesByThemselvesShareNoPoses) {
+  // One camera, two recordings of one arm at other poses under the same numbers.
+  HandEyeScene first = arm_scene(53), second = arm_scene(54);
+  const Eigen::Isometry3d X = first.truth.X, Z = first.truth.Z;
+  std::mt19937 random(6);
+  std::normal_distribution<double> normal;
+  for (std::size_t i = 0; i < second.observations.size(); ++i) {
+    // The arm brings the target to where the second scene has it, in the first scene's camera.
+    Observation& o = second.observations[i];
+    const Eigen::Isometry3d T = o.T_camera_target.front();
+    Vector6d noise;
+    for (Eigen::Index k = 0; k < 6; ++k) noise[k] = (k < 3 ? 5e-4 : 0.05 * M_PI / 180) * normal(random);
+    o.T_base_gripper = moved(X * T * Z.inverse(), noise);
+    for (Eigen::Index k = 0; k < second.points.cols(); ++k)
+      o.pixels.col(k) = project(to_vector(second.camera), T * second.points.col(k)) +
+                        0.1 * Eigen::Vector2d(normal(random), normal(random));
+  }
+  const std::vector<CellMember> members = {member_of(first, "arm"), member_of(second, "arm")};
+  const Bundle bundle = cell_bundle(members);
+  EXPECT_EQ(bundle.poses.size(), first.observations.size() + second.observations.size());
+  const Cell cell = solve_cell(members);
+  const Vector6d error = motion_between(cell.cameras.front().transform.T, X);
+  EXPECT_LT(error.dot(cell.cameras.front().covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
+}
+
 TEST(Register, ComposedCovarianceIsThatOfTheProduct) {
   Extrinsics a, b;
   a.setup = b.setup = Setup::eye_to_hand;

@@ -10,6 +10,7 @@
 #include "data/error.h"
 #include "data/json_reader.h"
 #include "tests/calib/hand_eye_scene.h"
+#include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
 namespace {
@@ -54,6 +55,17 @@ TEST(Extrinsics, DamagedFilesAreNamedByFieldAndFile) {
     FAIL();
   } catch (const data::InputError& error) {
     EXPECT_NE(std::string(error.what()).find("extrinsics_test.json: covariance: "), std::string::npos);
+  }
+}
+
+TEST(Extrinsics, CovariancesThatAreNoneAreRefused) {
+  for (const auto& [value, expected] :
+       {std::pair(-1.0, "no variance below 0"), {1e300, "numbers below 1e8"}}) {
+    SavedCalibration saved;
+    saved.json["covariance"][1][1] = value;
+    saved.save();
+    const std::string said = data::input_error_of([&] { load_extrinsics(saved.path); });
+    EXPECT_NE(said.find(expected), std::string::npos) << said;
   }
 }
 

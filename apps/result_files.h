@@ -1,0 +1,11 @@
+#pragma once
+#include <string>
+#include <vector>
+
+namespace flash {
+
+/// Files to write, empty where there are none: each is a file of its own, and none is one of `read`, whatever
+/// links and folders its path goes through. Throws data::InputError.
+void expect_own_files(const std::vector<std::string>& written, const std::vector<std::string>& read);
+
+}  // namespace flash
