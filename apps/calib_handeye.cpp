@@ -231,6 +231,22 @@ void expect_frame_names(const std::string& parent, const std::string& child) {
                            '"');
 }
 
+/// Files by path and text, those without a path left out: all, or none where one cannot be written.
+void write_all(const std::vector<std::pair<std::string, std::string>>& files) {
+  std::vector<std::string> written;
+  try {
+    for (const auto& [path, text] : files) {
+      if (path.empty()) continue;
+      data::write_atomically(path, text);
+      written.push_back(path);
+    }
+  } catch (const std::exception&) {
+    std::error_code ignored;
+    for (const std::string& path : written) std::filesystem::remove(path, ignored);
+    throw;
+  }
+}
+
 int run_handeye(const HandEyeOptions& options) {
   const std::string report = report_path(options);
   const std::vector<std::string> outputs = {
@@ -274,13 +290,11 @@ int run_handeye(const HandEyeOptions& options) {
     const data::FolderLock lock(options.out.empty() ? report : options.out);
     for (const std::string& path : outputs)
       if (!path.empty()) data::check_file_free(path, options.common.force);
-    if (!options.out.empty()) data::write_atomically(options.out, text);
-    if (!report.empty()) data::write_atomically(report, html);
-    if (!options.ros.empty())
-      data::write_atomically(options.ros, calib::ros_static_transform(extrinsics.transform));
-    if (!options.urdf.empty()) data::write_atomically(options.urdf, calib::urdf_joint(extrinsics.transform));
-    if (!options.easy_handeye2.empty())
-      data::write_atomically(options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup));
+    write_all({{options.out, text},
+               {report, html},
+               {options.ros, calib::ros_static_transform(extrinsics.transform)},
+               {options.urdf, calib::urdf_joint(extrinsics.transform)},
+               {options.easy_handeye2, calib::easy_handeye2(extrinsics.transform, setup)}});
     if (!options.camera_info.empty() && extrinsics.pixels)
       data::save_camera_info(solved.calibration.refined.bundle.intrinsics.front(), options.camera_info);
   }

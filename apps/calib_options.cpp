@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iostream>
 #include <limits>
@@ -116,6 +117,9 @@ calib::Target target_of(const DatasetChoice& choice, const calib::Dataset& datas
 std::vector<calib::Detection> detect_all(const calib::Dataset& dataset, const calib::Target& target,
                                          const DatasetChoice& choice, const CalibCommonOptions& options,
                                          LeftOut left_out) {
+  if (std::any_of(dataset.frames.begin(), dataset.frames.end(),
+                  [](const calib::Frame& frame) { return frame.image.empty(); }))
+    throw data::InputError(dataset.source + ": found pairs of poses, expected pictures of the target");
   calib::DetectSettings settings;
   settings.threads = options.threads;
   settings.cache = choice.cache;

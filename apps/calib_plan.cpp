@@ -72,20 +72,24 @@ int run_plan(const PlanOptions& options) {
   const calib::Target target = target_of(options.dataset, dataset);
   const std::vector<calib::Detection> detections =
       detect_all(dataset, target, options.dataset, options.common);
-  const calib::ImageCalibration solved =
-      calib::calibrate_images(setup, dataset, target, detections, calib::read_depth(dataset, detections));
+  calib::CalibrateSettings calibrate;
+  if (dataset.lens_covariance) calibrate.lens_covariance = *dataset.lens_covariance;
+  calibrate.threads = options.common.threads;
+  const calib::ImageCalibration solved = calib::calibrate_images(
+      setup, dataset, target, detections, calib::read_depth(dataset, detections), calibrate);
   calib::PlanSettings settings = options.settings;
   if (options.criterion == "determinant") settings.criterion = calib::PlanCriterion::determinant;
   if (!options.lower.empty()) settings.lower = Eigen::Vector3d::Map(options.lower.data());
   if (!options.upper.empty()) settings.upper = Eigen::Vector3d::Map(options.upper.data());
   const calib::Plan plan = calib::plan_poses(solved.calibration, calib::target_points(target), settings);
+  for (const std::string& warning : solved.calibration.warnings) warn_calib(warning);
   const std::string text = data::format_json(plan_json(plan, options));
   if (!options.out.empty()) data::write_atomically(options.out, text);
   if (options.common.json)
     std::cout << text;
   else
     print(plan);
-  return exit_done;
+  return solved.calibration.usable ? exit_done : exit_unusable;
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/calib_options.h"
 #include "apps/calib_verbs.h"
@@ -80,7 +81,8 @@ calib::CellMember member_of(const std::string& arm, const std::string& camera, c
     const std::size_t all = solved.calibration.views.size(), used = solved.calibration.used.size();
     if (used < all)
       warn_calib(choice.path + ": " + std::to_string(all - used) + " of " + std::to_string(all) +
-                 " views were not used; flash-calib handeye names them");
+                 (all - used == 1 ? " views was not used" : " views were not used") +
+                 "; flash-calib handeye names them");
   }
   calibration = solved.calibration;
   return calib::cell_member(arm, camera, dataset, target, solved.calibration);
@@ -100,6 +102,23 @@ std::string name_of(const std::string& path) {
   return normal.has_filename() ? normal.stem().string() : normal.parent_path().filename().string();
 }
 
+/// Names of files or folders; those that are alike are told apart by the folders that they lie in, or
+/// numbered.
+std::vector<std::string> names_of(const std::vector<std::string>& paths) {
+  const auto alike = [](const std::vector<std::string>& names) {
+    return std::set<std::string>(names.begin(), names.end()).size() < names.size();
+  };
+  std::vector<std::string> names;
+  for (const std::string& path : paths) names.push_back(name_of(path));
+  if (!alike(names)) return names;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    const std::string folder = fs::absolute(paths[i]).lexically_normal().parent_path().filename().string();
+    if (!folder.empty()) names[i] = folder + '/' + names[i];
+  }
+  for (std::size_t i = 0; alike(names) && i < paths.size(); ++i) names[i] += '_' + std::to_string(i + 1);
+  return names;
+}
+
 calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const RegisterOptions& options) {
   return calib::solve_cell(members, {.refine = {},
                                      .target_size_sd = options.target_size_sd,
@@ -109,11 +128,10 @@ calib::Cell solved_cell(const std::vector<calib::CellMember>& members, const Reg
 
 calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
   std::vector<calib::Extrinsics> calibrations;
-  std::vector<std::string> arms;
+  const std::vector<std::string> arms = names_of(options.calibrations);
   for (const std::string& path : options.calibrations) {
     calibrations.push_back(calib::load_extrinsics(path, options.common.force));
     doubts.add(path, calibrations.back().warnings);
-    arms.push_back(name_of(path));
   }
   const calib::Cell composed = calib::compose_cell(arms, calibrations);
   if (options.without_images) {
@@ -158,7 +176,9 @@ calib::Cell cell_of_arms(RegisterOptions options, Doubts& doubts) {
 
 calib::Cell cell_of_cameras(const RegisterOptions& options, Doubts& doubts) {
   std::vector<calib::CellMember> members;
-  for (const std::string& path : options.cameras) {
+  const std::vector<std::string> names = names_of(options.cameras);
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string& path = options.cameras[i];
     DatasetChoice choice;
     choice.path = path;
     choice.robot = options.robot.robot;
@@ -169,7 +189,7 @@ calib::Cell cell_of_cameras(const RegisterOptions& options, Doubts& doubts) {
     choice.depth_scale = options.depth_scale;
     choice.no_depth = options.no_depth;
     calib::Calibration calibration;
-    members.push_back(member_of("base", name_of(path), choice, options.setup, options, false, calibration));
+    members.push_back(member_of("base", names[i], choice, options.setup, options, false, calibration));
     doubts.add(path, calibration.warnings);
     doubts.unusable = doubts.unusable || !calibration.usable;
   }
@@ -178,7 +198,8 @@ calib::Cell cell_of_cameras(const RegisterOptions& options, Doubts& doubts) {
 
 void print(const calib::Cell& cell, const RegisterOptions& options) {
   const auto line = [&](const calib::CellFrame& frame) {
-    const Eigen::Matrix<double, 6, 1> sd = frame.covariance.diagonal().cwiseSqrt();
+    // Along and about the axes of the parent, in which the translation is written.
+    const calib::Vector6d sd = calib::parent_deviations(frame.transform.T, frame.covariance);
     const Eigen::Vector3d t = frame.transform.T.translation();
     std::printf("%s <- %s: (%.5f, %.5f, %.5f) m, +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n",
                 frame.transform.parent.c_str(), frame.transform.child.c_str(), t.x(), t.y(), t.z(),

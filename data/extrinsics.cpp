@@ -25,6 +25,9 @@ NamedTransform read_transform(const JsonObject& object) {
       .parent = object.string("parent", ""), .child = object.string("child", ""), .T = {}};
   Eigen::Matrix<double, 7, 1> pose;
   pose << object.vector("translation", 3), object.vector("rotation_xyzw", 4);
+  constexpr double kFarthest = 1e4;  // [m]
+  if (!(pose.head<3>().cwiseAbs().maxCoeff() < kFarthest))
+    throw object.error("translation", "metres, below 10,000");
   if (std::abs(pose.tail<4>().norm() - 1) > 1e-3) throw object.error("rotation_xyzw", "a unit quaternion");
   transform.T = from_vector(pose);
   return transform;

@@ -13,6 +13,7 @@
 #include "calib/calibrate/plausibility.h"
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
+#include "calib/uncertainty/lone_view.h"
 #include "calib/uncertainty/pixel_fit.h"
 #include "data/error.h"
 #include "data/median.h"
@@ -65,12 +66,16 @@ void expect_convention(Setup setup, const std::vector<Observation>& observations
       check_size(setup, observations, symmetries, stated, settings.convention);
   if (sized && (hopeless || !measurable_size(sized->size))) throw data::InputError(sized->sentence);
   if (!hopeless) return;
-  char text[240];
+  constexpr double kTurnsAgree = 1 * kDegree;
+  char text[320];
   std::snprintf(
       text, sizeof text,
       "robot and camera do not tell of the same motion: most views close to no better than %.1f deg and "
-      "%.0f mm, and no other convention explains them; check that each image stands beside its pose",
-      stated.rotation / kDegree, 1e3 * stated.translation);
+      "%.0f mm, and no other convention explains them; %s",
+      stated.rotation / kDegree, 1e3 * stated.translation,
+      stated.found && stated.rotation < kTurnsAgree
+          ? "turns agree and places do not: look for mirrored pictures, and for places in other columns"
+          : "check that each image stands beside its pose");
   throw data::InputError(text);
 }
 
@@ -218,14 +223,12 @@ std::optional<std::string> cause_of(const Calibration& result, const std::vector
 }
 
 /// Of the lens and the target, which are not what was stated.
-void warn_of_shapes(Calibration& result, bool disputed) {
-  if (result.warp.far_off()) result.warnings.insert(result.warnings.begin(), warp_sentence(result.warp));
-  if (!result.lens.far_off.empty())
-    result.warnings.insert(result.warnings.begin(), lens_sentence(result.lens));
+void warn_of_shapes(Calibration& result, bool disputed, const CalibrateSettings& settings) {
+  if (result.warp.far_off()) tell_first(result, warp_sentence(result.warp));
+  if (!result.lens.far_off.empty()) tell_first(result, lens_sentence(result.lens));
   if (!result.size || !result.size->far_off()) return;
-  result.warnings.insert(result.warnings.begin(), size_sentence(*result.size));
   // Who states a size that is to be kept is told, and served.
-  if (disputed && result.size->prior_sd > 0) result.usable = false;
+  tell_first(result, size_sentence(*result.size), disputed && !settings.size_as_stated);
 }
 
 /// A lens that is stated to the last digit, against one that is near to it: pictures that want another one
@@ -246,8 +249,7 @@ void check_stated_lens(Calibration& result, Bundle plain, RefineSettings refine_
       text, sizeof text,
       "; with it the camera is %.1f mm and %.2f deg from where it is here: leave --stated-intrinsics out",
       1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
-  result.warnings.insert(result.warnings.begin(), lens_differs(lens) + text);
-  if (depends) result.usable = false;
+  tell_first(result, lens_differs(lens) + text, depends);
 }
 
 /// An answer for arms that share a lens keeps it as it is stated. What the lens may be off drops out between
@@ -272,7 +274,21 @@ void add_shared_lens(Calibration& result, Bundle plain, RefineSettings refine_se
       "; it was kept, as arms on one camera share it, and the camera is %.1f mm and %.2f deg from where "
       "it is with the other: calibrate the lens",
       1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
-  result.warnings.insert(result.warnings.begin(), lens_differs(lens) + text);
+  tell_first(result, lens_differs(lens) + text);
+}
+
+/// A view that the answer hangs on is told: if it is wrong, nothing shows it.
+void warn_of_lone_view(Calibration& result, const BundleSettings& settings, double distance) {
+  const std::optional<LoneView> lone = lone_view(result.refined, settings);
+  if (!lone) return;
+  const auto view = static_cast<std::size_t>(result.used[lone->pose]);
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "the answer hangs on %s: without it the %s would be known %.0f times worse, and if its "
+                "pose is wrong, nothing shows it; add views like it",
+                result.selection.observations[view].image.c_str(),
+                weakest_direction(lone->covariance, distance, "camera").name.c_str(), lone->growth);
+  result.warnings.emplace_back(text);
 }
 
 void warn(Calibration& result) {
@@ -295,23 +311,25 @@ void warn(Calibration& result) {
   }
   if (missing > 0)
     result.warnings.push_back(std::to_string(missing) + " of " + std::to_string(result.views.size()) +
-                              " views were not used");
+                              (missing == 1 ? " views was not used" : " views were not used"));
   if (result.selection.renumbered > 0)
     result.warnings.push_back(std::to_string(result.selection.renumbered) +
                               " views had the target numbered from its other end; put right");
   bool unusable = false;
   const std::string noisy = unusual_noise(result.refined.noise, unusable);
-  if (!noisy.empty()) result.warnings.insert(result.warnings.begin(), noisy);
   // Noise that a size makes which is to be kept is that size's.
   const bool of_size = result.size && result.size->prior_sd == 0 && result.size->far_off();
-  if (unusable && !of_size) result.usable = false;
-  if (!result.refined.converged) {
-    result.warnings.insert(result.warnings.begin(), "the refinement did not converge");
-    result.usable = false;
-  }
+  if (!noisy.empty()) tell_first(result, noisy, unusable && !of_size);
+  if (!result.refined.converged) tell_first(result, "the refinement did not converge", true);
 }
 
 }  // namespace
+
+void tell_first(Calibration& calibration, std::string sentence, bool refuses) {
+  if (refuses) sentence += "; the answer cannot be used";
+  if (refuses) calibration.usable = false;
+  calibration.warnings.insert(calibration.warnings.begin(), std::move(sentence));
+}
 
 bool has_pixels(const Calibration& calibration) { return !calibration.refined.bundle.cameras.empty(); }
 
@@ -340,8 +358,7 @@ bool finish(Calibration& result, const std::vector<Observation>& used) {
   warn(result);
   const std::string implausible = implausibility(result, used);
   if (implausible.empty()) return true;
-  result.warnings.insert(result.warnings.begin(), implausible);
-  result.usable = false;
+  tell_first(result, implausible, true);
   return false;
 }
 
@@ -397,20 +414,23 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   if (settings.lens != given.lens)
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
+  warn_of_lone_view(result, refine_settings.bundle, usual_distance(observations));
   const bool plausible = finish(result, observations);
   // Who keeps a size is answered, however far off it may be.
-  if (settings.size_as_stated) {
-    result.covariance += covariance_of_kept_sizes(result.refined, refine_settings.bundle, sized.sizes,
-                                                  {*settings.target_size_sd})
-                             .topLeftCorner<6, 6>();
+  if (settings.size_as_stated || result.unknowns.scales) {
+    result.covariance +=
+        (settings.size_as_stated
+             ? covariance_of_kept_sizes(result.refined, refine_settings.bundle, sized.sizes,
+                                        {*settings.target_size_sd})
+             : covariance_of_disputed_sizes(result.refined, refine_settings.bundle, sized.sizes))
+            .topLeftCorner<6, 6>();
     result.weakest = weakest_direction(result.covariance, usual_distance(observations), "camera");
   }
   if (given.lens == LensKnowledge::stated)
     check_stated_lens(result, std::move(plain), refine_settings, camera, settings.lens_covariance);
-  warn_of_shapes(result, sized.disputed);
+  warn_of_shapes(result, sized.disputed, settings);
   if (!plausible)
-    if (const auto cause = cause_of(result, all, symmetries, settings))
-      result.warnings.insert(result.warnings.begin(), *cause);
+    if (const auto cause = cause_of(result, all, symmetries, settings)) tell_first(result, *cause);
   return result;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 
+#include "calib/calibrate/plausibility.h"
 #include "calib/solve/linearization.h"
 #include "data/error.h"
 #include "data/text.h"
@@ -89,6 +90,51 @@ void add_joint_zeros(Bundle& bundle, std::vector<std::string>* notices) {
   if (notices) notices->emplace_back("joints are not known of all arms: the zeros of none are solved for");
 }
 
+/// What cameras or targets that may have moved leave unknown of where the frames are: of a camera what its
+/// first member says, of a further base what its own first member and that of the first base say, as
+/// composed.
+void add_motions(Cell& cell, const std::vector<CellMember>& members, const std::vector<std::string>& arms,
+                 const std::vector<std::string>& cameras) {
+  const auto first = [&](std::string CellMember::*name, const std::string& value) -> const CellMember& {
+    return *std::find_if(members.begin(), members.end(),
+                         [&](const CellMember& member) { return member.*name == value; });
+  };
+  for (std::size_t a = 1; a < arms.size(); ++a) {
+    const CellMember &arm = first(&CellMember::arm, arms[a]), &world = first(&CellMember::arm, arms.front());
+    const Matrix6d carry = adjoint(arm.poses.X);
+    cell.bases[a - 1].covariance +=
+        carry * (arm.motion_covariance + world.motion_covariance) * carry.transpose();
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c)
+    cell.cameras[c].covariance += first(&CellMember::camera, cameras[c]).motion_covariance;
+}
+
+/// Recordings that contradict each other leave what they see to noise that none of them has by itself.
+void expect_agreement(Cell& cell, const std::vector<CellMember>& members, const NoiseLevels& noise) {
+  constexpr double kMore = 3;
+  double own = 0, joint = 0;
+  for (const CellMember& member : members) own = std::max(own, member.corner_px);
+  for (const double sigma : noise.corner) joint = std::max(joint, sigma);
+  bool unusable = false;
+  std::vector<std::string> doubts;
+  for (std::size_t arm = 0; arm < noise.rotation.size(); ++arm) {
+    const std::string noisy =
+        unusual_noise({{}, {noise.rotation[arm]}, {noise.translation[arm]}, {}}, unusable);
+    if (!noisy.empty()) doubts.push_back(noisy);
+  }
+  if (own > 0 && joint > kMore * own) {
+    unusable = true;
+    doubts.push_back("the recordings contradict each other: solved together their corners scatter by " +
+                     data::format_short(joint) + " px, each by itself by no more than " +
+                     data::format_short(own));
+  }
+  if (doubts.empty()) return;
+  cell.notices.insert(cell.notices.end(), doubts.begin(), doubts.end());
+  if (!unusable) return;
+  cell.notices.back() += "; the answer cannot be used";
+  cell.usable = false;
+}
+
 }  // namespace
 
 CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
@@ -103,6 +149,8 @@ CellMember cell_member(const std::string& arm, const std::string& camera, const 
   member.symmetries = confusable_symmetries(target);
   member.poses = calibration.poses;
   member.covariance = calibration.covariance;
+  member.motion_covariance = calibration.motion_covariance;
+  member.corner_px = calibration.refined.noise.corner.empty() ? 0 : calibration.refined.noise.corner.front();
   for (const int i : calibration.used) {
     const auto view = static_cast<std::size_t>(i);
     member.observations.push_back(calibration.selection.observations[view]);
@@ -208,7 +256,8 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
         "solved out, or add views farther apart");
   if (!refined.converged) cell.notices.emplace_back("the joint refinement did not converge");
   for (const TargetSize& size : cell.sizes)
-    if (size.far_off()) cell.notices.push_back(size_sentence(size));
+    if (size.far_off())
+      cell.notices.push_back(size_sentence(size) + (cell.usable ? "" : "; the answer cannot be used"));
   const SharedColumns columns = shared_columns(refined.bundle, settings.bundle.unknowns);
   for (std::size_t c = 0; c < refined.bundle.cameras.size(); ++c) {
     cell.lenses.push_back(lens_estimate(refined.bundle, settings.bundle.unknowns, systematic.covariance, c));
@@ -251,6 +300,8 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
   for (std::size_t c = 0; c < cameras.size(); ++c)
     cell.cameras.push_back(
         {{parent, cameras[c], refined.bundle.cameras[c]}, camera_factor * block(columns.cameras[c])});
+  add_motions(cell, members, arms, cameras);
+  expect_agreement(cell, members, refined.noise);
   cell.noise = refined.noise;
   cell.corner_rms = reprojection_rms(refined.bundle, true);
   cell.chain_rms = reprojection_rms(refined.bundle, false);

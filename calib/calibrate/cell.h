@@ -25,6 +25,8 @@ struct CellMember {
   std::vector<double> stamps = {};             ///< equal stamps of one arm are one pose of it
   HandEyePoses poses = {};                     ///< of the calibration by itself
   Matrix6d covariance = Matrix6d::Zero();
+  Matrix6d motion_covariance = Matrix6d::Zero();  ///< as Calibration has it
+  double corner_px = 0;                           ///< noise of its corners, by itself; 0: not known
 };
 
 /// The views in use as a member of a cell.
@@ -43,7 +45,7 @@ struct Cell {
   NoiseLevels noise = {};
   std::vector<TargetSize> sizes = {};     ///< of the targets; none where composed
   std::vector<LensEstimate> lenses = {};  ///< of the cameras; none where composed
-  bool usable = true;                     ///< false: a size is far off, and the answer depends on it
+  bool usable = true;                     ///< false: a notice says why not
   double corner_rms = 0, chain_rms = 0;   ///< with and without corrections, 2-D rms per corner [px]
   std::vector<std::string> notices = {};
 };

@@ -114,7 +114,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   }
   if (!extrinsics.covariance.isApprox(extrinsics.covariance.transpose(), 1e-6) ||
       extrinsics.covariance.diagonal().minCoeff() < 0)
-    throw object.error("covariance", "a symmetric matrix");
+    throw object.error("covariance", "a symmetric matrix, no variance below 0");
   if (object.has("sigmas")) {
     const data::JsonObject sigmas = object.object("sigmas");
     extrinsics.pixels = sigmas.has("corner_px");

@@ -51,7 +51,9 @@ class NamedNumbers {
  private:
   /// Also of what stands one level deeper, as in {"intrinsics": {"fx": ...}}.
   void add(const YAML::Node& node, int depth = 0) {
-    if (!node.IsMap()) throw data::InputError(path_ + ": expected names and numbers");
+    if (!node.IsMap())
+      throw data::InputError(path_ + (node.IsNull() ? ": is empty" : ": holds no names") +
+                             ", expected names and numbers, as camera_matrix: {data: [...]}");
     for (const auto& entry : node) {
       const YAML::Node value = entry.second;
       if (value.IsMap() && !value["data"]) {

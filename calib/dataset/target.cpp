@@ -45,7 +45,7 @@ class Parts {
     };
     if (sides.size() != 2 || side(0) < least || side(1) < least || side(0) > 1000 || side(1) > 1000)
       throw error("size",
-                  "COLUMNSxROWS of at least " + std::to_string(least) + ", found \"" + words_[k] + '"');
+                  "COLUMNSxROWS of " + std::to_string(least) + " to 1000, found \"" + words_[k] + '"');
     target.columns = static_cast<int>(side(0));
     target.rows = static_cast<int>(side(1));
   }

@@ -2,9 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 
 #include "calib/calibrate/calibrate_pairs.h"
-#include "tests/calib/hand_eye_scene.h"
+#include "tests/calib/knocked_scene.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
@@ -49,6 +50,29 @@ TEST(Pairs, WhoseTurnsAreAllByHalfACircleAreSolved) {
   EXPECT_TRUE(result.usable);
   const Vector6d error = motion_between(result.poses.X, scene.truth.X);
   EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
+}
+
+// A camera or a target that is knocked by 8 mm half-way: told, and stated. One that stands still is not.
+TEST(Pairs, OfWhichSomethingMovedHalfWayAreTold) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const bool camera : {true, false})
+      for (const bool knocked : {true, false}) {
+        SceneSettings settings = protocol_settings(setup);
+        settings.views = 24;
+        settings.robot_deg = 0.05;
+        settings.robot_mm = 0.5;
+        HandEyeScene scene = make_scene(settings, board_points(), 9);
+        Vector6d motion = Vector6d::Zero();
+        motion.head<3>() << 0.006, -0.004, 0.0035;
+        if (knocked) displace(scene, 0, 12, camera, motion, 9);
+        const Calibration result = calibrate_pairs(setup, pairs_of(scene));
+        const bool told =
+            std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
+              return warning.starts_with("first and second half of the views put the ");
+            });
+        EXPECT_EQ(told, knocked) << camera;
+        EXPECT_EQ(result.covariance_factor > 1, knocked);
+      }
 }
 
 TEST(Pairs, WhoseTargetPosesAreInvertedAreNamed) {

@@ -34,7 +34,7 @@ TEST(Target, ErrorsNameThePartThatIsWrong) {
             "target \"chessbord:9x6:0.025\": kind: expected one of chessboard, charuco, aruco, aruco_grid, "
             "apriltag, aprilgrid, circles");
   EXPECT_EQ(message_of("chessboard:9x:0.025"),
-            "target \"chessboard:9x:0.025\": size: expected COLUMNSxROWS of at least 3, found \"9x\"");
+            "target \"chessboard:9x:0.025\": size: expected COLUMNSxROWS of 3 to 1000, found \"9x\"");
   EXPECT_EQ(message_of("chessboard:9x6:25"),
             "target \"chessboard:9x6:25\": square: expected metres, found 25 (millimetres?)");
   EXPECT_EQ(
