@@ -105,12 +105,12 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
     std::printf("lens: focal lengths %s, %s px (stated %.1f, %.1f)\n",
                 with_deviation(c.lens.estimate[0], c.lens.sd[0]).c_str(),
                 with_deviation(c.lens.estimate[1], c.lens.sd[1]).c_str(), c.lens.stated[0], c.lens.stated[1]);
-    const Eigen::Vector2d warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
+    const calib::Warp warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
     std::printf(
         "target: %.4f +- %.4f times as large as stated, its middle %s +- %.2f and %s +- %.2f mm behind "
-        "its ends along x and y\n",
+        "its ends along x and y, twisted by %s +- %.2f mm\n",
         c.size->estimate, c.size->sd, fixed(warp.x(), 2).c_str(), warp_sd.x(), fixed(warp.y(), 2).c_str(),
-        warp_sd.y());
+        warp_sd.y(), fixed(warp.z(), 2).c_str(), warp_sd.z());
   }
   if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
     std::printf("joints are farther than they say by");
@@ -217,6 +217,22 @@ void expect_frame_names(const std::string& parent, const std::string& child) {
   if (child.empty() || parent == child)
     throw data::InputError("--child-frame: expected a name other than that of the parent, found \"" + child +
                            '"');
+}
+
+/// Files by path and text, those without a path left out: all, or none where one cannot be written.
+void write_all(const std::vector<std::pair<std::string, std::string>>& files) {
+  std::vector<std::string> written;
+  try {
+    for (const auto& [path, text] : files) {
+      if (path.empty()) continue;
+      data::write_atomically(path, text);
+      written.push_back(path);
+    }
+  } catch (const std::exception&) {
+    std::error_code ignored;
+    for (const std::string& path : written) std::filesystem::remove(path, ignored);
+    throw;
+  }
 }
 
 int run_handeye(const HandEyeOptions& options) {

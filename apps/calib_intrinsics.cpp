@@ -41,8 +41,9 @@ nlohmann::ordered_json result_json(const calib::IntrinsicsEstimate& estimate) {
   const calib::IntrinsicsVector values = calib::to_vector(estimate.camera);
   for (Eigen::Index i = 0; i < 4 + static_cast<Eigen::Index>(estimate.camera.distortion.size()); ++i)
     json["parameters"][kNames[i]] = {{"estimate", values[i]}, {"sd", estimate.sd[i]}};
-  json["warp_mm"] = {1e3 * estimate.warp.estimate.x(), 1e3 * estimate.warp.estimate.y()};
-  json["warp_sd_mm"] = {1e3 * estimate.warp.sd.x(), 1e3 * estimate.warp.sd.y()};
+  const calib::Warp warp = 1e3 * estimate.warp.estimate, warp_sd = 1e3 * estimate.warp.sd;
+  json["warp_mm"] = {warp.x(), warp.y(), warp.z()};
+  json["warp_sd_mm"] = {warp_sd.x(), warp_sd.y(), warp_sd.z()};
   json["reprojection_rms_px"] = estimate.rms;
   json["picture_corner_sd_px"] = estimate.corner_sd;
   json["coverage"] = estimate.coverage;
@@ -59,9 +60,11 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
   const calib::IntrinsicsVector values = calib::to_vector(estimate.camera);
   for (Eigen::Index i = 0; i < 4 + static_cast<Eigen::Index>(estimate.camera.distortion.size()); ++i)
     std::printf("%-3s %12.5g  +- %.2g%s\n", kNames[i], values[i], estimate.sd[i], i < 4 ? " px" : "");
-  const Eigen::Vector2d warp = 1e3 * estimate.warp.estimate, sd = 1e3 * estimate.warp.sd;
-  std::printf("target: its middle %.2f +- %.2f and %.2f +- %.2f mm behind its ends along x and y\n", warp.x(),
-              sd.x(), warp.y(), sd.y());
+  const calib::Warp warp = 1e3 * estimate.warp.estimate, sd = 1e3 * estimate.warp.sd;
+  std::printf(
+      "target: its middle %.2f +- %.2f and %.2f +- %.2f mm behind its ends along x and y, twisted by %.2f +- "
+      "%.2f mm\n",
+      warp.x(), sd.x(), warp.y(), sd.y(), warp.z(), sd.z());
   std::printf("%.3f px rms a corner; places at the picture's corners known to %.2g px\n", estimate.rms,
               estimate.corner_sd);
 }

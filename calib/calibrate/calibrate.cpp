@@ -13,6 +13,7 @@
 #include "calib/calibrate/plausibility.h"
 #include "calib/geometry/projection.h"
 #include "calib/solve/linearization.h"
+#include "calib/uncertainty/lone_view.h"
 #include "calib/uncertainty/pixel_fit.h"
 #include "data/error.h"
 #include "data/median.h"
@@ -65,12 +66,16 @@ void expect_convention(Setup setup, const std::vector<Observation>& observations
       check_size(setup, observations, symmetries, stated, settings.convention);
   if (sized && (hopeless || !measurable_size(sized->size))) throw data::InputError(sized->sentence);
   if (!hopeless) return;
-  char text[240];
+  constexpr double kTurnsAgree = 1 * kDegree;
+  char text[320];
   std::snprintf(
       text, sizeof text,
       "robot and camera do not tell of the same motion: most views close to no better than %.1f deg and "
-      "%.0f mm, and no other convention explains them; check that each image stands beside its pose",
-      stated.rotation / kDegree, 1e3 * stated.translation);
+      "%.0f mm, and no other convention explains them; %s",
+      stated.rotation / kDegree, 1e3 * stated.translation,
+      stated.found && stated.rotation < kTurnsAgree
+          ? "turns agree and places do not: look for mirrored pictures, and for places in other columns"
+          : "check that each image stands beside its pose");
   throw data::InputError(text);
 }
 
@@ -218,12 +223,12 @@ std::optional<std::string> cause_of(const Calibration& result, const std::vector
 }
 
 /// Of the lens and the target, which are not what was stated.
-void warn_of_shapes(Calibration& result, bool disputed) {
+void warn_of_shapes(Calibration& result, bool disputed, const CalibrateSettings& settings) {
   if (result.warp.far_off()) tell_first(result, warp_sentence(result.warp));
   if (!result.lens.far_off.empty()) tell_first(result, lens_sentence(result.lens));
   if (!result.size || !result.size->far_off()) return;
   // Who states a size that is to be kept is told, and served.
-  tell_first(result, size_sentence(*result.size), disputed && result.size->prior_sd > 0);
+  tell_first(result, size_sentence(*result.size), disputed && !settings.size_as_stated);
 }
 
 /// A lens that is stated to the last digit, against one that is near to it: pictures that want another one
@@ -270,6 +275,20 @@ void add_shared_lens(Calibration& result, Bundle plain, RefineSettings refine_se
       "it is with the other: calibrate the lens",
       1e3 * away.head<3>().norm(), away.tail<3>().norm() / kDegree);
   tell_first(result, lens_differs(lens) + text);
+}
+
+/// A view that the answer hangs on is told: if it is wrong, nothing shows it.
+void warn_of_lone_view(Calibration& result, const BundleSettings& settings, double distance) {
+  const std::optional<LoneView> lone = lone_view(result.refined, settings);
+  if (!lone) return;
+  const auto view = static_cast<std::size_t>(result.used[lone->pose]);
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "the answer hangs on %s: without it the %s would be known %.0f times worse, and if its "
+                "pose is wrong, nothing shows it; add views like it",
+                result.selection.observations[view].image.c_str(),
+                weakest_direction(lone->covariance, distance, "camera").name.c_str(), lone->growth);
+  result.warnings.emplace_back(text);
 }
 
 void warn(Calibration& result) {
@@ -398,17 +417,21 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   if (settings.lens != given.lens)
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
+  warn_of_lone_view(result, refine_settings.bundle, usual_distance(observations));
   const bool plausible = finish(result, observations);
   // Who keeps a size is answered, however far off it may be.
-  if (settings.size_as_stated) {
-    result.covariance += covariance_of_kept_sizes(result.refined, refine_settings.bundle, sized.sizes,
-                                                  {*settings.target_size_sd})
-                             .topLeftCorner<6, 6>();
+  if (settings.size_as_stated || result.unknowns.scales) {
+    result.covariance +=
+        (settings.size_as_stated
+             ? covariance_of_kept_sizes(result.refined, refine_settings.bundle, sized.sizes,
+                                        {*settings.target_size_sd})
+             : covariance_of_disputed_sizes(result.refined, refine_settings.bundle, sized.sizes))
+            .topLeftCorner<6, 6>();
     result.weakest = weakest_direction(result.covariance, usual_distance(observations), "camera");
   }
   if (given.lens == LensKnowledge::stated)
     check_stated_lens(result, std::move(plain), refine_settings, camera, settings.lens_covariance);
-  warn_of_shapes(result, sized.disputed);
+  warn_of_shapes(result, sized.disputed, settings);
   if (!plausible)
     if (const auto cause = cause_of(result, all, symmetries, settings)) tell_first(result, *cause, true);
   return result;

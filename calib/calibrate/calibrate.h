@@ -61,9 +61,10 @@ struct Calibration {
   std::vector<int> used;  ///< views in the solution, by their place in the set
   Refinement refined;
   HandEyePoses poses;
-  Matrix6d covariance = Matrix6d::Zero();       ///< of X, right perturbation (dt, dtheta)
-  Matrix6d repeatable = covariance;             ///< of independent errors alone
-  Method method = Method::errors_in_variables;  ///< that the poses are of: that, or pixels
+  Matrix6d covariance = Matrix6d::Zero();         ///< of X, right perturbation (dt, dtheta)
+  Matrix6d repeatable = covariance;               ///< of independent errors alone
+  Matrix6d motion_covariance = Matrix6d::Zero();  ///< what both hold of camera or target that may have moved
+  Method method = Method::errors_in_variables;    ///< that the poses are of: that, or pixels
   LensEstimate lens;
   WarpEstimate warp;
   Unknowns unknowns;                  ///< of the solution

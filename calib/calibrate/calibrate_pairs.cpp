@@ -1,7 +1,9 @@
 #include "calib/calibrate/calibrate_pairs.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "calib/solve/pose_space.h"
 
@@ -34,6 +36,43 @@ HeldOut hold_out_pairs(const std::vector<PoseLoop>& loops, int folds, const Fit&
   return held;
 }
 
+/// First and second half of the pairs, each solved by itself: where they put the camera and the target must
+/// agree, or something moved meanwhile.
+void check_halves_in_time(Calibration& result, const std::vector<PoseLoop>& loops) {
+  constexpr std::size_t kEnough = 16;
+  if (loops.size() < kEnough) return;
+  const auto middle = loops.begin() + static_cast<std::ptrdiff_t>(loops.size() / 2);
+  const auto solved = [&](const std::vector<PoseLoop>& half) {
+    return fit_pose_space(half, better_of(half, shah(half), result.poses));
+  };
+  const PoseSpaceFit first = solved({loops.begin(), middle}), second = solved({middle, loops.end()});
+  const auto check = [&](const Eigen::Isometry3d& before, const Eigen::Isometry3d& after, Eigen::Index at) {
+    SplitCheck halves{.split = Split::consecutive, .apart = motion_between(before, after)};
+    const Matrix6d covariance = (first.covariance + second.covariance).block<6, 6>(at, at);
+    halves.chi_square = halves.apart.dot(covariance.ldlt().solve(halves.apart));
+    return halves;
+  };
+  const std::vector<SplitCheck> checks = {check(first.poses.X, second.poses.X, 0),
+                                          check(first.poses.Z, second.poses.Z, 6)};
+  result.splits = {checks.front()};
+  const SplitCheck* worst = nullptr;
+  result.covariance_factor = split_inflation(checks, &worst);
+  if (worst == nullptr) return;
+  result.splits = {*worst};
+  result.covariance *= result.covariance_factor;
+  result.repeatable = result.covariance;
+  char text[300];
+  std::snprintf(
+      text, sizeof text,
+      "%s put the %s at places %.1f mm and %.2f deg apart, more than noise explains: camera or target "
+      "moved meanwhile, or the robot's errors depend on its pose; the stated standard deviations were "
+      "raised by %.1f",
+      describe(worst->split).c_str(), worst == checks.data() ? "camera" : "target",
+      1e3 * worst->apart.head<3>().norm(), worst->apart.tail<3>().norm() * 180 / M_PI,
+      std::sqrt(result.covariance_factor));
+  result.warnings.emplace_back(text);
+}
+
 }  // namespace
 
 Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
@@ -63,6 +102,7 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .poses = fit.poses,
                                .relative = relative_rms(compared, fit.poses.X),
                                .held_out = result.held_out});
+  check_halves_in_time(result, loops);
   finish(result, observations);
   if (compared.size() < loops.size())
     result.warnings.push_back("other methods are compared on " + std::to_string(compared.size()) + " of " +

@@ -97,6 +97,25 @@ void add_joint_zeros(Bundle& bundle, std::vector<std::string>* notices) {
   if (notices) notices->emplace_back("joints are not known of all arms: the zeros of none are solved for");
 }
 
+/// What cameras or targets that may have moved leave unknown of where the frames are: of a camera what its
+/// first member says, of a further base what its own first member and that of the first base say, as
+/// composed.
+void add_motions(Cell& cell, const std::vector<CellMember>& members, const std::vector<std::string>& arms,
+                 const std::vector<std::string>& cameras) {
+  const auto first = [&](std::string CellMember::*name, const std::string& value) -> const CellMember& {
+    return *std::find_if(members.begin(), members.end(),
+                         [&](const CellMember& member) { return member.*name == value; });
+  };
+  for (std::size_t a = 1; a < arms.size(); ++a) {
+    const CellMember &arm = first(&CellMember::arm, arms[a]), &world = first(&CellMember::arm, arms.front());
+    const Matrix6d carry = adjoint(arm.poses.X);
+    cell.bases[a - 1].covariance +=
+        carry * (arm.motion_covariance + world.motion_covariance) * carry.transpose();
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c)
+    cell.cameras[c].covariance += first(&CellMember::camera, cameras[c]).motion_covariance;
+}
+
 }  // namespace
 
 CellMember cell_member(const std::string& arm, const std::string& camera, const Dataset& dataset,
@@ -111,6 +130,7 @@ CellMember cell_member(const std::string& arm, const std::string& camera, const 
   member.symmetries = confusable_symmetries(target);
   member.poses = calibration.poses;
   member.covariance = calibration.covariance;
+  member.motion_covariance = calibration.motion_covariance;
   if (!calibration.refined.noise.corner.empty()) member.corner_px = calibration.refined.noise.corner.front();
   for (const int i : calibration.used) {
     const auto view = static_cast<std::size_t>(i);
@@ -274,6 +294,7 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
   for (std::size_t c = 0; c < cameras.size(); ++c)
     cell.cameras.push_back(
         {{parent, cameras[c], refined.bundle.cameras[c]}, camera_factor * block(columns.cameras[c])});
+  add_motions(cell, members, arms, cameras);
   for (const std::string& reason : cell_contradictions(members, refined, cell)) refuse(reason);
   cell.noise = refined.noise;
   cell.corner_rms = reprojection_rms(refined.bundle, true);

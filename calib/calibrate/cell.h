@@ -25,7 +25,8 @@ struct CellMember {
   std::vector<double> stamps = {};             ///< equal stamps and poses of one arm are one pose of it
   HandEyePoses poses = {};                     ///< of the calibration by itself
   Matrix6d covariance = Matrix6d::Zero();
-  double corner_px = 0;  ///< noise of its corners, by itself; 0: not known
+  Matrix6d motion_covariance = Matrix6d::Zero();  ///< as Calibration has it
+  double corner_px = 0;                           ///< noise of its corners, by itself; 0: not known
 };
 
 /// The views in use as a member of a cell.

@@ -54,6 +54,15 @@ Eigen::Vector2d two_numbers(const data::JsonObject& object, const char* field) {
   return {values[0], values[1]};
 }
 
+/// Files of old have no twist.
+Warp read_warp(const data::JsonObject& scale) {
+  const std::vector<double> values = numbers(scale, "warp_mm");
+  if (values.size() != 2 && values.size() != kWarp) throw scale.error("warp_mm", "three numbers");
+  Warp warp = Warp::Zero();
+  for (std::size_t i = 0; i < values.size(); ++i) warp[static_cast<Eigen::Index>(i)] = 1e-3 * values[i];
+  return warp;
+}
+
 data::CameraIntrinsics read_lens(const data::JsonObject& lens) {
   data::CameraIntrinsics camera;
   const Eigen::Vector2i size = two_numbers(lens, "size_px").cast<int>();
@@ -134,7 +143,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   if (object.has("scale")) {
     const data::JsonObject scale = object.object("scale");
     if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");
-    if (scale.has("warp_mm")) extrinsics.target.warp = 1e-3 * two_numbers(scale, "warp_mm");
+    if (scale.has("warp_mm")) extrinsics.target.warp = read_warp(scale);
   }
   if (object.has("use")) {
     const std::string use = object.object("use").string("for", "workspace");

@@ -43,7 +43,7 @@ std::string knock_sentence(const KnockedPart& other, std::size_t used) {
 /// Views that were left out one by one may be a knock if they are the last ones: the answer is then of the
 /// past. knock: probability of one near the ends, where that could be asked.
 void doubt_last_views(Calibration& result, const std::vector<Observation>& all, std::optional<double> knock) {
-  constexpr std::size_t kTold = 2, kUnusable = 3;
+  constexpr std::size_t kUnusable = 3;
   constexpr double kUnlikely = 0.05;
   std::vector<std::size_t> seen;
   for (std::size_t i = 0; i < all.size(); ++i)
@@ -53,14 +53,26 @@ void doubt_last_views(Calibration& result, const std::vector<Observation>& all, 
   const auto before = static_cast<double>(seen.size() - last);
   const double left_out = before - static_cast<double>(result.used.size());
   constexpr double kUsual = 0.1;  // share of views that are left out anyway
-  if (last < kTold || left_out > kUsual * before) return;
+  if (last == 0 || left_out > kUsual * before) return;
   const bool unlikely = last <= static_cast<std::size_t>(kEndViews) && knock && *knock < kUnlikely;
+  const std::string& first = all[seen[seen.size() - last]].image;
+  if (last == 1)  // one view is as likely wrong by itself
+    return tell_first(result,
+                      "the last view does not close with those before: its pose is wrong, or camera or "
+                      "target moved before " +
+                          first + ", and the answer is of where they were; take more views to know");
   tell_first(result,
              "the last " + std::to_string(last) +
-                 " views do not close with those before: if camera or target moved before " +
-                 all[seen[seen.size() - last]].image +
+                 " views do not close with those before: if camera or target moved before " + first +
                  ", the answer is of where they were; record anew, or take these views out",
              last >= kUnusable && !unlikely);
+}
+
+/// What a motion, known or not, leaves unknown of where the camera is.
+void add_motion(Calibration& result, const Matrix6d& covariance) {
+  result.covariance += covariance;
+  result.repeatable += covariance;
+  result.motion_covariance += covariance;
 }
 
 /// A size that was to be kept and is another makes errors that look like motions: here it is an unknown.
@@ -112,9 +124,7 @@ void add_drift(Calibration& result, const Drift& drift) {
   for (const double t : times) bends.push_back(t * (1 + t));
   constexpr double kBend = 0.5;  // standard deviation: twice that is a speed that ends at zero
   const Vector6d shift = kBend * motions.shift_of_camera(bends, times, drift.camera) * drift.motion;
-  const Matrix6d more = motions.growth(times, drift.camera) + shift * shift.transpose();
-  result.covariance += more;
-  result.repeatable += more;
+  add_motion(result, motions.growth(times, drift.camera) + shift * shift.transpose());
 }
 
 /// A drift that is no larger than what an arm may do is not taken out: it may as well be the robot's. The
@@ -124,8 +134,7 @@ void add_slow_drift(Calibration& result, double rival) {
   constexpr double kCertain = 0.95;
   const SlowDrift drift = slow_drift(result.refined, judged_with(result), times_of(result), rival);
   const double grown = result.covariance.ldlt().solve(drift.covariance).trace();
-  result.covariance += drift.covariance;
-  result.repeatable += drift.covariance;
+  add_motion(result, drift.covariance);
   if (drift.probability < kCertain || grown < 1) return;
   char text[320];
   std::snprintf(
@@ -136,20 +145,23 @@ void add_slow_drift(Calibration& result, double rival) {
   tell_first(result, text);
 }
 
-std::string drift_sentence(const Drift& drift, bool depends) {
-  char text[400];
+std::string drift_sentence(const Drift& drift, bool depends, const std::string& knocked) {
+  char text[600];
   std::snprintf(
       text, sizeof text,
       "the %s moved all the time, by %.1f mm and %.2f deg from the first view to the last: the answer "
-      "is of where it was at the last one, if it kept its speed%s",
+      "is of where it was at the last one, if it kept its speed%s%s%s",
       mover(drift.camera, drift.told), 1e3 * drift.motion.head<3>().norm(),
-      drift.motion.tail<3>().norm() / kDegree, depends ? "; fix what is loose and record anew" : "");
+      drift.motion.tail<3>().norm() / kDegree, knocked.empty() ? "" : "; one knock before ",
+      knocked.empty() ? "" : (knocked + " explains it nearly as well").c_str(),
+      depends ? "; fix what is loose and record anew" : "");
   return text;
 }
 
 /// The answer with the drift solved for: its motion as seen at first, then what is left of it.
+/// knocked: the view before which one knock would explain it nearly as well, if there is one.
 Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Observation>& all,
-                           const StillSolver& solve) {
+                           const std::string& knocked, const StillSolver& solve) {
   constexpr double kChiSquare999 = 22.46;  // six degrees of freedom
   constexpr int kRounds = 3;
   constexpr double kLittle = 0.02;  // of the motion
@@ -163,14 +175,14 @@ Calibration solve_drifting(Calibration whole, Drift drift, const std::vector<Obs
       if (left.norm() < kLittle * drift.motion.norm()) break;
     }
   } catch (const data::InputError&) {
-    tell_first(whole, drift_sentence(drift, true), true);
+    tell_first(whole, drift_sentence(drift, true, knocked), true);
     return whole;
   }
   add_drift(answer, drift);
   const Vector6d away = motion_between(answer.poses.X, whole.poses.X);
   const bool depends =
       drift.camera || !drift.told || away.dot(answer.covariance.ldlt().solve(away)) > kChiSquare999;
-  tell_first(answer, drift_sentence(drift, depends), depends);
+  tell_first(answer, drift_sentence(drift, depends, knocked), depends);
   answer.drift = drift;
   return answer;
 }
@@ -267,12 +279,16 @@ Calibration calibrate_moving(const std::vector<Observation>& all, const Eigen::M
   if (end.knock && end.knock->gain > (drifts ? drift->gain : knock ? knock->gain : 0))
     return solve_knocked(whole, *end.knock, static_cast<std::size_t>(views[end.knock->pose]), all, points,
                          solve);
-  if (drifts && beyond_usual(whole.refined.bundle, drift->motion))
-    return solve_drifting(whole, *drift, all, solve);
+  if (drifts && beyond_usual(whole.refined.bundle, drift->motion)) {
+    constexpr double kNearly = 6;  // of -2 log likelihood: twenty times less likely
+    std::string knocked;
+    if (knock && drift->gain - knock->gain < kNearly)
+      knocked = all[static_cast<std::size_t>(whole.used[knock->pose])].image;
+    return solve_drifting(whole, *drift, all, knocked, solve);
+  }
   if (drifts || !knock) {
     add_slow_drift(whole, rival);
-    whole.covariance += end.covariance;
-    whole.repeatable += end.covariance;
+    add_motion(whole, end.covariance);
     return whole;
   }
   return solve_knocked(whole, *knock, static_cast<std::size_t>(whole.used[knock->pose]), all, points, solve);

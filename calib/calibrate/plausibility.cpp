@@ -3,6 +3,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "data/median.h"
+
 namespace flash::calib {
 namespace {
 
@@ -25,6 +27,12 @@ Motion motion_of(const std::vector<Eigen::Isometry3d>& poses) {
   }
   const auto count = static_cast<double>(poses.size());
   return {std::sqrt(motion.translation / count), std::sqrt(motion.rotation / count)};
+}
+
+/// Rms of views left out, in the middle one of the folds: a view that alone tells an axis is predicted by
+/// none.
+double typical(const HeldOut& held, int measure, double of_all) {
+  return held.squares.empty() ? of_all : std::sqrt(data::median(means_of_folds(held, measure)));
 }
 
 template <class... Values>
@@ -78,7 +86,8 @@ std::string implausibility(const Calibration& calibration, const std::vector<Obs
     distance += view.T_camera_target.front().translation().norm() / static_cast<double>(used.size());
   }
   const Motion still = motion_of(target);  // of the target in the camera, whose middle a fixed pose would be
-  const Motion left{1e-3 * calibration.held_out.mm, kDegree * calibration.held_out.deg};
+  const HeldOut& held = calibration.held_out;
+  const Motion left{1e-3 * typical(held, 1, held.mm), kDegree * typical(held, 2, held.deg)};
   if (!(left.over(distance) < settings.held_out * still.over(distance)))
     return formatted(
         "robot and camera do not tell of the same motion: views left out are predicted to %.1f mm and %.2f "

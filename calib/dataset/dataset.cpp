@@ -186,7 +186,7 @@ class PosePairing {
     }
     frame.T_base_gripper = found->pose;
     frame.angles = found->angles;
-    if (robot && found->joints.size() > 0) frame.joint_motions = joint_motions(*robot, found->joints);
+    if (robot && found->joints.size() > 0) frame.joint_motions = model_motions(*robot, found->joints);
   }
 
   data::Trajectory stream() const {

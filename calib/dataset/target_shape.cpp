@@ -12,11 +12,15 @@ double longer_side(const Eigen::Matrix3Xd& target_points) {
 
 }  // namespace
 
-Eigen::Matrix2Xd target_bows(const Eigen::Matrix3Xd& target_points) {
+Bows target_bows(const Eigen::Matrix3Xd& target_points) {
   const Eigen::Array3d low = target_points.rowwise().minCoeff(), high = target_points.rowwise().maxCoeff();
   const Eigen::Array2d middle = 0.5 * (low + high).head<2>();
   const Eigen::Array2d half = (0.5 * (high - low).head<2>()).max(1e-9);
-  return 1 - ((target_points.topRows<2>().array().colwise() - middle).colwise() / half).square();
+  const Eigen::Array2Xd place = (target_points.topRows<2>().array().colwise() - middle).colwise() / half;
+  Bows bows(kWarp, target_points.cols());
+  bows.topRows<2>() = 1 - place.square();
+  bows.row(2) = place.row(0) * place.row(1);
+  return bows;
 }
 
 double usual_size_sd(const Eigen::Matrix3Xd& target_points) {
@@ -29,7 +33,7 @@ double usual_warp_sd(const Eigen::Matrix3Xd& target_points) {
   return kShare * longer_side(target_points);
 }
 
-Eigen::Matrix3Xd shaped(Eigen::Matrix3Xd points, const Eigen::Matrix2Xd& bows, const TargetShape& shape) {
+Eigen::Matrix3Xd shaped(Eigen::Matrix3Xd points, const Bows& bows, const TargetShape& shape) {
   points.row(2) += shape.warp.transpose() * bows;
   return shape.scale * points;
 }
@@ -41,12 +45,14 @@ bool WarpEstimate::far_off() const {
 }
 
 std::string warp_sentence(const WarpEstimate& warp) {
-  char text[240];
+  char text[320];
   std::snprintf(
       text, sizeof text,
       "the target is not flat: its middle stands %.1f +- %.1f mm (2 sd) behind its ends along x, %.1f +- "
-      "%.1f mm along y; the answer takes it into account, a flat target needs no such guess",
-      1e3 * warp.estimate.x(), 2e3 * warp.sd.x(), 1e3 * warp.estimate.y(), 2e3 * warp.sd.y());
+      "%.1f mm along y, and its corners by %.1f +- %.1f mm before and behind by turns; the answer takes it "
+      "into account, a flat target needs no such guess",
+      1e3 * warp.estimate.x(), 2e3 * warp.sd.x(), 1e3 * warp.estimate.y(), 2e3 * warp.sd.y(),
+      1e3 * warp.estimate.z(), 2e3 * warp.sd.z());
   return text;
 }
 

@@ -36,11 +36,13 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_of(const std::string& name) {
   return cv::aruco::getPredefinedDictionary(known.at(name));
 }
 
-/// Markers by id; those whose id is seen more than once are in `repeated` instead.
+/// Markers by id; those whose id is seen more than once are in `repeated` instead. refined: their corners, to
+/// a few hundredths of a pixel where nothing else is within five pixels.
 Markers find_markers(const GreyImage& image, const cv::Ptr<cv::aruco::Dictionary>& dictionary,
-                     std::vector<int>& repeated) {
+                     std::vector<int>& repeated, bool refined = true) {
   const cv::Ptr<cv::aruco::DetectorParameters> parameters = cv::aruco::DetectorParameters::create();
-  parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+  parameters->cornerRefinementMethod =
+      refined ? cv::aruco::CORNER_REFINE_SUBPIX : cv::aruco::CORNER_REFINE_NONE;
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
   cv::aruco::detectMarkers(as_mat(image), dictionary, corners, ids, parameters);
@@ -107,6 +109,14 @@ BoardFit fit_board(const Target& target, const Markers& markers, const Rectifier
   for (std::size_t i = 0; i < plane.size(); ++i)
     fit.agreeing += !fit.H.isZero() && (apply(fit.H, plane[i]) - pixels[i]).norm() < kTolerance;
   return fit;
+}
+
+/// Of both ways to begin a board that which more corners agree with.
+BoardFit fit_board(const Target& target, const Markers& markers, const Rectifier& rectifier) {
+  BoardFit fit = fit_board(target, markers, rectifier, false);
+  if (target.rows % 2 == 1) return fit;
+  BoardFit other = fit_board(target, markers, rectifier, true);
+  return other.agreeing > fit.agreeing ? other : fit;
 }
 
 /// The corner touches two markers; one of them seen is enough to know it is not hidden.
@@ -294,11 +304,16 @@ Finder charuco_finder(const Target& target, const Rectifier& rectifier) {
   return [target, &rectifier, dictionary = dictionary_of(target.dictionary)](const GreyImage& image) {
     Found found;
     std::vector<int> repeated;
-    const Markers markers = find_markers(image, dictionary, repeated);
-    BoardFit fit = fit_board(target, markers, rectifier, false);
-    if (target.rows % 2 == 0) {
-      const BoardFit other = fit_board(target, markers, rectifier, true);
-      if (other.agreeing > fit.agreeing) fit = other;
+    Markers markers = find_markers(image, dictionary, repeated);
+    BoardFit fit = fit_board(target, markers, rectifier);
+    if (fit.agreeing <
+        fit.corners) {  // the refiner may have gone to a corner of the board beside the marker's
+      Markers rough = find_markers(image, dictionary, repeated, false);
+      BoardFit other = fit_board(target, rough, rectifier);
+      if (other.agreeing * fit.corners > fit.agreeing * other.corners) {
+        markers = std::move(rough);
+        fit = std::move(other);
+      }
     }
     // Of markers that lie otherwise the corners of one agree, whichever it is.
     if (fit.agreeing < 4 || 2 * fit.agreeing < fit.corners) {

@@ -4,6 +4,7 @@
 #include <opencv2/features2d.hpp>
 
 #include "calib/detect/corner_shapes.h"
+#include "calib/detect/dot_lattice.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/opencv_image.h"
 
@@ -36,8 +37,12 @@ std::vector<cv::Point2f> grid_of(const std::vector<cv::Point2f>& dots, int colum
   std::vector<cv::Point2f> centres;
   for (const int flags :
        {static_cast<int>(cv::CALIB_CB_SYMMETRIC_GRID), cv::CALIB_CB_SYMMETRIC_GRID | cv::CALIB_CB_CLUSTERING})
-    if (cv::findCirclesGrid(dots, {columns, rows}, centres, flags, nullptr)) return centres;
-  return {};
+    if (cv::findCirclesGrid(dots, {columns, rows}, centres, flags, nullptr) &&
+        is_lattice(to_eigen(centres), columns, rows))
+      return centres;
+  centres.clear();
+  for (const std::size_t dot : dot_lattice(to_eigen(dots), columns, rows)) centres.push_back(dots[dot]);
+  return centres;
 }
 
 /// Dots of the grid as OpenCV orders them: row by row from one of the corners.

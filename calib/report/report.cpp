@@ -154,8 +154,11 @@ Json outline(const Eigen::Matrix3Xd& points) {
 /// The standard deviations along and about the axes of the parent frame, in which the translation is written.
 Json sd_in_parent(const Calibration& calibration) {
   const Vector6d sd = parent_deviations(calibration.poses.X, calibration.covariance);
+  const Vector6d here = parent_deviations(calibration.poses.X, calibration.repeatable);
   return {{"mm", list(Eigen::Vector3d(1e3 * sd.head<3>()))},
-          {"deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))}};
+          {"deg", list(Eigen::Vector3d(kDegrees * sd.tail<3>()))},
+          {"repeatable_mm", list(Eigen::Vector3d(1e3 * here.head<3>()))},
+          {"repeatable_deg", list(Eigen::Vector3d(kDegrees * here.tail<3>()))}};
 }
 
 std::string sentence(const char* format, double value, double other = 0) {

@@ -9,6 +9,7 @@
 #include "calib/geometry/chain.h"
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose.h"
+#include "calib/geometry/serial_chain.h"
 #include "calib/solve/lens_prior.h"
 #include "data/camera.h"
 
@@ -28,13 +29,10 @@ struct BundleView {
   int pose = 0, camera = 0, target = 0;
   Eigen::Matrix3Xd points;        ///< in the target frame [m]
   Eigen::Matrix2Xd pixels;        ///< where they were seen [px]
-  Eigen::Matrix2Xd bows;          ///< how far each point rises per unit of the target's warp along x and y
+  Bows bows;                      ///< how far each point rises per unit of the target's warp (target_bows)
   Eigen::Matrix3Xd depth_points;  ///< on the target's plane, measured by depth, in the camera frame [m]; or
                                   ///< none
 };
-
-/// Of the zeros of joints of arms in use [rad].
-constexpr double kUsualJointZero = 0.1 * M_PI / 180;
 
 /// What is known before a picture is taken: normal distributions about what is stated.
 struct Priors {
@@ -43,7 +41,7 @@ struct Priors {
   /// The prior weighs as much more against residuals that are taken for noise. Empty: 1.
   std::vector<double> caution = {};
   std::vector<LensPrior> lenses = {};      ///< of each camera; empty: nothing
-  std::vector<double> warp_sd = {};        ///< of each target's warp, an axis [m]; empty: flat
+  std::vector<double> warp_sd = {};        ///< of each number of each target's warp [m]; empty: flat
   double joint_zero_sd = kUsualJointZero;  ///< of each joint's zero [rad]
 };
 
@@ -63,11 +61,11 @@ struct Bundle {
   Setup setup = Setup::eye_in_hand;
   std::vector<Eigen::Isometry3d> cameras;          ///< C: in the gripper (eye-in-hand) or the world
   std::vector<data::CameraIntrinsics> intrinsics;  ///< of each camera
-  std::vector<Eigen::Isometry3d> bases;     ///< B: of each arm in the world, which is the first arm's base
-  std::vector<Eigen::Isometry3d> targets;   ///< Z: in the world (eye-in-hand) or a gripper
-  std::vector<double> scales;               ///< of each target: true size over stated size
-  std::vector<Eigen::Vector2d> warps = {};  ///< of each target, see target_bows(); empty: flat
-  std::vector<double> time_offsets;         ///< tau of each arm [s]
+  std::vector<Eigen::Isometry3d> bases;    ///< B: of each arm in the world, which is the first arm's base
+  std::vector<Eigen::Isometry3d> targets;  ///< Z: in the world (eye-in-hand) or a gripper
+  std::vector<double> scales;              ///< of each target: true size over stated size
+  std::vector<Warp> warps = {};            ///< of each target, see target_bows(); empty: flat
+  std::vector<double> time_offsets;        ///< tau of each arm [s]
   std::vector<Eigen::VectorXd> joint_zeros =
       {};                                 ///< of each arm: joints are that much farther [rad]; empty: 0
   std::vector<double> depth_scales = {};  ///< of each camera: depth over distance; empty: 1

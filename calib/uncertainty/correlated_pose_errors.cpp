@@ -33,9 +33,13 @@ struct PoseModes {
       smooth;  ///< of a turn by one radian, and of lengths that are wrong in proportion
 };
 
-/// arm: rms distance of the gripper from the base [m]. Lengths are taken to be wrong by as much as a turn
-/// makes them over half of it.
-PoseModes modes_of(const Bundle& bundle, std::size_t i, double arm) {
+/// Where the arm stands is not asked: poses may be in the frame of a table. It is taken to be kReach away, in
+/// any direction from the middle of the places. What a turn about it does there is a shift of two axes in
+/// three. Lengths are wrong by as much as a turn makes them over half of the reach: in base axes, at the
+/// wrist, and of a stretch along the arm, one axis in three.
+constexpr double kReach = 0.6;  // [m]
+
+PoseModes modes_of(const Bundle& bundle, std::size_t i, const Eigen::Vector3d& middle) {
   const RobotPose& pose = bundle.poses[i];
   PoseModes modes;
   modes.place = pose.T_base_gripper.translation();
@@ -46,20 +50,22 @@ PoseModes modes_of(const Bundle& bundle, std::size_t i, double arm) {
   modes.rotation << skew(pivot) * modes.attitude, modes.attitude;
   auto& [wrist, base, shift, shift_of_wrist, stretch] = modes.smooth;
   wrist = modes.rotation;
-  base << skew(-modes.place), I;
-  shift << 0.5 * arm * I, O;
-  shift_of_wrist << 0.5 * arm * modes.attitude, O;
+  const Eigen::Vector3d place = modes.place - middle;
+  const double shifted = kReach * std::sqrt(2.0 / 3 + 0.25 + 0.25 / 3);
+  base << -skew(place), I;
+  shift << shifted * I, O;
+  shift_of_wrist << 0.5 * kReach * modes.attitude, O;
   stretch.setZero();
-  stretch.col(0).head<3>() = 0.5 * modes.place;
+  stretch.col(0).head<3>() = 0.5 * place;
   return modes;
 }
 
 std::vector<PoseModes> modes_of(const Bundle& bundle, const std::vector<std::size_t>& poses) {
-  double squares = 0;
-  for (const std::size_t i : poses) squares += bundle.poses[i].T_base_gripper.translation().squaredNorm();
-  const double arm = std::sqrt(squares / static_cast<double>(poses.size()));
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const std::size_t i : poses)
+    middle += bundle.poses[i].T_base_gripper.translation() / static_cast<double>(poses.size());
   std::vector<PoseModes> modes;
-  for (const std::size_t i : poses) modes.push_back(modes_of(bundle, i, arm));
+  for (const std::size_t i : poses) modes.push_back(modes_of(bundle, i, middle));
   return modes;
 }
 

@@ -16,8 +16,10 @@ constexpr int kRemaining = 8;                      // on the long side
 constexpr double kOdds = 20;                       // against a knock, before any view is seen
 constexpr double kWrongOdds = 50;                  // against a view that is wrong by itself
 constexpr double kUsualError = 0.05 * M_PI / 180;  // of arms in use, shared by neighbouring views [rad]
+constexpr double kLittle = 1e-4;                   // weight of a shift's square that does not count
 constexpr double kShared = 1;  // errors that neighbouring poses share, over those that they do not
-constexpr std::array<double, 3> kSizes{0.003, 0.01, 0.03};  // of knocks, and of what is wrong with a view [m]
+constexpr std::array<double, 4> kSizes{0.001, 0.003, 0.01, 0.03};  // of knocks [m]
+constexpr std::array<double, 3> kWrongSizes{0.003, 0.01, 0.03};    // of what is wrong with a view [m]
 
 /// Which views stand moved: the first or the last `count`.
 struct Side {
@@ -91,12 +93,12 @@ class EndKnocks {
     shared.turn_sd = std::hypot(shared.turn_sd, turn);
     shared.shift_sd = std::hypot(shared.shift_sd, turn * distance_);
     double least = std::numeric_limits<double>::infinity();
-    for (const double wrong_size : kSizes) {
+    for (const double wrong_size : kWrongSizes) {
       std::vector<UncertainMotion> motions{shared};
       for (std::size_t i = 0; i < shape.size(); ++i)
         if (wrong(i)) motions.push_back(of_size(alone(i), wrong_size));
       const auto count = static_cast<double>(motions.size() - 1);
-      const double price = 2 * count * std::log(kWrongOdds * static_cast<double>(kSizes.size()));
+      const double price = 2 * count * std::log(kWrongOdds * static_cast<double>(kWrongSizes.size()));
       least = std::min(least, motions_.deviance(motions, side.camera) + price);
       if (count == 0) break;
     }
@@ -112,6 +114,18 @@ class EndKnocks {
   int views_ = 0;
   double distance_ = 0;
 };
+
+/// The weight of a shift's square that a normal distribution needs for its regions up to that of 99.9 % to
+/// hold what the shift has moved, where it took place with that probability: beyond its share of the
+/// variance, a region that holds all but so much reaches it.
+double weight_of(double probability) {
+  constexpr double kOutermost = 1e-3;  // outside of the widest region that is asked for
+  const double outside = std::max(probability, kOutermost);
+  double x = 6;  // half of chi-square with six degrees of freedom: exp(-x) (1 + x + x^2 / 2) = outside
+  for (int i = 0; i < 20; ++i) x = std::log((1 + x + 0.5 * x * x) / outside);
+  const double reaching = std::min(1.0, probability / kOutermost) / (2 * std::max(x, 0.5));
+  return std::max(probability, reaching);
+}
 
 /// Of X against where the camera is at the last view, had a motion of that shape taken place and the solution
 /// not known of it.
@@ -136,6 +150,7 @@ EndKnock find_end_knock(const TimedPoses& poses, const BundleSettings& settings)
   const EndKnocks knocks(poses, settings);
   const double places = 2.0 * (knocks.views() - 1);
   double odds = 0, best = 0, best_of_kind[2] = {0, 0};
+  double of_kind[2][2] = {{0, 0}, {0, 0}};  // odds of the last or the first views, of camera or target
   Side likeliest;
   std::vector<std::pair<Side, double>> all;
   for (const bool last : {true, false})
@@ -148,6 +163,7 @@ EndKnock find_end_knock(const TimedPoses& poses, const BundleSettings& settings)
           evidence += std::exp(std::min(300.0, 0.5 * (still - knocks.moved(side, size)))) /
                       (static_cast<double>(kSizes.size()) * kOdds * places);
         odds += evidence;
+        of_kind[last][camera] += evidence;
         all.emplace_back(side, evidence);
         best_of_kind[camera] = std::max(best_of_kind[camera], evidence);
         if (evidence <= best) continue;
@@ -168,10 +184,12 @@ EndKnock find_end_knock(const TimedPoses& poses, const BundleSettings& settings)
     knock.gain = knock.second = 2 * std::log(odds);
     return result;
   }
-  for (const auto& [side, evidence] : all)
-    if (evidence > 1e-4)
-      result.covariance +=
-          evidence / (1 + odds) * left_by(side, knocks.motion(side), poses, knocks, settings);
+  for (const auto& [side, evidence] : all) {
+    const double kind = of_kind[side.last][side.camera];
+    const double weight = kind > 0 ? weight_of(kind / (1 + odds)) * evidence / kind : 0;
+    if (weight > kLittle)
+      result.covariance += weight * left_by(side, knocks.motion(side), poses, knocks, settings);
+  }
   return result;
 }
 

@@ -31,7 +31,7 @@ struct EndKnock {
 /// Looks for one step of camera or target with two to six views on one side. Two recordings are compared by
 /// their likelihood with all motions integrated out: one in which nothing moved but by the errors that
 /// neighbouring poses of arms in use share, and one in which those few views stand moved alike as well, by a
-/// motion of 3, 10 or 30 mm an axis and as much over the distance in turn. Views that were left out are
+/// motion of 1, 3, 10 or 30 mm an axis and as much over the distance in turn. Views that were left out are
 /// either wrong by themselves, each by a motion of its own and once in fifty, or moved with the others. Once
 /// in twenty recordings something is knocked, at any time between two views.
 EndKnock find_end_knock(const TimedPoses& poses, const BundleSettings& settings);

@@ -87,9 +87,11 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
   return result;
 }
 
-Eigen::MatrixXd covariance_of_kept_sizes(const Refinement& refined, const BundleSettings& settings,
-                                         const std::vector<TargetSize>& sizes,
-                                         const std::vector<double>& sd) {
+namespace {
+
+/// Of the shared unknowns, which follow each size by as much as it may be off.
+Eigen::MatrixXd following_sizes(const Refinement& refined, const BundleSettings& settings,
+                                const std::vector<double>& variances) {
   BundleSettings with_scales = settings;
   with_scales.unknowns.scales = true;
   Bundle bundle = refined.bundle;
@@ -102,15 +104,51 @@ Eigen::MatrixXd covariance_of_kept_sizes(const Refinement& refined, const Bundle
     if (std::find(scales.begin(), scales.end(), static_cast<int>(column)) == scales.end())
       kept.push_back(column);
   const Eigen::LDLT<Eigen::MatrixXd> others(information(kept, kept));
+  const bool solved = settings.unknowns.scales;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(refined.covariance.rows(), refined.covariance.cols());
-  for (std::size_t target = 0; target < sizes.size(); ++target) {
+  for (std::size_t target = 0; target < variances.size(); ++target) {
     const Eigen::VectorXd shift = others.solve(information(kept, scales[target]));
-    double variance = sd[target] * sd[target];
-    if (const auto& wanted = sizes[target].wanted)
-      variance += std::max(0.0, std::pow(wanted->estimate - 1, 2) - std::pow(wanted->sd, 2) - variance);
-    covariance += variance * shift * shift.transpose();
+    Eigen::VectorXd all = Eigen::VectorXd::Zero(covariance.rows());
+    if (solved) {
+      all(kept) = shift;
+      all[scales[target]] = -1;
+    } else {
+      all = shift;
+    }
+    covariance += variances[target] * all * all.transpose();
   }
   return covariance;
+}
+
+}  // namespace
+
+Eigen::MatrixXd covariance_of_kept_sizes(const Refinement& refined, const BundleSettings& settings,
+                                         const std::vector<TargetSize>& sizes,
+                                         const std::vector<double>& sd) {
+  std::vector<double> variances;
+  for (std::size_t target = 0; target < sizes.size(); ++target) {
+    double& variance = variances.emplace_back(sd[target] * sd[target]);
+    if (const auto& wanted = sizes[target].wanted)
+      variance += std::max(0.0, std::pow(wanted->estimate - 1, 2) - std::pow(wanted->sd, 2) - variance);
+  }
+  return following_sizes(refined, settings, variances);
+}
+
+Eigen::MatrixXd covariance_of_disputed_sizes(const Refinement& refined, const BundleSettings& settings,
+                                             const std::vector<TargetSize>& sizes) {
+  constexpr double kAgree = 2;  // deviations
+  std::vector<double> variances;
+  for (const TargetSize& size : sizes) {
+    double& variance = variances.emplace_back(0);
+    if (!size.wanted || !std::isfinite(size.prior_sd)) continue;
+    const double apart = std::abs(size.wanted->estimate - 1),
+                 agree = kAgree * std::hypot(size.wanted->sd, size.prior_sd);
+    if (apart <= agree) continue;
+    const double farther =
+        std::max(std::abs(size.estimate - 1), std::abs(size.wanted->estimate - size.estimate));
+    variance = std::pow(farther / apart, 2) * (apart * apart - agree * agree);
+  }
+  return following_sizes(refined, settings, variances);
 }
 
 std::string size_sentence(const TargetSize& size) {

@@ -46,6 +46,12 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
 Eigen::MatrixXd covariance_of_kept_sizes(const Refinement& refined, const BundleSettings& settings,
                                          const std::vector<TargetSize>& sizes, const std::vector<double>& sd);
 
+/// Likewise of sizes that were solved for, where prior and pictures contradict each other: the print may be
+/// as stated and the unit of the robot or the lens wrong, or the print. So the size may be off by as much as
+/// either says, from two of their deviations on.
+Eigen::MatrixXd covariance_of_disputed_sizes(const Refinement& refined, const BundleSettings& settings,
+                                             const std::vector<TargetSize>& sizes);
+
 /// "the estimated size of the target is 1.0400 +- 0.0080 (2 sd) of the stated one ...", of a size that is far
 /// off.
 std::string size_sentence(const TargetSize& size);

@@ -25,4 +25,9 @@ endif()
 
 if(CALIB)
   run(${work}/build/hand_eye)
+  # The camera of these pairs, which are exact, is at (1, 0.5, 0.25) m.
+  run(${work}/build/example ${SOURCE}/samples.json)
+  if(NOT output MATCHES "^base <- camera:\n[^\n]* 1 *\n[^\n]* 0.5 *\n[^\n]* 0.25 *\n")
+    message(FATAL_ERROR "the example printed ${output}, expected a camera at (1, 0.5, 0.25)")
+  endif()
 endif()

@@ -16,6 +16,7 @@ import sys
 import tempfile
 import threading
 
+import png
 import program
 
 BOARD, PLAIN = "chessboard:9x6:0.025", "chessboard:8x6:0.025"  # 8 x 6 looks the same after half a turn
@@ -66,8 +67,25 @@ def roll_pitch_yaw(q):
             math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
 
 
-def angle_between(a, b):
-    return 2 * math.acos(min(1, abs(multiply(conjugate(a), b)[3])))
+def turning_xyz(q):
+    """Angles about turning x, y, z, as Staubli's: R = Rx Ry Rz."""
+    x, y, z, w = q
+    return (math.atan2(2 * (w * x - y * z), 1 - 2 * (x * x + y * y)),
+            math.asin(max(-1, min(1, 2 * (w * y + x * z)))),
+            math.atan2(2 * (w * z - x * y), 1 - 2 * (y * y + z * z)))
+
+
+def turning_zyz(q):
+    """Angles about turning z, y, z, as Kawasaki's: R = Rz Ry Rz."""
+    x, y, z, w = q
+    return (math.atan2(y * z - w * x, x * z + w * y), math.acos(max(-1, min(1, 1 - 2 * (x * x + y * y)))),
+            math.atan2(y * z + w * x, w * y - x * z))
+
+
+def rotation_vector(q):
+    x, y, z, w = q if q[3] >= 0 else [-c for c in q]
+    length = math.sqrt(x * x + y * y + z * z)
+    return [2 * math.atan2(length, w) / max(length, 1e-12) * c for c in (x, y, z)]
 
 
 # Ways to spoil a recording. Each changes the folder and returns options for the command line.
@@ -102,18 +120,35 @@ def w_first(poses):
     return [[*pose[:4], pose[7], *pose[4:7]] for pose in poses]
 
 
+def longer_quaternions(poses):
+    return [[*pose[:4], *(1.2 * x for x in pose[4:])] for pose in poses]
+
+
+def with_no_number(poses):
+    return [*poses[:4], [poses[4][0], math.nan, *poses[4][2:]], *poses[5:]]
+
+
+def at_one_place(poses):
+    return [[pose[0], *poses[0][1:]] for pose in poses]
+
+
+def one_moved(poses):
+    """The sixth pose is 50 mm off."""
+    return [[pose[0], pose[1] + (0.05 if i == 5 else 0), *pose[2:]] for i, pose in enumerate(poses)]
+
+
 def some_jolted(poses):
     rng = random.Random(7)
     return [jolted(pose, rng) if i % 3 == 1 and i < 15 else pose for i, pose in enumerate(poses)]
 
 
-def as_angles(columns, unit, backwards=False, length=1):
-    """Poses as roll, pitch and yaw under the given names, multiplied by `unit`; backwards as KUKA writes them. Without
-    names: bare numbers, in the order of the pictures."""
+def as_angles(columns, unit, backwards=False, length=1, angles=roll_pitch_yaw):
+    """Poses as three angles under the given names, multiplied by `unit`; roll, pitch and yaw backwards as KUKA writes them.
+    Without names: bare numbers, in the order of the pictures."""
     def spoil(folder):
         rows = [f"index,tx,ty,tz,{columns}"] if columns else []
         for pose in read_poses(folder / "poses.tum"):
-            turn = [unit * angle for angle in roll_pitch_yaw(pose[4:])]
+            turn = [unit * angle for angle in angles(pose[4:])]
             if backwards:
                 turn.reverse()
             if not columns:
@@ -164,6 +199,49 @@ def copied(folder):
         poses.append([100 + i, *pose[1:]])
     write_poses(folder / "poses.tum", poses)
     return []
+
+
+def last_pose_twice(folder):
+    path = folder / "poses.csv"
+    path.write_text(path.read_text() + path.read_text().splitlines()[-1] + "\n")
+    return []
+
+
+def redrawn(change, views):
+    def spoil(folder):
+        for view in views:
+            path = folder / f"images/{view:03d}.png"
+            png.write(path, *change(*png.read(path)))
+        return []
+    return spoil
+
+
+def pictures_that_are_none(folder):
+    (folder / "images/004.png").write_bytes(b"")
+    (folder / "images/005.png").write_text("no picture\n")
+    (folder / "images/006.png").write_bytes((folder / "images/006.png").read_bytes()[:200])
+    return []
+
+
+def camera_info_changed(change):
+    """change: of the numbers behind `data:` of the matrix (0) or the distortion (1)."""
+    def spoil(folder):
+        path = folder / "camera_info.yaml"
+        lists = iter(range(9))
+        def changed(match):
+            values = [float(word) for word in match[2].split(",")]
+            return match[1] + ", ".join(f"{value:.12g}" for value in change(next(lists), values)) + "]"
+        path.write_text(re.sub(r"(data: *\[)([^\]]*)\]", changed, path.read_text()))
+        return []
+    return spoil
+
+
+def longer_focal_length(which, values):
+    return [1.05 * v if which == 0 and i in (0, 4) else v for i, v in enumerate(values)]
+
+
+def other_distortion(which, values):
+    return [-0.15, *values[1:]] if which == 1 else values
 
 
 def cut_picture(folder):
@@ -249,6 +327,32 @@ def traps():
         yield Trap(f"{other}: copies", sound, copied, 0, "100.png: not used: a copy of 000.png",
                    "6 of 22 views were not used", used=16)
         yield Trap(f"{other}: a picture cut off", sound, cut_picture, 0, "004.png: not used", used=15)
+        yield Trap(f"{other}: pictures that are none", sound, pictures_that_are_none, 0, "004.png", "005.png", "006.png",
+                   used=13)
+        yield Trap(f"{other}: quaternions that are not unit", sound, poses_changed(longer_quaternions), 2, "quaternion")
+        yield Trap(f"{other}: two poses for one picture", sound, both(as_angles("rx,ry,rz", 1), last_pose_twice), 2,
+                   "two poses")
+        yield Trap(f"{other}: a pose that is no number", sound, poses_changed(with_no_number), 2, "poses.tum", "line 5")
+        yield Trap(f"{other}: one pose 50 mm off", sound, poses_changed(one_moved), 0, "005.png: not used", used=15)
+        yield Trap(f"{other}: identical poses", sound, poses_changed(at_one_place), 2, "turns by no more than 0.00 deg")
+        yield Trap(f"{other}: Staubli's angles", sound, as_angles("rx,ry,rz", 1, angles=turning_xyz), 2, "--angles XYZ")
+        yield Trap(f"{other}: Kawasaki's angles", sound,
+                   as_angles("rx_deg,ry_deg,rz_deg", math.degrees(1), angles=turning_zyz), 2, "--angles ZYZ")
+        yield Trap(f"{other}: rotation vectors for angles", sound, as_angles("rx,ry,rz", 1, angles=rotation_vector), 2,
+                   "rotation vector")
+        yield Trap(f"{other}: millimetres for the target", sound, option("--target", "chessboard:9x6:25"), 2, "millimetres")
+        yield Trap(f"{other}: three pictures of half the size", sound, redrawn(png.halved, (2, 7, 11)), 0,
+                   "320 x 240", "640 x 480", used=13)
+        yield Trap(f"{other}: three pictures turned", sound, redrawn(png.turned, (2, 7, 11)), 0,
+                   "turned by 180 deg", used=13)
+        yield Trap(f"{other}: focal lengths 5 % off", sound, camera_info_changed(longer_focal_length), 0,
+                   "the lens is not as stated", used=16)
+        yield Trap(f"{other}: a distortion that the lens has not", sound, camera_info_changed(other_distortion), 0,
+                   "the lens is not as stated", used=16)
+    yield Trap("all pictures of half the size", "in_hand", redrawn(png.halved, range(16)), 2, "320 x 240", "640 x 480")
+    yield Trap("two views", "in_hand", first_views(2), 2, "2 of 2 views", "at least 4")
+    yield Trap("four views", "in_hand", first_views(4), 0, "4 views: noise levels and uncertainty are themselves uncertain",
+               used=4)
     yield Trap("no intrinsics", "in_hand", without_intrinsics, 2, "flash-calib intrinsics")
     yield Trap("no target", "in_hand", without_target, 2, "names no target", "--target chessboard:9x6:0.025")
     yield Trap("half a target", "in_hand", option("--target", "chessboard:9x6"), 2, "chessboard:COLUMNSxROWS:SQUARE")
@@ -266,6 +370,7 @@ def traps():
     yield Trap("a misspelt setup", "in_hand", option("--setup", "eye-in-hnad"), 2, "--setup", "eye-in-hand,eye-to-hand")
     yield Trap("another target", "in_hand", option("--target", "apriltag:36h11:0:0.05"), 2, "none of 16 pictures")
     yield Trap("one axis", "one_axis", nothing, 2, "rotations turn about one axis only", "cannot be determined")
+    yield Trap("one axis, a noisy robot", "one_axis_noisy", nothing, 2, "rotations turn about one axis only")
     yield Trap("flipped boards", "flipped", nothing, 0, "numbered from its other end", used=16)
 
 
@@ -274,6 +379,7 @@ def draw(tool, work):
     program.must(tool, work / "in_hand", "eye-in-hand", BOARD, 16, *common, 1)
     program.must(tool, work / "to_hand", "eye-to-hand", BOARD, 16, *common, 2)
     program.must(tool, work / "one_axis", "eye-in-hand", BOARD, 8, *common, 3, "motion=one-axis")
+    program.must(tool, work / "one_axis_noisy", "eye-in-hand", BOARD, 12, "640x480", "0.3", "0.5", 5, "motion=one-axis")
     program.must(tool, work / "flipped", "eye-in-hand", PLAIN, 16, *common, 4)
 
 

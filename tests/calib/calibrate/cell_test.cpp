@@ -80,6 +80,30 @@ TEST(Register, RecordingsThatCountTheirPicturesByThemselvesShareNoPoses) {
   EXPECT_LT(error.dot(cell.cameras.front().covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
 }
 
+TEST(Register, WhatMayHaveMovedWhileEitherWasRecordedIsStated) {
+  CellMember left = member_of(arm_scene(40), "left"), right = member_of(arm_scene(41), "right");
+  const Cell still = solve_cell({left, right});
+  std::mt19937 random(40);
+  std::normal_distribution<double> normal(0, 1e-3);
+  for (CellMember* member : {&left, &right}) {
+    Vector6d shift;
+    for (double& value : shift) value = normal(random);
+    member->motion_covariance = shift * shift.transpose();
+  }
+  const Cell moved = solve_cell({left, right});
+  EXPECT_TRUE(
+      (moved.cameras[0].covariance - still.cameras[0].covariance).isApprox(left.motion_covariance, 1e-9));
+  // As two transforms that are composed, where nothing else is uncertain.
+  Extrinsics a, b;
+  a.setup = b.setup = Setup::eye_to_hand;
+  a.transform.T = left.poses.X;
+  b.transform.T = right.poses.X;
+  a.covariance = left.motion_covariance;
+  b.covariance = right.motion_covariance;
+  const Matrix6d composed = compose_cell({"left", "right"}, {a, b}).bases[0].covariance;
+  EXPECT_TRUE((moved.bases[0].covariance - still.bases[0].covariance).isApprox(composed, 1e-9));
+}
+
 TEST(Register, ComposedCovarianceIsThatOfTheProduct) {
   Extrinsics a, b;
   a.setup = b.setup = Setup::eye_to_hand;

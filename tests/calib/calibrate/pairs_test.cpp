@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "calib/calibrate/calibrate_pairs.h"
-#include "tests/calib/hand_eye_scene.h"
+#include "tests/calib/knocked_scene.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::calib {
@@ -77,6 +77,29 @@ TEST(Pairs, OfAStreamAreComparedOnSomeOfThemAndAllSolved) {
   EXPECT_LT(error.dot(result.covariance.ldlt().solve(error)), 22.5);  // 99.9 % of chi-square, 6
   // All pairs count: scatter of 0.5 mm, by the root of 1000; X and Z share it, and turns move places.
   EXPECT_LT(std::sqrt(result.covariance.topLeftCorner<3, 3>().trace() / 3), 5 * 0.5e-3 / std::sqrt(1000.0));
+}
+
+// A camera or a target that is knocked by 8 mm half-way: told, and stated. One that stands still is not.
+TEST(Pairs, OfWhichSomethingMovedHalfWayAreTold) {
+  for (const Mount setup : {Mount::eye_in_hand, Mount::eye_to_hand})
+    for (const bool camera : {true, false})
+      for (const bool knocked : {true, false}) {
+        SceneSettings settings = protocol_settings(setup);
+        settings.views = 24;
+        settings.robot_deg = 0.05;
+        settings.robot_mm = 0.5;
+        HandEyeScene scene = make_scene(settings, board_points(), 9);
+        Vector6d motion = Vector6d::Zero();
+        motion.head<3>() << 0.006, -0.004, 0.0035;
+        if (knocked) displace(scene, 0, 12, camera, motion, 9);
+        const Calibration result = calibrate_pairs(setup, pairs_of(scene));
+        const bool told =
+            std::any_of(result.warnings.begin(), result.warnings.end(), [](const std::string& warning) {
+              return warning.starts_with("first and second half of the views put the ");
+            });
+        EXPECT_EQ(told, knocked) << camera;
+        EXPECT_EQ(result.covariance_factor > 1, knocked);
+      }
 }
 
 TEST(Pairs, WhoseTargetPosesAreInvertedAreNamed) {

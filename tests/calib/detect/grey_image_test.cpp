@@ -44,6 +44,20 @@ TEST(GreyImage, PngIsTheSameAsOpenCvReadsIt) {
   }
 }
 
+// Ten bits in the lower part of sixteen: read as eight they would be four grey levels.
+TEST(GreyImage, OfSixteenBitsTheHighestInUseAreRead) {
+  const data::TemporaryFolder folder;
+  cv::Mat ten(37, 53, CV_16UC1);
+  cv::randu(ten, cv::Scalar::all(0), cv::Scalar::all(1024));
+  ten.at<std::uint16_t>(0, 0) = 1023;
+  cv::imwrite(folder / "ten.png", ten);
+  const GreyImage image = load_grey_image(folder / "ten.png");
+  ASSERT_EQ(image.pixels.size(), ten.total());
+  for (int y = 0; y < ten.rows; ++y)
+    for (int x = 0; x < ten.cols; ++x)
+      EXPECT_EQ(image.at(x, y), ten.at<std::uint16_t>(y, x) / 4);  // ten bits to eight
+}
+
 cv::Mat noise() {
   cv::Mat picture(120, 160, CV_8UC3);
   cv::randu(picture, cv::Scalar::all(0), cv::Scalar::all(256));

@@ -107,10 +107,10 @@ TEST(CorrelatedPoseErrors, AFieldThatWasDrawnIsFoundAndCovered) {
   EXPECT_GE(covered, 32);
 }
 
-TEST(CorrelatedPoseErrors, AreTheSameHoweverTheBaseIsTurned) {
+TEST(CorrelatedPoseErrors, AreTheSameWhereverTheBaseStands) {
   HandEyeScene scene = make_arm_scene(noisy(), {.zero_deg = 1}, 0.6, tag_points(), 101);
   const SystematicUncertainty here = uncertainty_of(refined(scene));
-  const Eigen::Isometry3d turn = make_pose(Eigen::Vector3d::Zero(), {0.3, -1.1, 2.0});
+  const Eigen::Isometry3d turn = make_pose({1.5, -2, 0.7}, {0.3, -1.1, 2.0});
   for (Observation& o : scene.observations) o.T_base_gripper = turn * o.T_base_gripper;
   const SystematicUncertainty there = uncertainty_of(refined(scene));
   ASSERT_TRUE(here.arms.front().found);
