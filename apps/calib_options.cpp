@@ -24,10 +24,7 @@ void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options, const
   group.add_option("--threads", options.threads, "Number of threads; 0: one per processor")
       ->check(thread_number())
       ->capture_default_str();
-  verb.parse_complete_callback([&verb, &options] {
-    const CLI::Option* const config = verb.get_parent()->get_config_ptr();
-    if (config != nullptr && config->count() > 0) options.config = config->results().front();
-  });
+  options.config = verb.get_parent()->get_config_ptr();
 }
 
 void add_robot_options(CLI::App& group, DatasetChoice& choice) {
@@ -110,10 +107,15 @@ calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses, bool 
   return dataset;
 }
 
+std::string options_file(const CalibCommonOptions& options) {
+  const bool given = options.config != nullptr && options.config->count() > 0;
+  return given ? options.config->results().front() : "";
+}
+
 std::vector<std::string> files_read(const DatasetChoice& choice, const calib::Dataset& dataset,
                                     const CalibCommonOptions& options) {
   std::vector<std::string> files = dataset.files;
-  for (const std::string& path : {choice.target, options.config})
+  for (const std::string& path : {choice.target, options_file(options)})
     if (!path.empty()) files.push_back(path);
   return files;
 }

@@ -19,8 +19,8 @@ struct CalibCommonOptions {
   bool quiet = false;
   bool verbose = false;
   bool force = false;
-  int threads = 0;     ///< 0: one a processor
-  std::string config;  ///< file of options, where there is one
+  int threads = 0;                      ///< 0: one a processor
+  const CLI::Option* config = nullptr;  ///< that names a file of options
 };
 void add_calib_common_options(CLI::App& verb, CalibCommonOptions& options,
                               const char* force = "Overwrite what is there");
@@ -50,6 +50,9 @@ void add_target_size_options(CLI::App& verb, std::optional<double>& sd, bool& as
 void add_lens_options(CLI::App& verb, calib::LensKnowledge& lens);
 
 calib::Dataset load_dataset(const DatasetChoice& choice, bool needs_poses = true, bool needs_camera = true);
+
+/// The file of options, empty where there is none.
+std::string options_file(const CalibCommonOptions& options);
 
 /// Files that a run on the dataset reads.
 std::vector<std::string> files_read(const DatasetChoice& choice, const calib::Dataset& dataset,

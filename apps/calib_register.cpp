@@ -266,7 +266,7 @@ int run_register(const RegisterOptions& options) {
     throw data::InputError("register: found one calibration, expected two or more");
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
   std::vector<std::string> named = options.calibrations;
-  named.push_back(options.common.config);
+  named.push_back(options_file(options.common));
   expect_own_files({options.out}, named);
   constexpr double kFarthest = 100;  // [m]
   for (const double place : options.workspace)

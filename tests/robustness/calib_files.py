@@ -165,7 +165,7 @@ def check_refusals(calib, work):
 def check_arms(calib, work):
     """left/camera.json and right/camera.json are two arms, as left.json and right.json are."""
     for name in ("left", "right"):
-        shutil.copy(work / name / "camera.json", work / f"{name}.json")
+        program.must(calib, "handeye", work / name, "-o", work / f"{name}.json", "--cache", work / "cache")
     cells = []
     for calibrations in (("left/camera.json", "right/camera.json"), ("left.json", "right.json")):
         for more in ((), ("--without-images",)):
