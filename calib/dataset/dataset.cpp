@@ -186,7 +186,7 @@ class PosePairing {
     }
     frame.T_base_gripper = found->pose;
     frame.angles = found->angles;
-    if (robot && found->joints.size() > 0) frame.joint_motions = model_motions(*robot, found->joints);
+    if (robot && found->joints.size() > 0) frame.joint_motions = joint_motions(*robot, found->joints);
   }
 
   data::Trajectory stream() const {
@@ -374,9 +374,8 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
 void expect_places(const Dataset& dataset) {
   constexpr double kFarthest = 1e4;  // [m]
   for (const Frame& frame : dataset.frames) {
-    double farthest = frame.T_base_gripper.translation().stableNorm();
-    if (frame.T_camera_target)
-      farthest = std::max(farthest, frame.T_camera_target->translation().stableNorm());
+    double farthest = frame.T_base_gripper.translation().norm();
+    if (frame.T_camera_target) farthest = std::max(farthest, frame.T_camera_target->translation().norm());
     if (!(farthest < kFarthest))
       throw data::input_error(dataset.source, frame.name,
                               "found a pose " + data::format_short(farthest) + " m away, expected metres");

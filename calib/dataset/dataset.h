@@ -20,7 +20,7 @@ struct Frame {
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
   std::optional<Eigen::Vector3d> angles;  ///< the rotation as written, where it came as angles [rad]
   std::optional<Eigen::Isometry3d> T_camera_target;             ///< in a set of pairs
-  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< model_motions(), where joints are known
+  Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions = {};  ///< of the gripper, where joints are known
 };
 
 struct Dataset {

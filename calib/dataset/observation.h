@@ -20,7 +20,7 @@ struct Observation {
   Eigen::Matrix<double, 6, 1> velocity =
       Eigen::Matrix<double, 6, 1>::Zero();  ///< of the gripper, in its frame [m/s, rad/s]; of a stream
   Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions =
-      {};  ///< as model_motions(), where joints are known
+      {};  ///< as joint_motions(), where joints are known
 };
 
 /// The closed chain through each view, with the first pose of its target.

@@ -48,23 +48,4 @@ Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions(const SerialChain& chain,
   return J;
 }
 
-Eigen::Matrix<double, 6, Eigen::Dynamic> model_motions(const SerialChain& chain, const Eigen::VectorXd& q) {
-  const std::vector<Eigen::Isometry3d> poses = after_each(chain, q);
-  Eigen::Matrix<double, 6, Eigen::Dynamic> J(6, kErrorsOfJoint * q.size());
-  J.leftCols(q.size()) = joint_motions(chain, q);
-  Eigen::Index column = q.size();
-  for (std::size_t k = 0; k < chain.joints.size(); ++k) {
-    const Joint& joint = chain.joints[k];
-    if (joint.kind == Joint::Kind::fixed) continue;
-    // A motion of the joint's frame, which its origin carries and it has not turned yet.
-    const Matrix6d carried = adjoint(poses[k].inverse() * joint.origin);
-    const Eigen::Vector3d across = joint.axis.unitOrthogonal();
-    J.middleCols<3>(column) = kUsualAxisPlace / kUsualJointZero * carried.leftCols<3>();
-    J.col(column + 3) = kUsualAxisTilt / kUsualJointZero * carried.rightCols<3>() * across;
-    J.col(column + 4) = kUsualAxisTilt / kUsualJointZero * carried.rightCols<3>() * joint.axis.cross(across);
-    column += kErrorsOfJoint - 1;
-  }
-  return J;
-}
-
 }  // namespace flash::calib

@@ -1,6 +1,5 @@
 #pragma once
 #include <Eigen/Geometry>
-#include <cmath>
 #include <string>
 #include <vector>
 
@@ -26,20 +25,8 @@ std::vector<std::string> moving_joints(const SerialChain& chain);
 /// T_base_gripper = prod origin_k motion_k(q_k). q: of the joints that move [rad, m].
 Eigen::Isometry3d gripper_pose(const SerialChain& chain, const Eigen::VectorXd& q);
 
-/// Of arms in use, standard deviations: zeros of joints, places and directions of their axes.
-constexpr double kUsualJointZero = 0.1 * M_PI / 180;  ///< [rad]
-constexpr double kUsualAxisPlace = 3e-4;              ///< [m]
-constexpr double kUsualAxisTilt = 0.03 * M_PI / 180;  ///< [rad]
-
-constexpr Eigen::Index kErrorsOfJoint = 6;  ///< its zero, its axis' place and tilt
-
 /// How the gripper moves with each joint, in its own frame: columns (dt, dtheta) with
 /// T(q + d) = moved(T(q), J d) to first order.
 Eigen::Matrix<double, 6, Eigen::Dynamic> joint_motions(const SerialChain& chain, const Eigen::VectorXd& q);
-
-/// The same of all that a chain may be wrong in: kErrorsOfJoint columns for each of n joints that move. First
-/// the n joints as above. Then, joint by joint, the place of its axis along its own x, y and z, and its tilt
-/// about two directions across, in units in which kUsualJointZero is the standard deviation of these as well.
-Eigen::Matrix<double, 6, Eigen::Dynamic> model_motions(const SerialChain& chain, const Eigen::VectorXd& q);
 
 }  // namespace flash::calib

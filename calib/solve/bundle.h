@@ -9,7 +9,6 @@
 #include "calib/geometry/chain.h"
 #include "calib/geometry/closed_form.h"
 #include "calib/geometry/pose.h"
-#include "calib/geometry/serial_chain.h"
 #include "calib/solve/lens_prior.h"
 #include "data/camera.h"
 
@@ -33,6 +32,9 @@ struct BundleView {
   Eigen::Matrix3Xd depth_points;  ///< on the target's plane, measured by depth, in the camera frame [m]; or
                                   ///< none
 };
+
+/// Of the zeros of joints of arms in use [rad].
+constexpr double kUsualJointZero = 0.1 * M_PI / 180;
 
 /// What is known before a picture is taken: normal distributions about what is stated.
 struct Priors {

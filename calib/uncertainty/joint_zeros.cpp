@@ -8,9 +8,9 @@ std::optional<JointZeros> joint_zeros(const Bundle& bundle, const Unknowns& unkn
                                       const Eigen::MatrixXd& covariance) {
   const SharedColumns columns = shared_columns(bundle, unknowns);
   if (columns.joint_zeros.empty() || columns.joint_zeros.front() < 0) return std::nullopt;
-  const Eigen::Index joints = bundle.joint_zeros.front().size() / kErrorsOfJoint;
-  return JointZeros{bundle.joint_zeros.front().head(joints),
-                    covariance.diagonal().segment(columns.joint_zeros.front(), joints).cwiseSqrt()};
+  const Eigen::VectorXd& zeros = bundle.joint_zeros.front();
+  return JointZeros{zeros,
+                    covariance.diagonal().segment(columns.joint_zeros.front(), zeros.size()).cwiseSqrt()};
 }
 
 }  // namespace flash::calib

@@ -66,34 +66,6 @@ TEST_F(Urdf, MotionsOfTheJointsAreDerivatives) {
   }
 }
 
-// Each axis moved along its own frame, and tilted: against the pose of a chain whose origin is so.
-TEST_F(Urdf, MotionsOfTheModelAreDerivatives) {
-  const SerialChain chain = load_urdf(write("arm.urdf", kArm), "base", "tool");
-  const Eigen::Vector3d q(0.4, -0.7, 0.12);
-  const auto J = model_motions(chain, q);
-  ASSERT_EQ(J.cols(), 3 * kErrorsOfJoint);
-  EXPECT_EQ(J.leftCols(3), joint_motions(chain, q));
-  Eigen::Index column = 3;
-  for (std::size_t k = 0; k < chain.joints.size(); ++k) {
-    if (chain.joints[k].kind == Joint::Kind::fixed) continue;
-    const Eigen::Vector3d axis = chain.joints[k].axis, across = axis.unitOrthogonal();
-    for (int error = 0; error + 1 < kErrorsOfJoint; ++error, ++column) {
-      Vector6d motion = Vector6d::Zero();
-      if (error < 3) motion[error] = kUsualAxisPlace / kUsualJointZero;
-      if (error >= 3)
-        motion.tail<3>() = kUsualAxisTilt / kUsualJointZero * (error == 3 ? across : axis.cross(across));
-      constexpr double h = 1e-5;
-      const auto moved_by = [&](double step) {
-        SerialChain other = chain;
-        other.joints[k].origin = moved(chain.joints[k].origin, step * motion);
-        return motion_between(gripper_pose(chain, q), gripper_pose(other, q));
-      };
-      const Vector6d d = (moved_by(h) - moved_by(-h)) / (2 * h);
-      EXPECT_LT((J.col(column) - d).norm(), 1e-9) << column;  // h^2 of central differences
-    }
-  }
-}
-
 TEST_F(Urdf, WhatIsNoChainIsNamed) {
   const std::string arm = write("arm.urdf", kArm);
   EXPECT_NE(data::input_error_of([&] { load_urdf(arm); }).find("eye, tool"), std::string::npos);
