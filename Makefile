@@ -33,7 +33,8 @@ demo: configure  ## Packages, build, then the main job on depth frames it makes 
 	$(sysid) import $(DEMO)/segmented/frames --trajectory $(DEMO)/recording/gripper.tum --times rate:10 \
 	  --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 --table-z 0 --crop-z 0.008: \
 	  --offset-bound 0.005 --force -o $(DEMO)/lift
-	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
+	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 \
+	  --hold areal_density=0.2:measured --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
 	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \

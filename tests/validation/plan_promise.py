@@ -65,7 +65,7 @@ def planned(runs, name, recording, asset, run):
 
 def followed(runs, asset, seed):
     truth = truth_of(seed)
-    search = ("--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes", *synthetic.axes(RANGES), "--no-plan",
+    search = ("--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes", *synthetic.axes(RANGES), "--no-plan", *synthetic.WEIGHED,
               "--rollouts", str(runs.out / "motions"))
     lift = recorded(runs, f"lift_{seed}", asset, seed, truth, *synthetic.LIFT)
     before = runs.grid(f"run_{seed}", [lift], *search)

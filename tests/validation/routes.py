@@ -55,9 +55,9 @@ def main():
         subprocess.run([options.sysid, "synth", "--asset", asset, *lift, "--seed", options.seed, "--quiet", "--force", "-o",
                         recordings[rate]], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
-    search = ("--asset", asset, "--bending", "1e-4:4e-4:5:log", "--hold", f"friction={FRICTION}:measured")
+    search = ("--asset", asset, *synthetic.WEIGHED, "--bending", "1e-4:4e-4:5:log", "--hold", f"friction={FRICTION}:measured")
     routes = {"grid": ("grid", *search), "grid, motions kept elsewhere": ("grid", *search, "--rollouts", out / "motions"),
-              "grid, a wide range": ("grid", "--asset", asset, "--bending", "1e-6:1e-3:8:log", "--hold", f"friction={FRICTION}:measured"),
+              "grid, a wide range": ("grid", "--asset", asset, *synthetic.WEIGHED, "--bending", "1e-6:1e-3:8:log", "--hold", f"friction={FRICTION}:measured"),
               "fit": ("fit", "--start", out / "grid", "--hold", f"friction={FRICTION}:measured")}
     found = {}
     for name, (verb, *words) in routes.items():
@@ -71,7 +71,7 @@ def main():
     widths = {}
     for words, name in ((("--hold", f"friction={FRICTION}:measured"), "friction measured"), (("--hold", "friction=0.5"), "friction taken for 0.5")):
         for rate in RATES:
-            each, fits = finding(options.sysid, out / "rate", "grid", recordings[rate], "--asset", asset, "--bending",
+            each, fits = finding(options.sysid, out / "rate", "grid", recordings[rate], "--asset", asset, *synthetic.WEIGHED, "--bending",
                                  "1e-4:4e-4:5:log", *words)
             show(f"{name}, {rate} frames per second", each, fits)
             low, high = each["interval95"]
