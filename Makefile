@@ -18,7 +18,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage plan-promise answer-time size-study use-study
+.PHONY: help demo configure build test validate routes coverage other-simulators plan-promise answer-time size-study use-study
 .PHONY: few-views-study knock-study locking reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
@@ -72,6 +72,10 @@ routes: configure-test  ## Say whether every route to an answer gives the same o
 coverage: configure-test  ## Say whether intervals hold the truth of RUNS strips from SEED on, and of as many that the model is wrong of
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage --seed $(SEED) --runs $(RUNS)
+
+other-simulators: configure-test  ## Search the lifts that other simulators made, from $(DATA)/twin, and say what holds
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/other_simulators.py --sysid $(sysid) --data $(DATA)/twin --out $(BUILD)/other_simulators
 
 plan-promise: configure-test  ## Say whether following the first proposal of plan narrows what it promised, on ten strips of known truth
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
