@@ -19,7 +19,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage plan-promise answer-time size-study use-study
+.PHONY: help demo configure build test validate routes coverage other-simulators plan-promise answer-time size-study use-study
 .PHONY: few-views-study knock-study locking reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
@@ -34,7 +34,8 @@ demo: configure  ## Packages, build, then the main job on depth frames it makes 
 	$(sysid) import $(DEMO)/segmented/frames --trajectory $(DEMO)/recording/gripper.tum --times rate:10 \
 	  --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 --table-z 0 --crop-z 0.008: \
 	  --offset-bound 0.005 --force -o $(DEMO)/lift
-	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 --force -o $(DEMO)/run
+	$(sysid) grid $(DEMO)/lift --asset examples/towel.json --bending 5e-5:1e-3:9:log --friction 0.2:0.4:3 \
+	  --hold areal_density=0.2:measured --force -o $(DEMO)/run
 	$(sysid) export $(DEMO)/run --force -o $(DEMO)/tuned.json
 	@printf '\n%s\n' 'Tuned asset: $(abspath $(DEMO)/tuned.json)' \
 	  'Report:      $(abspath $(DEMO)/run/report.html)   (open it in a browser)' \
@@ -72,6 +73,10 @@ routes: configure-test  ## Say whether every route to an answer gives the same o
 coverage: configure-test  ## Say whether intervals hold the truth of RUNS strips from SEED on, and of as many that the model is wrong of
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage --seed $(SEED) --runs $(RUNS)
+
+other-simulators: configure-test  ## Search the lifts that other simulators made, from $(DATA)/twin, and say what holds
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/other_simulators.py --sysid $(sysid) --data $(DATA)/twin --out $(BUILD)/other_simulators
 
 plan-promise: configure-test  ## Say whether following the first proposal of plan narrows what it promised, on ten strips of known truth
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid

@@ -51,7 +51,8 @@ sysid::Hold hold_of(const std::string& text, const sysid::Summary& found) {
     throw data::InputError("--hold " + text + ": the search neither found nor held it, expected " + text +
                            "=value");
   const auto fixed = found.fixed.find(text);
-  return {{text, {value->second}, false}, fixed != found.fixed.end() && fixed->second.source == "measured"};
+  if (fixed == found.fixed.end()) return {{text, {value->second}, false}};
+  return {{text, {value->second}, false}, fixed->second.source == "measured", fixed->second.deviation};
 }
 
 // What the search held stays held, unless it is said otherwise, and what it found is where the fit begins.
@@ -69,7 +70,8 @@ Start start_of(const FitOptions& options, const sysid::SearchFolder& search) {
     holds.push_back(std::move(hold));
   }
   for (const auto& [name, fixed] : found.fixed)
-    if (!is_held(name) && fixed.source == "measured") holds.push_back({{name, {fixed.value}, false}, true});
+    if (!is_held(name) && (fixed.source == "measured" || fixed.deviation))
+      holds.push_back({{name, {fixed.value}, false}, fixed.source == "measured", fixed.deviation});
   Start start;
   for (const sysid::Axis& axis : search.results.axes) {
     if (is_held(axis.name)) continue;

@@ -227,8 +227,20 @@ std::vector<sysid::Axis> axes_of(const std::vector<sysid::Hold>& holds) {
   return axes;
 }
 
+std::vector<sysid::Axis> parse_values(const std::vector<std::string>& texts) {
+  const std::vector<sysid::Hold> holds = parse_holds(texts);
+  for (const sysid::Hold& hold : holds)
+    if (hold.deviation)
+      throw data::InputError("--hold " + hold.axis.name +
+                             ": found a standard deviation, expected one value: nothing is estimated here");
+  return axes_of(holds);
+}
+
 void add_holds(const std::vector<sysid::Hold>& holds, sysid::GridSettings& settings) {
-  for (const sysid::Hold& hold : holds) (hold.measured ? settings.fixed : settings.axes).push_back(hold.axis);
+  for (const sysid::Hold& hold : holds) {
+    (hold.measured ? settings.fixed : settings.axes).push_back(hold.axis);
+    if (hold.deviation) settings.deviations[hold.axis.name] = *hold.deviation;
+  }
 }
 
 sysid::Axis parse_searched(const std::string& name, const std::string& specification) {

@@ -61,6 +61,8 @@ void take_search(const std::string& folder, sysid::PlanSettings& settings) {
   }
   for (const auto& [name, fixed] : summary.fixed)
     if (fixed.source == "measured") settings.grid.fixed.push_back({name, {fixed.value}, false});
+  for (const auto& [name, fixed] : summary.fixed)
+    if (fixed.deviation) settings.grid.deviations[name] = *fixed.deviation;
   std::vector<sysid::Misfit> misfits;
   double duration = 0;
   for (const sysid::SummaryRecording& recording : summary.recordings) {

@@ -155,7 +155,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (options.common.verbose)
     for (const std::string& notice : replay.notices) say(options.common, notice);
   std::vector<std::string> notices;
-  const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
+  const std::vector<sysid::Axis> axes = parse_values(options.holds);
   const sysid::MaterialBase base = material_base(asset, replay.sheet(), notices, axes);
   sysid::check_axes(axes, base);
   sysid::check_grasp_axes(axes, {replay});

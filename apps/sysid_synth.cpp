@@ -109,7 +109,7 @@ int run_twin(const SynthOptions& options) {
   settings.element_order = asset.element_order;
   const sysid::Replay replay = sysid::make_replay(recording, settings);
   std::vector<std::string> notices;
-  const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
+  const std::vector<sysid::Axis> axes = parse_values(options.holds);
   const sysid::MaterialBase base = material_base(asset, replay.sheet(), notices, axes);
   sysid::check_axes(axes, base);
   std::vector<double> values;
@@ -155,7 +155,7 @@ int run_synth(SynthOptions options) {
                                   : data::is_mesh_spec(mesh_spec) ? data::parse_mesh_spec(mesh_spec, "--mesh")
                                                                   : data::load_triangle_mesh(mesh_spec);
   std::vector<std::string> notices;
-  const std::vector<sysid::Axis> axes = axes_of(parse_holds(options.holds));
+  const std::vector<sysid::Axis> axes = parse_values(options.holds);
   const sysid::MaterialBase base = material_base(asset, sim::make_sheet(mesh), notices, axes);
   std::vector<double> values;
   for (const sysid::Axis& axis : axes) values.push_back(axis.values.front());

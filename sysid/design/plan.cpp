@@ -74,6 +74,7 @@ Asked with_held(const PlanSettings& settings, const std::vector<Replay>& replays
     }
   }
   for (const HeldParameter& held : all) {
+    std::erase_if(asked.grid.fixed, [&](const Axis& axis) { return axis.name == held.name; });
     const auto [low, high] = held.values;
     const bool logarithmic = low > 0;
     asked.grid.axes.push_back({held.name, {low, high}, logarithmic});
@@ -160,12 +161,14 @@ Misfit expected_misfit(const std::vector<Misfit>& misfits) {
   const auto count = static_cast<double>(misfits.size());
   for (const Misfit& misfit : misfits) {
     expected.noise += misfit.noise * misfit.noise / count;
+    expected.rough += misfit.rough * misfit.rough / count;
     expected.size += misfit.size * misfit.size / count;
+    expected.rms += misfit.rms * misfit.rms / count;
     expected.reach_time += misfit.reach_time / count;
     expected.reach_sheet += misfit.reach_sheet / count;
   }
-  expected.noise = std::sqrt(expected.noise);
-  expected.size = std::sqrt(expected.size);
+  for (double Misfit::*const each : {&Misfit::noise, &Misfit::rough, &Misfit::size, &Misfit::rms})
+    expected.*each = std::sqrt(expected.*each);
   return expected;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include <atomic>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -21,6 +22,8 @@ struct GridSettings {
   MaterialBase base;
   std::vector<Axis> axes;   ///< searched; the last runs fastest
   std::vector<Axis> fixed;  ///< one value each
+  std::map<std::string, double> deviations =
+      {};  ///< standard deviation of what is held, where one was stated
   ScoreSettings score;
   int envs = 64;  ///< candidates in a batch, at most
   int threads = 1;

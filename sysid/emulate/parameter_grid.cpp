@@ -121,7 +121,7 @@ Axis parse_axis(const std::string& name, const std::string& specification) {
 }
 
 Hold parse_hold(const std::string& text) {
-  constexpr std::string_view kMeasured = ":measured";
+  constexpr std::string_view kMeasured = ":measured", kDeviation = "+-";
   const std::size_t equals = text.find('=');
   if (equals == std::string::npos)
     throw data::InputError("--hold: \"" + text +
@@ -132,12 +132,20 @@ Hold parse_hold(const std::string& text) {
   std::string_view word = std::string_view(text).substr(equals + 1);
   const bool measured = word.ends_with(kMeasured);
   if (measured) word.remove_suffix(kMeasured.size());
-  const std::optional<double> value = data::parse_number(word);
+  const std::size_t sign = word.find(kDeviation);
+  const std::optional<double> value = data::parse_number(word.substr(0, sign));
   if (!value || !std::isfinite(*value))
     throw data::InputError(where + ": found \"" + std::string(word) +
                            "\", expected a number, or one with :measured");
   check_range(where, info, *value);
-  return {{name, {*value}, false}, measured};
+  Hold hold{{name, {*value}, false}, measured};
+  if (sign == std::string_view::npos) return hold;
+  const std::string_view behind = word.substr(sign + kDeviation.size());
+  hold.deviation = data::parse_number(behind);
+  if (!hold.deviation || !(*hold.deviation > 0) || !std::isfinite(*hold.deviation))
+    throw data::InputError(where + ": found \"" + std::string(behind) +
+                           "\", expected a standard deviation above 0, as 0.3+-0.02");
+  return hold;
 }
 
 std::vector<std::vector<double>> cartesian_product(const std::vector<Axis>& axes) {

@@ -42,10 +42,13 @@ Axis parse_axis(const std::string& name, const std::string& specification);
 /// A parameter that is held at a value.
 struct Hold {
   Axis axis;              ///< of one value
-  bool measured = false;  ///< it counts as known; else it is an assumption
+  bool measured = false;  ///< else it is an assumption
+  std::optional<double> deviation =
+      {};  ///< standard deviation; without one, what is measured counts as known
 };
 
-/// "friction=0.3", or "friction=0.3:measured". Throws data::InputError naming --hold.
+/// "friction=0.3", "friction=0.3:measured", or "friction=0.3+-0.02:measured" with a standard deviation.
+/// Throws data::InputError naming --hold.
 Hold parse_hold(const std::string& text);
 
 /// Every combination of values, one a candidate; its index is the candidate's id, the last axis runs fastest.

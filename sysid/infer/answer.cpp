@@ -184,6 +184,9 @@ std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
   return motions;
 }
 
+/// Friction, weight, start yaw and table height, and what was stated with a deviation, to both sides.
+std::size_t most_held_motions(const GridSettings& grid) { return 2 * (4 + grid.deviations.size()); }
+
 enum class Settled { yes, at_points, elsewhere };
 
 /// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
@@ -298,8 +301,7 @@ std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
 }  // namespace
 
 AnswerWork most_design_work(const GridSettings& grid, std::size_t recordings) {
-  constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
-  const std::size_t motions = kRounds * (2 * kFew + motions_at_estimate) + kHeld;
+  const std::size_t motions = kRounds * (2 * kFew + motions_at_estimate) + most_held_motions(grid);
   return {static_cast<int>(recordings * motions), 2 * kRounds * most_scores(grid.axes)};
 }
 
@@ -327,9 +329,8 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
-  constexpr std::size_t kHeld = 6;  // of three parameters, to both sides
-  std::size_t motions =
-      motions_at_estimate + 4 + kHeld + kRounds * (own + motions_at_estimate + (solver_check ? finer : 0));
+  std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) +
+                        kRounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
   const int looks = 2 * (own > 0 ? 1 + kRounds : 1);
   return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};

@@ -253,6 +253,7 @@ double DiscrepancyModel::deviance_at(const Eigen::VectorXd& residuals, std::size
 
 void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
   const Reduced reduced = reduce(residuals);
+  misfit_.rough = noise_;
   misfit_.explained = explained_;
   misfit_.keyframes = keyframes_;
   if (!noise_is_told_) {
@@ -262,7 +263,7 @@ void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
         along_.values.cwiseAbs2() * variances_along(along_, fields_[longest].shape.reach_sheet);
     variances_.assign(fields_.size(), 0);
     variances_[longest] = noise_ * noise_ / at_rows.mean();
-    misfit_.size = noise_;
+    misfit_.size = misfit_.rms = noise_;
     misfit_.reach_time = fields_[longest].shape.reach_time;
     misfit_.reach_sheet = fields_[longest].shape.reach_sheet;
     return;
@@ -282,20 +283,23 @@ void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
   misfit_.gain = std::max(0.0, without - least);
   misfit_.found = misfit_.gain > kOnceInTwenty;
   variances_.assign(fields_.size(), 0);
-  double total = 0;
+  double total = 0, squares = 0;
   for (std::size_t f = 0, i = 0; f < fields_.size(); ++f)
     for (std::size_t s = 0; s < sizes_.size(); ++s, ++i) {
-      const double weight = priors_[s] * std::exp(-0.5 * (deviances[i] - least));
+      const double weight = priors_[s] * std::exp(-0.5 * (deviances[i] - least)),
+                   square = std::max(weight * sizes_[s] * sizes_[s], std::numeric_limits<double>::min());
       total += weight;
-      variances_[f] += weight * sizes_[s] * sizes_[s];
+      squares += square;
+      variances_[f] += square;
       misfit_.size += weight * sizes_[s];
-      misfit_.reach_time += weight * fields_[f].shape.reach_time;
-      misfit_.reach_sheet += weight * fields_[f].shape.reach_sheet;
+      misfit_.reach_time += square * fields_[f].shape.reach_time;
+      misfit_.reach_sheet += square * fields_[f].shape.reach_sheet;
     }
   for (double& variance : variances_) variance /= total;
   misfit_.size /= total;
-  misfit_.reach_time /= total;
-  misfit_.reach_sheet /= total;
+  misfit_.rms = std::sqrt(squares / total);
+  misfit_.reach_time /= squares;
+  misfit_.reach_sheet /= squares;
 }
 
 Eigen::MatrixXd DiscrepancyModel::covariance_of(const Eigen::MatrixXd& combinations, bool independent) const {

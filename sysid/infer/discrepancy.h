@@ -21,9 +21,11 @@ struct ObservedRows {
 
 /// What the residuals say of the error of the model itself.
 struct Misfit {
-  double noise = 0;        ///< standard deviation by which neighbours differ [m]
-  double size = 0;         ///< tau: that of the discrepancy, posterior mean [m]
-  double reach_time = 0;   ///< over which it agrees, posterior mean [s]
+  double noise = 0;  ///< standard deviation by which neighbours differ [m]
+  double rough = 0;  ///< that of all that the discrepancy leaves: noise, and what is rough in an error [m]
+  double size = 0;   ///< tau: that of the discrepancy, posterior mean [m]
+  double rms = 0;    ///< its root mean square, of which an interval has to allow for all [m]
+  double reach_time = 0;   ///< over which it agrees, posterior mean where it counts by its square [s]
   double reach_sheet = 0;  ///< [m]
   double gain = 0;         ///< fall of -2 log likelihood against a discrepancy of the size `explained`
   bool found = false;      ///< the gain is more than chance gives once in twenty

@@ -73,7 +73,11 @@ void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const st
   for (std::size_t e = 0; e < errors.size(); ++e)
     for (const HeldParameter& held : held_parameters(task.grid, task.replays))
       if (errors[e].name == held.name && likelihood.spread_of(e) < kFarBetter)
-        warnings.push_back(held.name + " was not measured, and the recordings tell it: search it as well");
+        warnings.push_back(held.name +
+                           (task.grid.deviations.contains(held.name)
+                                ? " is told by the recordings far better than was stated"
+                                : " was not measured, and the recordings tell it") +
+                           ": search it as well");
 }
 
 std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,

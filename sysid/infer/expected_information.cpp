@@ -29,7 +29,7 @@ Eigen::MatrixXd inverse_root(const Eigen::MatrixXd& information) {
 Eigen::MatrixXd covariance_of_discrepancy(const ObservedRows& rows, const Misfit& misfit,
                                           const Eigen::MatrixXd& combinations) {
   const SheetModes modes = sheet_modes(rows.places);
-  const Eigen::VectorXd along = misfit.size * misfit.size * variances_along(modes, misfit.reach_sheet);
+  const Eigen::VectorXd along = misfit.rms * misfit.rms * variances_along(modes, misfit.reach_sheet);
   const Eigen::Index count = along.size();
   const auto keyframes = static_cast<Eigen::Index>(rows.times.size());
   const int channels = 1 + *std::max_element(rows.channel.begin(), rows.channel.end());
@@ -81,9 +81,9 @@ Eigen::MatrixXd expected_information(const ObservedRows& rows, const Misfit& mis
     const Eigen::MatrixXd by_beside =
         (slopes.transpose() * beside) * priors.cwiseSqrt().cwiseInverse().asDiagonal();
     Eigen::MatrixXd covariance =
-        misfit.noise * misfit.noise * slopes.transpose() * spreads.asDiagonal() * slopes +
+        misfit.rough * misfit.rough * slopes.transpose() * spreads.asDiagonal() * slopes +
         by_beside * by_beside.transpose();
-    if (misfit.size > 0) covariance += covariance_of_discrepancy(rows, misfit, slopes);
+    if (misfit.rms > 0) covariance += covariance_of_discrepancy(rows, misfit, slopes);
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
     const double next =
         std::max(spread * std::sqrt(std::max(eigen.eigenvalues().maxCoeff(), 0.0)), misfit.noise);

@@ -6,11 +6,31 @@
 namespace flash::sysid {
 namespace {
 
-bool is_known(const std::string& name, const GridSettings& grid) {
-  const auto named = [&](const Axis& axis) { return axis.name == name; };
-  return std::any_of(grid.fixed.begin(), grid.fixed.end(), named) ||
-         std::any_of(grid.axes.begin(), grid.axes.end(),
-                     [&](const Axis& axis) { return named(axis) && axis.values.size() > 1; });
+constexpr double kFriction = 2, kWeight = 1.1;  // factors within which both are known unless measured
+
+bool is_searched(const std::string& name, const GridSettings& grid) {
+  return std::any_of(grid.axes.begin(), grid.axes.end(),
+                     [&](const Axis& axis) { return axis.name == name && axis.values.size() > 1; });
+}
+
+/// Known, or stated with a deviation.
+bool is_stated(const std::string& name, const GridSettings& grid) {
+  return is_searched(name, grid) || grid.deviations.contains(name) ||
+         std::any_of(grid.fixed.begin(), grid.fixed.end(),
+                     [&](const Axis& axis) { return axis.name == name; });
+}
+
+const Axis* axis_of(const std::string& name, const GridSettings& grid) {
+  for (const std::vector<Axis>* axes : {&grid.fixed, &grid.axes})
+    for (const Axis& axis : *axes)
+      if (axis.name == name) return &axis;
+  return nullptr;
+}
+
+/// One deviation to both sides; by a factor where that would leave what is possible.
+std::array<double, 2> within(double value, double deviation, double lowest) {
+  if (value - deviation > lowest || value <= 0) return {value - deviation, value + deviation};
+  return {value * value / (value + deviation), value + deviation};
 }
 
 }  // namespace
@@ -19,20 +39,29 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
   std::vector<double> first;
   for (const Axis& axis : grid.axes) first.push_back(axis.values.front());
   const ReplayCandidate candidate = candidate_at(first, grid);
-  const double friction = candidate.solid ? candidate.solid->friction : candidate.material.friction;
   std::vector<HeldParameter> held;
-  const auto add = [&](const char* name, double low, double high) {
-    if (!is_known(name, grid)) held.push_back({name, {low, high}});
+  for (const ParameterInfo& info : known_parameters()) {
+    const auto stated = grid.deviations.find(info.name);
+    const Axis* const axis = axis_of(info.name, grid);
+    if (stated != grid.deviations.end() && axis != nullptr && axis->values.size() == 1)
+      held.push_back({info.name, within(axis->values.front(), stated->second, info.low)});
+  }
+  const auto add = [&](const char* name, double value, double factor) {
+    if (!is_stated(name, grid)) held.push_back({name, {value / factor, factor * value}});
   };
   if (std::any_of(replays.begin(), replays.end(), [](const Replay& r) { return r.recording.has_table; }))
-    add("friction", friction / 2, 2 * friction);
+    add("friction", candidate.solid ? candidate.solid->friction : candidate.material.friction, kFriction);
+  if (candidate.solid)
+    add("density", candidate.solid->density, kWeight);
+  else
+    add("areal_density", candidate.material.areal_density, kWeight);
   double yaw = 0, height = 0;
   for (const Replay& replay : replays) {
     yaw = std::max(yaw, replay.recording.nuisance.start_yaw);
     height = std::max(height, replay.recording.nuisance.table_height);
   }
   const auto add_bound = [&](const char* name, double bound) {
-    if (bound > 0 && !is_known(name, grid))
+    if (bound > 0 && !is_stated(name, grid))
       held.push_back({name, {-bound / std::sqrt(3.0), bound / std::sqrt(3.0)}, false});
   };
   add_bound("start_yaw", yaw);

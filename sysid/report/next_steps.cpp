@@ -108,9 +108,11 @@ std::vector<std::string> standing_unknowns(const Summary& summary) {
   for (const ParameterFinding& finding : summary.parameters)
     searched_density = searched_density || finding.name == density;
   if (!searched_density && !is_fixed_as(summary, density, "measured"))
-    unknowns.push_back(std::string("The weight: the ") + (solid ? "density" : "areal density") +
-                       " is taken from the asset, and every stiffness scales with it. Weigh the " +
-                       (solid ? "object." : "sheet."));
+    unknowns.push_back(
+        std::string("The weight: the ") + (solid ? "density" : "areal density") +
+        " is taken from the asset and counts as known to 10 %. Every stiffness scales with it. "
+        "Weigh the " +
+        (solid ? "object" : "sheet") + ": --hold " + density + "=VALUE:measured");
   std::string assumed;
   for (const auto& [name, fixed] : summary.fixed)
     if (fixed.source == "assumed" && name != density)

@@ -81,6 +81,7 @@ Json fixed_of(const Summary& summary, bool has_thickness) {
     add_label(entry, name, has_thickness);
     entry["value"] = fixed.value;
     entry["source"] = fixed.source;
+    if (const auto held = summary.held.find(name); held != summary.held.end()) entry["within"] = held->second;
     list.push_back(entry);
   }
   return list;

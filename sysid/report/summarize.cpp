@@ -10,6 +10,7 @@
 #include "data/recording_digest.h"
 #include "data/text.h"
 #include "sysid/emulate/candidate_lines.h"
+#include "sysid/infer/held.h"
 #include "sysid/observe/registration_parameter.h"
 
 namespace flash::sysid {
@@ -59,6 +60,9 @@ std::map<std::string, FixedParameter> fixed_of(const Summary& summary, const Gri
     if (fixed.count(name) || follows_young || (axis && axis->values.size() > 1)) continue;
     fixed[name] = {summary.best.at(name), "assumed"};
   }
+  for (auto& [name, each] : fixed)
+    if (const auto stated = settings.deviations.find(name); stated != settings.deviations.end())
+      each.deviation = stated->second;
   return fixed;
 }
 
@@ -280,6 +284,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   if (summary.parameters.size() == answer.parameters.size()) summary.covariance_log = answer.covariance_log;
   if (answer.samples.rows() > 0) summary.samples = some_samples(answer);
   summary.fixed = fixed_of(summary, settings);
+  for (const HeldParameter& held : held_parameters(settings, replays)) summary.held[held.name] = held.values;
   for (std::size_t r = 0; r < replays.size(); ++r) {
     const Misfit misfit = r < answer.misfits.size() ? answer.misfits[r] : Misfit{};
     summary.recordings.push_back(

@@ -59,7 +59,9 @@ Json to_json(const SummaryRecording& recording) {
   json["nuisance"] = recording.nuisance;
   json["score"] = number(recording.score);
   json["noise_m"] = number(recording.misfit.noise);
+  json["rough_m"] = number(recording.misfit.rough);
   json["misfit_m"] = number(recording.misfit.size);
+  json["misfit_rms_m"] = number(recording.misfit.rms);
   json["misfit_explained_m"] = number(recording.misfit.explained);
   json["misfit_reach_s"] = number(recording.misfit.reach_time);
   json["misfit_reach_m"] = number(recording.misfit.reach_sheet);
@@ -144,9 +146,11 @@ ParameterFinding read_finding(const std::string& name, const data::JsonObject& j
 }
 
 SummaryRecording read_recording(const data::JsonObject& json) {
-  json.expect_fields({"name", "sha256", "offset", "yaw", "time_offset", "nuisance", "score", "noise_m",
-                      "misfit_m", "misfit_explained_m", "misfit_reach_s", "misfit_reach_m", "misfit_gain",
-                      "model_fits", "keyframes", "keyframes_worth", "markers", "horizon_s", "frames"});
+  json.expect_fields(
+      {"name",           "sha256",         "offset",      "yaw",        "time_offset",  "nuisance",
+       "score",          "noise_m",        "rough_m",     "misfit_m",   "misfit_rms_m", "misfit_explained_m",
+       "misfit_reach_s", "misfit_reach_m", "misfit_gain", "model_fits", "keyframes",    "keyframes_worth",
+       "markers",        "horizon_s",      "frames"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -158,6 +162,9 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   Misfit& misfit = recording.misfit;
   misfit.noise = score_of(json, "noise_m");
   misfit.size = score_of(json, "misfit_m");
+  // Earlier programs stated one noise and one size.
+  misfit.rough = json.has("rough_m") ? score_of(json, "rough_m") : misfit.noise;
+  misfit.rms = json.has("misfit_rms_m") ? score_of(json, "misfit_rms_m") : misfit.size;
   misfit.explained = score_of(json, "misfit_explained_m");
   misfit.reach_time = score_of(json, "misfit_reach_s");
   misfit.reach_sheet = score_of(json, "misfit_reach_m");
@@ -355,8 +362,12 @@ std::string summary_text(const Summary& summary) {
     json["parameters"][finding.name] = to_json(finding);
   }
   json["fixed"] = Json::object();
-  for (const auto& [name, fixed] : summary.fixed)
+  for (const auto& [name, fixed] : summary.fixed) {
     json["fixed"][name] = {{"value", fixed.value}, {"source", fixed.source}};
+    if (fixed.deviation) json["fixed"][name]["deviation"] = *fixed.deviation;
+  }
+  json["held"] = Json::object();
+  for (const auto& [name, between] : summary.held) json["held"][name] = between;
   json["covariance_log"] = to_json(summary.covariance_log);
   json["samples"] = to_json(summary.samples);
   json["next_experiments"] = Json::array();
@@ -393,11 +404,12 @@ Summary load_summary(const std::string& path) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject json(file, path);
   if (json.string("schema") != schema) throw json.error("schema", schema);
-  json.expect_fields({"schema",          "tool_version", "best",           "axes",           "parameters",
-                      "fixed",           "samples",      "covariance_log", "recordings",     "solver_check",
-                      "settings",        "asset",        "candidates",     "unconverged",    "device",
-                      "wall_seconds",    "warnings",     "exit_code",      "results_digest", "digest",
-                      "next_experiments"});
+  json.expect_fields({"schema",           "tool_version", "best",           "axes",
+                      "parameters",       "fixed",        "samples",        "covariance_log",
+                      "recordings",       "solver_check", "settings",       "asset",
+                      "candidates",       "unconverged",  "device",         "wall_seconds",
+                      "warnings",         "exit_code",    "results_digest", "digest",
+                      "next_experiments", "held"});
   check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
@@ -410,8 +422,13 @@ Summary load_summary(const std::string& path) {
   const data::JsonObject parameters = json.object("parameters");
   for (const std::string& name : typed<std::vector<std::string>>(json, "axes", "a list of names"))
     summary.parameters.push_back(read_finding(name, parameters.object(name.c_str())));
-  for (const auto& [name, fixed] : json.members("fixed"))
+  for (const auto& [name, fixed] : json.members("fixed")) {
     summary.fixed[name] = {fixed.number("value"), fixed.string("source")};
+    if (fixed.has("deviation")) summary.fixed[name].deviation = fixed.number("deviation");
+  }
+  if (json.has("held"))  // earlier programs named none
+    summary.held =
+        typed<std::map<std::string, std::array<double, 2>>>(json, "held", "pairs of numbers by name");
   summary.covariance_log = read_matrix(json, "covariance_log");
   summary.samples = read_matrix(json, "samples", static_cast<Eigen::Index>(summary.parameters.size()));
   if (json.has("next_experiments"))  // earlier programs ranked none

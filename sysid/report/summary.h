@@ -16,7 +16,8 @@ namespace flash::sysid {
 /// A parameter that was not searched.
 struct FixedParameter {
   double value = 0;
-  std::string source = "assumed";  ///< "measured" or "assumed"
+  std::string source = "assumed";        ///< "measured" or "assumed"
+  std::optional<double> deviation = {};  ///< standard deviation, where one was stated
 };
 
 struct SummaryFrame {
@@ -68,6 +69,8 @@ struct Summary {
   double score_on_mesh = 0;  ///< of the estimate on the mesh that was searched, as a replay gives it [m]
   std::vector<ParameterFinding> parameters;  ///< the searched ones, in the order of the axes
   std::map<std::string, FixedParameter> fixed;
+  /// Priors of what was not searched and counts as unknown: one standard deviation to both sides.
+  std::map<std::string, std::array<double, 2>> held;
   Eigen::MatrixXd covariance_log;  ///< of log(parameter) in the order of `parameters`; empty: not estimated
   Eigen::MatrixXd samples;         ///< of the posterior: a draw a row, in the order of `parameters`
   std::vector<NextExperiment> next_experiments;  ///< best first; empty: they were not ranked

@@ -53,7 +53,7 @@ def main():
         if options.only not in (None, name):
             continue
         words = [word for key, values in ranges.items() for word in (f"--{key}", values)]
-        search = [*map(str, recordings), "--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes", *words, "--threads", "2",
+        search = [*map(str, recordings), "--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes", *words, *synthetic.WEIGHED, "--threads", "2",
                   "--quiet", "-o", str(options.out / name)]
         for attempt in ("first", "again"):  # the first simulates what is not kept yet
             begin = time.monotonic()

@@ -53,7 +53,8 @@ def planned(runs, name, recording, asset, run):
     path = runs.out / f"{name}.json"
     if not path.exists():
         done = subprocess.run([runs.sysid, "plan", str(recording), "--asset", asset, "--run", str(run), "--mesh", synthetic.FIT,
-                               "--clamp-slopes", "--quiet", "-o", str(path)], capture_output=True, text=True)
+                               "--clamp-slopes", "--quiet", *runs.threads, "-o", str(path)],
+                              capture_output=True, text=True)
         if done.returncode != 0:
             sys.exit(done.stderr)
     plan = json.loads(path.read_text())
@@ -65,7 +66,7 @@ def planned(runs, name, recording, asset, run):
 
 def followed(runs, asset, seed):
     truth = truth_of(seed)
-    search = ("--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes", *synthetic.axes(RANGES), "--no-plan",
+    search = ("--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes", *synthetic.axes(RANGES), "--no-plan", *synthetic.WEIGHED,
               "--rollouts", str(runs.out / "motions"))
     lift = recorded(runs, f"lift_{seed}", asset, seed, truth, *synthetic.LIFT)
     before = runs.grid(f"run_{seed}", [lift], *search)
@@ -83,13 +84,16 @@ def main():
     parser.add_argument("--out", required=True, type=pathlib.Path)
     parser.add_argument("--seed", type=int, default=9401)
     parser.add_argument("--runs", type=int, default=10)
+    parser.add_argument("--jobs", type=int, default=1, help="seeds at a time")
+    parser.add_argument("--threads", type=int, help="of each search; without it, as many as there are processors")
+    parser.add_argument("--minutes", type=float, help="after which no seed is begun")
     options = parser.parse_args()
-    runs = kept.Runs(options.sysid, options.out)
+    runs = kept.Runs(options.sysid, options.out, options.threads)
     asset = synthetic.write_asset(options.out)
     print("seed   proposed         bits  parameter    before  promised     after  after/promised  truth inside")
     ratios, held, table = [], [], []
-    for seed in range(options.seed, options.seed + options.runs):
-        case = followed(runs, asset, seed)
+    seeds = range(options.seed, options.seed + options.runs)
+    for seed, case in kept.each_in_time(lambda seed: followed(runs, asset, seed), seeds, options.jobs, options.minutes):
         for name in RANGES:
             low, high = case["parameters"][name]["interval95"]
             ratios.append(case["after"][name] / case["promised"][name])

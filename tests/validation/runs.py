@@ -1,6 +1,8 @@
 """Runs of flash-sysid that are kept and not repeated."""
+import concurrent.futures
 import csv
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -10,9 +12,10 @@ import time
 class Runs:
     """Each run has a folder below `out`; one that holds the answer to the same command is left alone."""
 
-    def __init__(self, sysid, out):
+    def __init__(self, sysid, out, threads=None):
         self.sysid = str(sysid)
         self.out = pathlib.Path(out)
+        self.threads = [] if threads is None else ["--threads", str(threads)]
 
     def grid(self, name, recordings, *options, horizon=False):
         """The summary of a search, with the rows of results.csv as `rows`. Exit code 3 (finished, but nothing is
@@ -22,7 +25,7 @@ class Runs:
                    str(folder)]
         if not self._done(folder, command, "summary.json"):
             begun = self._same(folder, command) and (folder / "results.csv").exists()
-            self._call(folder, command, ["--resume"] if begun else ["--force"])
+            self._call(folder, command, [*self.threads, "--resume" if begun else "--force"])
         summary = json.loads((folder / "summary.json").read_text())
         with open(folder / "results.csv", newline="") as file:
             rows = [{key: _number(text) for key, text in row.items()} for row in csv.DictReader(file)]
@@ -71,6 +74,19 @@ class Runs:
             sys.exit(f"validate: {' '.join(command)}\n{done.stderr}")
         print(f"{time.monotonic() - begin:6.0f} s  {folder.relative_to(self.out)}", flush=True)
         return done.stdout
+
+
+def each_in_time(task, items, jobs, minutes=None):
+    """Pairs of an item and what `task` makes of it, `jobs` at a time, in the order in which they are done. After so many minutes
+    none is begun any more."""
+    end = math.inf if minutes is None else time.monotonic() + 60 * minutes
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        begun = {pool.submit(lambda item=item: task(item) if time.monotonic() < end else None): item for item in items}
+        for done in concurrent.futures.as_completed(begun):
+            if isinstance(done.exception(), SystemExit):
+                print(done.exception(), flush=True)  # the others go on
+            elif done.result() is not None:
+                yield begun[done], done.result()
 
 
 def _number(text):

@@ -10,6 +10,7 @@ import random
 ASSET = {"schema": "flash-asset/1", "mesh": "sheet:0.2x0.025:0.00625", "element_type": "TRIANGLE",
          "mechanical_props": {"areal_density": 0.2, "young": 10.0, "poisson": 0.3, "constitutive": "TRI_COROTATED",
                               "bending_rigidity": 2e-4, "friction": 0.3}}
+WEIGHED = ("--hold", f"areal_density={ASSET['mechanical_props']['areal_density']}:measured")
 STRIP = "sheet:0.2x0.025:"
 LIFT = ("--kind", "corner_lift", "--displacement=-0.03,0,0.06", "--duration", "0.8", "--rate", "20", "--grasp-within", "0.0501",
         "--clamp-slopes", "--camera", "0.1,-0.35,0.3", "--camera", "0.35,0.3,0.3", "--resolution", "64x48", "--noise", "0.001")
@@ -48,7 +49,7 @@ def searched(runs, asset, seed):
     truth = truth_of(seed)
     recording = runs.synth(f"coverage/recording_{seed:03d}", asset, "--mesh", TRUTH, *LIFT, "--seed", str(seed), *settings(truth))
     summary = runs.grid(f"coverage/run_{seed:03d}", [recording], "--asset", asset, "--mesh", FIT, "--clamp-slopes",
-                        *axes(RANGES), "--rollouts", str(runs.out / "coverage" / "rollouts"))
+                        *axes(RANGES), *WEIGHED, "--rollouts", str(runs.out / "coverage" / "rollouts"))
     return {"seed": seed, "truth": truth, "parameters": summary["parameters"], "solver_check": summary["solver_check"]}
 
 
@@ -113,14 +114,14 @@ def lift(runs, bending, seed, relabel=None):
         recording.write_text(text)
         run += f"_{relabel}"
     return runs.grid(run, [recording], "--asset", asset, "--mesh", STRIP + cell, "--clamp-slopes", "--bending", values,
-                     "--poisson", "0:0.45:3", "--hold", "friction=0.3:measured", "--rollouts", str(runs.out / name / "rollouts"))
+                     "--poisson", "0:0.45:3", "--hold", "friction=0.3:measured", *WEIGHED, "--rollouts", str(runs.out / name / "rollouts"))
 
 
 def bar_pull(runs, seed):
     asset = write_asset(runs.out, "bar.json", young=BAR_MATERIAL["young"])
     recording = runs.synth(f"bar_pull/recording_{seed:02d}", asset, *BAR, "--seed", str(seed))
     return runs.grid(f"bar_pull/run_{seed:02d}", [recording], "--asset", asset, "--mesh", "sheet:0.3x0.3:0.025",
-                     "--young", "25:100:7:log", "--poisson", "0.1:0.45:6", "--hold", "friction=0.3:measured", "--rollouts",
+                     "--young", "25:100:7:log", "--poisson", "0.1:0.45:6", "--hold", "friction=0.3:measured", *WEIGHED, "--rollouts",
                      str(runs.out / "bar_pull" / "rollouts"))
 
 

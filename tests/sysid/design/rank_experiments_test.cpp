@@ -17,8 +17,8 @@ PlanSettings settings_of(double young_spread, double bending_spread) {
   settings.at = {3e3, 2e-4};
   KnownSoFar known;
   known.covariance = Eigen::Vector2d(young_spread, bending_spread).cwiseAbs2().asDiagonal();
-  known.misfit.noise = 1e-3;
-  known.misfit.size = 1e-3;
+  known.misfit.noise = known.misfit.rough = 1e-3;
+  known.misfit.rms = 1e-3;
   known.misfit.reach_time = 0.5;
   known.misfit.reach_sheet = 0.1;
   settings.known = known;
@@ -78,7 +78,7 @@ TEST(RankExperiments, ALargerMisfitPromisesLess) {
   const MotionStore store(folder / "motions");
   PlanSettings settings = settings_of(0.01, 1);
   const double bits = plan_experiment("again", {lift}, settings, &store).bits;
-  settings.known->misfit.size = 2e-2;
+  settings.known->misfit.rms = 2e-2;
   EXPECT_LT(plan_experiment("again", {lift}, settings, &store).bits, 0.5 * bits);
 }
 

@@ -84,6 +84,18 @@ TEST(ParameterGrid, AHeldValueIsAssumedUnlessItWasMeasured) {
   EXPECT_EQ(measured.axis.values, std::vector<double>{0.3});
   EXPECT_FALSE(assumed.measured);
   EXPECT_TRUE(measured.measured);
+  EXPECT_FALSE(measured.deviation.has_value());
+  const Hold near = parse_hold("friction=0.3+-0.02:measured"), about = parse_hold("start_yaw=-0.1+-1e-2");
+  EXPECT_EQ(near.axis.values, std::vector<double>{0.3});
+  EXPECT_TRUE(near.measured);
+  EXPECT_EQ(near.deviation, 0.02);
+  EXPECT_EQ(about.axis.values, std::vector<double>{-0.1});
+  EXPECT_FALSE(about.measured);
+  EXPECT_EQ(about.deviation, 0.01);
+  for (const char* none : {"0", "-1", "wide", ""})
+    EXPECT_EQ(message_of([&] { parse_hold(std::string("friction=0.3+-") + none); }),
+              std::string("--hold friction: found \"") + none +
+                  "\", expected a standard deviation above 0, as 0.3+-0.02");
   EXPECT_NE(message_of([] { parse_hold("friction=0.3:weighed"); }).find("found \"0.3:weighed\""),
             std::string::npos);
 }

@@ -29,7 +29,7 @@ TEST(ExpectedInformation, OfNoiseAloneIsThatOfLeastSquares) {
   ObservedRows rows = rows_over(5, 40, 3, 1);
   rows.weights.tail(50).setConstant(0.25);
   Misfit misfit;
-  misfit.noise = 2e-3;
+  misfit.noise = misfit.rough = 2e-3;
   const Eigen::MatrixXd expected =
       rows.rates.transpose() * rows.weights.asDiagonal() * rows.rates / (2e-3 * 2e-3);
   EXPECT_LT((expected_information(rows, misfit) - expected).norm(), 1e-9 * expected.norm());
@@ -40,7 +40,7 @@ TEST(ExpectedInformation, OfNoiseAloneIsThatOfLeastSquares) {
 TEST(ExpectedInformation, WhatIsFittedBesideTheParametersIsTakenOut) {
   ObservedRows rows = rows_over(4, 30, 2, 2);
   Misfit misfit;
-  misfit.noise = 1e-3;
+  misfit.noise = misfit.rough = 1e-3;
   rows.known = 0.01 * Eigen::MatrixXd::Random(120, 1);
   rows.free = 0.02 * Eigen::MatrixXd::Random(120, 2);
   Eigen::MatrixXd all(120, 5);
@@ -60,8 +60,8 @@ TEST(ExpectedInformation, ADiscrepancyThatNeverChangesIsNotAveragedAway) {
     ObservedRows rows = rows_over(6, points, 1, 3);
     rows.rates.setConstant(0.5);
     Misfit misfit;
-    misfit.noise = 1e-3;
-    misfit.size = 4e-3;
+    misfit.noise = misfit.rough = 1e-3;
+    misfit.rms = 4e-3;
     misfit.reach_time = 500;
     misfit.reach_sheet = 200;
     const double variance = (1e-6 / (6 * points) + 16e-6) / 0.25;
@@ -74,8 +74,8 @@ TEST(ExpectedInformation, KeyframesFarApartInTimeCountOneByOne) {
   ObservedRows rows = rows_over(6, 300, 1, 4);
   rows.rates.setConstant(1);
   Misfit misfit;
-  misfit.noise = 1e-6;
-  misfit.size = 4e-3;
+  misfit.noise = misfit.rough = 1e-6;
+  misfit.rms = 4e-3;
   misfit.reach_time = 1e-3;
   misfit.reach_sheet = 200;
   const double variance = 16e-6 / 6;
@@ -86,7 +86,7 @@ TEST(ExpectedInformation, OfWhatDoesNotMoveIsNone) {
   ObservedRows rows = rows_over(2, 10, 2, 5);
   rows.rates.setZero();
   Misfit misfit;
-  misfit.noise = 1e-3;
+  misfit.noise = misfit.rough = 1e-3;
   EXPECT_EQ(expected_information(rows, misfit), Eigen::MatrixXd::Zero(2, 2));
 }
 

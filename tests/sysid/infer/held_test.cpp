@@ -22,6 +22,7 @@ TEST(Held, FrictionIsUncertainUnlessItWasSearchedOrMeasured) {
   grid.base.material = short_lift_material();
   grid.base.material.friction = 0.3;
   grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  grid.fixed = {parse_hold("areal_density=0.2:measured").axis};
   const std::vector<HeldParameter> held = held_parameters(grid, replays);
   ASSERT_EQ(names_of(held), std::vector<std::string>{"friction"});
   EXPECT_DOUBLE_EQ(held[0].values[0], 0.15);
@@ -37,8 +38,42 @@ TEST(Held, FrictionIsUncertainUnlessItWasSearchedOrMeasured) {
   searched.axes.push_back(parse_axis("friction", "0.1:0.5:3"));
   EXPECT_TRUE(held_parameters(searched, replays).empty());
   GridSettings measured = grid;
-  measured.fixed = {parse_hold("friction=0.3").axis};
+  measured.fixed.push_back(parse_hold("friction=0.3").axis);
   EXPECT_TRUE(held_parameters(measured, replays).empty());
+}
+
+// Nobody weighed it: known to 10 %, whatever the asset says. A stated deviation takes the place of that, and
+// one as large as the value leaves it above zero.
+TEST(Held, TheWeightIsUncertainUnlessItWasMeasured) {
+  const data::TemporaryFolder folder;
+  std::vector<Replay> replays = {short_lift(folder)};
+  replays[0].recording.has_table = false;
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.base.material.areal_density = 0.2;
+  grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  const std::vector<HeldParameter> held = held_parameters(grid, replays);
+  ASSERT_EQ(names_of(held), std::vector<std::string>{"areal_density"});
+  EXPECT_DOUBLE_EQ(held[0].values[0], 0.2 / 1.1);
+  EXPECT_DOUBLE_EQ(held[0].values[1], 0.2 * 1.1);
+  EXPECT_TRUE(held[0].shared);
+
+  const auto held_as = [&](const std::string& text) {
+    const Hold hold = parse_hold(text);
+    GridSettings stated = grid;
+    (hold.measured ? stated.fixed : stated.axes).push_back(hold.axis);
+    if (hold.deviation) stated.deviations[hold.axis.name] = *hold.deviation;
+    return held_parameters(stated, replays);
+  };
+  EXPECT_TRUE(held_as("areal_density=0.2:measured").empty());
+  for (const char* text : {"areal_density=0.25+-0.01:measured", "areal_density=0.25+-0.01"}) {
+    const std::vector<HeldParameter> stated = held_as(text);
+    ASSERT_EQ(names_of(stated), std::vector<std::string>{"areal_density"}) << text;
+    EXPECT_DOUBLE_EQ(stated[0].values[0], 0.24) << text;
+    EXPECT_DOUBLE_EQ(stated[0].values[1], 0.26) << text;
+  }
+  EXPECT_DOUBLE_EQ(held_as("areal_density=0.2+-0.2")[0].values[0], 0.1);
+  EXPECT_EQ(names_of(held_as("poisson=0.3+-0.05")), (std::vector<std::string>{"poisson", "areal_density"}));
 }
 
 TEST(Held, BoundsOfTheRecordingAreThoseOfAnEvenDistribution) {
@@ -49,6 +84,7 @@ TEST(Held, BoundsOfTheRecordingAreThoseOfAnEvenDistribution) {
   GridSettings grid;
   grid.base.material = short_lift_material();
   grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  grid.fixed = {parse_hold("areal_density=0.2:measured").axis};
   const std::vector<HeldParameter> held = held_parameters(grid, replays);
   ASSERT_EQ(names_of(held), std::vector<std::string>{"start_yaw"});
   EXPECT_DOUBLE_EQ(held[0].values[1], 0.2 / std::sqrt(3.0));

@@ -53,7 +53,7 @@ TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
   answer.estimate.status = CandidateStatus::ok;
   answer.estimate.recordings.resize(1);
   answer.fit.score = answer.estimate;
-  answer.misfits = {{0.001, 0.0052, 0.3, 0.1, 90, true, 0.0028, 80, 9}};
+  answer.misfits = {{0.001, 0.001, 0.0052, 0.0052, 0.3, 0.1, 90, true, 0.0028, 80, 9}};
   const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
   const auto first = [&] { return summarize(results, answer, replays, grid).warnings; };
   ASSERT_FALSE(first().empty());
