@@ -188,10 +188,12 @@ MeshGap gap_behind(const SurfaceMesh& mesh, double margin, const Barrier& barrie
   entry.normal = barrier.side * t.normal;
   entry.distance = dot(entry.normal, to - t.corners[0]) - margin;
   const MeshGap near = gap_to_place(mesh, margin, nearest, to, barrier.side);
-  const bool smooth = !barrier.passed && near.distance <= 0 && !is_on_border(mesh, nearest) &&
+  // Of a part that reaches into this one the nearest triangle may lie within.
+  const bool same_part = mesh.triangles[nearest.triangle].part == t.part;
+  const bool smooth = same_part && !barrier.passed && near.distance <= 0 && !is_on_border(mesh, nearest) &&
                       dot(near.normal, entry.normal) > same_surface;
   // In a bend it may be before the plane of the triangle that it went in by.
-  return smooth || !(entry.distance < 0) ? near : entry;
+  return smooth || (same_part && !(entry.distance < 0)) ? near : entry;
 }
 
 /// Whether a way from inside leaves by a triangle that is not on the far side of `normal`.

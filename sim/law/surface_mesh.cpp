@@ -138,6 +138,22 @@ struct Sight {
   }
 };
 
+/// Numbers the parts of a surface: triangles that hang together by vertices, which no two parts share.
+void number_parts(SurfaceMesh& mesh) {
+  std::vector<int> root(mesh.vertex_normals.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto root_of = [&](int vertex) {
+    while (root[vertex] != vertex) vertex = root[vertex] = root[root[vertex]];
+    return vertex;
+  };
+  for (const SurfaceTriangle& t : mesh.triangles)
+    for (int k = 1; k < 3; ++k) {
+      const int a = root_of(t.vertices[0]), b = root_of(t.vertices[k]);
+      root[std::max(a, b)] = std::min(a, b);
+    }
+  for (SurfaceTriangle& t : mesh.triangles) t.part = root_of(t.vertices[0]);
+}
+
 SurfacePlace placed(int triangle, SurfaceFeature feature, int number, const V& on, const V& point) {
   return {triangle, feature, number, on, norm(point - on)};
 }
@@ -197,6 +213,7 @@ SurfaceMesh make_surface_mesh(const data::ObstacleMesh& source) {
       mesh.border_vertices[t.vertices[k]] = true;
       mesh.border_vertices[t.vertices[(k + 1) % 3]] = true;
     }
+  number_parts(mesh);
   mesh.order.resize(mesh.triangles.size());
   std::iota(mesh.order.begin(), mesh.order.end(), 0);
   mesh.nodes.push_back(box_about(mesh, 0, mesh.size()));

@@ -13,6 +13,7 @@ struct SurfaceTriangle {
   Vector3<double> normal;           ///< unit, out of what a closed surface bounds
   Vector3<double> edge_normals[3];  ///< pseudonormal of the edge from corner k to the next
   bool at_border[3];                ///< whether that edge has no other triangle
+  int part;                         ///< number of the part whose triangles hang together by edges
 };
 
 /// A node of the hierarchy: a box about triangles. An inner one has its children at `first` and `first + 1`.

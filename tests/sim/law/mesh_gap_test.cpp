@@ -178,6 +178,17 @@ TEST(MeshGap, AVertexInACreaseIsKeptByBothOfItsSides) {
   }
 }
 
+TEST(MeshGap, WhatLiesWithinAnotherPartIsNotMet) {
+  // A plate of 4 mm within one of 6 mm: a way from above ends on the top of the inner one, or a little below.
+  const Mesh plates =
+      mesh_shape(joined_surfaces(box_surface({0.1, 0.1, 0.002}), box_surface({0.08, 0.08, 0.003})));
+  for (const double end : {0.0025, 0.002 + 1e-18, 0.002, 0.002 - 1e-18, 0.0019, -0.001, -0.01}) {
+    const Gap gap = gap_of_way(at_rest({plates}), {0.01, 0.02, 0.1}, {0.012, 0.017, end});
+    EXPECT_NEAR(gap.distance, end - 0.003, 1e-15) << end;
+    EXPECT_NEAR(gap.normal.z(), 1, 1e-15) << end;
+  }
+}
+
 TEST(MeshGap, AMovingMeshIsMetAsOneAtRestIsInItsFrame) {
   for (int sample = 0; sample < 300; ++sample) {
     const Mesh mesh = mesh_shape(ball_surface(0.3, 1), sample % 2 == 0 ? 0 : 0.01);
