@@ -1,0 +1,17 @@
+#pragma once
+#include <optional>
+#include <utility>
+
+#include "sim/pairs/pair_surface.h"
+
+namespace flash::sim {
+
+/// Whether the segment from a to b passes through the triangle x[0], x[1], x[2]. What only touches does not
+/// pass.
+bool passes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d* x);
+
+/// Two triangles of the surface, which share no vertex, that pass through each other at `positions`; those of
+/// the lowest numbers. Empty where there are none.
+std::optional<std::pair<int, int>> first_intersection(PairSurface& surface, const data::Points& positions);
+
+}  // namespace flash::sim
