@@ -76,8 +76,8 @@ TEST(Discrepancy, NoiseAndMisfitOfAFewMarkersAreWhatTheParametersLeave) {
   EXPECT_NEAR(sum / kSeeds, kNoise * kNoise, 0.15 * kNoise * kNoise);
 }
 
-// What a plan reckons with in another recording is what the covariance of this one has: the mean of the variance,
-// not of the size.
+// What a plan reckons with in another recording is what the covariance of this one has: the mean of the
+// variance, not of the size.
 TEST(Discrepancy, ItsMeanSquareIsTheMeanVarianceOfRowsBeyondNoise) {
   const ObservedRows rows = strip_rows(9, 40);
   const Eigen::Index count = rows.weights.size();
@@ -87,9 +87,9 @@ TEST(Discrepancy, ItsMeanSquareIsTheMeanVarianceOfRowsBeyondNoise) {
     y += 1e-3 * seed * lifted(rows) / 0.05;
     const DiscrepancyModel model(rows, y);
     const Misfit& misfit = model.misfit();
-    const double variance = model.covariance_of(Eigen::MatrixXd::Identity(count, count)).trace() /
-                                static_cast<double>(count) -
-                            model.noise() * model.noise();
+    const double variance =
+        model.covariance_of(Eigen::MatrixXd::Identity(count, count)).trace() / static_cast<double>(count) -
+        model.noise() * model.noise();
     EXPECT_EQ(misfit.rough, model.noise());
     EXPECT_GE(misfit.rms, misfit.size);
     // Cosines have unit mean square over the sheet; over forty places along it, to a hundredth.
