@@ -40,12 +40,12 @@ struct PlanSettings {
 ///
 /// With `known`, P is the inverse of its covariance and F what rows under noise and discrepancy tell
 /// (expected_information), registration within its bounds and what is held without a measurement
-/// (held_parameters) unknown beside the parameters; axes of one value are no parameters. An error of the weight
-/// is the same in every recording and stays. Spread (in its logarithm) and bits are expected values: over the
-/// parameters, by one standard deviation to both sides along the direction in which they are known least; over
-/// the discrepancy of the recording to come, which is no larger than that of the search's, as likely as not, or
-/// has one of its own beside it, by the prior of DiscrepancyModel. `store`: keeps the motions, where there is
-/// one; then errors of the solution are reckoned with too, by finer ones.
+/// (held_parameters) unknown beside the parameters; axes of one value are no parameters. An error of the
+/// weight is the same in every recording and stays. Spread (in its logarithm) and bits are expected values:
+/// over the parameters, by one standard deviation to both sides along the direction in which they are known
+/// least; over the discrepancy of the recording to come, which is no larger than that of the search's, as
+/// likely as not, or has one of its own beside it, by the prior of DiscrepancyModel. `store`: keeps the
+/// motions, where there is one; then errors of the solution are reckoned with too, by finer ones.
 PlannedExperiment plan_experiment(const std::string& name, const std::vector<Replay>& replays,
                                   const PlanSettings& settings, const MotionStore* store = nullptr);
 
