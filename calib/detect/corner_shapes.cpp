@@ -15,9 +15,7 @@ constexpr double kSharpest = 0.2;  // blur of an edge below that of a pixel's ow
 constexpr double kBluntest = 6;    // [px]
 constexpr double kContrast = 8;    // least difference of brightness that counts as an edge, of 255
 constexpr double kBowEvidence =
-    25;  // gain in squared error a bend must show, in those of a pixel: five sigma
-constexpr double kGammaEvidence = 25;  // likewise of a picture's gamma, over all four sides
-constexpr double kLeastGamma = 0.5, kMostGamma = 4;
+    25;                          // gain in squared error a bend must show, in those of a pixel: five sigma
 constexpr double kMisfit = 0.2;  // largest rms left over, as a share of the contrast
 
 double erf_step(double distance, double blur) { return std::erf(distance / (std::sqrt(2.0) * blur)); }
@@ -57,22 +55,12 @@ bool whole_disc(const Rectifier& rectifier, const Eigen::Vector2d& centre, doubl
          pixel.y() + radius <= rectifier.height() - 1;
 }
 
-/// What a pixel says of which a share of the light comes from the bright side of an edge. The lens blurs
-/// light; what the picture shows is its 1 / gamma.
-double shown(double dark, double bright, double share, double gamma) {
-  if (gamma == 1) return dark + share * (bright - dark);
-  const double from = std::pow(std::max(dark, 1.0), gamma), to = std::pow(std::max(bright, 1.0), gamma);
-  return std::pow(from + share * (to - from), 1 / gamma);
-}
-
 /// The edge of one side of a marker: straight, or bent as the paper is.
 struct Side {
   Eigen::Vector2d middle, along, across;
-  double half;          ///< length of the part that was fitted [px]
-  double first, last;   ///< offsets across at its ends [px]
-  double bow = 0;       ///< offset of the middle from the line between the ends [px]
-  double gamma = 1;     ///< of the picture, that these pixels alone tell
-  double evidence = 0;  ///< gain in squared error by it, in those of a pixel
+  double half;         ///< length of the part that was fitted [px]
+  double first, last;  ///< offsets across at its ends [px]
+  double bow = 0;      ///< offset of the middle from the line between the ends [px]
 
   /// The tangent where a point lies along the side, a x + b y + c = 0.
   Eigen::Vector3d tangent(const Eigen::Vector2d& point) const {
@@ -85,12 +73,10 @@ struct Side {
   }
 };
 
-/// Of the side from p to q, with the inside of the marker on the right of it, in a picture of that gamma.
-/// ask: what these pixels would say of another.
+/// Of the side from p to q, with the inside of the marker on the right of it.
 std::optional<Side> fit_side(const GreyImage& image, const Rectifier& rectifier, const Eigen::Vector2d& p,
-                             const Eigen::Vector2d& q, double inside, double outside, double ends,
-                             double gamma, bool ask) {
-  using Vector = Eigen::Matrix<double, 9, 1>;
+                             const Eigen::Vector2d& q, double inside, double outside, double ends) {
+  using Vector = Eigen::Matrix<double, 8, 1>;
   Side side;
   side.middle = (p + q) / 2;
   side.along = (q - p).normalized();
@@ -107,20 +93,16 @@ std::optional<Side> fit_side(const GreyImage& image, const Rectifier& rectifier,
                      const Eigen::Vector2d t = split(place);
                      return std::abs(t[0]) <= 1 && t[1] >= -inside && t[1] <= outside;
                    });
-  // Offsets of the edge at both ends, blur, brightness on either side at both ends, bow, gamma.
-  const auto whole = [&](const Vector& x, const Eigen::Vector2d& place) {
+  // Offsets of the edge at both ends, blur, brightness on either side at both ends, bow.
+  const auto bent = [&](const Vector& x, const Eigen::Vector2d& place) {
     const Eigen::Vector2d t = split(place);
     const double u = (1 + t[0]) / 2;
     const double edge = (1 - u) * x[0] + u * x[1] + x[7] * (1 - t[0] * t[0]);
     const double low = (1 - u) * x[3] + u * x[4], high = (1 - u) * x[5] + u * x[6];
-    return shown(low, high, 0.5 * (1 + erf_step(t[1] - edge, blur_of(x[2]))),
-                 std::clamp(x[8], kLeastGamma, kMostGamma));
-  };
-  const auto bent = [&](const Eigen::Matrix<double, 8, 1>& x, const Eigen::Vector2d& place) {
-    return whole((Vector() << x, gamma).finished(), place);
+    return 0.5 * (low + high) + 0.5 * (high - low) * erf_step(t[1] - edge, blur_of(x[2]));
   };
   const auto straight = [&](const Eigen::Matrix<double, 7, 1>& x, const Eigen::Vector2d& place) {
-    return whole((Vector() << x, 0, gamma).finished(), place);
+    return bent((Vector() << x, 0).finished(), place);
   };
   double low = 0, high = 0;
   int lows = 0, highs = 0;
@@ -136,12 +118,10 @@ std::optional<Side> fit_side(const GreyImage& image, const Rectifier& rectifier,
   start << 0, 0, 1, low, low, high, high;
   scales << 0.1, 0.1, 0.1, 5, 5, 5, 5;
   const ShapeFit<7> line = fit_shape<7>(straight, start, scales, samples);
-  Eigen::Matrix<double, 8, 1> x, x_scales;
-  x << line.parameters, 0;
-  x_scales << scales, 0.1;
+  Vector x = (Vector() << line.parameters, 0).finished();
   double rms = line.rms;
   // Paper bends, but a bow that is not there makes the corners twice as unsure: only where it is plain.
-  const ShapeFit<8> curve = fit_shape<8>(bent, x, x_scales, samples);
+  const ShapeFit<8> curve = fit_shape<8>(bent, x, (Vector() << scales, 0.1).finished(), samples);
   if (line.rms * line.rms >
       curve.rms * curve.rms * (1 + kBowEvidence / static_cast<double>(samples.size()))) {
     x = curve.parameters;
@@ -155,23 +135,7 @@ std::optional<Side> fit_side(const GreyImage& image, const Rectifier& rectifier,
   side.first = x[0];
   side.last = x[1];
   side.bow = x[7];
-  if (!ask) return side;
-  const ShapeFit<9> other =
-      fit_shape<9>(whole, (Vector() << x, gamma).finished(), (Vector() << x_scales, 0.1).finished(), samples);
-  if (!other.parameters.allFinite() || !(other.rms > 0)) return side;
-  side.gamma = std::clamp(other.parameters[8], kLeastGamma, kMostGamma);
-  side.evidence = static_cast<double>(samples.size()) * (curve.rms * curve.rms / (other.rms * other.rms) - 1);
   return side;
-}
-
-/// What four sides say of the picture's gamma; 1 where it is not plain.
-double gamma_of(const std::array<Side, 4>& sides) {
-  double evidence = 0, sum = 0;
-  for (const Side& side : sides) {
-    evidence += std::max(0.0, side.evidence);
-    sum += std::max(0.0, side.evidence) * side.gamma;
-  }
-  return evidence > kGammaEvidence ? sum / evidence : 1;
 }
 
 }  // namespace
@@ -225,8 +189,7 @@ std::optional<Eigen::Vector2d> fit_crossing(const GreyImage& image, const Rectif
 std::optional<Quad> fit_quad(const GreyImage& image, const Rectifier& rectifier, const Quad& seed,
                              double inside, double outside) {
   Quad quad = seed;
-  double gamma = 1;
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < 2; ++round) {
     Eigen::Vector2d middle = Eigen::Vector2d::Zero();
     for (const Eigen::Vector2d& corner : quad) middle += corner / 4;
     std::array<Side, 4> sides;
@@ -239,7 +202,7 @@ std::optional<Quad> fit_quad(const GreyImage& image, const Rectifier& rectifier,
       const double in = std::clamp(inside * depth - 1, 1.5, 5.0),
                    out = std::clamp(outside * depth - 1, 1.5, 5.0);
       const std::optional<Side> side =
-          fit_side(image, rectifier, p, q, in, out, std::max(2.0, std::min(in, out)), gamma, round == 1);
+          fit_side(image, rectifier, p, q, in, out, std::max(2.0, std::min(in, out)));
       if (!side) return std::nullopt;
       sides[i] = *side;
     }
@@ -253,8 +216,6 @@ std::optional<Quad> fit_quad(const GreyImage& image, const Rectifier& rectifier,
       if (!((corner - seed[i]).norm() < 5)) return std::nullopt;
       quad[i] = corner;
     }
-    if (round == 1) gamma = gamma_of(sides);
-    if (round == 1 && gamma == 1) break;
   }
   return quad;
 }

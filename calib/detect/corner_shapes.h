@@ -22,10 +22,8 @@ std::optional<Eigen::Vector2d> fit_crossing(const GreyImage& image, const Rectif
 using Quad = std::array<Eigen::Vector2d, 4>;  ///< corners in order, either way round
 
 /// The corners of a bordered square marker: a line through each blurred side, or an arc where it is plainly
-/// bent, away from the corners; their intersections. Pictures that do not show light in proportion (gamma)
-/// put the middle of an edge's brightness to its dark side; where the sides plainly show that, it is taken
-/// out. inside, outside: widths of the plain bands on both sides of the edge as shares of the side. Empty
-/// where a side shows no edge.
+/// bent, away from the corners; their intersections. inside, outside: widths of the plain bands on both sides
+/// of the edge as shares of the side. Empty where a side shows no edge.
 std::optional<Quad> fit_quad(const GreyImage& image, const Rectifier& rectifier, const Quad& seed,
                              double inside, double outside);
 

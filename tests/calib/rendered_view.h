@@ -15,7 +15,6 @@ struct RenderSettings {
   double background = 120;         ///< around it
   double blur = 0.7;               ///< of the lens, sigma [px]
   double noise = 2;                ///< of a pixel, sigma
-  double gamma = 1;                ///< light to its 1 / gamma is what a pixel says, before the noise
   int samples = 16;                ///< a side of a pixel that an edge crosses
   bool double_border = false;      ///< aprilgrid as Kalibr prints it
   double dots = 0;  ///< a projector's dots, fixed to the camera: light on the dot over other light

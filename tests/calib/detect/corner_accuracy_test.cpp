@@ -178,19 +178,6 @@ TEST(CornerAccuracyOf, HasNoBiasWhateverTheBlur) {
     }
 }
 
-// Light that is blurred, then shown as its 1 / 2.2, makes a marker smaller by half a pixel: each corner by
-// 0.4 px. What is left is the noise of an edge whose blur, place and gamma are all unknown.
-TEST(CornerAccuracyOf, MarkersAreAsLargeInPicturesWithGamma) {
-  for (const char* target : {"aruco:DICT_4X4_50:0:0.09", "apriltag:36h11:3:0.09"})
-    for (const double gamma : {1.8, 2.2}) {
-      RenderSettings settings;
-      settings.gamma = gamma;
-      const auto errors = measure({target, 0.6, 1.0, 0.7}, small_camera(), settings);
-      ASSERT_EQ(errors.count(kImageModel), 1u);
-      EXPECT_LT(errors.at(kImageModel).rms(), 0.05) << target << gamma;
-    }
-}
-
 // The dots of a depth camera's projector hide crossings. No board may be lost for that, and what the corners
 // say of their own noise has to be so: with 48 x 2 numbers a view it scatters by 3 % over six views.
 TEST(CornerAccuracyOf, BoardsUnderProjectedDotsAreFoundAndTheirNoiseIsTold) {
