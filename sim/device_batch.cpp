@@ -18,6 +18,7 @@ namespace flash::sim {
 std::string why_not_on_device(const Environment& environment) {
   if (!environment.solids.empty()) return "solids (element_type TETRAHEDRON) are simulated on the CPU alone";
   if (!environment.point_masses.empty()) return "point masses (attached_mass) are simulated on the CPU alone";
+  if (environment.self_contact) return "self-contact (self_contact) is simulated on the CPU alone";
   if (environment.materials.size() > 1) return "several bodies in one environment";
   if (environment.obstacles.size() > most_obstacles)
     return "more than " + std::to_string(most_obstacles) + " obstacles: found " +
