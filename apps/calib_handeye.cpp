@@ -101,11 +101,8 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
     std::printf("lens: focal lengths %s, %s px (stated %.1f, %.1f)\n",
                 with_deviation(c.lens.estimate[0], c.lens.sd[0]).c_str(),
                 with_deviation(c.lens.estimate[1], c.lens.sd[1]).c_str(), c.lens.stated[0], c.lens.stated[1]);
-    const Eigen::Vector2d warp = 1e3 * c.warp.estimate, warp_sd = 1e3 * c.warp.sd;
-    std::printf(
-        "target: %.4f +- %.4f times as large as stated, its middle %.2f +- %.2f and %.2f +- %.2f mm behind "
-        "its ends along x and y\n",
-        c.size->estimate, c.size->sd, warp.x(), warp_sd.x(), warp.y(), warp_sd.y());
+    std::printf("target: %.4f +- %.4f times as large as stated, %s\n", c.size->estimate, c.size->sd,
+                calib::describe(c.warp).c_str());
   }
   if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
     std::printf("joints are farther than they say by");

@@ -40,8 +40,10 @@ nlohmann::ordered_json result_json(const calib::IntrinsicsEstimate& estimate) {
   const calib::IntrinsicsVector values = calib::to_vector(estimate.camera);
   for (Eigen::Index i = 0; i < 4 + static_cast<Eigen::Index>(estimate.camera.distortion.size()); ++i)
     json["parameters"][kNames[i]] = {{"estimate", values[i]}, {"sd", estimate.sd[i]}};
-  json["warp_mm"] = {1e3 * estimate.warp.estimate.x(), 1e3 * estimate.warp.estimate.y()};
-  json["warp_sd_mm"] = {1e3 * estimate.warp.sd.x(), 1e3 * estimate.warp.sd.y()};
+  for (const Eigen::Index term : {0, 1, 2}) {
+    json["warp_mm"].push_back(1e3 * estimate.warp.estimate[term]);
+    json["warp_sd_mm"].push_back(1e3 * estimate.warp.sd[term]);
+  }
   json["reprojection_rms_px"] = estimate.rms;
   json["picture_corner_sd_px"] = estimate.corner_sd;
   json["coverage"] = estimate.coverage;
@@ -58,9 +60,7 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
   const calib::IntrinsicsVector values = calib::to_vector(estimate.camera);
   for (Eigen::Index i = 0; i < 4 + static_cast<Eigen::Index>(estimate.camera.distortion.size()); ++i)
     std::printf("%-3s %12.5g  +- %.2g%s\n", kNames[i], values[i], estimate.sd[i], i < 4 ? " px" : "");
-  const Eigen::Vector2d warp = 1e3 * estimate.warp.estimate, sd = 1e3 * estimate.warp.sd;
-  std::printf("target: its middle %.2f +- %.2f and %.2f +- %.2f mm behind its ends along x and y\n", warp.x(),
-              sd.x(), warp.y(), sd.y());
+  std::printf("target: %s\n", calib::describe(estimate.warp).c_str());
   std::printf("%.3f px rms a corner; places at the picture's corners known to %.2g px\n", estimate.rms,
               estimate.corner_sd);
 }

@@ -54,6 +54,14 @@ Eigen::Vector2d two_numbers(const data::JsonObject& object, const char* field) {
   return {values[0], values[1]};
 }
 
+/// Files of before the twist have two numbers.
+Eigen::Vector3d read_warp(const data::JsonObject& scale) {
+  std::vector<double> values = numbers(scale, "warp_mm");
+  if (values.size() == 2) values.push_back(0);
+  if (values.size() != 3) throw scale.error("warp_mm", "three numbers");
+  return {values[0], values[1], values[2]};
+}
+
 data::CameraIntrinsics read_lens(const data::JsonObject& lens) {
   data::CameraIntrinsics camera;
   const Eigen::Vector2i size = two_numbers(lens, "size_px").cast<int>();
@@ -131,7 +139,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
   if (object.has("scale")) {
     const data::JsonObject scale = object.object("scale");
     if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");
-    if (scale.has("warp_mm")) extrinsics.target.warp = 1e-3 * two_numbers(scale, "warp_mm");
+    if (scale.has("warp_mm")) extrinsics.target.warp = 1e-3 * read_warp(scale);
   }
   if (object.has("use")) {
     const std::string use = object.object("use").string("for", "workspace");

@@ -46,7 +46,7 @@ Eigen::MatrixXd view_information(Bundle bundle, const Eigen::Isometry3d& T_base_
   bundle.poses = {pose};
   BundleView view;
   view.points = points;
-  view.bows = Eigen::Matrix2Xd::Zero(2, points.cols());
+  view.bows = Eigen::Matrix3Xd::Zero(3, points.cols());
   view.pixels = Eigen::Matrix2Xd::Zero(2, points.cols());
   double count = 0;
   // The residual of these pixels is of no account: only its derivatives are.

@@ -206,7 +206,7 @@ IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<
   const auto count = static_cast<Eigen::Index>(used.size());
   const Eigen::MatrixXd variances = fit.covariance.topLeftCorner(count, count);
   estimate.warp = {.estimate = fit.warp,
-                   .sd = fit.covariance.diagonal().tail<2>().cwiseSqrt(),
+                   .sd = fit.covariance.diagonal().tail<3>().cwiseSqrt(),
                    .prior_sd = usual_warp_sd(points)};
   estimate.covariance(used, used) = variances;
   for (std::size_t i = 0; i < used.size(); ++i)

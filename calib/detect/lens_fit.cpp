@@ -10,7 +10,7 @@
 namespace flash::calib {
 namespace {
 
-constexpr Eigen::Index kWarp = 2;
+constexpr Eigen::Index kWarp = 3;
 
 /// Of one view: information of the shared unknowns, of its pose and of both, and their gradients.
 struct ViewTerms {
@@ -21,14 +21,14 @@ struct ViewTerms {
 };
 
 ViewTerms terms_of(const LensFit& fit, std::size_t view, const std::vector<int>& unknowns,
-                   const Eigen::Matrix3Xd& points, const Eigen::Matrix2Xd& bows, const Observation& seen) {
+                   const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& bows, const Observation& seen) {
   const Eigen::Index count = static_cast<Eigen::Index>(unknowns.size()), s = count + kWarp;
   ViewTerms terms{.shared = Eigen::MatrixXd::Zero(s, s),
                   .cross = Eigen::MatrixXd::Zero(s, 6),
                   .g_shared = Eigen::VectorXd::Zero(s)};
   const Eigen::Isometry3d& pose = fit.poses[view];
   for (std::size_t i = 0; i < seen.points.size(); ++i) {
-    const Eigen::Vector2d bow = bows.col(seen.points[i]);
+    const Eigen::Vector3d bow = bows.col(seen.points[i]);
     const Eigen::Vector3d p = points.col(seen.points[i]) + fit.warp.dot(bow) * Eigen::Vector3d::UnitZ();
     Eigen::Matrix<double, 2, 3> by_point;
     Eigen::Matrix<double, 2, kIntrinsics> by_all;
@@ -71,7 +71,7 @@ LensFit fit_lens(LensFit fit, const std::vector<int>& unknowns, const Eigen::Mat
                  const std::vector<const Observation*>& views) {
   constexpr int kSteps = 30;
   constexpr double kStill = 1e-6;  // of a step, in standard deviations
-  const Eigen::Matrix2Xd bows = target_bows(points);
+  const Eigen::Matrix3Xd bows = target_bows(points);
   const Eigen::Index count = static_cast<Eigen::Index>(unknowns.size()), s = count + kWarp;
   double freedom = -static_cast<double>(s);
   for (const Observation* view : views) freedom += 2 * static_cast<double>(view->points.size()) - 6;

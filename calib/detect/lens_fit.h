@@ -10,7 +10,7 @@ namespace flash::calib {
 /// A lens, the warp of the target it was seen through (target_bows) and where the target stood in each view.
 struct LensFit {
   IntrinsicsVector lens = IntrinsicsVector::Zero();
-  Eigen::Vector2d warp = Eigen::Vector2d::Zero();  ///< [m]
+  Eigen::Vector3d warp = Eigen::Vector3d::Zero();  ///< [m]
   std::vector<Eigen::Isometry3d> poses;
   double variance = 0;         ///< of a corner's coordinate, from the residuals [px^2]
   Eigen::MatrixXd covariance;  ///< of the unknowns in use, then of the warp; poses marginalised

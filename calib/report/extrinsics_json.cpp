@@ -186,8 +186,8 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
   json["convention_findings"] = Json::array();
   json["scale"] = calibration.size ? to_json(*calibration.size) : Json(nullptr);
   if (calibration.size) {
-    json["scale"]["warp_mm"] = list(Eigen::Vector2d(1e3 * calibration.warp.estimate));
-    json["scale"]["warp_sd_mm"] = list(Eigen::Vector2d(1e3 * calibration.warp.sd));
+    json["scale"]["warp_mm"] = list(Eigen::Vector3d(1e3 * calibration.warp.estimate));
+    json["scale"]["warp_sd_mm"] = list(Eigen::Vector3d(1e3 * calibration.warp.sd));
   }
   json["splits"] = nullptr;
   if (!calibration.splits.empty()) {

@@ -28,7 +28,7 @@ struct BundleView {
   int pose = 0, camera = 0, target = 0;
   Eigen::Matrix3Xd points;        ///< in the target frame [m]
   Eigen::Matrix2Xd pixels;        ///< where they were seen [px]
-  Eigen::Matrix2Xd bows;          ///< how far each point rises per unit of the target's warp along x and y
+  Eigen::Matrix3Xd bows;          ///< how far each point rises per unit of the target's warp
   Eigen::Matrix3Xd depth_points;  ///< on the target's plane, measured by depth, in the camera frame [m]; or
                                   ///< none
 };
@@ -43,7 +43,7 @@ struct Priors {
   /// The prior weighs as much more against residuals that are taken for noise. Empty: 1.
   std::vector<double> caution = {};
   std::vector<LensPrior> lenses = {};      ///< of each camera; empty: nothing
-  std::vector<double> warp_sd = {};        ///< of each target's warp, an axis [m]; empty: flat
+  std::vector<double> warp_sd = {};        ///< of each target's warp, a term [m]; empty: flat
   double joint_zero_sd = kUsualJointZero;  ///< of each joint's zero [rad]
 };
 
@@ -66,7 +66,7 @@ struct Bundle {
   std::vector<Eigen::Isometry3d> bases;     ///< B: of each arm in the world, which is the first arm's base
   std::vector<Eigen::Isometry3d> targets;   ///< Z: in the world (eye-in-hand) or a gripper
   std::vector<double> scales;               ///< of each target: true size over stated size
-  std::vector<Eigen::Vector2d> warps = {};  ///< of each target, see target_bows(); empty: flat
+  std::vector<Eigen::Vector3d> warps = {};  ///< of each target, see target_bows(); empty: flat
   std::vector<double> time_offsets;         ///< tau of each arm [s]
   std::vector<Eigen::VectorXd> joint_zeros =
       {};                                 ///< of each arm: joints are that much farther [rad]; empty: 0

@@ -94,15 +94,15 @@ class ViewChain {
 };
 
 /// Blocks: camera, base, target, correction, intrinsics, scale, time offset, warp.
-class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1, 2> {
+class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1, 3> {
  public:
-  CornerCost(std::shared_ptr<ViewChain> chain, Eigen::Vector3d point, const Eigen::Vector2d& bow,
+  CornerCost(std::shared_ptr<ViewChain> chain, Eigen::Vector3d point, const Eigen::Vector3d& bow,
              const Eigen::Vector2d& pixel, double sigma)
       : chain_(std::move(chain)), point_(std::move(point)), bow_(bow), pixel_(pixel), weight_(1 / sigma) {}
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const Chain& chain = chain_->at(x, *x[6]);
-    const Eigen::Vector3d bowed = point_ + bow_.dot(Eigen::Map<const Eigen::Vector2d>(x[7])) * kBehind;
+    const Eigen::Vector3d bowed = point_ + bow_.dot(Eigen::Map<const Eigen::Vector3d>(x[7])) * kBehind;
     const Eigen::Vector3d p = *x[5] * bowed;
     const Eigen::Vector3d q = chain.target_in_camera() * p;
     if (!(q.z() > 1e-6)) return false;
@@ -126,7 +126,7 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
     if (jacobians[5]) Eigen::Map<Eigen::Vector2d>(jacobians[5], 2) = d_point * chain.d_scale(bowed);
     if (jacobians[6]) Eigen::Map<Eigen::Vector2d>(jacobians[6], 2) = d_point * chain.d_time(d_correction);
     if (jacobians[7]) {
-      Eigen::Map<Eigen::Matrix<double, 2, 2, Eigen::RowMajor>> d(jacobians[7]);
+      Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> d(jacobians[7]);
       d = *x[5] * d_point * chain.d_scale(kBehind) * bow_.transpose();
     }
     return true;
@@ -134,8 +134,8 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
 
  private:
   std::shared_ptr<ViewChain> chain_;
-  Eigen::Vector3d point_;
-  Eigen::Vector2d bow_, pixel_;
+  Eigen::Vector3d point_, bow_;
+  Eigen::Vector2d pixel_;
   double weight_;
 };
 
@@ -242,13 +242,13 @@ class ScalePrior final : public ceres::SizedCostFunction<1, 1> {
 };
 
 /// Likewise of its warp.
-class WarpPrior final : public ceres::SizedCostFunction<2, 2> {
+class WarpPrior final : public ceres::SizedCostFunction<3, 3> {
  public:
   explicit WarpPrior(double sd) : weight_(1 / sd) {}
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
-    Eigen::Map<Eigen::Vector2d>(residual, 2) = weight_ * Eigen::Map<const Eigen::Vector2d>(x[0]);
+    Eigen::Map<Eigen::Vector3d>(residual, 3) = weight_ * Eigen::Map<const Eigen::Vector3d>(x[0]);
     if (jacobians && jacobians[0])
-      Eigen::Map<Eigen::Matrix2d>(jacobians[0], 2, 2) = weight_ * Eigen::Matrix2d::Identity();
+      Eigen::Map<Eigen::Matrix3d>(jacobians[0], 3, 3) = weight_ * Eigen::Matrix3d::Identity();
     return true;
   }
 
@@ -281,7 +281,7 @@ class LensPart final : public ceres::CostFunction {
 struct Blocks {
   std::vector<PoseBlock> cameras, bases, targets, corrections;
   std::vector<IntrinsicsVector> intrinsics;
-  std::vector<Eigen::Vector2d> warps;
+  std::vector<Eigen::Vector3d> warps;
   std::vector<Eigen::VectorXd> joint_zeros;
   std::vector<double> scales, time_offsets, depth_scales;
 
@@ -291,7 +291,7 @@ struct Blocks {
         scales(bundle.scales),
         time_offsets(bundle.time_offsets),
         depth_scales(bundle.depth_scales) {
-    warps.resize(bundle.targets.size(), Eigen::Vector2d::Zero());
+    warps.resize(bundle.targets.size(), Eigen::Vector3d::Zero());
     depth_scales.resize(bundle.cameras.size(), 1);
     for (const Eigen::Isometry3d& T : bundle.cameras) cameras.push_back(block_of(T));
     for (const Eigen::Isometry3d& T : bundle.bases) bases.push_back(block_of(T));
@@ -357,7 +357,7 @@ void order_shared(const ceres::Problem& problem, Blocks& blocks, ceres::Paramete
   for (auto* list : {&blocks.cameras, &blocks.bases, &blocks.targets, &blocks.corrections})
     for (PoseBlock& block : *list) take(block.data());
   for (IntrinsicsVector& block : blocks.intrinsics) take(block.data());
-  for (Eigen::Vector2d& block : blocks.warps) take(block.data());
+  for (Eigen::Vector3d& block : blocks.warps) take(block.data());
   for (Eigen::VectorXd& block : blocks.joint_zeros) take(block.data());
   for (auto* list : {&blocks.scales, &blocks.time_offsets, &blocks.depth_scales})
     for (double& block : *list) take(&block);

@@ -105,7 +105,7 @@ Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns)
   for (std::size_t target = 0; target < bundle.targets.size(); ++target) {
     if (columns.warps[target] < 0) continue;
     const double weight = std::pow(bundle.priors.warp_sd[target], -2);
-    for (Eigen::Index axis = 0; axis < 2; ++axis) {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
       const Eigen::Index column = columns.warps[target] + axis;
       const double warp = bundle.warps[target][axis];
       gram(column, column) += weight;
@@ -153,7 +153,7 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
   take(columns.intrinsics, bundle.cameras.size(), unknowns.intrinsics);
   columns.intrinsics_count = unknowns.intrinsics;
   take(columns.scales, bundle.targets.size(), unknowns.scales ? 1 : 0);
-  take(columns.warps, bundle.targets.size(), unknowns.warps ? 2 : 0);
+  take(columns.warps, bundle.targets.size(), unknowns.warps ? 3 : 0);
   columns.joint_zeros.assign(bundle.joint_zeros.size(), -1);
   for (std::size_t arm = 0; unknowns.joint_zeros && arm < bundle.joint_zeros.size(); ++arm) {
     if (bundle.joint_zeros[arm].size() == 0) continue;
@@ -182,9 +182,9 @@ void move_shared(Bundle& bundle, const SharedColumns& columns, const Eigen::Vect
   move_poses(bundle.targets, columns.targets);
   move_poses(bundle.bases, columns.bases);
   move_numbers(bundle.scales, columns.scales);
-  bundle.warps.resize(bundle.targets.size(), Eigen::Vector2d::Zero());
+  bundle.warps.resize(bundle.targets.size(), Eigen::Vector3d::Zero());
   for (std::size_t i = 0; i < bundle.warps.size(); ++i)
-    if (columns.warps[i] >= 0) bundle.warps[i] += step.segment<2>(columns.warps[i]);
+    if (columns.warps[i] >= 0) bundle.warps[i] += step.segment<3>(columns.warps[i]);
   for (std::size_t arm = 0; arm < bundle.joint_zeros.size(); ++arm)
     if (columns.joint_zeros[arm] >= 0)
       bundle.joint_zeros[arm] += step.segment(columns.joint_zeros[arm], bundle.joint_zeros[arm].size());
@@ -237,7 +237,7 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
     if (columns.scales[target] >= 0)
       rows.col(builder.first_shared() + columns.scales[target]) = d_q * builder.chain().d_scale(p / scale);
     if (columns.warps[target] >= 0)
-      rows.middleCols<2>(builder.first_shared() + columns.warps[target]) =
+      rows.middleCols<3>(builder.first_shared() + columns.warps[target]) =
           scale * d_q * builder.chain().d_scale(Eigen::Vector3d::UnitZ()) * view.bows.col(i).transpose();
     rows.col(builder.width() - 1) = residual;
     const double weight = huber_weight(residual.norm(), sigma, huber);

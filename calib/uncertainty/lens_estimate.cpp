@@ -70,7 +70,7 @@ WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const
   const int first = shared_columns(bundle, unknowns).warps[target];
   if (first < 0) return warp;
   warp.estimate = bundle.warps[target];
-  warp.sd = covariance.diagonal().segment<2>(first).cwiseSqrt();
+  warp.sd = covariance.diagonal().segment<3>(first).cwiseSqrt();
   warp.prior_sd = bundle.priors.warp_sd[target];
   return warp;
 }

@@ -45,6 +45,17 @@ TEST(Extrinsics, WhatIsSavedIsLoaded) {
   EXPECT_EQ(loaded.inputs.target, "chessboard:9x6:0.025");
 }
 
+TEST(Extrinsics, WarpIsReadFromFilesOfBeforeTheTwistToo) {
+  SavedCalibration saved;
+  EXPECT_EQ(load_extrinsics(saved.path).target.warp, saved.calibration.warp.estimate);
+  saved.json["scale"]["warp_mm"] = {0.5, -0.25};
+  saved.save();
+  EXPECT_EQ(load_extrinsics(saved.path).target.warp, Eigen::Vector3d(5e-4, -2.5e-4, 0));
+  saved.json["scale"]["warp_mm"] = {0.5};
+  saved.save();
+  EXPECT_THROW(load_extrinsics(saved.path), data::InputError);
+}
+
 TEST(Extrinsics, DamagedFilesAreNamedByFieldAndFile) {
   SavedCalibration saved;
   saved.json["covariance"][2].erase(5);

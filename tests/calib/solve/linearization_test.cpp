@@ -26,7 +26,7 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
   bundle.intrinsics[0].model = data::DistortionModel::rational_polynomial;
   bundle.intrinsics[0].distortion = {0.1, -0.2, 0.001, -0.002, 0.05, 0.02, -0.03, 0.01};
   bundle.scales[0] = 1.02;
-  bundle.warps = {Eigen::Vector2d(0.004, -0.003)};
+  bundle.warps = {Eigen::Vector3d(0.004, -0.003, 0.002)};
   const Unknowns unknowns{
       .corrections = true, .intrinsics = kIntrinsics, .scales = true, .warps = true, .time_offsets = true};
   const SharedColumns columns = shared_columns(bundle, unknowns);
@@ -50,7 +50,7 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
       b.intrinsics[0] = with_vector(b.intrinsics[0], v);
     }
     if (shared == columns.scales[0]) b.scales[0] += step;
-    if (shared >= columns.warps[0] && shared < columns.warps[0] + 2)
+    if (shared >= columns.warps[0] && shared < columns.warps[0] + 3)
       b.warps[0][shared - columns.warps[0]] += step;
     if (shared == columns.time_offsets[1]) b.time_offsets[1] += step;
     const Eigen::Matrix2Xd r = -residuals(b, b.views[0]);
@@ -90,11 +90,16 @@ TEST(LensPrior, StandsInTheLinearModelAsItsResidualsDo) {
 }
 
 TEST(TargetWarp, LeavesTheEndsAndRaisesTheMiddle) {
-  const Eigen::Matrix2Xd bows = target_bows(board_points(5, 3));
-  EXPECT_EQ(bows.col(0), Eigen::Vector2d::Zero());
-  EXPECT_EQ(bows.col(7), Eigen::Vector2d::Ones());
-  EXPECT_EQ(bows.col(2), Eigen::Vector2d(1, 0));
-  EXPECT_TRUE(target_bows(tag_points()).isZero(0));
+  const Eigen::Matrix3Xd bows = target_bows(board_points(5, 3));
+  EXPECT_EQ(bows.col(7), Eigen::Vector3d(1, 1, 0));
+  EXPECT_EQ(bows.col(2), Eigen::Vector3d(1, 0, 0));
+  // Opposite corners stand behind, the others before.
+  EXPECT_EQ(bows.col(0), Eigen::Vector3d(0, 0, 1));
+  EXPECT_EQ(bows.col(14), Eigen::Vector3d(0, 0, 1));
+  EXPECT_EQ(bows.col(4), Eigen::Vector3d(0, 0, -1));
+  // Four corners are bent by a twist alone.
+  EXPECT_TRUE(target_bows(tag_points()).topRows<2>().isZero(0));
+  EXPECT_EQ(target_bows(tag_points()).row(2).cwiseAbs(), Eigen::RowVector4d::Ones());
 }
 
 }  // namespace
