@@ -103,6 +103,7 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
                 with_deviation(c.lens.estimate[1], c.lens.sd[1]).c_str(), c.lens.stated[0], c.lens.stated[1]);
     std::printf("target: %.4f +- %.4f times as large as stated, %s\n", c.size->estimate, c.size->sd,
                 calib::describe(c.warp).c_str());
+    if (c.edges) std::printf("%s\n", calib::describe(*c.edges).c_str());
   }
   if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
     std::printf("joints are farther than they say by");

@@ -44,6 +44,10 @@ nlohmann::ordered_json result_json(const calib::IntrinsicsEstimate& estimate) {
     json["warp_mm"].push_back(1e3 * estimate.warp.estimate[term]);
     json["warp_sd_mm"].push_back(1e3 * estimate.warp.sd[term]);
   }
+  if (estimate.edges) {
+    json["edge_offset_px"] = estimate.edges->estimate;
+    json["edge_offset_sd_px"] = estimate.edges->sd;
+  }
   json["reprojection_rms_px"] = estimate.rms;
   json["picture_corner_sd_px"] = estimate.corner_sd;
   json["coverage"] = estimate.coverage;
@@ -61,6 +65,7 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
   for (Eigen::Index i = 0; i < 4 + static_cast<Eigen::Index>(estimate.camera.distortion.size()); ++i)
     std::printf("%-3s %12.5g  +- %.2g%s\n", kNames[i], values[i], estimate.sd[i], i < 4 ? " px" : "");
   std::printf("target: %s\n", calib::describe(estimate.warp).c_str());
+  if (estimate.edges) std::printf("%s\n", calib::describe(*estimate.edges).c_str());
   std::printf("%.3f px rms a corner; places at the picture's corners known to %.2g px\n", estimate.rms,
               estimate.corner_sd);
 }

@@ -219,6 +219,8 @@ std::optional<std::string> cause_of(const Calibration& result, const std::vector
 
 /// Of the lens and the target, which are not what was stated.
 void warn_of_shapes(Calibration& result, bool disputed) {
+  if (result.edges && result.edges->far_off())
+    result.warnings.insert(result.warnings.begin(), edge_sentence(*result.edges));
   if (result.warp.far_off()) result.warnings.insert(result.warnings.begin(), warp_sentence(result.warp));
   if (!result.lens.far_off.empty())
     result.warnings.insert(result.warnings.begin(), lens_sentence(result.lens));
@@ -358,7 +360,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
 
   RefineSettings refine_settings = settings.refine;
   refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0 && !settings.size_as_stated;
-  refine_settings.bundle.unknowns.warps = true;
+  refine_settings.bundle.unknowns.warps = refine_settings.bundle.unknowns.edge_offsets = true;
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   refine_settings.bundle.unknowns.joint_zeros = observations.front().joint_motions.cols() > 0;
   result.unknowns = refine_settings.bundle.unknowns;
@@ -394,6 +396,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   }
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
+  result.edges = edge_estimate(bundle, result.unknowns, result.shared_covariance);
   if (settings.lens != given.lens)
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);
