@@ -36,11 +36,16 @@ cv::Ptr<cv::aruco::Dictionary> dictionary_of(const std::string& name) {
   return cv::aruco::getPredefinedDictionary(known.at(name));
 }
 
+/// How well the corners of markers are placed: to a pixel, or by the gradients within 5 px. In these the
+/// corners of a small ChArUco board's squares pull at its markers, by more than the board's fit allows.
+enum class Corners { rough, refined };
+
 /// Markers by id; those whose id is seen more than once are in `repeated` instead.
-Markers find_markers(const GreyImage& image, const cv::Ptr<cv::aruco::Dictionary>& dictionary,
+Markers find_markers(const GreyImage& image, const cv::Ptr<cv::aruco::Dictionary>& dictionary, Corners placed,
                      std::vector<int>& repeated) {
   const cv::Ptr<cv::aruco::DetectorParameters> parameters = cv::aruco::DetectorParameters::create();
-  parameters->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+  parameters->cornerRefinementMethod =
+      placed == Corners::refined ? cv::aruco::CORNER_REFINE_SUBPIX : cv::aruco::CORNER_REFINE_NONE;
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
   cv::aruco::detectMarkers(as_mat(image), dictionary, corners, ids, parameters);
@@ -230,12 +235,12 @@ std::optional<Target> shown_markers(const GreyImage& image, const Target& stated
   const std::size_t least = single ? 1 : kOfABoard;
   Target best = stated;
   std::vector<int> repeated;
-  Markers most = find_markers(image, dictionary_of(stated.dictionary), repeated);
+  Markers most = find_markers(image, dictionary_of(stated.dictionary), Corners::rough, repeated);
   if (most.size() < least)
     for (const std::string family : {"DICT_4X4_", "DICT_5X5_", "DICT_6X6_", "DICT_7X7_", "DICT_ARUCO_"}) {
       const bool original = family == "DICT_ARUCO_";
-      Markers markers =
-          find_markers(image, dictionary_of(family + (original ? "ORIGINAL" : "1000")), repeated);
+      Markers markers = find_markers(image, dictionary_of(family + (original ? "ORIGINAL" : "1000")),
+                                     Corners::rough, repeated);
       if (markers.size() <= most.size()) continue;
       most = std::move(markers);
       best.dictionary = original ? family + "ORIGINAL" : dictionary_of_family(family, most.rbegin()->first);
@@ -252,7 +257,7 @@ Finder aruco_finder(const Target& target, const Rectifier& rectifier) {
   return [target, &rectifier, dictionary = dictionary_of(target.dictionary)](const GreyImage& image) {
     Found found;
     std::vector<int> repeated;
-    Markers markers = find_markers(image, dictionary, repeated);
+    Markers markers = find_markers(image, dictionary, Corners::refined, repeated);
     const bool grid = target.kind == TargetKind::aruco_grid;
     const int count = grid ? target.columns * target.rows : 1;
     if (target.first_id >= 0)
@@ -294,7 +299,7 @@ Finder charuco_finder(const Target& target, const Rectifier& rectifier) {
   return [target, &rectifier, dictionary = dictionary_of(target.dictionary)](const GreyImage& image) {
     Found found;
     std::vector<int> repeated;
-    const Markers markers = find_markers(image, dictionary, repeated);
+    const Markers markers = find_markers(image, dictionary, Corners::rough, repeated);
     BoardFit fit = fit_board(target, markers, rectifier, false);
     if (target.rows % 2 == 0) {
       const BoardFit other = fit_board(target, markers, rectifier, true);

@@ -15,7 +15,7 @@
 namespace flash::calib {
 namespace {
 
-constexpr int kFinderVersion = 5;  // counts changes of what the finders return
+constexpr int kFinderVersion = 6;  // counts changes of what the finders return
 
 /// Points of the target, each once, at places in or near a picture.
 bool is_sound(const Sighting& sighting, int points) {
