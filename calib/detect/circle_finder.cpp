@@ -4,6 +4,7 @@
 #include <opencv2/features2d.hpp>
 
 #include "calib/detect/corner_shapes.h"
+#include "calib/detect/dot_lattice.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/opencv_image.h"
 
@@ -32,15 +33,17 @@ std::vector<cv::Point2f> largest_blobs(const cv::Mat& picture, cv::FeatureDetect
   return places;
 }
 
-std::vector<cv::Point2f> grid_of(const std::vector<cv::Point2f>& dots, int columns, int rows) {
+/// By OpenCV; none where it orders dots as no grid lies.
+Places grid_of(const std::vector<cv::Point2f>& dots, int columns, int rows) {
   std::vector<cv::Point2f> centres;
   for (const int flags :
        {static_cast<int>(cv::CALIB_CB_SYMMETRIC_GRID), cv::CALIB_CB_SYMMETRIC_GRID | cv::CALIB_CB_CLUSTERING})
-    if (cv::findCirclesGrid(dots, {columns, rows}, centres, flags, nullptr)) return centres;
+    if (cv::findCirclesGrid(dots, {columns, rows}, centres, flags, nullptr))
+      if (Places places = to_eigen(centres); is_lattice(places, columns, rows)) return places;
   return {};
 }
 
-/// Dots of the grid as OpenCV orders them: row by row from one of the corners.
+/// Dots of the grid, row by row from one of the corners.
 Places find_grid(const GreyImage& image, int columns, int rows) {
   cv::SimpleBlobDetector::Params blobs;
   blobs.filterByArea = true;
@@ -61,16 +64,16 @@ Places find_grid(const GreyImage& image, int columns, int rows) {
     if (scale != 1) cv::resize(picture, picture, {}, scale, scale, cv::INTER_CUBIC);
     const auto count = static_cast<std::size_t>(columns * rows), most = count + kMostOthers,
                few = count + count / 4;
-    std::vector<cv::Point2f> dots = largest_blobs(picture, *detector, most);
-    std::vector<cv::Point2f> centres = grid_of(dots, columns, rows);
-    if (centres.empty() && dots.size() == most) {  // specks are smaller than dots
-      dots.resize(few);
-      centres = grid_of(dots, columns, rows);
-    }
+    const std::vector<cv::Point2f> dots = largest_blobs(picture, *detector, most);
+    Places centres = grid_of(dots, columns, rows);
+    if (centres.empty() && dots.size() == most)  // specks are smaller than dots
+      centres =
+          grid_of({dots.begin(), dots.begin() + static_cast<std::ptrdiff_t>(std::min(few, dots.size()))},
+                  columns, rows);
+    if (centres.empty()) centres = find_dot_lattice(to_eigen(dots), columns, rows).value_or(Places());
     if (centres.empty()) continue;
     Places places;
-    for (const Eigen::Vector2d& centre : to_eigen(centres))
-      places.emplace_back((centre.array() + 0.5) / scale - 0.5);
+    for (const Eigen::Vector2d& centre : centres) places.emplace_back((centre.array() + 0.5) / scale - 0.5);
     return places;
   }
   return {};
@@ -229,9 +232,9 @@ Finder circle_finder(const Target& target, const Rectifier& rectifier) {
     correct_for_perspective(target, grid);
     Sighting fitted{kImageModel, {}, {}}, blobs{"blobs", {}, {}};
     for (std::size_t i = 0; i < places.size(); ++i) {
+      if (!(grid.areas[i] > 0)) continue;
       blobs.points.push_back(static_cast<int>(i));
       blobs.pixels.push_back(seeds[i]);
-      if (!(grid.areas[i] > 0)) continue;
       fitted.points.push_back(static_cast<int>(i));
       fitted.pixels.push_back(rectifier.distorted(grid.centres[i]));
     }

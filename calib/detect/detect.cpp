@@ -9,6 +9,7 @@
 #include "calib/detect/find_in_all.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/planar_pose.h"
+#include "calib/detect/plane_residual.h"
 #include "data/error.h"
 #include "data/median.h"
 #include "data/parallel.h"
@@ -18,6 +19,7 @@ namespace flash::calib {
 namespace {
 
 constexpr double kAlwaysGood = 2;  // small markers, seen aslant, vary by that much [px]
+constexpr double kBentByLens = 5;  // so much, or less, a lens not known may bend a flat target [px]
 
 Observation observe(const Frame& frame, const Target& target, const Sighting& sighting) {
   Observation observation;
@@ -64,24 +66,28 @@ void add_poses(const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& poi
                            : "the corners fit no pose of the target";
 }
 
-/// A view that fits far worse than the others of its set shows wrong corners.
-void drop_misfits(const DetectSettings& settings, std::vector<Detection>& detections) {
+/// A view that fits far worse than the others of its set shows wrong corners. points: of the target; posed:
+/// views have poses to fit to. Without, they are to be flat.
+void drop_misfits(const DetectSettings& settings, const Eigen::Matrix3Xd& points, bool posed,
+                  std::vector<Detection>& detections) {
+  const auto misfit = [&](const CornerReading& reading) {
+    return posed ? reading.observation.pose_rms : plane_residual(points, reading.observation);
+  };
   std::vector<double> rms;
   for (const Detection& detection : detections)
-    if (!detection.readings.empty()) rms.push_back(detection.readings.front().observation.pose_rms);
+    if (!detection.readings.empty()) rms.push_back(misfit(detection.readings.front()));
   if (rms.empty()) return;
   const double usual = data::median(rms);
-  const double limit = std::max(kAlwaysGood, settings.largest_ratio * usual);
+  const double limit = std::max(posed ? kAlwaysGood : kBentByLens, settings.largest_ratio * usual);
   for (Detection& detection : detections) {
     if (detection.readings.empty()) continue;
-    const double found = detection.readings.front().observation.pose_rms;
+    const double found = misfit(detection.readings.front());
     if (found > limit) {
       detection.readings.clear();
       detection.reason = "the corners fit the target to " + data::format_short(found) +
                          " px, the usual view to " + data::format_short(usual) + " px";
     }
-    std::erase_if(detection.readings,
-                  [&](const CornerReading& reading) { return reading.observation.pose_rms > limit; });
+    std::erase_if(detection.readings, [&](const CornerReading& reading) { return misfit(reading) > limit; });
   }
 }
 
@@ -152,7 +158,7 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
       add_poses(*dataset.camera, points, settings.largest_rms, detection);
   });
 
-  drop_misfits(settings, detections);
+  drop_misfits(settings, points, dataset.camera.has_value(), detections);
   const bool none = std::all_of(detections.begin(), detections.end(),
                                 [](const Detection& detection) { return detection.readings.empty(); });
   const std::string shown = none ? shown_instead(dataset, target, rectifier) : std::string();

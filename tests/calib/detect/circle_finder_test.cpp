@@ -39,5 +39,36 @@ TEST(CircleFinder, GridAmongAThousandSpecksIsFoundAsWithoutThem) {
   EXPECT_EQ(among.sightings.front().pixels, alone.sightings.front().pixels);
 }
 
+// Turned by 45 deg, and towards the picture's edge, libraries order some of these otherwise, or give up.
+TEST(CircleFinder, GridsAnywhereInThePictureAreFoundInTheirOrder) {
+  data::CameraIntrinsics camera = small_camera();
+  const Rectifier rectifier(camera);
+  for (const char* words : {"circles:7x5:0.03", "circles:10x10:0.02:origin-dot"}) {
+    const Target target = parse_target(words);
+    const Eigen::Matrix3Xd points = target_points(target);
+    const std::vector<std::vector<int>> symmetries = target_symmetries(target);
+    const Renderer renderer(target, camera);
+    const Finder finder = make_finder(target, rectifier);
+    std::mt19937 random(29);
+    for (int view = 0; view < 8; ++view) {
+      const Eigen::Isometry3d pose = random_view(target, camera, 0.4, 0.55, 0.9, random);
+      const Found found = finder(renderer.draw(pose, random));
+      ASSERT_FALSE(found.sightings.empty()) << words << " " << view << ": " << found.reason;
+      const Sighting& sighting = found.sightings.front();
+      double least = 1e300;
+      for (const std::vector<int>& symmetry : symmetries) {
+        double squares = 0;
+        for (std::size_t i = 0; i < sighting.points.size(); ++i)
+          squares += (sighting.pixels[i] -
+                      *data::project(
+                          camera, pose * points.col(symmetry[static_cast<std::size_t>(sighting.points[i])])))
+                         .squaredNorm();
+        least = std::min(least, std::sqrt(squares / (2 * static_cast<double>(sighting.points.size()))));
+      }
+      EXPECT_LT(least, 0.05) << words << " " << view;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace flash::calib

@@ -218,6 +218,28 @@ TEST(Detect, ThoroughSearchGoesOnOnlyWhereABoardIsSeen) {
   EXPECT_EQ(seen(5, 8), std::vector<int>({5, 8}));
 }
 
+// Without intrinsics there is no pose to hold corners against, but a target is flat.
+TEST(Detect, PictureOfATargetThatIsNotFlatIsNoneWithoutIntrinsicsEither) {
+  const data::TemporaryFolder folder;
+  const Target target = parse_target("chessboard:7x5:0.03");
+  Dataset dataset = write_set(folder, target, 5);
+  dataset.camera.reset();
+  for (const Detection& detection : detect(dataset, target)) EXPECT_FALSE(detection.readings.empty());
+  const GreyImage image = load_grey_image(folder / "images/2.png");
+  GreyImage bent = image;
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x) {
+      const int from = x + static_cast<int>(std::lround(25 * std::sin(0.016 * y)));
+      bent.pixels[static_cast<std::size_t>(y * image.width + x)] =
+          image.at(std::clamp(from, 0, image.width - 1), y);
+    }
+  data::save_mask(bent, folder / "images/2.png");
+  const std::vector<Detection> detections = detect(dataset, target);
+  EXPECT_TRUE(detections[2].readings.empty());
+  EXPECT_NE(detections[2].reason.find("the usual view to"), std::string::npos) << detections[2].reason;
+  EXPECT_FALSE(detections[1].readings.empty());
+}
+
 TEST(Detect, TransposedBoardIsTheSameBoard) {
   const data::TemporaryFolder folder;
   const Dataset dataset = write_set(folder, parse_target("chessboard:7x5:0.03"), 2);
