@@ -219,22 +219,6 @@ void expect_frame_names(const std::string& parent, const std::string& child) {
                            '"');
 }
 
-/// Files by path and text, those without a path left out: all, or none where one cannot be written.
-void write_all(const std::vector<std::pair<std::string, std::string>>& files) {
-  std::vector<std::string> written;
-  try {
-    for (const auto& [path, text] : files) {
-      if (path.empty()) continue;
-      data::write_atomically(path, text);
-      written.push_back(path);
-    }
-  } catch (const std::exception&) {
-    std::error_code ignored;
-    for (const std::string& path : written) std::filesystem::remove(path, ignored);
-    throw;
-  }
-}
-
 int run_handeye(const HandEyeOptions& options) {
   const std::string report = report_path(options);
   const std::vector<std::string> outputs = {

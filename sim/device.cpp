@@ -54,7 +54,8 @@ std::string why_no_cuda() {
 
 DeviceRates device_rates(int cuda_device) {
 #ifdef FLASH_HAVE_CUDA
-  return cuda::rates_of(cuda_device);
+  const cuda::Rates rates = cuda::rates_of(cuda_device);
+  return {rates.name, rates.copied_bytes, rates.single_flops};
 #else
   throw std::runtime_error("device " + std::to_string(cuda_device) + ": " + why_no_cuda());
 #endif

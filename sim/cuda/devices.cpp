@@ -45,14 +45,14 @@ int single_lanes(int major, int minor) { return major == 7 || (major == 8 && min
 
 }  // namespace
 
-DeviceRates rates_of(int device) {
+Rates rates_of(int device) {
   use_device(device);
   const auto attribute = [device](cudaDeviceAttr which) {
     int value = 0;
     check(cudaDeviceGetAttribute(&value, which, device));
     return value;
   };
-  DeviceRates rates;
+  Rates rates;
   cudaDeviceProp properties{};
   check(cudaGetDeviceProperties(&properties, device));
   rates.name = properties.name;

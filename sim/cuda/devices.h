@@ -1,8 +1,6 @@
 #pragma once
 #include <string>
 
-#include "sim/device.h"
-
 namespace flash::sim::cuda {
 
 /// CUDA devices of this machine; 0 where they cannot be asked.
@@ -20,7 +18,13 @@ void use_device(int device);
 /// That which this thread works with.
 int device_in_use();
 
+/// As sim::DeviceRates.
+struct Rates {
+  std::string name;
+  double copied_bytes = 0, single_flops = 0;
+};
+
 /// Copies half of the free memory, at most 512 MB, for some milliseconds. Leaves the device in use.
-DeviceRates rates_of(int device);
+Rates rates_of(int device);
 
 }  // namespace flash::sim::cuda
