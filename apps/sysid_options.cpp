@@ -277,10 +277,6 @@ void place_simulation(const CommonOptions& options, const data::Asset& asset,
   const sim::DeviceChoice choice = sim::choose_device(open && solid ? "cpu" : options.device);
   settings.device = choice.device;
   settings.cuda_devices = choice.cuda_devices;
-  if (!open) return;
-  const std::string why = solid ? "no device simulates solids" : sim::why_no_cuda();
-  say(options, choice.device == sim::Device::cuda ? "the simulations run on the first CUDA device"
-                                                  : "the simulations run on the CPU: " + why);
 }
 
 void require_cpu(const CommonOptions& options) {

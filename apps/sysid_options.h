@@ -74,8 +74,8 @@ void warn_of_camera(const data::Recording& recording);
 
 int thread_count(const CommonOptions& options);
 
-/// Has candidates simulated where --device wants it, and says so where that is auto. No device simulates
-/// solids: auto takes the CPU for them. Throws data::InputError for a CUDA device that is not there.
+/// Has candidates simulated where --device wants it. No device simulates solids: auto takes the CPU for
+/// them. Throws data::InputError for a CUDA device that is not there.
 void place_simulation(const CommonOptions& options, const data::Asset& asset,
                       sysid::ReplaySettings& settings);
 /// For verbs that no device simulates for yet. Throws data::InputError for cuda.
