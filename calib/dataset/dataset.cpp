@@ -374,8 +374,9 @@ void read_pictures(const fs::path& folder, const DatasetOptions& options, Datase
 void expect_places(const Dataset& dataset) {
   constexpr double kFarthest = 1e4;  // [m]
   for (const Frame& frame : dataset.frames) {
-    double farthest = frame.T_base_gripper.translation().norm();
-    if (frame.T_camera_target) farthest = std::max(farthest, frame.T_camera_target->translation().norm());
+    double farthest = frame.T_base_gripper.translation().stableNorm();
+    if (frame.T_camera_target)
+      farthest = std::max(farthest, frame.T_camera_target->translation().stableNorm());
     if (!(farthest < kFarthest))
       throw data::input_error(dataset.source, frame.name,
                               "found a pose " + data::format_short(farthest) + " m away, expected metres");

@@ -57,7 +57,7 @@ def overwrites(calib):
         yield [calib, "register", "left/camera.json", "right/camera.json", "-o", path], path
     yield [calib, "register", "--cameras", "left", "right", "-o", "right/images/000.png"], "right/images/000.png"
     validate = [calib, "validate", "wrist", "--extrinsics"]
-    yield [*validate, "validation.json", "-o", "."], "./validation.json"
+    yield [*validate, "validation.json", "-o", "."], "./corners/000.png"
     yield [calib, "validate", "bare/corners", "--camera", "wrist/camera_info.yaml", "--poses", "wrist/poses.tum", "--target",
            BOARD, "--extrinsics", "wrist/camera.json", "-o", "bare"], "bare/corners/000.png"
 

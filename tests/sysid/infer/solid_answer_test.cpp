@@ -23,7 +23,7 @@ ParameterFinding young_from(const data::TemporaryFolder& folder, double noise, u
   GridSettings grid;
   grid.base.solid = beam_material(2e5);
   grid.axes = {parse_axis("young", "1.5e5:4e5:4:log")};
-  grid.fixed = {parse_axis("poisson", "0.45")};
+  grid.fixed = {parse_axis("poisson", "0.45"), parse_axis("density", std::to_string(truth.density))};
   grid.rollouts = folder / "motions";
   ResultsStore store(folder / "run", grid.axes, {"twin"}, {}, Existing::refuse);
   EXPECT_TRUE(grid_search(replays, grid, store));
