@@ -20,7 +20,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage other-simulators plan-promise answer-time size-study use-study
-.PHONY: few-views-study knock-study locking reference fuzz sanitize
+.PHONY: few-views-study knock-study locking drape reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -113,6 +113,9 @@ deep-starts: configure-test  ## Simulate SCENES random sheets that start across 
 locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever over Poisson's ratio and mesh
 	cmake --build $(BUILD) -j $(JOBS) --target locking_study
 	$(BUILD)/tests/locking_study
+
+drape: build packages-test  ## Say how far drapes of a disc are from those of an independent solver, over bending length and mesh
+	$(PYTHON) tests/validation/drape.py --sim $(BUILD)/bin/flash-sim --out $(BUILD)/drape
 
 reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them by its compare.py
 	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \
