@@ -111,6 +111,7 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
         "its ends along x and y, twisted by %s +- %.2f mm\n",
         c.size->estimate, c.size->sd, fixed(warp.x(), 2).c_str(), warp_sd.x(), fixed(warp.y(), 2).c_str(),
         warp_sd.y(), fixed(warp.z(), 2).c_str(), warp_sd.z());
+    if (c.edges) std::printf("%s\n", calib::describe(*c.edges).c_str());
   }
   if (const auto zeros = calib::joint_zeros(c.refined.bundle, c.unknowns, c.shared_covariance)) {
     std::printf("joints are farther than they say by");

@@ -44,6 +44,10 @@ nlohmann::ordered_json result_json(const calib::IntrinsicsEstimate& estimate) {
   const calib::Warp warp = 1e3 * estimate.warp.estimate, warp_sd = 1e3 * estimate.warp.sd;
   json["warp_mm"] = {warp.x(), warp.y(), warp.z()};
   json["warp_sd_mm"] = {warp_sd.x(), warp_sd.y(), warp_sd.z()};
+  if (estimate.edges) {
+    json["edge_offset_px"] = estimate.edges->estimate;
+    json["edge_offset_sd_px"] = estimate.edges->sd;
+  }
   json["reprojection_rms_px"] = estimate.rms;
   json["picture_corner_sd_px"] = estimate.corner_sd;
   json["coverage"] = estimate.coverage;
@@ -65,6 +69,7 @@ void print_table(const calib::IntrinsicsEstimate& estimate) {
       "target: its middle %.2f +- %.2f and %.2f +- %.2f mm behind its ends along x and y, twisted by %.2f +- "
       "%.2f mm\n",
       warp.x(), sd.x(), warp.y(), sd.y(), warp.z(), sd.z());
+  if (estimate.edges) std::printf("%s\n", calib::describe(*estimate.edges).c_str());
   std::printf("%.3f px rms a corner; places at the picture's corners known to %.2g px\n", estimate.rms,
               estimate.corner_sd);
 }

@@ -183,11 +183,13 @@ int run_validate(const ValidateOptions& options) {
   // The calibration knows its lens better than the file that it started from.
   const data::CameraIntrinsics lens =
       same_size ? *extrinsics.lens : dataset.camera.value_or(data::CameraIntrinsics{});
-  if (!pairs) observations = calib::with_poses_for(lens, target, extrinsics.target, std::move(observations));
+  if (!pairs)
+    observations = calib::with_poses_for(lens, target, extrinsics.target, std::move(observations),
+                                         extrinsics.edge_offset);
   calib::HandEyePoses poses{extrinsics.transform.T, extrinsics.target_pose.T};
   if (options.refit_target) poses.Z = calib::target_pose_from(extrinsics.setup, poses.X, observations);
-  const calib::ProjectionCheck check =
-      calib::check_projection(extrinsics.setup, poses, lens, target, observations, extrinsics.target);
+  const calib::ProjectionCheck check = calib::check_projection(
+      extrinsics.setup, poses, lens, target, observations, extrinsics.target, extrinsics.edge_offset);
   const calib::Contradiction contradiction =
       calib::contradiction(extrinsics, poses, options.refit_target, lens, target, observations, check);
   std::vector<std::string> warnings = extrinsics.warnings;

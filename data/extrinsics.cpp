@@ -38,8 +38,9 @@ CameraPose read_camera_pose(const JsonObject& file, bool accept_unusable) {
                       "target_pose", "covariance", "predicted_sd",  "sigmas",
                       "residuals",   "depth",      "lens",          "time_offset",
                       "comparison",  "views",      "observability", "convention_findings",
-                      "scale",       "splits",     "smooth_errors", "joint_zeros",
-                      "use",         "warnings",   "exit_code",     "provenance"});
+                      "scale",       "edges",      "splits",        "smooth_errors",
+                      "joint_zeros", "use",        "warnings",      "exit_code",
+                      "provenance"});
   // The second version has joint_zeros, use and the depth of comparisons; what is read here is in both.
   const std::string schema = file.string("schema", "");
   if (schema != "flash-extrinsics/1" && schema != "flash-extrinsics/2")

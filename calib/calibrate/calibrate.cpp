@@ -224,6 +224,7 @@ std::optional<std::string> cause_of(const Calibration& result, const std::vector
 
 /// Of the lens and the target, which are not what was stated.
 void warn_of_shapes(Calibration& result, bool disputed, const CalibrateSettings& settings) {
+  if (result.edges && result.edges->far_off()) tell_first(result, edge_sentence(*result.edges));
   if (result.warp.far_off()) tell_first(result, warp_sentence(result.warp));
   if (!result.lens.far_off.empty()) tell_first(result, lens_sentence(result.lens));
   if (!result.size || !result.size->far_off()) return;
@@ -378,7 +379,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
 
   RefineSettings refine_settings = settings.refine;
   refine_settings.bundle.unknowns.scales = *settings.target_size_sd > 0 && !settings.size_as_stated;
-  refine_settings.bundle.unknowns.warps = true;
+  refine_settings.bundle.unknowns.warps = refine_settings.bundle.unknowns.edge_offsets = true;
   refine_settings.bundle.unknowns.intrinsics = settings.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   refine_settings.bundle.unknowns.joint_zeros = observations.front().joint_motions.cols() > 0;
   result.unknowns = refine_settings.bundle.unknowns;
@@ -414,6 +415,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   }
   result.lens = lens_estimate(bundle, result.unknowns, result.shared_covariance);
   result.warp = warp_estimate(bundle, result.unknowns, result.shared_covariance);
+  result.edges = edge_estimate(bundle, result.unknowns, result.shared_covariance);
   if (settings.lens != given.lens)
     add_shared_lens(result, plain, refine_settings, camera, settings.lens_covariance);
   check_splits(result, refine_settings.bundle, settings, grown);

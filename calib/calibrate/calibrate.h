@@ -67,6 +67,7 @@ struct Calibration {
   Method method = Method::errors_in_variables;    ///< that the poses are of: that, or pixels
   LensEstimate lens;
   WarpEstimate warp;
+  std::optional<EdgeOffset> edges;    ///< of a target with corners of edges
   Unknowns unknowns;                  ///< of the solution
   Eigen::MatrixXd shared_covariance;  ///< of all shared unknowns (SharedColumns), before splits widen it
   double corner_rms = 0;              ///< with corrections, 2-D rms per corner [px]
@@ -106,9 +107,9 @@ std::vector<Observation> prepare(Calibration& result, const std::vector<Observat
 bool finish(Calibration& result, const std::vector<Observation>& used);
 
 /// From observations to the answer: views selected, seed, bundle, errors in variables, a second look for
-/// views that do not belong, held-out residuals, comparison; lens, size and warp of the target among the
-/// unknowns, with what is known of them. Throws data::InputError where too few views are left or nothing can
-/// be determined, with the one sentence that names the cause.
+/// views that do not belong, held-out residuals, comparison; lens, size, warp and edges of the target among
+/// the unknowns, with what is known of them. Throws data::InputError where too few views are left or nothing
+/// can be determined, with the one sentence that names the cause.
 Calibration calibrate(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& points,
                       const std::vector<Symmetry>& symmetries, const std::vector<Observation>& observations,
                       const CalibrateSettings& settings = {});

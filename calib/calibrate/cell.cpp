@@ -216,7 +216,7 @@ Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& give
   const bool unknown_sizes = given.target_size_sd && std::isinf(*given.target_size_sd);
   RefineSettings settings = given.refine;
   settings.bundle.unknowns.scales = !as_stated;
-  settings.bundle.unknowns.warps = true;
+  settings.bundle.unknowns.warps = settings.bundle.unknowns.edge_offsets = true;
   settings.bundle.unknowns.intrinsics = given.lens == LensKnowledge::stated ? 0 : kLensUnknowns;
   Bundle start = cell_bundle(members, &cell.notices);
   std::vector<double> size_sd = start.priors.scale_sd;

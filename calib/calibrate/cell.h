@@ -67,7 +67,7 @@ struct CellSettings {
   LensKnowledge lens = LensKnowledge::near;
 };
 
-/// Solved by errors in variables, with lenses, sizes and warps of targets among the unknowns.
+/// Solved by errors in variables, with lenses, sizes, warps and edges of targets among the unknowns.
 Cell solve_cell(const std::vector<CellMember>& members, const CellSettings& settings = {});
 
 /// Covariance of where a point lies, p in the frame's child, seen from its parent [m^2].

@@ -93,6 +93,7 @@ Extrinsics extrinsics_of(const Calibration& calibration, const ExtrinsicsInputs&
   extrinsics.robot_translation_m = calibration.refined.noise.translation.front();
   if (extrinsics.pixels) {
     extrinsics.target = shape_of(calibration.refined.bundle, 0);
+    extrinsics.edge_offset = edge_offset(calibration.refined.bundle, 0);
     extrinsics.lens = calibration.refined.bundle.intrinsics.front();
   }
   extrinsics.inputs = inputs;
@@ -145,6 +146,7 @@ Extrinsics load_extrinsics(const std::string& path, bool accept_unusable) {
     if (scale.boolean("solved", false)) extrinsics.target.scale = scale.positive("estimate");
     if (scale.has("warp_mm")) extrinsics.target.warp = read_warp(scale);
   }
+  if (object.has("edges")) extrinsics.edge_offset = object.object("edges").number("offset_px");
   if (object.has("use")) {
     const std::string use = object.object("use").string("for", "workspace");
     const std::optional<Use> known = use_named(use);

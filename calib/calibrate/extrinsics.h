@@ -40,6 +40,7 @@ struct Extrinsics {
   NamedTransform target_pose;                  ///< base <- target (eye-in-hand) or gripper <- target
   Matrix6d covariance = Matrix6d::Zero();      ///< of the transform, right perturbation (dt, dtheta) [m, rad]
   TargetShape target;                          ///< that transform and target_pose are for
+  double edge_offset = 0;                      ///< of the camera's pictures [px], see EdgeOffset
   std::optional<data::CameraIntrinsics> lens;  ///< likewise; none of pose pairs
   double corner_px = 0, robot_rotation_rad = 0, robot_translation_m = 0;  ///< estimated noise per axis
   std::optional<ClosingError>

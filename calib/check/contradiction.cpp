@@ -71,8 +71,8 @@ Contradiction contradiction(const Extrinsics& extrinsics, const HandEyePoses& po
   if (result.ratio <= kContradicts) return result;
 
   const auto ratio_at = [&](const HandEyePoses& at) {
-    const ProjectionCheck moved =
-        check_projection(extrinsics.setup, at, lens, target, observations, extrinsics.target);
+    const ProjectionCheck moved = check_projection(extrinsics.setup, at, lens, target, observations,
+                                                   extrinsics.target, extrinsics.edge_offset);
     return ratio_of(moved.mm_rms, moved.deg_rms, stated);
   };
   const HandEyePoses target_moved{poses.X, target_pose_from(extrinsics.setup, poses.X, observations)};

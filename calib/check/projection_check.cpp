@@ -41,7 +41,7 @@ Numbering numbering(const Eigen::Matrix3Xd& points, const std::vector<int>& perm
 
 ViewProjection project_view(const Eigen::Isometry3d& T_camera_target, const data::CameraIntrinsics& camera,
                             const Eigen::Matrix3Xd& points, const Numbering& numbering,
-                            const Observation& view) {
+                            const Observation& view, double edge_offset) {
   ViewProjection result;
   result.image = view.image;
   result.projected.resize(2, view.pixels.cols());
@@ -50,6 +50,7 @@ ViewProjection project_view(const Eigen::Isometry3d& T_camera_target, const data
     result.points.push_back((*numbering.permutation)[static_cast<std::size_t>(point)]);
     result.projected.col(i) = pixel_of(camera, T_camera_target * points.col(result.points.back()));
   }
+  if (view.outward.cols() > 0) result.projected += edge_offset * view.outward;
   if (view.pixels.cols() > 0)
     result.corner_rms =
         std::sqrt((result.projected - view.pixels).squaredNorm() / static_cast<double>(view.pixels.cols()));
@@ -68,7 +69,7 @@ ViewProjection project_view(const Eigen::Isometry3d& T_camera_target, const data
 
 ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const data::CameraIntrinsics& camera,
                                  const Target& target, const std::vector<Observation>& observations,
-                                 const TargetShape& shape) {
+                                 const TargetShape& shape, double edge_offset) {
   const Eigen::Matrix3Xd flat = target_points(target), points = shaped(flat, target_bows(flat), shape);
   const std::vector<std::vector<int>> symmetries = target_symmetries(target);
   std::vector<Numbering> numberings;
@@ -82,7 +83,8 @@ ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const d
                       Eigen::Isometry3d::Identity(), poses.Z);
     ViewProjection best;
     for (std::size_t k = 0; k < numberings.size(); ++k) {
-      ViewProjection projection = project_view(chain.target_in_camera(), camera, points, numberings[k], view);
+      ViewProjection projection =
+          project_view(chain.target_in_camera(), camera, points, numberings[k], view, edge_offset);
       const bool better =
           view.pixels.cols() > 0 ? projection.corner_rms < best.corner_rms : projection.deg < best.deg;
       if (k == 0 || better) best = std::move(projection);
@@ -104,14 +106,17 @@ ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const d
 }
 
 std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, const Target& target,
-                                        const TargetShape& shape, std::vector<Observation> observations) {
+                                        const TargetShape& shape, std::vector<Observation> observations,
+                                        double edge_offset) {
   const Eigen::Matrix3Xd flat = target_points(target), points = shaped(flat, target_bows(flat), shape);
-  for (Observation& observation : observations)
+  for (Observation& observation : observations) {
+    Eigen::Matrix2Xd pixels = observation.pixels;
+    if (observation.outward.cols() > 0) pixels -= edge_offset * observation.outward;
     for (Eigen::Isometry3d& T : observation.T_camera_target) {
       T.translation() *= shape.scale;
-      if (observation.pixels.cols() > 0)
-        T = fitted_pose(camera, points(Eigen::all, observation.points), observation.pixels, T);
+      if (pixels.cols() > 0) T = fitted_pose(camera, points(Eigen::all, observation.points), pixels, T);
     }
+  }
   return observations;
 }
 

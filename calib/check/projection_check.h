@@ -29,14 +29,16 @@ struct ProjectionCheck {
 
 /// Projects corners and middle of the target through the chain. Nothing is fitted; where a target can be
 /// numbered in several ways, the numbering that fits a view best counts. Views without pixels (pose pairs)
-/// have px 0. shape: of the target; the views' own poses are for it, and for this camera.
+/// have px 0. shape: of the target; the views' own poses are for it, and for this camera. edge_offset: of its
+/// pictures [px].
 ProjectionCheck check_projection(Setup setup, const HandEyePoses& poses, const data::CameraIntrinsics& camera,
                                  const Target& target, const std::vector<Observation>& observations,
-                                 const TargetShape& shape = {});
+                                 const TargetShape& shape = {}, double edge_offset = 0);
 
 /// The views with their own poses fitted anew, of a target of that shape through that lens.
 std::vector<Observation> with_poses_for(const data::CameraIntrinsics& camera, const Target& target,
-                                        const TargetShape& shape, std::vector<Observation> observations);
+                                        const TargetShape& shape, std::vector<Observation> observations,
+                                        double edge_offset = 0);
 
 /// T_base_target (eye-in-hand) or T_gripper_target as the mean over the views, for a target that was moved
 /// since.

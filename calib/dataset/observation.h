@@ -14,6 +14,7 @@ struct Observation {
   Eigen::Isometry3d T_base_gripper = Eigen::Isometry3d::Identity();
   std::vector<int> points;                         ///< columns of target_points that were seen
   Eigen::Matrix2Xd pixels;                         ///< where [px], distorted; pixel centres are whole numbers
+  Eigen::Matrix2Xd outward = {};                   ///< of them, see outward_motion(); or none
   std::vector<Eigen::Isometry3d> T_camera_target;  ///< poses that fit, best first: a flat target may have two
   double pose_rms = 0;                 ///< reprojection of the first of them, 2-D rms per point [px]
   Eigen::Matrix3Xd depth_points = {};  ///< on the target's plane by depth, camera frame [m]; or none

@@ -5,6 +5,7 @@
 #include <optional>
 #include <tuple>
 
+#include "calib/dataset/edge_offset.h"
 #include "calib/detect/find_in_all.h"
 #include "calib/detect/finder.h"
 #include "calib/detect/planar_pose.h"
@@ -18,7 +19,7 @@ namespace {
 
 constexpr double kAlwaysGood = 2;  // small markers, seen aslant, vary by that much [px]
 
-Observation observe(const Frame& frame, const Sighting& sighting) {
+Observation observe(const Frame& frame, const Target& target, const Sighting& sighting) {
   Observation observation;
   observation.image = frame.name;
   observation.T_base_gripper = frame.T_base_gripper;
@@ -27,6 +28,7 @@ Observation observe(const Frame& frame, const Sighting& sighting) {
   observation.pixels.resize(2, static_cast<Eigen::Index>(sighting.pixels.size()));
   for (std::size_t i = 0; i < sighting.pixels.size(); ++i)
     observation.pixels.col(static_cast<Eigen::Index>(i)) = sighting.pixels[i];
+  observation.outward = outward_motion(target.kind, observation.pixels);
   return observation;
 }
 
@@ -145,7 +147,7 @@ std::vector<Detection> detect(const Dataset& dataset, const Target& target, cons
     detection.image = frame.name;
     detection.reason = found[k].reason;
     for (const Sighting& sighting : found[k].sightings)
-      detection.readings.push_back({sighting.refiner, observe(frame, sighting)});
+      detection.readings.push_back({sighting.refiner, observe(frame, target, sighting)});
     if (dataset.camera && detection.reason.empty())
       add_poses(*dataset.camera, points, settings.largest_rms, detection);
   });

@@ -136,6 +136,7 @@ std::vector<std::string> warnings_of(const IntrinsicsEstimate& estimate, std::si
     warnings.push_back("corners cover " + percent(estimate.coverage) +
                        " of the picture: distortion beyond is a guess");
   if (estimate.warp.far_off()) warnings.push_back(warp_sentence(estimate.warp));
+  if (estimate.edges && estimate.edges->far_off()) warnings.push_back(edge_sentence(*estimate.edges));
   if (views < 8) warnings.push_back("only " + std::to_string(views) + " views; 15 or more are usual");
   return warnings;
 }
@@ -206,8 +207,11 @@ IntrinsicsEstimate calibrate_intrinsics(const Target& target, const std::vector<
   const auto count = static_cast<Eigen::Index>(used.size());
   const Eigen::MatrixXd variances = fit.covariance.topLeftCorner(count, count);
   estimate.warp = {.estimate = fit.warp,
-                   .sd = fit.covariance.diagonal().tail<kWarp>().cwiseSqrt(),
+                   .sd = fit.covariance.diagonal().segment<kWarp>(count).cwiseSqrt(),
                    .prior_sd = usual_warp_sd(points)};
+  if (views.front()->outward.cols() > 0)
+    estimate.edges =
+        EdgeOffset{.estimate = fit.edge_offset, .sd = std::sqrt(fit.covariance.diagonal()[count + kWarp])};
   estimate.covariance(used, used) = variances;
   for (std::size_t i = 0; i < used.size(); ++i)
     estimate.sd[used[i]] =

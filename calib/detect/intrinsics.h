@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "calib/dataset/edge_offset.h"
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target.h"
 #include "calib/dataset/target_shape.h"
@@ -28,6 +30,7 @@ struct IntrinsicsEstimate {
       IntrinsicsVector::Zero();  ///< standard deviations, from the residuals; poses marginalised
   LensCovariance covariance = LensCovariance::Zero();  ///< of which those are the diagonal
   WarpEstimate warp;                                   ///< of the target, solved for beside the lens
+  std::optional<EdgeOffset> edges;                     ///< likewise, of a target with corners of edges
   double rms = 0;                                      ///< reprojection, 2-D rms per corner [px]
   double corner_sd =
       0;  ///< of where the worst corner of the picture is projected, for a fixed ray; 100 at most [px]

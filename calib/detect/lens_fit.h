@@ -8,18 +8,21 @@
 
 namespace flash::calib {
 
-/// A lens, the warp of the target it was seen through (target_bows) and where the target stood in each view.
+/// A lens, the warp of the target it was seen through (target_bows), by how much the target's edges stand
+/// outwards (EdgeOffset) and where the target stood in each view.
 struct LensFit {
   IntrinsicsVector lens = IntrinsicsVector::Zero();
   Warp warp = Warp::Zero();  ///< [m]
+  double edge_offset = 0;    ///< of views with corners of edges [px]
   std::vector<Eigen::Isometry3d> poses;
   double variance = 0;         ///< of a corner's coordinate, from the residuals [px^2]
-  Eigen::MatrixXd covariance;  ///< of the unknowns in use, then of the warp; poses marginalised
+  Eigen::MatrixXd covariance;  ///< of the unknowns in use, then of the warp and of the offset; poses
+                               ///< marginalised
 };
 
 /// Least squares of the reprojection from a start that is near, by Gauss and Newton with the poses
-/// eliminated. unknowns: places in `lens` that may change. The warp is held by what prints usually are
-/// (usual_warp_sd).
+/// eliminated. unknowns: places in `lens` that may change. Warp and offset are held by what is usual
+/// (usual_warp_sd, kUsualEdgeOffset).
 LensFit fit_lens(LensFit start, const std::vector<int>& unknowns, const Eigen::Matrix3Xd& points,
                  const std::vector<const Observation*>& views);
 

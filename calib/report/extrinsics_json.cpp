@@ -189,6 +189,10 @@ Json to_json(const Calibration& calibration, const ExtrinsicsInputs& inputs, int
     json["scale"]["warp_mm"] = list(Warp(1e3 * calibration.warp.estimate));
     json["scale"]["warp_sd_mm"] = list(Warp(1e3 * calibration.warp.sd));
   }
+  json["edges"] = calibration.edges ? Json{{"offset_px", calibration.edges->estimate},
+                                           {"offset_sd_px", calibration.edges->sd},
+                                           {"prior_sd_px", kUsualEdgeOffset}}
+                                    : Json(nullptr);
   json["splits"] = nullptr;
   if (!calibration.splits.empty()) {
     json["splits"] = {{"covariance_factor", calibration.covariance_factor}};

@@ -1,5 +1,6 @@
 #include "calib/solve/bundle.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "calib/geometry/pose_from_pixels.h"
@@ -12,12 +13,24 @@ BundleView make_view(const Eigen::Matrix3Xd& target_points, const Observation& o
   view.points = target_points(Eigen::all, observation.points);
   view.bows = target_bows(target_points)(Eigen::all, observation.points);
   view.pixels = observation.pixels;
+  view.outward = observation.outward;
   view.depth_points = observation.depth_points;
   return view;
 }
 
 Eigen::Matrix3Xd true_points(const Bundle& bundle, const BundleView& view) {
   return shaped(view.points, view.bows, shape_of(bundle, static_cast<std::size_t>(view.target)));
+}
+
+Eigen::Matrix2Xd true_pixels(const Bundle& bundle, const BundleView& view) {
+  if (view.outward.cols() == 0) return view.pixels;
+  return view.pixels - edge_offset(bundle, static_cast<std::size_t>(view.camera)) * view.outward;
+}
+
+bool sees_edges(const Bundle& bundle, std::size_t camera) {
+  return std::any_of(bundle.views.begin(), bundle.views.end(), [&](const BundleView& view) {
+    return view.camera == static_cast<int>(camera) && view.outward.cols() > 0;
+  });
 }
 
 Bundle make_bundle(Setup setup, const data::CameraIntrinsics& camera, const Eigen::Matrix3Xd& target_points,
@@ -55,8 +68,8 @@ void append_view(Bundle& bundle, const Eigen::Matrix3Xd& target_points, const Ob
   pose.T_base_gripper = observation.T_base_gripper;
   pose.velocity = observation.velocity;
   pose.joint_motions = observation.joint_motions;
-  const Eigen::Isometry3d T = fitted_pose(bundle.intrinsics.front(), true_points(bundle, view), view.pixels,
-                                          observation.T_camera_target.front());
+  const Eigen::Isometry3d T = fitted_pose(bundle.intrinsics.front(), true_points(bundle, view),
+                                          true_pixels(bundle, view), observation.T_camera_target.front());
   const Eigen::Isometry3d &X = bundle.cameras.front(), &Z = bundle.targets.front();
   pose.correction =
       pose.T_base_gripper.inverse() *
@@ -100,9 +113,8 @@ Eigen::Matrix2Xd residuals(const Bundle& bundle, const BundleView& view, bool co
   const Eigen::Isometry3d T = predicted_pose(bundle, view, corrected);
   const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics[static_cast<std::size_t>(view.camera)]);
   const Eigen::Matrix3Xd points = true_points(bundle, view);
-  Eigen::Matrix2Xd result(2, points.cols());
-  for (Eigen::Index i = 0; i < points.cols(); ++i)
-    result.col(i) = view.pixels.col(i) - project(intrinsics, T * points.col(i));
+  Eigen::Matrix2Xd result = true_pixels(bundle, view);
+  for (Eigen::Index i = 0; i < points.cols(); ++i) result.col(i) -= project(intrinsics, T * points.col(i));
   return result;
 }
 

@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include "calib/dataset/edge_offset.h"
 #include "calib/dataset/observation.h"
 #include "calib/dataset/target_shape.h"
 #include "calib/geometry/chain.h"
@@ -28,6 +29,7 @@ struct BundleView {
   int pose = 0, camera = 0, target = 0;
   Eigen::Matrix3Xd points;        ///< in the target frame [m]
   Eigen::Matrix2Xd pixels;        ///< where they were seen [px]
+  Eigen::Matrix2Xd outward = {};  ///< how they move per pixel of the camera's edge offset; none: not at all
   Bows bows;                      ///< how far each point rises per unit of the target's warp (target_bows)
   Eigen::Matrix3Xd depth_points;  ///< on the target's plane, measured by depth, in the camera frame [m]; or
                                   ///< none
@@ -67,6 +69,7 @@ struct Bundle {
   std::vector<Eigen::Isometry3d> targets;  ///< Z: in the world (eye-in-hand) or a gripper
   std::vector<double> scales;              ///< of each target: true size over stated size
   std::vector<Warp> warps = {};            ///< of each target, see target_bows(); empty: flat
+  std::vector<double> edge_offsets = {};   ///< of each camera [px], see EdgeOffset; empty: 0
   std::vector<double> time_offsets;        ///< tau of each arm [s]
   std::vector<Eigen::VectorXd> joint_zeros =
       {};                                 ///< of each arm: joints are that much farther [rad]; empty: 0
@@ -101,6 +104,17 @@ void append_view(Bundle& bundle, const Eigen::Matrix3Xd& target_points, const Ob
 /// The bundle with the views of the poses whose `fold` is `part`, or of all others.
 Bundle views_of(const Bundle& bundle, const std::vector<int>& fold, int part, bool inside);
 
+/// Where the points of a view would have been seen if edges stood where they are [px], 2 x N.
+Eigen::Matrix2Xd true_pixels(const Bundle& bundle, const BundleView& view);
+
+/// By how much edges stand outwards in the pictures of a camera [px].
+inline double edge_offset(const Bundle& bundle, std::size_t camera) {
+  return bundle.edge_offsets.empty() ? 0 : bundle.edge_offsets[camera];
+}
+
+/// Whether any view of a camera has corners of edges.
+bool sees_edges(const Bundle& bundle, std::size_t camera);
+
 /// Depth over distance of a camera.
 inline double depth_scale(const Bundle& bundle, std::size_t camera) {
   return bundle.depth_scales.empty() ? 1 : bundle.depth_scales[camera];
@@ -116,7 +130,7 @@ Chain chain_of(const Bundle& bundle, const BundleView& view, bool corrected = tr
 /// Pose of the target in the camera, with the correction of the robot's pose or without.
 Eigen::Isometry3d predicted_pose(const Bundle& bundle, const BundleView& view, bool corrected = true);
 
-/// Seen minus projected [px], 2 x N.
+/// Seen minus projected [px], 2 x N, edges put where they are.
 Eigen::Matrix2Xd residuals(const Bundle& bundle, const BundleView& view, bool corrected = true);
 
 /// 2-D rms per corner over all views [px].

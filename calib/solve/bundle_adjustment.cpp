@@ -93,16 +93,18 @@ class ViewChain {
   std::optional<Chain> chain_;
 };
 
-/// Blocks: camera, base, target, correction, intrinsics, scale, time offset, warp.
-class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1, kWarp> {
+/// Blocks: camera, base, target, correction, intrinsics, scale, time offset, warp, edge offset.
+class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrinsics, 1, 1, kWarp, 1> {
  public:
-  CornerCost(std::shared_ptr<ViewChain> chain, Eigen::Vector3d point, Warp bow, const Eigen::Vector2d& pixel,
-             double sigma)
+  /// corner: of the view.
+  CornerCost(std::shared_ptr<ViewChain> chain, const BundleView& view, Eigen::Index corner, double sigma)
       : chain_(std::move(chain)),
-        point_(std::move(point)),
-        bow_(std::move(bow)),
-        pixel_(pixel),
-        weight_(1 / sigma) {}
+        point_(view.points.col(corner)),
+        bow_(view.bows.col(corner)),
+        pixel_(view.pixels.col(corner)),
+        weight_(1 / sigma) {
+    if (view.outward.cols() > 0) outward_ = view.outward.col(corner);
+  }
 
   bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
     const Chain& chain = chain_->at(x, *x[6]);
@@ -115,7 +117,7 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
     const Eigen::Map<const IntrinsicsVector> intrinsics(x[4]);
     const Eigen::Vector2d seen =
         project(intrinsics, q, jacobians ? &d_point : nullptr, jacobians ? &d_intrinsics : nullptr);
-    Eigen::Map<Eigen::Vector2d>(residual, 2) = weight_ * (seen - pixel_);
+    Eigen::Map<Eigen::Vector2d>(residual, 2) = weight_ * (seen + *x[8] * outward_ - pixel_);
     if (!jacobians) return true;
     d_point *= weight_;
     const Chain::Derivative d_correction = chain.d_correction(p);
@@ -133,6 +135,7 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
       Eigen::Map<Eigen::Matrix<double, 2, kWarp, Eigen::RowMajor>> d(jacobians[7]);
       d = *x[5] * d_point * chain.d_scale(kBehind) * bow_.transpose();
     }
+    if (jacobians[8]) Eigen::Map<Eigen::Vector2d>(jacobians[8], 2) = weight_ * outward_;
     return true;
   }
 
@@ -140,7 +143,7 @@ class CornerCost final : public ceres::SizedCostFunction<2, 7, 7, 7, 7, kIntrins
   std::shared_ptr<ViewChain> chain_;
   Eigen::Vector3d point_;
   Warp bow_;
-  Eigen::Vector2d pixel_;
+  Eigen::Vector2d pixel_, outward_ = Eigen::Vector2d::Zero();
   double weight_;
 };
 
@@ -261,6 +264,16 @@ class WarpPrior final : public ceres::SizedCostFunction<kWarp, kWarp> {
   double weight_;
 };
 
+/// Likewise of how far edges stand outwards.
+class EdgePrior final : public ceres::SizedCostFunction<1, 1> {
+ public:
+  bool Evaluate(double const* const* x, double* residual, double** jacobians) const override {
+    *residual = *x[0] / kUsualEdgeOffset;
+    if (jacobians && jacobians[0]) *jacobians[0] = 1 / kUsualEdgeOffset;
+    return true;
+  }
+};
+
 /// One part of what is known of a lens.
 class LensPart final : public ceres::CostFunction {
  public:
@@ -288,15 +301,17 @@ struct Blocks {
   std::vector<IntrinsicsVector> intrinsics;
   std::vector<Warp> warps;
   std::vector<Eigen::VectorXd> joint_zeros;
-  std::vector<double> scales, time_offsets, depth_scales;
+  std::vector<double> scales, edge_offsets, time_offsets, depth_scales;
 
   explicit Blocks(const Bundle& bundle)
       : warps(bundle.warps),
         joint_zeros(bundle.joint_zeros),
         scales(bundle.scales),
+        edge_offsets(bundle.edge_offsets),
         time_offsets(bundle.time_offsets),
         depth_scales(bundle.depth_scales) {
     warps.resize(bundle.targets.size(), Warp::Zero());
+    edge_offsets.resize(bundle.cameras.size(), 0);
     depth_scales.resize(bundle.cameras.size(), 1);
     for (const Eigen::Isometry3d& T : bundle.cameras) cameras.push_back(block_of(T));
     for (const Eigen::Isometry3d& T : bundle.bases) bases.push_back(block_of(T));
@@ -315,6 +330,7 @@ struct Blocks {
       bundle.intrinsics[i] = with_vector(bundle.intrinsics[i], intrinsics[i]);
     bundle.scales = scales;
     bundle.warps = warps;
+    bundle.edge_offsets = edge_offsets;
     bundle.joint_zeros = joint_zeros;
     bundle.time_offsets = time_offsets;
     bundle.depth_scales = depth_scales;
@@ -330,13 +346,12 @@ void add_views(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle, co
     double* correction = blocks.corrections[static_cast<std::size_t>(view.pose)].data();
     const auto chain = std::make_shared<ViewChain>(bundle.setup, pose);
     for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
-      problem.AddResidualBlock(new CornerCost(chain, view.points.col(i), view.bows.col(i), view.pixels.col(i),
-                                              noise.corner[camera]),
+      problem.AddResidualBlock(new CornerCost(chain, view, i, noise.corner[camera]),
                                settings.huber > 0 ? new ceres::HuberLoss(settings.huber) : nullptr,
                                blocks.cameras[camera].data(), blocks.bases[arm].data(),
                                blocks.targets[target].data(), correction, blocks.intrinsics[camera].data(),
-                               &blocks.scales[target], &blocks.time_offsets[arm],
-                               blocks.warps[target].data());
+                               &blocks.scales[target], &blocks.time_offsets[arm], blocks.warps[target].data(),
+                               &blocks.edge_offsets[camera]);
     }
     for (Eigen::Index i = 0; i < view.depth_points.cols(); ++i) {
       problem.AddResidualBlock(new DepthCost(chain, view.depth_points.col(i), noise.depth[camera]),
@@ -364,7 +379,7 @@ void order_shared(const ceres::Problem& problem, Blocks& blocks, ceres::Paramete
   for (IntrinsicsVector& block : blocks.intrinsics) take(block.data());
   for (Warp& block : blocks.warps) take(block.data());
   for (Eigen::VectorXd& block : blocks.joint_zeros) take(block.data());
-  for (auto* list : {&blocks.scales, &blocks.time_offsets, &blocks.depth_scales})
+  for (auto* list : {&blocks.scales, &blocks.edge_offsets, &blocks.time_offsets, &blocks.depth_scales})
     for (double& block : *list) take(&block);
 }
 
@@ -422,6 +437,13 @@ void set_unknowns(ceres::Problem& problem, Blocks& blocks, const Bundle& bundle,
       hold(problem, warp);
     else if (problem.HasParameterBlock(warp))
       problem.AddResidualBlock(new WarpPrior(bundle.priors.warp_sd[target]), nullptr, warp);
+  }
+  for (std::size_t camera = 0; camera < blocks.edge_offsets.size(); ++camera) {
+    double* offset = &blocks.edge_offsets[camera];
+    if (!unknowns.edge_offsets || !sees_edges(bundle, camera))
+      hold(problem, offset);
+    else
+      problem.AddResidualBlock(new EdgePrior, nullptr, offset);
   }
   for (Eigen::VectorXd& zeros : blocks.joint_zeros)
     if (problem.HasParameterBlock(zeros.data()))

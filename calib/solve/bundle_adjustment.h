@@ -15,10 +15,11 @@ struct NoiseLevels {
 
 /// What may change. The first arm's base never does.
 struct Unknowns {
-  bool corrections = true;  ///< of robot poses, held by a prior of their noise: errors in variables
-  int intrinsics = 0;       ///< how many of fx fy cx cy k1 k2 p1 p2 k3 ..., held by Priors::lenses
-  bool scales = false;      ///< of targets, held by Priors::scale_sd
-  bool warps = false;       ///< of targets, held by Priors::warp_sd
+  bool corrections = true;    ///< of robot poses, held by a prior of their noise: errors in variables
+  int intrinsics = 0;         ///< how many of fx fy cx cy k1 k2 p1 p2 k3 ..., held by Priors::lenses
+  bool scales = false;        ///< of targets, held by Priors::scale_sd
+  bool warps = false;         ///< of targets, held by Priors::warp_sd
+  bool edge_offsets = false;  ///< of cameras that see corners of edges, held by kUsualEdgeOffset
   bool joint_zeros =
       false;  ///< of arms whose joints are known, held by Priors::joint_zero_sd; with corrections
   bool time_offsets = false;

@@ -81,7 +81,7 @@ HeldOutSums hold_out_part(const Bundle& bundle, const std::vector<Eigen::Isometr
     // With lens and size of the target as they were solved for.
     const Eigen::Matrix3Xd points = true_points(train, view);
     const Eigen::Isometry3d seen =
-        fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], points, view.pixels,
+        fitted_pose(train.intrinsics[static_cast<std::size_t>(view.camera)], points, true_pixels(train, view),
                     T_camera_target[static_cast<std::size_t>(view.pose)]);
     const Eigen::Vector3d centre = points.rowwise().mean();
     const double angle = rotation_angle(predicted.linear().transpose() * seen.linear());

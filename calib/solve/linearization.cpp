@@ -114,6 +114,13 @@ Eigen::MatrixXd shared_prior(const Bundle& bundle, const SharedColumns& columns)
       gram(columns.count, columns.count) += weight * warp * warp;
     }
   }
+  for (std::size_t camera = 0; camera < bundle.cameras.size(); ++camera) {
+    if (columns.edge_offsets[camera] < 0) continue;
+    Eigen::VectorXd row = Eigen::VectorXd::Zero(columns.count + 1);
+    row[columns.edge_offsets[camera]] = 1 / kUsualEdgeOffset;
+    row[columns.count] = edge_offset(bundle, camera) / kUsualEdgeOffset;
+    gram += row * row.transpose();
+  }
   for (std::size_t arm = 0; arm < columns.joint_zeros.size(); ++arm) {
     if (columns.joint_zeros[arm] < 0) continue;
     const double weight = std::pow(bundle.priors.joint_zero_sd, -2);
@@ -154,6 +161,9 @@ SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns) {
   columns.intrinsics_count = unknowns.intrinsics;
   take(columns.scales, bundle.targets.size(), unknowns.scales ? 1 : 0);
   take(columns.warps, bundle.targets.size(), unknowns.warps ? kWarp : 0);
+  columns.edge_offsets.assign(bundle.cameras.size(), -1);
+  for (std::size_t camera = 0; unknowns.edge_offsets && camera < bundle.cameras.size(); ++camera)
+    if (sees_edges(bundle, camera)) columns.edge_offsets[camera] = columns.count++;
   columns.joint_zeros.assign(bundle.joint_zeros.size(), -1);
   for (std::size_t arm = 0; unknowns.joint_zeros && arm < bundle.joint_zeros.size(); ++arm) {
     if (bundle.joint_zeros[arm].size() == 0) continue;
@@ -185,6 +195,8 @@ void move_shared(Bundle& bundle, const SharedColumns& columns, const Eigen::Vect
   bundle.warps.resize(bundle.targets.size(), Warp::Zero());
   for (std::size_t i = 0; i < bundle.warps.size(); ++i)
     if (columns.warps[i] >= 0) bundle.warps[i] += step.segment<kWarp>(columns.warps[i]);
+  bundle.edge_offsets.resize(bundle.cameras.size(), 0);
+  move_numbers(bundle.edge_offsets, columns.edge_offsets);
   for (std::size_t arm = 0; arm < bundle.joint_zeros.size(); ++arm)
     if (columns.joint_zeros[arm] >= 0)
       bundle.joint_zeros[arm] += step.segment(columns.joint_zeros[arm], bundle.joint_zeros[arm].size());
@@ -222,6 +234,7 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
   const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics[camera]);
   const double scale = bundle.scales[target];
   const Eigen::Matrix3Xd points = true_points(bundle, view);
+  const Eigen::Matrix2Xd pixels = true_pixels(bundle, view);
   Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(builder.width(), builder.width());
   Eigen::Matrix<double, 2, Eigen::Dynamic> rows;
   Eigen::Matrix<double, 2, 3> d_q;
@@ -229,7 +242,7 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
   for (Eigen::Index i = 0; i < view.points.cols(); ++i) {
     const Eigen::Vector3d p = points.col(i);
     const Eigen::Vector3d q = builder.chain().target_in_camera() * p;
-    const Eigen::Vector2d residual = project(intrinsics, q, &d_q, &d_intrinsics) - view.pixels.col(i);
+    const Eigen::Vector2d residual = project(intrinsics, q, &d_q, &d_intrinsics) - pixels.col(i);
     builder.fill<2>(d_q, p, q, rows);
     if (columns.intrinsics[camera] >= 0)
       rows.middleCols(builder.first_shared() + columns.intrinsics[camera], unknowns.intrinsics) =
@@ -239,6 +252,8 @@ Eigen::MatrixXd corner_gram(const Bundle& bundle, const BundleView& view, const 
     if (columns.warps[target] >= 0)
       rows.middleCols<kWarp>(builder.first_shared() + columns.warps[target]) =
           scale * d_q * builder.chain().d_scale(Eigen::Vector3d::UnitZ()) * view.bows.col(i).transpose();
+    if (columns.edge_offsets[camera] >= 0 && view.outward.cols() > 0)
+      rows.col(builder.first_shared() + columns.edge_offsets[camera]) = view.outward.col(i);
     rows.col(builder.width() - 1) = residual;
     const double weight = huber_weight(residual.norm(), sigma, huber);
     gram += weight * rows.transpose() * rows;

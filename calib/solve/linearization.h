@@ -12,9 +12,10 @@ struct SharedColumns {
   std::vector<int> cameras, bases, targets;  ///< first of six, a right perturbation (dt, dtheta) each
   std::vector<int> intrinsics;               ///< first of Unknowns::intrinsics
   std::vector<int> scales, time_offsets, depth_scales;
-  std::vector<int> warps;        ///< first of kWarp
-  std::vector<int> joint_zeros;  ///< first of as many as Bundle::joint_zeros has
-  int intrinsics_count = 0;      ///< of each camera
+  std::vector<int> warps;         ///< first of kWarp
+  std::vector<int> edge_offsets;  ///< of cameras that see edges
+  std::vector<int> joint_zeros;   ///< first of as many as Bundle::joint_zeros has
+  int intrinsics_count = 0;       ///< of each camera
   int count = 0;
 };
 SharedColumns shared_columns(const Bundle& bundle, const Unknowns& unknowns);

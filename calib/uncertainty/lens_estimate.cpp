@@ -75,4 +75,11 @@ WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const
   return warp;
 }
 
+std::optional<EdgeOffset> edge_estimate(const Bundle& bundle, const Unknowns& unknowns,
+                                        const Eigen::MatrixXd& covariance, std::size_t camera) {
+  const int column = shared_columns(bundle, unknowns).edge_offsets[camera];
+  if (column < 0) return std::nullopt;
+  return EdgeOffset{.estimate = edge_offset(bundle, camera), .sd = std::sqrt(covariance(column, column))};
+}
+
 }  // namespace flash::calib

@@ -1,4 +1,5 @@
 #pragma once
+#include <optional>
 #include <string>
 
 #include "calib/dataset/target_shape.h"
@@ -32,5 +33,9 @@ std::string lens_sentence(const LensEstimate& lens);
 
 WarpEstimate warp_estimate(const Bundle& bundle, const Unknowns& unknowns, const Eigen::MatrixXd& covariance,
                            std::size_t target = 0);
+
+/// Of a camera that sees corners of edges; none of another.
+std::optional<EdgeOffset> edge_estimate(const Bundle& bundle, const Unknowns& unknowns,
+                                        const Eigen::MatrixXd& covariance, std::size_t camera = 0);
 
 }  // namespace flash::calib

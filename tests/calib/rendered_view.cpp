@@ -237,6 +237,7 @@ GreyImage Renderer::draw(const Eigen::Isometry3d& T_camera_target, std::mt19937&
   image.width = w;
   image.height = h;
   std::normal_distribution<double> noise(0, std::max(settings_.noise, 1e-12));
+  for (double& value : picture) value = 255 * std::pow(value / 255, 1 / settings_.gamma);
   for (const double value : picture)
     image.pixels.push_back(
         static_cast<std::uint8_t>(std::clamp(std::lround(value + noise(random)), 0L, 255L)));

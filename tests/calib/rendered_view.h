@@ -14,6 +14,7 @@ struct RenderSettings {
   double black = 35, white = 215;  ///< of the print, of 255
   double background = 120;         ///< around it
   double blur = 0.7;               ///< of the lens, sigma [px]
+  double gamma = 1;                ///< pixels are light to the power of 1 / gamma; noise is added to them
   double noise = 2;                ///< of a pixel, sigma
   int samples = 16;                ///< a side of a pixel that an edge crosses
   bool double_border = false;      ///< aprilgrid as Kalibr prints it

@@ -5,10 +5,13 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <optional>
 #include <random>
+#include <vector>
 
 #include "calib/calibrate/calibrate_pairs.h"
 #include "data/error.h"
+#include "data/parallel.h"
 #include "tests/calib/hand_eye_scene.h"
 
 namespace flash::calib {
@@ -29,43 +32,56 @@ void blur(HandEyeScene& scene, unsigned seed) {
   }
 }
 
+struct Outcome {
+  Vector6d error;
+  Matrix6d covariance;
+};
+
+/// None of recordings that are refused.
+std::optional<Outcome> outcome_of(const SceneSettings& settings, bool pairs, unsigned seed) {
+  const Setup setup = settings.setup;
+  HandEyeScene scene = make_scene(settings, protocol_points(setup), seed);
+  if (pairs) blur(scene, seed);
+  try {
+    const Calibration result = pairs ? calibrate_pairs(setup, scene.observations, {})
+                                     : calibrate(setup, scene.camera, scene.points,
+                                                 grid_symmetries(scene.points), scene.observations);
+    if (!result.usable) return std::nullopt;
+    return Outcome{motion_between(result.poses.X, scene.truth.X), result.covariance};
+  } catch (const data::InputError&) {
+    return std::nullopt;
+  }
+}
+
 void study(Setup setup, bool pairs, int views, int scenes, unsigned first_seed) {
   constexpr double kChiSquare95 = 12.592, kChiSquare999 = 22.458;
   SceneSettings settings = protocol_settings(setup);
   settings.views = views;
   settings.robot_deg = 0.05;
   settings.robot_mm = 0.5;
-  const CalibrateSettings calibrate_settings;
+  std::vector<std::optional<Outcome>> outcomes(static_cast<std::size_t>(scenes));
+  data::for_each_in_parallel(outcomes.size(), 0, [&](std::size_t i) {
+    outcomes[i] = outcome_of(settings, pairs, first_seed + static_cast<unsigned>(i));
+  });
   int solved = 0, inside = 0, far_inside = 0;
   double worst = 0, square = 0, variance = 0;
-  for (int i = 0; i < scenes; ++i) {
-    const unsigned seed = first_seed + static_cast<unsigned>(i);
-    HandEyeScene scene = make_scene(settings, protocol_points(setup), seed);
-    if (pairs) blur(scene, seed);
-    Calibration result;
-    try {
-      result = pairs ? calibrate_pairs(setup, scene.observations, calibrate_settings)
-                     : calibrate(setup, scene.camera, scene.points, grid_symmetries(scene.points),
-                                 scene.observations, calibrate_settings);
-    } catch (const data::InputError&) {
-      continue;
-    }
-    if (!result.usable) continue;
+  for (const std::optional<Outcome>& outcome : outcomes) {
+    if (!outcome) continue;
     ++solved;
-    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
-    const double distance = error.dot(result.covariance.ldlt().solve(error));
+    const auto& [error, covariance] = *outcome;
+    const double distance = error.dot(covariance.ldlt().solve(error));
     inside += distance < kChiSquare95;
     far_inside += distance < kChiSquare999;
-    worst =
-        std::max(worst, error.cwiseQuotient(result.covariance.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff());
+    worst = std::max(worst, error.cwiseQuotient(covariance.diagonal().cwiseSqrt()).cwiseAbs().maxCoeff());
     square += error.head<3>().squaredNorm();
-    variance += result.covariance.topLeftCorner<3, 3>().trace();
+    variance += covariance.topLeftCorner<3, 3>().trace();
   }
   std::printf(
       "%s, %s, %d views | answered %d of %d | inside 95 %%: %.1f %%, 99.9 %%: %.1f %% | worst axis %.1f "
       "deviations | stated over actual %.2f\n",
       to_string(setup), pairs ? "pairs" : "pictures", views, solved, scenes, 100.0 * inside / solved,
       100.0 * far_inside / solved, worst, std::sqrt(variance / square));
+  std::fflush(stdout);
 }
 
 }  // namespace

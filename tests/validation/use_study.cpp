@@ -8,8 +8,10 @@
 #include <map>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "calib/calibrate/calibrate.h"
+#include "data/parallel.h"
 #include "tests/calib/arm_scene.h"
 
 namespace flash::calib {
@@ -37,63 +39,80 @@ const char* name_of(bool wrong_kinematics) { return wrong_kinematics ? "wrong ki
 
 void study_image(Setup setup, bool wrong_kinematics, int scenes, unsigned first_seed) {
   constexpr double kChiSquare95 = 12.592;
-  int fewest = 0, inside = 0;
-  std::map<std::string, double> px;
-  for (int i = 0; i < scenes; ++i) {
+  std::vector<Calibration> results(static_cast<std::size_t>(scenes));
+  std::vector<Vector6d> errors(results.size());
+  data::for_each_in_parallel(results.size(), 0, [&](std::size_t i) {
     const HandEyeScene scene =
         scene_of(setup, protocol_points(setup), wrong_kinematics, first_seed + static_cast<unsigned>(i));
-    const Calibration result = solved(scene, scene.camera, Use::image, 5);
+    results[i] = solved(scene, scene.camera, Use::image, 5);
+    errors[i] = motion_between(results[i].poses.X, scene.truth.X);
+  });
+  int fewest = 0, inside = 0;
+  std::map<std::string, double> px;
+  for (std::size_t i = 0; i < results.size(); ++i) {
+    const Calibration& result = results[i];
     for (const ComparedMethod& method : result.comparison)
       if (method.held_out) px[method.name] += std::pow(method.held_out->px, 2) / scenes;
     px["answer"] += std::pow(result.held_out.px, 2) / scenes;
     fewest += result.method == Method::pixels;
-    const Vector6d error = motion_between(result.poses.X, scene.truth.X);
-    inside += error.dot(result.covariance.ldlt().solve(error)) < kChiSquare95;
+    inside += errors[i].dot(result.covariance.ldlt().solve(errors[i])) < kChiSquare95;
   }
   std::printf("image, %s, %s: held out px", to_string(setup), name_of(wrong_kinematics));
   for (const auto& [name, square] : px) std::printf(" %s %.3f", name.c_str(), std::sqrt(square));
   std::printf(" | fewest pixels in %d, truth inside 95 %% in %d of %d\n", fewest, inside, scenes);
+  std::fflush(stdout);
+}
+
+/// By method, the squared distance between two arms' places for one point [m^2].
+std::map<std::string, double> between_arms(bool wrong_kinematics, double lens_sd, unsigned first_seed,
+                                           unsigned number) {
+  const Eigen::Matrix3Xd points = board_points(7, 5, 0.03);
+  std::mt19937 random(first_seed + number);
+  const double off = 1 + lens_sd * std::normal_distribution<double>()(random);
+  std::map<std::string, std::vector<Eigen::Isometry3d>> X;
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();  // of what the second arm holds, in its base
+  for (unsigned arm = 0; arm < 2; ++arm) {
+    const double size = 1 + usual_size_sd(points) * std::normal_distribution<double>()(random);
+    HandEyeScene scene =
+        scene_of(Setup::eye_to_hand, size * points, wrong_kinematics, first_seed + 2 * number + arm);
+    scene.points = points;
+    data::CameraIntrinsics camera = scene.camera;
+    camera.fx *= off;
+    camera.fy *= off;
+    middle.setZero();
+    for (Observation& o : scene.observations) {
+      middle += scene.truth.X * (o.T_camera_target.front() * points.rowwise().mean()) / scene.settings.views;
+      o.T_camera_target = {fitted_pose(camera, points, o.pixels, o.T_camera_target.front())};
+    }
+    X["truth"].push_back(scene.truth.X);
+    X["workspace"].push_back(solved(scene, camera, Use::workspace, 2).poses.X);
+    const Calibration result = solved(scene, camera, Use::two_arms, 2);
+    X["two-arms"].push_back(result.poses.X);
+    for (const ComparedMethod& method : result.comparison)
+      if (method.held_out) X[method.name].push_back(method.poses.X);
+  }
+  X.erase("errors_in_variables");
+  const auto at = [&](const std::vector<Eigen::Isometry3d>& arms) -> Eigen::Vector3d {
+    return arms[0] * (arms[1].inverse() * middle);
+  };
+  std::map<std::string, double> squares;
+  for (const auto& [name, arms] : X) squares[name] = (at(arms) - at(X["truth"])).squaredNorm();
+  return squares;
 }
 
 void study_arms(bool wrong_kinematics, double lens_sd, int scenes, unsigned first_seed) {
-  const Eigen::Matrix3Xd points = board_points(7, 5, 0.03);
+  std::vector<std::map<std::string, double>> all(static_cast<std::size_t>(scenes));
+  data::for_each_in_parallel(all.size(), 0, [&](std::size_t i) {
+    all[i] = between_arms(wrong_kinematics, lens_sd, first_seed, static_cast<unsigned>(i));
+  });
   std::map<std::string, double> squares;
-  for (int i = 0; i < scenes; ++i) {
-    std::mt19937 random(first_seed + static_cast<unsigned>(i));
-    const double off = 1 + lens_sd * std::normal_distribution<double>()(random);
-    std::map<std::string, std::vector<Eigen::Isometry3d>> X;
-    Eigen::Vector3d middle = Eigen::Vector3d::Zero();  // of what the second arm holds, in its base
-    for (unsigned arm = 0; arm < 2; ++arm) {
-      const double size = 1 + usual_size_sd(points) * std::normal_distribution<double>()(random);
-      HandEyeScene scene = scene_of(Setup::eye_to_hand, size * points, wrong_kinematics,
-                                    first_seed + 2 * static_cast<unsigned>(i) + arm);
-      scene.points = points;
-      data::CameraIntrinsics camera = scene.camera;
-      camera.fx *= off;
-      camera.fy *= off;
-      middle.setZero();
-      for (Observation& o : scene.observations) {
-        middle +=
-            scene.truth.X * (o.T_camera_target.front() * points.rowwise().mean()) / scene.settings.views;
-        o.T_camera_target = {fitted_pose(camera, points, o.pixels, o.T_camera_target.front())};
-      }
-      X["truth"].push_back(scene.truth.X);
-      X["workspace"].push_back(solved(scene, camera, Use::workspace, 2).poses.X);
-      const Calibration result = solved(scene, camera, Use::two_arms, 2);
-      X["two-arms"].push_back(result.poses.X);
-      for (const ComparedMethod& method : result.comparison)
-        if (method.held_out) X[method.name].push_back(method.poses.X);
-    }
-    X.erase("errors_in_variables");
-    const auto at = [&](const std::vector<Eigen::Isometry3d>& arms) -> Eigen::Vector3d {
-      return arms[0] * (arms[1].inverse() * middle);
-    };
-    for (const auto& [name, arms] : X) squares[name] += (at(arms) - at(X["truth"])).squaredNorm() / scenes;
-  }
+  for (const std::map<std::string, double>& one : all)
+    for (const auto& [name, square] : one) squares[name] += square / scenes;
   std::printf("two arms, %s, lens stated to %.1f %%: mm", name_of(wrong_kinematics), 100 * lens_sd);
   for (const auto& [name, square] : squares)
     if (name != "truth") std::printf(" %s %.2f", name.c_str(), 1e3 * std::sqrt(square));
   std::printf(" of %d\n", scenes);
+  std::fflush(stdout);
 }
 
 }  // namespace

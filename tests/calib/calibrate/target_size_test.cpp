@@ -65,7 +65,8 @@ TEST_P(TargetSizes, ValidationIsForSizeWarpAndLensThatWereSolvedFor) {
   const Extrinsics extrinsics = extrinsics_of(result, {});
   const ProjectionCheck check = check_projection(
       scene.settings.setup, result.poses, *extrinsics.lens, target,
-      with_poses_for(*extrinsics.lens, target, extrinsics.target, scene.observations), extrinsics.target);
+      with_poses_for(*extrinsics.lens, target, extrinsics.target, scene.observations, extrinsics.edge_offset),
+      extrinsics.target, extrinsics.edge_offset);
   EXPECT_NEAR(check.corner_rms, result.chain_rms, 1e-9);  // the same sum, the other way round
 }
 

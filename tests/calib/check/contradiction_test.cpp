@@ -52,10 +52,12 @@ Validation validated(Setup setup, unsigned seed, const Vector6d& camera_motion, 
   result.extrinsics = extrinsics_of(calibration, {});
   result.extrinsics.held_out = {calibration.held_out.deg * M_PI / 180, 1e-3 * calibration.held_out.mm};
   const data::CameraIntrinsics lens = *result.extrinsics.lens;
-  views = with_poses_for(lens, target, result.extrinsics.target, std::move(views));
+  views =
+      with_poses_for(lens, target, result.extrinsics.target, std::move(views), result.extrinsics.edge_offset);
   HandEyePoses poses = calibration.poses;
   if (refit_target) poses.Z = target_pose_from(setup, poses.X, views);
-  const ProjectionCheck check = check_projection(setup, poses, lens, target, views, result.extrinsics.target);
+  const ProjectionCheck check = check_projection(setup, poses, lens, target, views, result.extrinsics.target,
+                                                 result.extrinsics.edge_offset);
   result.found = contradiction(result.extrinsics, poses, refit_target, lens, target, views, check);
   return result;
 }

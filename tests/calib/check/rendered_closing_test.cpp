@@ -98,7 +98,8 @@ TEST_P(RenderedClosing, ExactRobotClosesBelowATwentiethOfAPixel) {
   const Extrinsics answer = extrinsics_of(calibration, {});
   const ProjectionCheck check = check_projection(
       set.setup, calibration.poses, *answer.lens, set.target,
-      with_poses_for(*answer.lens, set.target, answer.target, set.observations), answer.target);
+      with_poses_for(*answer.lens, set.target, answer.target, set.observations, answer.edge_offset),
+      answer.target, answer.edge_offset);
   const double mm = 1e3 * (calibration.poses.X.translation() - set.truth.X.translation()).norm();
   const double deg =
       rotation_angle(calibration.poses.X.linear().transpose() * set.truth.X.linear()) * 180 / M_PI;

@@ -27,8 +27,14 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
   bundle.intrinsics[0].distortion = {0.1, -0.2, 0.001, -0.002, 0.05, 0.02, -0.03, 0.01};
   bundle.scales[0] = 1.02;
   bundle.warps = {Warp(0.004, -0.003, 0.002)};
-  const Unknowns unknowns{
-      .corrections = true, .intrinsics = kIntrinsics, .scales = true, .warps = true, .time_offsets = true};
+  bundle.views[0].outward = Eigen::Matrix2Xd::Random(2, scene.points.cols());
+  bundle.edge_offsets = {0.3};
+  const Unknowns unknowns{.corrections = true,
+                          .intrinsics = kIntrinsics,
+                          .scales = true,
+                          .warps = true,
+                          .edge_offsets = true,
+                          .time_offsets = true};
   const SharedColumns columns = shared_columns(bundle, unknowns);
   double count = 0;
   const Eigen::MatrixXd gram = corner_gram(bundle, bundle.views[0], unknowns, columns, 1, 0, count);
@@ -52,6 +58,7 @@ TEST_P(Linearization, HasTheDerivativesOfTheResiduals) {
     if (shared == columns.scales[0]) b.scales[0] += step;
     if (shared >= columns.warps[0] && shared < columns.warps[0] + kWarp)
       b.warps[0][shared - columns.warps[0]] += step;
+    if (shared == columns.edge_offsets[0]) b.edge_offsets[0] += step;
     if (shared == columns.time_offsets[1]) b.time_offsets[1] += step;
     const Eigen::Matrix2Xd r = -residuals(b, b.views[0]);
     return Eigen::VectorXd(r.reshaped());
