@@ -47,8 +47,13 @@ TEST(WeightScale, OneFactorOfAllStiffnessesLeavesTheirRatioAlone) {
                 .cwiseAbs()
                 .maxCoeff(),
             1e-12);
-  for (Eigen::Index k = 0; k < 2; ++k)  // 12,800 draws of both: to 2 %
-    EXPECT_NEAR(spread(after.samples.col(k)), std::hypot(spread(before.samples.col(k)), 0.2), 0.02 * 0.22);
+  // The mean square of n sums of a draw b and a factor f scatters by sqrt((2 f^4 + 4 b^2 f^2) / n).
+  const double f2 = 0.2 * 0.2, n = static_cast<double>(before.samples.rows());
+  for (Eigen::Index k = 0; k < 2; ++k) {
+    const double b2 = std::pow(spread(before.samples.col(k)), 2);
+    EXPECT_NEAR(std::pow(spread(after.samples.col(k)), 2), b2 + f2,
+                4 * std::sqrt((2 * f2 * f2 + 4 * b2 * f2) / n));
+  }
   EXPECT_EQ(after.estimate, before.estimate);
   // Nothing was searched beyond a range.
   Posterior cut = before;
