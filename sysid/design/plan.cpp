@@ -1,53 +1,70 @@
 #include "sysid/design/plan.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "data/error.h"
 #include "sysid/emulate/sensitivity.h"
+#include "sysid/infer/discrepancy_prior.h"
 #include "sysid/infer/expected_information.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/observed_rows.h"
+#include "sysid/infer/posterior.h"
 #include "sysid/infer/solver_check.h"
+#include "sysid/infer/weight_scale.h"
 #include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 namespace {
 
-/// From the precision before an experiment and its information.
-PlannedExperiment planned(const std::string& name, const Eigen::MatrixXd& before,
-                          const Eigen::MatrixXd& information) {
-  const Eigen::MatrixXd after = before + information;
-  const Eigen::LLT<Eigen::MatrixXd> factor(after);
-  const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(after.rows(), after.cols()));
-  PlannedExperiment experiment{name, {}};
-  for (Eigen::Index k = 0; k < after.rows(); ++k) experiment.spread.push_back(std::sqrt(covariance(k, k)));
-  const auto log_root = [](const Eigen::LLT<Eigen::MatrixXd>& of) {
-    return Eigen::MatrixXd(of.matrixL()).diagonal().array().log2().sum();
-  };
-  experiment.bits = log_root(factor) - log_root(before.llt());
-  return experiment;
-}
-
 Eigen::MatrixXd inverse(const Eigen::MatrixXd& matrix) {
   return matrix.llt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
 }
 
-Eigen::MatrixXd precision_before(const PlanSettings& settings) {
+/// Half the binary logarithm of a determinant.
+double half_log_determinant(const Eigen::MatrixXd& matrix) {
+  return Eigen::MatrixXd(matrix.llt().matrixL()).diagonal().array().log2().sum();
+}
+
+/// Covariance of the parameters before an experiment.
+struct Before {
+  Eigen::MatrixXd told;    ///< what an experiment can lower
+  Eigen::MatrixXd common;  ///< what is the same in all experiments
+};
+
+/// `whole`: that of both, `common`: standard deviations, of one error.
+Before divided(const Eigen::MatrixXd& whole, Eigen::VectorXd common) {
+  constexpr double kMost = 0.99;  // share of a variance that is common: draws are few, and may show less
+  const double share = common.dot(whole.llt().solve(common));
+  if (share > kMost) common *= std::sqrt(kMost / share);
+  const Eigen::MatrixXd of_common = common * common.transpose();
+  return {whole - of_common, of_common};
+}
+
+PlannedExperiment planned(const std::string& name, const Before& before, const Eigen::MatrixXd& information) {
+  const Eigen::MatrixXd after = inverse(inverse(before.told) + information) + before.common;
+  PlannedExperiment experiment{name, {}};
+  for (Eigen::Index k = 0; k < after.rows(); ++k) experiment.spread.push_back(std::sqrt(after(k, k)));
+  experiment.bits = half_log_determinant(before.told + before.common) - half_log_determinant(after);
+  return experiment;
+}
+
+Eigen::MatrixXd covariance_before(const PlanSettings& settings) {
   if (settings.known) {
     constexpr double kSure = 1e-9;  // of a coordinate: what draws do not differ in
     Eigen::MatrixXd covariance = settings.known->covariance;
     covariance.diagonal().array() += kSure * kSure;
-    return inverse(covariance);
+    return covariance;
   }
-  Eigen::VectorXd precisions(static_cast<Eigen::Index>(settings.grid.axes.size()));
   const std::vector<double> ranges = spread_of_ranges(settings.grid.axes);
-  for (std::size_t k = 0; k < ranges.size(); ++k)
-    precisions[static_cast<Eigen::Index>(k)] = 1 / (ranges[k] * ranges[k]);
-  return precisions.asDiagonal();
+  return Eigen::VectorXd::Map(ranges.data(), static_cast<Eigen::Index>(ranges.size()))
+      .cwiseAbs2()
+      .asDiagonal();
 }
 
 /// The search's parameters and, behind them, what is held without a measurement.
@@ -57,18 +74,21 @@ struct Asked {
   std::vector<double> held;  ///< standard deviation of each that is held, in the coordinate of its axis
 };
 
-Asked with_held(const PlanSettings& settings, const std::vector<Replay>& replays) {
-  const std::vector<HeldParameter> all = held_parameters(settings.grid, replays);
+/// `at`: of every axis. `scales`: an error of the weight is the same factor of every stiffness.
+Asked with_held(const PlanSettings& settings, const std::vector<double>& at,
+                const std::vector<Replay>& replays, bool scales) {
+  std::vector<HeldParameter> all = held_parameters(settings.grid, replays);
+  if (scales) std::erase_if(all, [](const HeldParameter& held) { return held.name.ends_with("density"); });
   const auto is_held = [&](const Axis& axis) {
     return std::any_of(all.begin(), all.end(), [&](const auto& held) { return held.name == axis.name; });
   };
   Asked asked{settings.grid, {}, {}};
   asked.grid.axes.clear();
-  for (std::size_t k = 0; k < settings.at.size(); ++k) {
+  for (std::size_t k = 0; k < at.size(); ++k) {
     const Axis& axis = settings.grid.axes[k];
     if (axis.values.size() > 1) {
       asked.grid.axes.push_back(axis);
-      asked.at.push_back(settings.at[k]);
+      asked.at.push_back(at[k]);
     } else if (!is_held(axis)) {
       asked.grid.fixed.push_back(axis);
     }
@@ -105,10 +125,10 @@ Eigen::MatrixXd errors_of_solution(const Replay& replay, const LinearObservation
   return errors;
 }
 
-/// What the rows of one recording tell of the first `searched` parameters.
-Eigen::MatrixXd information_of(const Replay& replay, const LinearObservations& places,
-                               const Eigen::MatrixXd& parameters, const Eigen::MatrixXd& nuisance,
-                               const Eigen::MatrixXd& errors, const Asked& asked, const Misfit& misfit) {
+/// The rows of one recording that tell of the first `searched` parameters.
+ObservedRows rows_of(const Replay& replay, const LinearObservations& places,
+                     const Eigen::MatrixXd& parameters, const Eigen::MatrixXd& nuisance,
+                     const Eigen::MatrixXd& errors, const Asked& asked) {
   ObservedRows rows = observed_rows(replay, places, {.kind = RobustKind::plain});
   const auto held = static_cast<Eigen::Index>(asked.held.size()), searched = parameters.cols() - held;
   Eigen::VectorXd scale(places.rows());  // from rows of the score to those of the likelihood
@@ -122,7 +142,83 @@ Eigen::MatrixXd information_of(const Replay& replay, const LinearObservations& p
                     Eigen::VectorXd::Map(asked.held.data(), held).asDiagonal(),
       scale.asDiagonal() * errors;
   rows.free = scale.asDiagonal() * nuisance;
-  return expected_information(rows, misfit);
+  return rows;
+}
+
+/// What the discrepancy of a recording to come may be, and how likely: that of the search's recordings, or
+/// one of its own beside it, by the middles of the quarters of an exponential distribution.
+std::vector<std::pair<Misfit, double>> misfits_to_come(const Misfit& found) {
+  std::vector<std::pair<Misfit, double>> all = {{found, 0.5}};
+  constexpr int kParts = 4;
+  for (int part = 0; part < kParts; ++part) {
+    const double beyond = -std::log(1 - (part + 0.5) / kParts) * usual_discrepancy * found.rough;
+    all.emplace_back(found, 0.5 / kParts);
+    all.back().first.rms = std::hypot(found.rms, beyond);
+  }
+  return all;
+}
+
+/// One standard deviation to both sides of the estimate along the direction that is known least.
+std::vector<std::vector<double>> points_about(const PlanSettings& settings) {
+  std::vector<std::size_t> searched;
+  for (std::size_t k = 0; k < settings.grid.axes.size(); ++k)
+    if (settings.grid.axes[k].values.size() > 1) searched.push_back(k);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(settings.known->covariance);
+  const Eigen::Index last = eigen.eigenvalues().size() - 1;
+  const Eigen::VectorXd step =
+      std::sqrt(std::max(0.0, eigen.eigenvalues()[last])) * eigen.eigenvectors().col(last);
+  std::vector<std::vector<double>> points;
+  for (const double side : {-1, 1}) {
+    points.push_back(settings.at);
+    for (std::size_t i = 0; i < searched.size(); ++i) {
+      const Axis& axis = settings.grid.axes[searched[i]];
+      double& value = points.back()[searched[i]];
+      value = value_of(axis, coordinate_of(axis, value) + side * step[static_cast<Eigen::Index>(i)]);
+    }
+  }
+  return points;
+}
+
+/// Standard deviation that an error of the weight gives to the searched parameters, each in its coordinate.
+Eigen::VectorXd common_of(const PlanSettings& settings, double spread) {
+  std::vector<double> common;
+  for (std::size_t k = 0; k < settings.grid.axes.size(); ++k) {
+    const Axis& axis = settings.grid.axes[k];
+    if (axis.values.size() > 1)
+      common.push_back(!is_stiffness(axis.name) ? 0 : axis.logarithmic ? spread : spread * settings.at[k]);
+  }
+  return Eigen::VectorXd::Map(common.data(), static_cast<Eigen::Index>(common.size()));
+}
+
+/// What recordings that may have several misfits tell with each.
+std::vector<Eigen::MatrixXd> informations_of(const std::vector<Replay>& replays,
+                                             const Sensitivity& sensitivity, const Asked& asked,
+                                             const KnownSoFar& known,
+                                             const std::vector<std::pair<Misfit, double>>& misfits,
+                                             const MotionStore* store) {
+  const Eigen::Index searched = sensitivity.parameters.cols() - static_cast<Eigen::Index>(asked.held.size());
+  std::vector<Eigen::MatrixXd> informations(misfits.size(), Eigen::MatrixXd::Zero(searched, searched));
+  const double root = std::sqrt(static_cast<double>(replays.size()));  // see Sensitivity
+  Eigen::Index row = 0;
+  for (std::size_t r = 0; r < replays.size(); ++r) {
+    const LinearObservations& places = sensitivity.places[r];
+    const auto part = [&](const Eigen::MatrixXd& all) {
+      return Eigen::MatrixXd(root * all.middleRows(row, places.rows()));
+    };
+    Eigen::MatrixXd errors(places.rows(), 0);
+    if (store != nullptr)
+      errors = errors_of_solution(replays[r], places, sensitivity.motions[r],
+                                  candidate_at(asked.at, asked.grid), *store);
+    const ObservedRows rows =
+        rows_of(replays[r], places, part(sensitivity.parameters), part(sensitivity.nuisance), errors, asked);
+    for (std::size_t m = 0; m < misfits.size(); ++m) {
+      Misfit misfit = misfits[m].first;
+      if (known.duration > 0) misfit.reach_time *= mean_duration({replays[r]}) / known.duration;
+      informations[m] += expected_information(rows, misfit);
+    }
+    row += places.rows();
+  }
+  return informations;
 }
 
 }  // namespace
@@ -174,48 +270,50 @@ Misfit expected_misfit(const std::vector<Misfit>& misfits) {
 
 PlannedExperiment plan_experiment(const std::string& name, const std::vector<Replay>& replays,
                                   const PlanSettings& settings, const MotionStore* store) {
-  const Eigen::MatrixXd before = precision_before(settings);
-  const Asked asked = settings.known ? with_held(settings, replays) : Asked{settings.grid, settings.at, {}};
-  MotionsAt motions;
-  if (store != nullptr)
-    motions = [&](std::size_t r, const std::vector<std::vector<double>>& values) {
-      std::vector<ReplayCandidate> candidates;
-      for (const std::vector<double>& each : values) candidates.push_back(candidate_at(each, asked.grid));
-      std::vector<ReplayResult> results(candidates.size());
-      store->run(replays[r], candidates,
-                 [&](std::size_t i, ReplayResult result) { results[i] = std::move(result); });
-      return results;
-    };
-  const Sensitivity sensitivity = measure_sensitivity(replays, asked.grid, asked.at, true, motions);
-  if (sensitivity.places.empty()) throw data::InputError(name + ": the simulation diverges");
+  const auto measured = [&](const Asked& asked) {
+    MotionsAt motions;
+    if (store != nullptr)
+      motions = [&](std::size_t r, const std::vector<std::vector<double>>& values) {
+        std::vector<ReplayCandidate> candidates;
+        for (const std::vector<double>& each : values) candidates.push_back(candidate_at(each, asked.grid));
+        std::vector<ReplayResult> results(candidates.size());
+        store->run(replays[r], candidates,
+                   [&](std::size_t i, ReplayResult result) { results[i] = std::move(result); });
+        return results;
+      };
+    Sensitivity sensitivity = measure_sensitivity(replays, asked.grid, asked.at, true, motions);
+    if (sensitivity.places.empty()) throw data::InputError(name + ": the simulation diverges");
+    return sensitivity;
+  };
+  const Eigen::MatrixXd covariance = covariance_before(settings);
   if (!settings.known) {
+    const Sensitivity sensitivity = measured({settings.grid, settings.at, {}});
     Eigen::MatrixXd rates = sensitivity.parameters;
     if (sensitivity.nuisance.cols() > 0)
       rates -=
           sensitivity.nuisance * sensitivity.nuisance.colPivHouseholderQr().solve(sensitivity.parameters);
-    return planned(name, before,
+    return planned(name, {covariance, Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols())},
                    settings.keyframes / (settings.error * settings.error) * (rates.transpose() * rates));
   }
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(before.rows(), before.cols());
-  const double root = std::sqrt(static_cast<double>(replays.size()));  // see Sensitivity
-  Eigen::Index row = 0;
-  for (std::size_t r = 0; r < replays.size(); ++r) {
-    const LinearObservations& places = sensitivity.places[r];
-    const auto part = [&](const Eigen::MatrixXd& all) {
-      return Eigen::MatrixXd(root * all.middleRows(row, places.rows()));
-    };
-    Eigen::MatrixXd errors(places.rows(), 0);
-    if (store != nullptr)
-      errors = errors_of_solution(replays[r], places, sensitivity.motions[r],
-                                  candidate_at(asked.at, asked.grid), *store);
-    Misfit misfit = settings.known->misfit;
-    if (settings.known->duration > 0)
-      misfit.reach_time *= mean_duration({replays[r]}) / settings.known->duration;
-    information += information_of(replays[r], places, part(sensitivity.parameters),
-                                  part(sensitivity.nuisance), errors, asked, misfit);
-    row += places.rows();
+  const double scale = spread_of_scale(settings.grid, replays);
+  const Before before = divided(covariance, common_of(settings, scale));
+  const std::vector<std::pair<Misfit, double>> misfits = misfits_to_come(settings.known->misfit);
+  const std::vector<std::vector<double>> points = points_about(settings);
+  PlannedExperiment expected{name, std::vector<double>(static_cast<std::size_t>(covariance.rows()), 0.0)};
+  for (const std::vector<double>& point : points) {
+    const Asked asked = with_held(settings, point, replays, scale > 0);
+    const std::vector<Eigen::MatrixXd> informations =
+        informations_of(replays, measured(asked), asked, *settings.known, misfits, store);
+    for (std::size_t m = 0; m < misfits.size(); ++m) {
+      const double likely = misfits[m].second / static_cast<double>(points.size());
+      const PlannedExperiment each = planned(name, before, informations[m]);
+      for (std::size_t k = 0; k < each.spread.size(); ++k)
+        expected.spread[k] += likely * std::log(each.spread[k]);
+      expected.bits += likely * each.bits;
+    }
   }
-  return planned(name, before, information);
+  for (double& spread : expected.spread) spread = std::exp(spread);
+  return expected;
 }
 
 }  // namespace flash::sysid

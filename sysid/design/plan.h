@@ -20,7 +20,7 @@ struct PlannedExperiment {
 /// What a search left to be known.
 struct KnownSoFar {
   Eigen::MatrixXd covariance;  ///< of the searched parameters, in the coordinates of their axes
-  Misfit misfit;               ///< noise and discrepancy to reckon with
+  Misfit misfit;               ///< noise and discrepancy that its recordings have
   /// Of the recordings that the misfit is of, first to last keyframe, mean [s]. The discrepancy of another
   /// recording reaches over the same share of its own, as in the prior of DiscrepancyModel; 0: over as long.
   double duration = 0;
@@ -38,9 +38,13 @@ struct PlanSettings {
 /// registration projected out, and a prior that is the searched range (a uniform of that width): (F + P)^-1.
 /// The errors of a keyframe are taken as common to it: n keyframes, not points.
 ///
-/// With `known`, P is the inverse of its covariance and F what rows under its noise and discrepancy tell
+/// With `known`, P is the inverse of its covariance and F what rows under noise and discrepancy tell
 /// (expected_information), registration within its bounds and what is held without a measurement
-/// (held_parameters) unknown beside the parameters; axes of one value are no parameters. `store`: keeps the
+/// (held_parameters) unknown beside the parameters; axes of one value are no parameters. An error of the
+/// weight is the same in every recording and stays. Spread (in its logarithm) and bits are expected values:
+/// over the parameters, by one standard deviation to both sides along the direction in which they are known
+/// least; over the discrepancy of the recording to come, which is no larger than that of the search's, as
+/// likely as not, or has one of its own beside it, by the prior of DiscrepancyModel. `store`: keeps the
 /// motions, where there is one; then errors of the solution are reckoned with too, by finer ones.
 PlannedExperiment plan_experiment(const std::string& name, const std::vector<Replay>& replays,
                                   const PlanSettings& settings, const MotionStore* store = nullptr);

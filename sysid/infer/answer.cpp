@@ -9,14 +9,16 @@
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/verdict.h"
+#include "sysid/infer/weight_scale.h"
 #include "sysid/observe/horizon.h"
 #include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 namespace {
 
-constexpr int kRounds = 8;        // of motions about an answer
-constexpr std::size_t kFew = 30;  // of them in a round
+constexpr int kRounds = 8;          // of motions about an answer
+constexpr std::size_t kFew = 30;    // of them in a round
+constexpr std::size_t kMany = 100;  // where the emulator by few misses too much
 
 int best_of(const GridResults& results) {
   int best = -1;
@@ -119,7 +121,7 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
   if (held.empty()) held = errors_of_held(task, first.posterior.values(), estimate->motions);
   errors = estimate->errors;
   errors.insert(errors.end(), held.begin(), held.end());
-  for (KnownError& error : errors_of_emulator(task, emulator, first.posterior))
+  for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
     errors.push_back(std::move(error));
   Look second = look(extent_of(first.posterior.axes), first.posterior.values());
   return Found{std::move(emulator), axes, std::move(second), std::move(*estimate), std::move(errors)};
@@ -134,22 +136,23 @@ std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes) 
     const std::size_t count = axes[k].values.size();
     if (count < 2) continue;
     fewest *= std::min<std::size_t>(count, 3);
-    own *= std::max<std::size_t>(count, 3);
+    own *= std::max<std::size_t>(count, 4);
     finer *= std::max<std::size_t>(thin[k].values.size(), 2);
   }
   if (fewest > kFew) return {0, 0};
-  return {std::min(own, kFew), std::min(finer, kFew)};
+  return {std::min(own, kMany), std::min(finer, kMany)};
 }
 
-/// One lattice over an extent, and what its motions say; empty where too many would be needed, or one
-/// diverged.
+/// One lattice over an extent, of few values or of many, and what its motions say; empty where too many would
+/// be needed, or one diverged.
 std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
                                 bool finer, const std::vector<KnownError>& errors,
-                                std::vector<KnownError>& held) {
-  const std::vector<Axis> axes = lattice(extent, task.ranges, 3, kFew);
-  if (cartesian_product(axes).size() > kFew) return std::nullopt;
+                                std::vector<KnownError>& held, bool many = false) {
+  const std::size_t most = many ? kMany : kFew;
+  const std::vector<Axis> axes = lattice(extent, task.ranges, many ? 4 : 3, most);
+  if (cartesian_product(axes).size() > most) return std::nullopt;
   std::optional<Emulator> emulator = emulator_over(
-      task, axes, finer ? thinned(lattice(extent, task.ranges, 2, kFew / 3)) : std::vector<Axis>{}, true);
+      task, axes, finer ? thinned(lattice(extent, task.ranges, 2, most / 3)) : std::vector<Axis>{}, true);
   if (!emulator) return std::nullopt;
   return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
 }
@@ -186,6 +189,13 @@ std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
 
 /// Friction, weight, start yaw and table height, and what was stated with a deviation, to both sides.
 std::size_t most_held_motions(const GridSettings& grid) { return 2 * (4 + grid.deviations.size()); }
+
+std::vector<std::size_t> stiffnesses_of(const std::vector<Axis>& axes) {
+  std::vector<std::size_t> stiffnesses;
+  for (std::size_t k = 0; k < axes.size(); ++k)
+    if (axes[k].values.size() > 1 && is_stiffness(axes[k].name)) stiffnesses.push_back(k);
+  return stiffnesses;
+}
 
 enum class Settled { yes, at_points, elsewhere };
 
@@ -246,20 +256,52 @@ void keep_to_simulated(const Task& task, Found& found, const std::vector<double>
       found.axes, deviance_over(found.emulator, found.axes, found.look.likelihood, task.grid));
 }
 
-/// Motions simulated anew about the answer, again while it leaves them or takes too little of them, where few
-/// simulations do.
+/// How far an error of the estimate moves the surface, and the parameters if they had to explain it.
+SolverCheck check_of(const KnownError& error, const Sensitivity& sensitivity, const std::vector<Axis>& axes) {
+  const Motions &from = *error.terms[0].motions, &to = *error.terms[1].motions;
+  return compare_solutions(error.name, sensitivity, from.replays, from.results, to.replays, to.results, axes);
+}
+
+/// How motions change with the parameters at the estimate, by the emulator.
+Sensitivity sensitivity_of(const Task& task, const Found& found) {
+  GridSettings grid = task.grid;
+  grid.axes = found.look.posterior.axes;
+  return measure_sensitivity(replays_of(found.emulator), grid, found.look.posterior.values(), true,
+                             motions_of(found.emulator.models, found.emulator.share));
+}
+
+/// Whether what the emulator misses at the estimate would move a parameter by much of what it is known to.
+bool misses_much(const Task& task, const Found& found) {
+  constexpr double kMuch = 0.5;  // of a standard deviation
+  const Posterior& posterior = found.look.posterior;
+  const SolverCheck check =
+      check_of(found.estimate.errors.front(), sensitivity_of(task, found), posterior.axes);
+  for (std::size_t k = 0; k < posterior.axes.size(); ++k) {
+    const Eigen::VectorXd draws = posterior.samples.col(static_cast<Eigen::Index>(k));
+    const double spread = std::sqrt((draws.array() - draws.mean()).square().mean());
+    if (posterior.axes[k].values.size() > 1 &&
+        std::abs(check.shift.at(posterior.axes[k].name)) > kMuch * spread)
+      return true;
+  }
+  return false;
+}
+
+/// Motions simulated anew about the answer, where few simulations do: again while it leaves them or takes too
+/// little of them, and with more of them where the emulator misses much.
 Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held) {
   const bool finer = found.emulator.share != own_mesh;
   Extent extent = next_lattice(extent_of(found.axes), found.look.posterior, task.ranges);
   if (!reaches_beyond(extent, found.axes) && !is_finer(lattice(extent, task.ranges, 3, kFew), found.axes))
     return found;
+  bool many = false;
   for (int round = 0; round < kRounds; ++round) {
     std::optional<Found> there =
-        look_about(task, extent, found.look.posterior.values(), finer, found.errors, held);
+        look_about(task, extent, found.look.posterior.values(), finer, found.errors, held, many);
     if (!there) break;
     found = std::move(*there);
     const Extent next = next_lattice(extent, found.look.posterior, task.ranges);
-    if (next == extent) break;
+    if (next == extent && (many || !misses_much(task, found))) break;
+    many = many || next == extent;
     extent = next;
   }
   return found;
@@ -280,21 +322,11 @@ Fit fit_of(const Task& task, const Found& found, const Answer& answer) {
   return fit;
 }
 
-/// How far each error moves the surface, and the parameters if they had to explain it.
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
-  const std::vector<Replay> on_model = replays_of(found.emulator);
-  GridSettings grid = task.grid;
-  grid.axes = found.look.posterior.axes;
-  const Sensitivity sensitivity =
-      measure_sensitivity(on_model, grid, found.look.posterior.values(), true,
-                          motions_of(found.emulator.models, found.emulator.share));
+  const Sensitivity sensitivity = sensitivity_of(task, found);
   std::vector<SolverCheck> checks;
-  for (std::size_t e = 0; e < found.estimate.errors.size(); ++e) {
-    const std::vector<MotionTerm>& terms = found.estimate.errors[e].terms;
-    const Motions &from = *terms[0].motions, &to = *terms[1].motions;
-    checks.push_back(compare_solutions(found.estimate.errors[e].name, sensitivity, from.replays, from.results,
-                                       to.replays, to.results, grid.axes));
-  }
+  for (const KnownError& error : found.estimate.errors)
+    checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
   return checks;
 }
 
@@ -396,8 +428,10 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
 
   warn_of_held(task, found->look.likelihood, found->errors, answer.warnings);
 
-  const Posterior& posterior = found->look.posterior;
+  Posterior posterior = found->look.posterior;
   answer.values = posterior.values();
+  if (const double spread = spread_of_scale(usable, replays); spread > 0)
+    scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges);
   for (std::size_t r = 0; r < replays.size(); ++r) {
     answer.motions.push_back(store.run(replays[r], candidate_at(answer.values, grid)));
     answer.misfits.push_back(found->look.likelihood.of_recording(r).misfit());

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "sysid/infer/discrepancy_prior.h"
 #include "sysid/infer/local_noise.h"
 
 namespace flash::sysid {
@@ -20,7 +21,6 @@ constexpr Eigen::Index kCoordinates = 160;           // of a field, at most
 constexpr double kLeast = 1e-5;                      // variance of a coordinate over the largest
 constexpr int kSizes = 20;                           // values of tau, to that of the residuals
 constexpr double kFirstSize = 0.03;                  // over sigma
-constexpr double kLarge = 2.995732;                  // -log of one in twenty
 constexpr double kLeastFreedom = 0.1;                // of the rows
 constexpr int kFew = 12;        // rows of one keyframe and channel that are too few to tell noise from misfit
 constexpr double kVague = 100;  // of what is not known, over the residuals
@@ -87,7 +87,7 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
   for (int i = 0; i < kSizes; ++i) {
     const double beyond = first * std::pow(last / first, static_cast<double>(i) / (kSizes - 1));
     sizes_.push_back(std::hypot(explained_, beyond));
-    priors_.push_back(beyond * std::exp(-kLarge * beyond / noise_));  // d tau = tau d log tau
+    priors_.push_back(beyond * std::exp(-beyond / (usual_discrepancy * noise_)));  // d tau = tau d log tau
     sum += priors_.back();
   }
   for (double& prior : priors_) prior /= 2 * sum;

@@ -6,6 +6,7 @@
 
 #include "sysid/infer/held.h"
 #include "sysid/infer/verdict.h"
+#include "sysid/infer/weight_scale.h"
 
 namespace flash::sysid {
 namespace {
@@ -41,7 +42,9 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
                                        const std::vector<ReplayResult>& here) {
   std::vector<KnownError> errors;
   const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
-  const std::vector<HeldParameter> all = held_parameters(task.grid, task.replays);
+  std::vector<HeldParameter> all = held_parameters(task.grid, task.replays);
+  if (spread_of_scale(task.grid, task.replays) > 0)  // the posterior takes it in without an approximation
+    std::erase_if(all, [](const HeldParameter& held) { return held.name.ends_with("density"); });
   std::vector<WantedMotion> wanted;
   for (const HeldParameter& held : all)
     for (const double value : held.values)
@@ -80,35 +83,39 @@ void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const st
                            ": search it as well");
 }
 
-std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,
-                                           const Posterior& posterior) {
+std::vector<KnownError> errors_at_draws(const Task& task, const Emulator& emulator, const Estimate& estimate,
+                                        const Posterior& posterior) {
   std::vector<KnownError> errors;
   const Eigen::MatrixXd samples = samples_of(posterior);
   const std::vector<Replay> on_model = replays_of(emulator);
   const double share = 1 / std::sqrt(static_cast<double>(emulator_draws));
+  const auto half_step = std::find_if(estimate.errors.begin(), estimate.errors.end(),
+                                      [](const KnownError& error) { return error.name == "half_step"; });
+  const bool halved = half_step != estimate.errors.end();
+  const std::vector<Replay>& replays = halved ? half_step->terms[1].motions->replays : task.replays;
   std::vector<std::vector<double>> draws;
   std::vector<WantedMotion> wanted;
   for (int draw = 0; draw < emulator_draws; ++draw) {
     const Eigen::VectorXd row =
         samples.row((2 * draw + 1) * samples.rows() / (2 * emulator_draws)).transpose();
     draws.emplace_back(row.begin(), row.end());
-    for (const Replay& replay : task.replays)
-      wanted.push_back({&replay, candidate_at(draws.back(), task.grid)});
+    for (const Replay& replay : replays) wanted.push_back({&replay, candidate_at(draws.back(), task.grid)});
   }
   task.store.prepare(wanted);
   for (const std::vector<double>& values : draws) {
     const ReplayCandidate candidate = candidate_at(values, task.grid);
-    Motions simulated{on_model, {}};
-    for (std::size_t r = 0; r < task.replays.size(); ++r) {
-      ReplayResult own = task.store.run(task.replays[r], candidate);
+    Motions simulated{replays, {}};
+    for (const Replay& replay : replays) {
+      simulated.results.push_back(task.store.run(replay, candidate));
       task.tell_motion();
-      simulated.results.push_back(own);
-      simulated.results.back().motion = emulator.models[r].model.on_its_mesh(own.motion);
     }
     if (!all_finite(simulated.results)) continue;
-    errors.push_back({{{-share, std::make_shared<const Motions>(
-                                    Motions{on_model, motions_at(emulator, values, own_mesh)})},
-                       {share, std::make_shared<const Motions>(std::move(simulated))}}});
+    MotionChange missed = {
+        {-share, std::make_shared<const Motions>(Motions{on_model, motions_at(emulator, values, own_mesh)})},
+        {share, std::make_shared<const Motions>(std::move(simulated))}};
+    if (halved)  // what the step changes at the estimate is an error by itself
+      for (const MotionTerm& term : half_step->terms) missed.push_back({-share * term.factor, term.motions});
+    errors.push_back({std::move(missed)});
   }
   return errors;
 }

@@ -50,9 +50,10 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
 void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const std::vector<KnownError>& errors,
                   std::vector<std::string>& warnings);
 
-/// What the emulator misses at some draws of a posterior: errors of which any mixture is as likely.
-std::vector<KnownError> errors_of_emulator(const Task& task, const Emulator& emulator,
-                                           const Posterior& posterior);
+/// What the emulator misses at some draws of a posterior, and what half the step of time changes there other
+/// than at the estimate: errors of which any mixture is as likely.
+std::vector<KnownError> errors_at_draws(const Task& task, const Emulator& emulator, const Estimate& estimate,
+                                        const Posterior& posterior);
 
 /// Motions simulated at values, as the emulator's mesh has them; empty where one diverged. `own`: on the
 /// search's own mesh. `finer`: on the finer mesh too; else the emulator's difference between both stays.

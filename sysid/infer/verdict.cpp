@@ -88,7 +88,11 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
     if (looked.values.size() > 1) {
       // What a look leaves likely at its end may be likely up to the end of the range.
       const auto open = [&](bool high) { return posterior.end(k, high) < kExcluded; };
-      const bool below = open(false), above = open(true);
+      // So may what draws are cut off at.
+      const double first = coordinate_of(range, range.values.front()),
+                   last = coordinate_of(range, range.values.back());
+      const bool below = open(false) || posterior.quantile(k, 0.025) <= first,
+                 above = open(true) || posterior.quantile(k, 0.975) >= last;
       // The most likely values of all parameters together may lie beyond what is likely of one by itself.
       const double mode = posterior.estimate[static_cast<Eigen::Index>(k)];
       const double low = std::min(mode, posterior.quantile(k, 0.025)),

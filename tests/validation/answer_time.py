@@ -5,6 +5,7 @@ to simulate. Exits with 1 where that takes longer than --limit on two threads.""
 import argparse
 import json
 import pathlib
+import resource
 import subprocess
 import sys
 import time
@@ -32,6 +33,12 @@ def recorded(runs, asset, name, path, seed):
     return folder
 
 
+def processor_seconds():
+    """That the programs called so far have taken."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def told(summary):
     for name, finding in summary["parameters"].items():
         low, high = finding["interval95"] or (float("nan"), float("nan"))
@@ -56,12 +63,12 @@ def main():
         search = [*map(str, recordings), "--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes", *words, *synthetic.WEIGHED, "--threads", "2",
                   "--quiet", "-o", str(options.out / name)]
         for attempt in ("first", "again"):  # the first simulates what is not kept yet
-            begin = time.monotonic()
+            begin, worked = time.monotonic(), processor_seconds()
             done = subprocess.run([options.sysid, "grid", *search, "--resume"], capture_output=True, text=True)
             seconds = time.monotonic() - begin
             if done.returncode not in (0, 3):
                 sys.exit(done.stderr)
-            print(f"{name}, {attempt}: {seconds:.1f} s", flush=True)
+            print(f"{name}, {attempt}: {seconds:.1f} s, of processors {processor_seconds() - worked:.1f} s", flush=True)
         told(json.loads((options.out / name / "summary.json").read_text()))
         if seconds > options.limit:
             late.append(name)

@@ -14,6 +14,7 @@ PlanSettings settings_of(double young_spread, double bending_spread) {
   PlanSettings settings;
   settings.grid.base.material = short_lift_material();
   settings.grid.axes = {{"young", {300, 3e4}, true}, {"bending", {2e-5, 2e-3}, true}};
+  settings.grid.fixed = {parse_hold("areal_density=0.2:measured").axis};
   settings.at = {3e3, 2e-4};
   KnownSoFar known;
   known.covariance = Eigen::Vector2d(young_spread, bending_spread).cwiseAbs2().asDiagonal();
@@ -80,6 +81,19 @@ TEST(RankExperiments, ALargerMisfitPromisesLess) {
   const double bits = plan_experiment("again", {lift}, settings, &store).bits;
   settings.known->misfit.rms = 2e-2;
   EXPECT_LT(plan_experiment("again", {lift}, settings, &store).bits, 0.5 * bits);
+}
+
+// Every stiffness is known to what the weight is known to, and no better, whatever is recorded.
+TEST(RankExperiments, AnErrorOfTheWeightStays) {
+  const data::TemporaryFolder folder;
+  const Replay lift = short_lift(folder);
+  const MotionStore store(folder / "motions");
+  PlanSettings settings = settings_of(1, 1);
+  const double measured = plan_experiment("again", {lift}, settings, &store).spread[1];
+  settings.grid.fixed.clear();
+  const double assumed = plan_experiment("again", {lift}, settings, &store).spread[1], weight = std::log(1.1);
+  EXPECT_GT(assumed, weight);
+  EXPECT_NEAR(assumed, std::hypot(measured, weight), 0.05 * assumed);
 }
 
 TEST(RankExperiments, CovarianceOfDrawsIsThatOfCoordinates) {

@@ -50,6 +50,22 @@ TEST(Summary, KeepsWhatToRecordNext) {
             std::string::npos);
 }
 
+// The factor of a weight that was not measured is applied to what was simulated.
+TEST(Summary, AnIntervalMayReachBeyondWhatWasSimulatedByAnErrorOfTheWeightAlone) {
+  const data::TemporaryFolder folder;
+  Summary summary = example_summary();
+  (*summary.parameters[1].interval95)[1] = 1.1 * summary.parameters[1].values.back();
+  summary.held.clear();
+  save_summary(summary, folder / "summary.json");
+  EXPECT_NE(data::input_error_of([&] {
+              load_summary(folder / "summary.json");
+            }).find("parameters.bending.interval95"),
+            std::string::npos);
+  summary.held["areal_density"] = {0.18, 0.22};
+  save_summary(summary, folder / "summary.json");
+  EXPECT_EQ(load_summary(folder / "summary.json").parameters[1].interval95, summary.parameters[1].interval95);
+}
+
 TEST(Summary, HasTheFieldsOfItsSchema) {
   const nlohmann::json json = nlohmann::json::parse(summary_text(example_summary()));
   EXPECT_EQ(json["schema"], "flash-sysid-summary/2");
