@@ -20,7 +20,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage other-simulators plan-promise answer-time size-study use-study
-.PHONY: few-views-study knock-study locking reference fuzz sanitize
+.PHONY: few-views-study knock-study locking self-contact reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -109,6 +109,10 @@ random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on, of
 deep-starts: configure-test  ## Simulate SCENES random sheets that start across obstacles; say how fast they come out
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
 	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --round $(ROUND) --mesh $(MESHES) --list
+
+self-contact: configure-test  ## Say what sheets do that meet themselves and each other, on six scenes
+	cmake --build $(BUILD) -j $(JOBS) --target self_contact_study
+	$(BUILD)/tests/self_contact_study
 
 locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever over Poisson's ratio and mesh
 	cmake --build $(BUILD) -j $(JOBS) --target locking_study
