@@ -1,9 +1,9 @@
-// Prints how sheets that meet themselves and each other do on six scenes: what docs/theory.md says of it.
+// Prints how sheets and solids that meet themselves and each other do: what docs/theory.md and
+// docs/performance.md say of it.
 
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <functional>
 #include <numbers>
 #include <string>
@@ -11,6 +11,7 @@
 #include "data/procedural_mesh.h"
 #include "sim/newton/solver.h"
 #include "sim/pairs/intersection.h"
+#include "tests/sim/layer_scenes.h"
 
 namespace flash::sim {
 namespace {
@@ -46,7 +47,7 @@ struct Study {
 
 struct Result {
   double least = 1e300, last = 0, creep = 0, seconds = 0;
-  int unsolved = 0, halved = 0, intersections = 0, most_iterations = 0;
+  int unsolved = 0, halved = 0, intersections = 0, most_iterations = 0, most_touches = 0;
   long iterations = 0, solves = 0, factors = 0, pairs = 0, ways = 0;
   StepReport report;
 };
@@ -67,42 +68,20 @@ Result run(Study& study) {
     r.halved += r.report.substeps > 1;
     r.iterations += r.report.iterations;
     r.most_iterations = std::max(r.most_iterations, r.report.iterations);
+    r.most_touches = std::max(r.most_touches, r.report.layer_touches);
     r.solves += r.report.solves;
     r.factors += r.report.factorizations;
     r.pairs = std::max(r.pairs, r.report.layer_pairs);
     r.ways += r.report.layer_ways;
     r.intersections += first_intersection(surface, study.world.state.positions).has_value();
-    if (std::getenv("TRACE"))
-      std::printf(
-          "%4d it %3d solves %4d fac %3d sub %3d conv %d touches %5d closest %.3g res %.2g pairs %ld ways "
-          "%ld\n",
-          k, r.report.iterations, r.report.solves, r.report.factorizations, r.report.substeps,
-          r.report.converged, r.report.layer_touches, r.report.layer_distance, r.report.residual,
-          r.report.layer_pairs, r.report.layer_ways);
   }
   r.creep = (study.world.state.positions - before).rowwise().norm().maxCoeff() / h;
   r.last = r.report.layer_distance;
   return r;
 }
 
-Sheet stacked(int count, double side, int cells) {
-  std::vector<Sheet> sheets;
-  for (int k = 0; k < count; ++k)
-    sheets.push_back(square_sheet(
-        side, cells, k % 2 == 0 ? data::DiagonalPattern::alternating : data::DiagonalPattern::jittered));
-  return joined(sheets);
-}
-
-/// A pile of sheets on a table, each let go somewhat above the one below.
-Study pile(const char* name, int count, const SelfContact& settings, double tilt = 0, int steps = 200) {
-  Study study{name, stacked(count, 0.2, 12), {}, steps};
-  study.world = world_of(study.sheet, settings);
-  study.world.gravity = 9.81 * Vector3d(std::sin(tilt), 0, -std::cos(tilt));
-  study.world.obstacles.push_back({.shape = Plane{}, .friction = std::vector<double>(count, 2.0)});
-  for (int k = 0; k < count; ++k)
-    rows_of(study.sheet.bodies[k], study.world.state.positions).col(2).array() +=
-        1.05 * settings.thickness * k;
-  return study;
+Study study_of(const char* name, LayerScene scene, int steps) {
+  return {name, std::move(scene.sheet), std::move(scene.environment), steps};
 }
 
 /// A strip whose one end is carried over and laid down on the other in a second, and let go.
@@ -126,28 +105,6 @@ Study fold(const SelfContact& settings) {
   Schedule schedule = *make_schedule({&path, 1}, 0.0, h, 100);
   study.world.schedule = std::make_shared<const Schedule>(schedule);
   study.world.holds.push_back({.name = "gripper", .vertices = edge, .frame = 0, .to = 1.0});
-  return study;
-}
-
-/// Both halves of a folded sheet thrown at each other.
-Study thrown(const SelfContact& settings, double speed) {
-  Study study{"thrown", square_sheet(0.2, 16), {}, 60};
-  study.world = world_of(study.sheet, settings);
-  Points& x = study.world.state.positions;
-  const double middle = 0.5 * (x.col(0).maxCoeff() + x.col(0).minCoeff());
-  for (int i = 0; i < x.rows(); ++i) {
-    const double from = x(i, 0) - middle, radius = 0.02, half = 0.5 * std::numbers::pi * radius;
-    // A U: two straight legs and a half circle.
-    if (std::abs(from) < half) {
-      x(i, 0) = middle + radius * std::cos(from / radius);
-      x(i, 2) = radius * std::sin(from / radius);
-    } else {
-      x(i, 0) = middle - (std::abs(from) - half);
-      x(i, 2) = from > 0 ? radius : -radius;
-    }
-    x(i, 1) *= from > 0 ? 0.97 : 1.0;
-    study.world.state.velocities(i, 2) = from > 0 ? -0.5 * speed : 0.5 * speed;
-  }
   return study;
 }
 
@@ -180,11 +137,35 @@ Study pressed(const SelfContact& settings) {
 }
 
 void print(const Study& study, const Result& r) {
-  std::printf("| %s | %td | %.3f | %.3f | %d | %.3g | %.2f (%d) | %.1f | %.1f | %ld | %.2f | %d, %d |\n",
-              study.name.c_str(), study.sheet.rest.vertices.rows(), 1e3 * r.least, 1e3 * r.last,
-              r.intersections, 1e3 * r.creep, double(r.iterations) / study.steps, r.most_iterations,
-              double(r.solves) / study.steps, double(r.factors) / study.steps, r.pairs,
+  std::printf("| %s | %td | %d | %.3f | %.3f | %d | %.2g | %.1f (%d) | %.1f | %.1f | %ld | %.1f | %d, %d |\n",
+              study.name.c_str(), study.sheet.rest.vertices.rows(), r.most_touches, 1e3 * r.least,
+              1e3 * r.last, r.intersections, 1e3 * r.creep, double(r.iterations) / study.steps,
+              r.most_iterations, double(r.solves) / study.steps, double(r.factors) / study.steps, r.pairs,
               1e3 * r.seconds / study.steps, r.halved, r.unsolved);
+  std::fflush(stdout);
+}
+
+/// Whether the last body of a scene slides: in half a second as fast as at a thousandth of a percent of the
+/// weight, or it has stopped.
+bool slides(const LayerScene& start) {
+  constexpr int steps = 50;
+  constexpr double share = 1e-5;
+  LayerScene scene = start;
+  Solver solver(scene.sheet, {.time_step = h, .tolerance = 1e-4});
+  for (int k = 0; k < steps; ++k) solver.step(scene.environment);
+  return mean_velocity(scene, scene.sheet.bodies.back()).x() > share * 9.81 * steps * h;
+}
+
+/// Prints the friction below which the last body of a scene slides, by bisection, beside the slope.
+void print_threshold(const char* name, double slope, const SelfContact& settings,
+                     const std::function<LayerScene(const SelfContact&)>& scene_of) {
+  SelfContact contact = settings;
+  double low = slope - 0.02, high = slope + 0.02;
+  while (high - low > 1e-5) {
+    contact.friction = 0.5 * (low + high);
+    (slides(scene_of(contact)) ? low : high) = contact.friction;
+  }
+  std::printf("| %s | %.5f | %.5f | %.1e |\n", name, slope, low, std::abs(low - slope));
   std::fflush(stdout);
 }
 
@@ -194,19 +175,36 @@ void print(const Study& study, const Result& r) {
 int main(int argc, char** argv) {
   using namespace flash::sim;
   const SelfContact settings{.thickness = 1e-3, .friction = 0.3, .pressure = 2500};
-  std::vector<Study> studies = {pile("two sheets", 2, settings),
-                                pile("ten sheets", 10, settings),
-                                pile("incline, holds", 2, settings, std::atan(0.29)),
-                                fold(settings),
-                                pressed(settings),
-                                thrown(settings, 2)};
+  const auto tilted = [&](double slope) { return layer_on_incline(slope, settings); };
+  std::vector<Study> studies = {
+      study_of("two sheets", pile(2, settings, 0.2, 12), 200),
+      study_of("ten sheets, 10 s", pile(10, settings, 0.2, 12), 1000),
+      study_of("incline 0.299, holds", tilted(0.299), 200),
+      fold(settings),
+      pressed(settings),
+      study_of("folded twice, pressed", folded_twice_and_pressed(settings, 0.006), 120),
+      study_of("thrown at 2 m/s", thrown(settings, 2), 60),
+      study_of("thrown at 20 m/s", thrown(settings, 20), 60),
+      study_of("knot", strip_knot(settings, 0.95, 0.8), 120),
+      study_of("pinch", pinched_layers(settings, 5), 60),
+      study_of("block on block", block_on_incline(0.15, settings, false), 100),
+      study_of("block, sheet, block", block_on_incline(0.15, settings, true), 100)};
   std::puts(
-      "| scene | vertices | least mm | last mm | passing steps | creep mm/s | iterations (most) | solves | "
-      "factors "
-      "| pairs | ms | halved, unsolved |\n|---|---|---|---|---|---|---|---|---|---|---|---|");
+      "| scene | vertices | touches, at most | least mm | last mm | passing steps | creep mm/s | "
+      "iterations (most) | solves | factors | pairs | ms a step | halved, unsolved |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|---|---|");
   for (Study& study : studies) {
     if (argc > 1 && study.name.find(argv[1]) == std::string::npos) continue;
     print(study, run(study));
   }
+  if (argc > 1) return 0;
+  std::puts("\n| what lies on a slope | slope | slides below a friction of | off by |\n|---|---|---|---|");
+  print_threshold("sheet on sheet", 0.3, settings,
+                  [](const SelfContact& contact) { return layer_on_incline(0.3, contact); });
+  const double ten_degrees = std::tan(std::numbers::pi / 18);
+  for (const bool between : {false, true})
+    print_threshold(
+        between ? "block on sheet on block" : "block on block", ten_degrees, settings,
+        [&](const SelfContact& contact) { return block_on_incline(ten_degrees, contact, between); });
   return 0;
 }
