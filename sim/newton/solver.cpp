@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <limits>
+#include <string>
 #include <utility>
 
 #include "data/error.h"
+#include "data/text.h"
 #include "sim/law/feasible_place.h"
 #include "sim/newton/newton_iteration.h"
 #include "sim/pairs/intersection.h"
@@ -133,6 +135,25 @@ StepReport advance(Environment& environment, double h, int halvings, NewtonWorks
   return parts;
 }
 
+/// Layers thicker than the cells of a mesh would meet their own neighbours.
+void check_thickness(const Sheet& sheet, const PairSurface& surface, double thickness) {
+  for (std::size_t b = 0; b < sheet.bodies.size(); ++b) {
+    double sum = 0;
+    int count = 0;
+    for (const auto& [i, j] : surface.edges) {
+      if (surface.body[static_cast<std::size_t>(i)] != static_cast<int>(b)) continue;
+      sum += (surface.rest.row(i) - surface.rest.row(j)).norm();
+      ++count;
+    }
+    const std::string& name = sheet.bodies[b].name;
+    if (thickness * count >= sum)
+      throw data::input_error("self_contact", "thickness",
+                              "found " + data::format_short(thickness) + " m, expected less than " +
+                                  data::format_short(sum / count) + " m, the mean edge of the mesh" +
+                                  (name.empty() ? "" : " of " + name));
+  }
+}
+
 /// Layers that start on both sides of each other would stay so.
 void check_start(const Sheet& sheet, PairSurface& surface, const Points& positions) {
   const auto passing = first_intersection(surface, positions);
@@ -161,6 +182,7 @@ StepReport Solver::step(Environment& environment) {
   NewtonWorkspace& w = *workspace_;
   if (environment.self_contact && !w.surface) {
     w.surface = std::make_unique<PairSurface>(w.plan->sheet);
+    check_thickness(w.plan->sheet, *w.surface, environment.self_contact->thickness);
     check_start(w.plan->sheet, *w.surface, environment.state.positions);
   }
   const double h = w.settings.time_step;

@@ -14,15 +14,16 @@ using data::Points;
 
 namespace {
 
-constexpr double far = 1e300;  // [m]
+constexpr double far = 1e300;         // [m]
+constexpr double margin_share = 0.5;  ///< of the thickness, that a vertex may move before a new search
 
 void gather(const Points& x, const std::array<int, 4>& vertices, Vector3<double>* places) {
   for (int k = 0; k < 4; ++k) places[k] = vector3(x, vertices[k]);
 }
 
-/// Whether the features of a pair may be nearer than its thickness, by their boxes.
-bool may_touch(const CandidatePair& pair, const Vector3<double>* x) {
-  const int split = pair.kind == PairKind::vertex_face ? 1 : 2;
+/// Whether two features may be nearer than `reach`, by their boxes.
+bool may_come_near(PairKind kind, const Vector3<double>* x, double reach) {
+  const int split = kind == PairKind::vertex_face ? 1 : 2;
   for (int axis = 0; axis < 3; ++axis) {
     double low[2] = {far, far}, high[2] = {-far, -far};
     for (int k = 0; k < 4; ++k) {
@@ -30,7 +31,7 @@ bool may_touch(const CandidatePair& pair, const Vector3<double>* x) {
       low[feature] = std::min(low[feature], x[k][axis]);
       high[feature] = std::max(high[feature], x[k][axis]);
     }
-    if (low[0] - high[1] >= pair.thickness || low[1] - high[0] >= pair.thickness) return false;
+    if (low[0] - high[1] >= reach || low[1] - high[0] >= reach) return false;
   }
   return true;
 }
@@ -102,38 +103,43 @@ LayerStep::LayerStep(PairSurface& surface, const Environment& environment, doubl
 
 void LayerStep::set_carried(const std::vector<bool>& carried) {
   carried_ = carried;
-  boxes_.clear();
+  near_.boxes.clear();
 }
 
-void LayerStep::cover(const Points& from, const Points& to) {
+bool LayerStep::cover(const Candidates& candidates, const Points& from, const Points& to) {
+  const std::vector<Bounds>& boxes = candidates.boxes;
   const auto covers = [&](const Points& x, Eigen::Index i) {
     const Eigen::Array3d place = x.row(i).transpose().array();
-    return (boxes_[i].low <= place).all() && (place <= boxes_[i].high).all();
+    return (boxes[i].low <= place).all() && (place <= boxes[i].high).all();
   };
-  bool all = !boxes_.empty();
+  bool all = !boxes.empty();
   for (Eigen::Index i = 0; i < from.rows() && all; ++i) all = covers(from, i) && covers(to, i);
-  if (all) return;
-  boxes_.resize(static_cast<std::size_t>(from.rows()));
+  return all;
+}
+
+void LayerStep::search(const Points& from, const Points& to, double margin, Candidates& candidates) {
+  candidates.boxes.resize(static_cast<std::size_t>(from.rows()));
   for (Eigen::Index i = 0; i < from.rows(); ++i) {
     const Eigen::Array3d a = from.row(i).transpose().array(), b = to.row(i).transpose().array();
-    boxes_[i] = {a.min(b) - settings_.thickness, a.max(b) + settings_.thickness};
+    candidates.boxes[i] = {a.min(b) - margin, a.max(b) + margin};
   }
-  find_candidates(surface_, boxes_, settings_.thickness, carried_, pairs_);
+  find_candidates(surface_, candidates.boxes, settings_.thickness, carried_, candidates.pairs);
   ++counts_.searches;
-  counts_.pairs = std::max(counts_.pairs, static_cast<long>(pairs_.size()));
+  counts_.pairs = std::max(counts_.pairs, static_cast<long>(candidates.pairs.size()));
 }
 
 void LayerStep::add_forces(const Points& positions, LayerContact& contact, Points& force) {
-  cover(positions, positions);
+  if (!cover(near_, positions, positions))
+    search(positions, positions, margin_share * settings_.thickness, near_);
   contact.touches.clear();
   contact.energy = 0;
   contact.closest = far;
   const double length = bristle_length(time_step_);
   const Points& start = environment_.state.positions;
-  for (const CandidatePair& pair : pairs_) {
+  for (const CandidatePair& pair : near_.pairs) {
     Vector3<double> x[4];
     gather(positions, pair.vertices, x);
-    if (!may_touch(pair, x)) continue;
+    if (!may_come_near(pair.kind, x, pair.thickness)) continue;
     const NearestPoints nearest = nearest_points(pair.kind, x);
     contact.closest = std::min(contact.closest, nearest.distance);
     const LayerResponse response = layer_response(pair.thickness, settings_.pressure, nearest.distance);
@@ -189,12 +195,21 @@ double LayerStep::bristle_energy(const LayerContact& contact) const {
 }
 
 double LayerStep::free_share(const Points& from, const Points& to) {
-  cover(from, to);
+  const bool is_near = cover(near_, from, to);
+  if (!is_near) search(from, to, 0, way_);
+  const Eigen::VectorXd lengths = (to - from).rowwise().norm();
   double share = 1;
-  for (const CandidatePair& pair : pairs_) {
+  for (const CandidatePair& pair : (is_near ? near_ : way_).pairs) {
+    const auto& v = pair.vertices;
     Vector3<double> x[4], move[4];
-    gather(from, pair.vertices, x);
-    for (int k = 0; k < 4; ++k) move[k] = share * (vector3(to, pair.vertices[k]) - x[k]);
+    gather(from, v, x);
+    // What is farther apart than both can go is free.
+    const double longest =
+        pair.kind == PairKind::vertex_face
+            ? lengths[v[0]] + std::max({lengths[v[1]], lengths[v[2]], lengths[v[3]]})
+            : std::max(lengths[v[0]], lengths[v[1]]) + std::max(lengths[v[2]], lengths[v[3]]);
+    if (!may_come_near(pair.kind, x, share * longest + pair.thickness)) continue;
+    for (int k = 0; k < 4; ++k) move[k] = share * (vector3(to, v[k]) - x[k]);
     ++counts_.ways;
     share *= sim::free_share(pair.kind, x, move, pair.thickness);
   }

@@ -72,16 +72,25 @@ class LayerStep {
   double time_step() const { return time_step_; }
 
  private:
-  /// Makes the candidates hold for all positions between two.
-  void cover(const data::Points& from, const data::Points& to);
+  /// Pairs that may touch while each vertex stays in its box.
+  struct Candidates {
+    std::vector<Bounds> boxes;
+    std::vector<CandidatePair> pairs;
+  };
+
+  /// Whether the pairs of `candidates` are all that matter on the way between two positions.
+  static bool cover(const Candidates& candidates, const data::Points& from, const data::Points& to);
+
+  /// Fills in the pairs of all ways between two positions, and of a `margin` beside them.
+  void search(const data::Points& from, const data::Points& to, double margin, Candidates& candidates);
 
   PairSurface& surface_;
   const Environment& environment_;
   SelfContact settings_;
   double time_step_;
   std::vector<bool> carried_;
-  std::vector<Bounds> boxes_;
-  std::vector<CandidatePair> pairs_;
+  Candidates near_;  ///< an iterate
+  Candidates way_;   ///< between iterates that are far apart
   LayerCounts counts_;
 };
 

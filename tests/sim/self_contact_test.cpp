@@ -226,6 +226,17 @@ TEST(SelfContact, RefusesAStartThatPassesThroughItself) {
   }
 }
 
+TEST(SelfContact, RefusesLayersThickerThanCells) {
+  LayerScene world = pile(2, {.thickness = 0.03}, 0.1, 6);
+  Solver solver(world.sheet, {.time_step = h});
+  try {
+    solver.step(world.environment);
+    FAIL() << "it has to be refused";
+  } catch (const data::InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("the mean edge of the mesh"), std::string::npos) << error.what();
+  }
+}
+
 TEST(SelfContact, IsNotOnDevices) {
   Environment environment;
   environment.self_contact = cloth;
