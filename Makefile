@@ -20,7 +20,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage other-simulators plan-promise answer-time size-study use-study
-.PHONY: few-views-study knock-study locking drape reference fuzz sanitize
+.PHONY: few-views-study knock-study locking drape self-contact reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -102,13 +102,17 @@ knock-study: configure-test  ## Say whether hand-eye calibration sees knocks nea
 	cmake --build $(BUILD) -j $(JOBS) --target knock_study
 	$(BUILD)/tests/knock_study
 
-random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on, of solids with SOLIDS=1; say what was not solved, and what energy, gaps and ways say
+random-scenes: configure-test  ## Simulate SCENES random scenes from SEED on, of solids with SOLIDS=1, that meet themselves at up to LAYERS=1 m/s; say what was not solved, and what energy, gaps and ways say
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
-	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --round $(ROUND) --mesh $(MESHES) $(if $(SOLIDS),--solid) --list
+	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --round $(ROUND) --mesh $(MESHES) $(if $(SOLIDS),--solid) $(if $(LAYERS),--layers $(LAYERS)) --list
 
 deep-starts: configure-test  ## Simulate SCENES random sheets that start across obstacles; say how fast they come out
 	cmake --build $(BUILD) -j $(JOBS) --target random_scene_study
 	$(BUILD)/tests/random_scene_study $(SEED) $(SCENES) --deep --round $(ROUND) --mesh $(MESHES) --list
+
+self-contact: configure-test  ## Say what sheets do that meet themselves and each other, on six scenes
+	cmake --build $(BUILD) -j $(JOBS) --target self_contact_study
+	$(BUILD)/tests/self_contact_study
 
 locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever over Poisson's ratio and mesh
 	cmake --build $(BUILD) -j $(JOBS) --target locking_study

@@ -108,7 +108,7 @@ void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies
                                 " MB that there are; a coarser mesh is needed");
 }
 
-std::string log_row(int step, double time, const std::vector<StepReport>& reports) {
+std::string log_row(int step, double time, const std::vector<StepReport>& reports, bool self_contact) {
   StepReport largest, sum;
   bool converged = true;
   for (const StepReport& r : reports) {
@@ -130,8 +130,15 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
                        sum.membrane + sum.bending + sum.solid, sum.gravitational})
     row += "," + data::format_number(value);
   row += converged ? ",1" : ",0";
-  return row + "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "," +
-         std::to_string(largest.substeps) + "\n";
+  row += "," + data::format_number(sum.membrane) + "," + data::format_number(sum.bending) + "," +
+         std::to_string(largest.substeps);
+  if (self_contact) {
+    const StepReport& r = reports.front();  // of all objects together
+    row += "," + (r.layer_distance < no_layers ? data::format_number(r.layer_distance) : std::string()) +
+           "," + std::to_string(r.layer_touches) + "," + std::to_string(r.layer_pairs) + "," +
+           data::format_number(r.layers);
+  }
+  return row + "\n";
 }
 
 /// In quotes where a comma, a quote or a line break would end it.
@@ -270,7 +277,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   };
   std::string log =
       "step,t,residual,iterations,penetration_max_m,complementarity,kinetic_J,elastic_J,potential_J,"
-      "converged,membrane_J,bending_J,substeps\n";
+      "converged,membrane_J,bending_J,substeps";
+  log += scene.self_contact ? ",layer_distance_m,layer_touches,layer_pairs,layers_J\n" : "\n";
   std::string forces = "t,body,fx,fy,fz\n";
   const auto write_tables = [&] {
     data::write_atomically((fs::path(output_dir) / "log.csv").string(), log);
@@ -287,6 +295,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   };
 
   std::vector<StepReport> reports(bodies.size());
+  summary.self_contact = scene.self_contact.has_value();
+  double nearest = no_layers;  // layers at the end of a step [m]
   Deepest held, started;
   double inside_at_end = 0;  // depth at the start of the last step [m]
   std::string holder;
@@ -314,7 +324,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       if (step == 1) begin_writing();  // what the first step refuses leaves nothing behind
 
       const double time = bodies.empty() ? step * scene.time_step : bodies.front().environment.state.time;
-      log += log_row(step, time, reports);
+      log += log_row(step, time, reports, summary.self_contact);
       forces += force_rows(time, bodies, reports);
       bool converged = true, halved = false;
       inside_at_end = 0;
@@ -332,6 +342,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         summary.penetration_max = data::worst(summary.penetration_max, report.penetration_max);
         summary.complementarity_max = data::worst(summary.complementarity_max, report.complementarity);
         summary.iterations += report.iterations;
+        summary.layer_touches_max = std::max(summary.layer_touches_max, report.layer_touches);
+        nearest = std::min(nearest, report.layer_distance);
       }
       summary.unconverged_steps += !converged;
       summary.halved_steps += halved;
@@ -352,6 +364,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     throw;
   }
   write_tables();
+  if (nearest < no_layers) summary.layer_distance_min = nearest;
   summary.warnings = locking_warnings(bodies);
   for (std::size_t b = 0; b < bodies.size() && !summary.interrupted && summary.steps > 0; ++b)
     for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))

@@ -17,8 +17,12 @@ struct SceneSummary {
   double penetration_max = 0;        ///< [m]
   double held_penetration_max = 0;   ///< of vertices that supports or end effectors hold [m]
   double start_penetration_max = 0;  ///< of vertices that start a step inside an obstacle [m]
-  long iterations = 0;               ///< of all objects and steps
-  int frames = 0;                    ///< written
+  bool self_contact = false;         ///< whether objects meet themselves and each other
+  double layer_distance_min =
+      0;                      ///< with self-contact: the nearest that layers came at the end of a step [m]
+  int layer_touches_max = 0;  ///< pairs of features that pressed each other, at most
+  long iterations = 0;        ///< of all objects and steps
+  int frames = 0;             ///< written
   double wall_seconds = 0;
   bool interrupted = false;
   double last_motion = 0;  ///< quasistatic: of the vertex that moved farthest in the last step [m]
@@ -39,7 +43,8 @@ struct SceneRun {
 
 /// Runs a scene and writes, into output_dir: frames/%06d.ply (number: the step; all objects in one mesh),
 /// log.csv (step, t, residual, iterations, penetration_max_m, complementarity, kinetic_J, elastic_J,
-/// potential_J, converged, membrane_J, bending_J, substeps) and forces.csv (t, body, fx, fy, fz: of the body
+/// potential_J, converged, membrane_J, bending_J, substeps; with self-contact then layer_distance_m,
+/// layer_touches, layer_pairs, layers_J) and forces.csv (t, body, fx, fy, fz: of the body
 /// on the objects [N]). The last step of a quasistatic run is always a frame. What was
 /// done is kept when the run stops early; nothing is written before the first step is done, and then frames
 /// and tables of an earlier run go first. Throws data::InputError, too, where the scene needs more memory

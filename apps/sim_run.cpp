@@ -77,22 +77,26 @@ class ProgressLine {
 void print_json(const sim::SceneSummary& summary, const std::string& out, int exit_code) {
   std::vector<std::string> warnings = summary.notices;
   warnings.insert(warnings.end(), summary.warnings.begin(), summary.warnings.end());
-  const nlohmann::ordered_json json = {{"schema", "flash-sim-summary/1"},
-                                       {"out", out},
-                                       {"steps", summary.steps},
-                                       {"unconverged_steps", summary.unconverged_steps},
-                                       {"residual_max", summary.residual_max},
-                                       {"halved_steps", summary.halved_steps},
-                                       {"penetration_max_m", summary.penetration_max},
-                                       {"held_penetration_max_m", summary.held_penetration_max},
-                                       {"start_penetration_max_m", summary.start_penetration_max},
-                                       {"iterations", summary.iterations},
-                                       {"frames", summary.frames},
-                                       {"wall_seconds", summary.wall_seconds},
-                                       {"interrupted", summary.interrupted},
-                                       {"at_rest", summary.at_rest},
-                                       {"warnings", warnings},
-                                       {"exit_code", exit_code}};
+  nlohmann::ordered_json json = {{"schema", "flash-sim-summary/1"},
+                                 {"out", out},
+                                 {"steps", summary.steps},
+                                 {"unconverged_steps", summary.unconverged_steps},
+                                 {"residual_max", summary.residual_max},
+                                 {"halved_steps", summary.halved_steps},
+                                 {"penetration_max_m", summary.penetration_max},
+                                 {"held_penetration_max_m", summary.held_penetration_max},
+                                 {"start_penetration_max_m", summary.start_penetration_max},
+                                 {"iterations", summary.iterations},
+                                 {"frames", summary.frames},
+                                 {"wall_seconds", summary.wall_seconds},
+                                 {"interrupted", summary.interrupted},
+                                 {"at_rest", summary.at_rest},
+                                 {"warnings", warnings},
+                                 {"exit_code", exit_code}};
+  if (summary.self_contact) {
+    json["layer_distance_min_m"] = summary.layer_distance_min;
+    json["layer_touches_max"] = summary.layer_touches_max;
+  }
   std::cout << json.dump(2) << '\n';
 }
 
@@ -171,6 +175,9 @@ int run(const RunOptions& options) {
         double(summary.iterations) / std::max(1, summary.steps),
         data::format_short(summary.residual_max).c_str(),
         data::format_short(summary.penetration_max).c_str());
+    if (summary.layer_touches_max > 0)
+      std::printf("layers touched at up to %d places, no nearer than %s m\n", summary.layer_touches_max,
+                  data::format_short(summary.layer_distance_min).c_str());
     std::printf("%s: %d frames, log.csv, forces.csv\n", options.out.c_str(), summary.frames);
   }
   return exit_code;

@@ -327,6 +327,18 @@ void read_end_effectors(const JsonObject& file, Scene& scene) {
   }
 }
 
+void read_self_contact(const JsonObject& file, Scene& scene) {
+  if (!file.has("self_contact")) return;
+  const JsonObject object = file.object("self_contact");
+  object.expect_fields({"thickness", "friction", "pressure"});
+  SceneSelfContact& contact = scene.self_contact.emplace();
+  contact.thickness = object.positive("thickness", contact.thickness);
+  if (object.has("friction")) contact.friction = object.not_negative("friction");
+  contact.pressure = object.positive("pressure", contact.pressure);
+  if (scene.solver.integrator != "newton")
+    throw file.error("self_contact", "solver.type newton, which alone has it");
+}
+
 /// Bodies are known by their names: in pairs of friction, in messages and in tables of forces.
 void check_names(const JsonObject& file, const Scene& scene) {
   std::set<std::string> names;
@@ -399,7 +411,7 @@ Scene load_scene(const std::string& path) {
       throw file.error("schema", "\"flash-scene/1\", or no schema for the published format");
     file.expect_fields({"schema", "name", "note", "timestep", "steps", "duration", "gravity", "linearsolver",
                         "constraintsolver", "solver", "bending_model", "planecollisions", "obstacles",
-                        "objects", "end_effectors", "friction", "keyframes", "quasistatic"});
+                        "objects", "end_effectors", "friction", "keyframes", "quasistatic", "self_contact"});
   } else {
     file.expect_fields(
         {"timestep", "gravity", "linearsolver", "constraintsolver", "planecollisions", "objects"});
@@ -420,6 +432,7 @@ Scene load_scene(const std::string& path) {
   read_end_effectors(file, scene);
   check_names(file, scene);
   read_pair_friction(file, scene);
+  read_self_contact(file, scene);
   if (file.has("quasistatic")) {
     const JsonObject object = file.object("quasistatic");
     object.expect_fields({"motion"});

@@ -132,6 +132,13 @@ struct SceneEndEffector {
   std::vector<SceneGrasp> grasps;
 };
 
+/// How objects meet themselves and each other.
+struct SceneSelfContact {
+  double thickness = 1e-3;   ///< distance from which on layers feel each other [m]
+  double friction = 0.3;     ///< Coulomb coefficient of layer on layer
+  double pressure = 2500.0;  ///< that presses layers to 0.53 of the thickness [Pa]
+};
+
 /// Coulomb coefficient of an object on an obstacle, or on an end effector that collides.
 struct ScenePairFriction {
   std::string object, other;
@@ -152,7 +159,8 @@ struct Scene {
   std::vector<SceneObstacle> obstacles;
   std::vector<SceneEndEffector> end_effectors;
   std::vector<ScenePairFriction> pair_friction;
-  std::vector<double> keyframe_times;  ///< to write [s]; empty: every step
+  std::optional<SceneSelfContact> self_contact;  ///< empty: objects pass through themselves and each other
+  std::vector<double> keyframe_times;            ///< to write [s]; empty: every step
   /// Quasistatic: every step starts without velocity, and the run ends at rest, when no vertex moves farther
   /// than this in a step and all supports have arrived [m].
   std::optional<double> rest_motion;

@@ -34,11 +34,30 @@ ProductPattern product_pattern(const BlockPattern& pattern, size_t pair_count,
   return product;
 }
 
+namespace {
+
+template <typename Scalar>
+void add_weighted(const WeightedPart<Scalar>& part, const Scalar* x, Scalar* y) {
+  Scalar between[3] = {};
+  for (int k = 0; k < 4; ++k)
+    for (int c = 0; c < 3; ++c) between[c] += part.weights[k] * x[4L * part.positions[k] + c];
+  const Scalar* b = part.block;
+  const Scalar image[3] = {b[0] * between[0] + b[1] * between[1] + b[2] * between[2],
+                           b[1] * between[0] + b[3] * between[1] + b[4] * between[2],
+                           b[2] * between[0] + b[4] * between[1] + b[5] * between[2]};
+  for (int k = 0; k < 4; ++k)
+    for (int c = 0; c < 3; ++c) y[4L * part.positions[k] + c] += part.weights[k] * image[c];
+}
+
+}  // namespace
+
 template <typename Scalar>
 void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValues<double>& values,
-                                  std::vector<ScalarPart> scalar_parts) {
+                                  std::vector<ScalarPart> scalar_parts,
+                                  std::vector<WeightedPart<Scalar>> weighted_parts) {
   pattern_ = &pattern;
   scalar_parts_ = std::move(scalar_parts);
+  weighted_parts_ = std::move(weighted_parts);
   blocks_.resize(12 * pattern.sources.size());
   linear<Scalar>(*kernels_).copy_blocks(static_cast<int>(pattern.sources.size()), pattern.sources.data(),
                                         pattern.transposed.data(), values.data(), blocks_.data());
@@ -51,6 +70,7 @@ void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
   linear<Scalar>(*kernels_).multiply_blocks(rows, blocks_.data(), x, y);
   for (const ScalarPart& part : scalar_parts_)
     add_product(*kernels_, *part.matrix, static_cast<Scalar>(part.scale), x, y);
+  for (const WeightedPart<Scalar>& part : weighted_parts_) add_weighted(part, x, y);
 }
 
 template class SheetProduct<float>;

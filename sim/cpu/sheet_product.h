@@ -26,9 +26,17 @@ struct ScalarPart {
   double scale;
 };
 
-/// y = (B + sum s S) x over the vertices of a sheet in elimination order, four numbers a vertex, the last of
-/// them zero: B of 3 x 3 blocks, each S scalar. A block is three columns of four numbers, so that a column is
-/// one vector multiply-add.
+/// A 3 x 3 matrix between what four vertices weigh together: w_i B w_j for each two of them.
+template <typename Scalar>
+struct WeightedPart {
+  int positions[4];  ///< of the vertices in the elimination
+  Scalar weights[4];
+  Scalar block[6];  ///< B, symmetric: xx, xy, xz, yy, yz, zz
+};
+
+/// y = (B + sum s S + sum w w^T C) x over the vertices of a sheet in elimination order, four numbers a
+/// vertex, the last of them zero: B of 3 x 3 blocks, each S scalar, each C between the weighted vertices of a
+/// part. A block is three columns of four numbers, so that a column is one vector multiply-add.
 template <typename Scalar>
 class SheetProduct {
  public:
@@ -36,13 +44,14 @@ class SheetProduct {
 
   /// The pattern and the matrices of the scalar parts have to outlive the product.
   void assign(const ProductPattern& pattern, const BlockValues<double>& values,
-              std::vector<ScalarPart> scalar_parts);
+              std::vector<ScalarPart> scalar_parts, std::vector<WeightedPart<Scalar>> weighted_parts = {});
   void multiply(const Scalar* x, Scalar* y);
 
  private:
   const Kernels* kernels_;
   const ProductPattern* pattern_ = nullptr;
   std::vector<ScalarPart> scalar_parts_;
+  std::vector<WeightedPart<Scalar>> weighted_parts_;
   AlignedStorage<Scalar> blocks_;  ///< 12 numbers each
 };
 

@@ -10,7 +10,6 @@ namespace flash::sim {
 namespace {
 
 constexpr double enough = 0.1;       ///< share of the first residual: a direction needs a digit or two
-constexpr int most_gradients = 20;   ///< iterations of conjugate gradients
 constexpr int most_directions = 40;  ///< of GMRES, which keeps all of them
 
 template <typename Scalar>
@@ -55,7 +54,7 @@ KrylovSolution<Scalar> conjugate_gradients(const RestrictedProblem<Scalar>& prob
   const auto norm_of = [&](const Vector& v) { return std::sqrt(kernels.dot(size, v.data(), v.data())); };
   Scalar norm = norm_of(residual), previous = 0;
   const Scalar target = std::max(Scalar(enough) * norm, static_cast<Scalar>(problem.tolerance));
-  while (norm > target && solution.solves < most_gradients) {
+  while (norm > target && solution.solves < problem.most_solves) {
     const bool first = solution.solves++ == 0;
     precondition(problem.preconditioner, residual, single, preconditioned);
     apply(problem.free, preconditioned);

@@ -31,6 +31,7 @@ struct RestrictedProblem {
   OrderedVector<Scalar> right;             ///< b
   OrderedVector<Scalar> start;             ///< x, zero in the free directions
   double tolerance;                        ///< residual that is small enough; so is a tenth of the first
+  int most_solves = 20;                    ///< iterations of conjugate gradients
 };
 
 template <typename Scalar>

@@ -31,12 +31,31 @@ bool couples_friction(const StepProblem& problem, const SolverSettings& settings
   return problem.contacts.time_step < settings.time_step && report.iterations > coupled_after;
 }
 
+/// The stiffness of all touches of layers at an iterate.
+std::vector<TouchStiffness> layer_stiffness(const StepProblem& problem, const Iterate& iterate) {
+  std::vector<TouchStiffness> all;
+  if (!problem.layers) return all;
+  for (const LayerTouch& touch : iterate.layers.touches)
+    all.push_back({touch, stiffness_of(touch, problem.layers->friction(), problem.layers->time_step())});
+  return all;
+}
+
+/// Adds what layers that touch add to the blocks of their vertices. Those between them are not in the
+/// pattern.
+void add_layer_diagonal(const std::vector<TouchStiffness>& layers, BlockValues<double>& values) {
+  for (const auto& [touch, stiffness] : layers)
+    for (int k = 0; k < 4; ++k)
+      Eigen::Map<Eigen::Matrix3d>(values.data() + 9L * touch.vertices[k]) +=
+          touch.weights[k] * touch.weights[k] * matrix3d(stiffness);
+}
+
 /// Factorizes the positive Hessian at w.now. Returns false where it is not positive definite after all.
 bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
   problem.potential.assemble(w.now.positions, Curvature::positive, false, w.values);
   for (const BodyLaw& law : problem.laws)
     add_bending_stand_in(law.bending, problem.potential.effective_rigidity(law), w.values);
   add_slip_stiffness(w.now.contacts, w.values);
+  add_layer_diagonal(layer_stiffness(problem, w.now), w.values);
   restrict_matrix(w.plan->pattern, w.now.contacts, w.values);
   return w.matrix.factorize(w.values);
 }
@@ -55,7 +74,8 @@ void assemble_matrix(const StepProblem& problem, bool positive, NewtonWorkspace&
                              w.values);
   add_slip_stiffness(w.now.contacts, w.values);
   if (!positive) add_surface_curvature(w.now.contacts, w.values);
-  w.matrix.assign(w.values, sparse, bending, problem.potential.mass().minCoeff() / (h * h));
+  w.matrix.assign(w.values, sparse, bending, problem.potential.mass().minCoeff() / (h * h),
+                  layer_stiffness(problem, w.now));
 }
 
 /// Finds w.direction and the contacts that go with it, w.linear: solves the linear problem and exchanges its
@@ -100,13 +120,27 @@ struct LinePoint {
 
 /// The potential with that of friction at the normal forces of the line's start.
 double potential_at(const StepProblem& problem, const Iterate& now, const Iterate& at) {
-  return at.incremental_potential + friction_potential(problem.contacts, now.contacts, at.positions);
+  const double potential =
+      at.incremental_potential + friction_potential(problem.contacts, now.contacts, at.positions);
+  return problem.layers ? potential + problem.layers->friction_potential(now.layers, at.positions)
+                        : potential;
 }
 
-/// Evaluates the feasible iterate nearest to the point at `length`.
+/// Evaluates the feasible iterate nearest to the point at `length`, or nearer where the surface would pass
+/// through itself on the way.
 LinePoint move(const SearchLine& line, double length, Iterate& to) {
-  to.positions = line.w.now.positions + length * line.w.direction;
-  project_to_feasible(line.problem.contacts, line.w.linear, to.positions);
+  constexpr int most_cuts = 20;
+  for (int cut = 0;; ++cut) {
+    to.positions = line.w.now.positions + length * line.w.direction;
+    project_to_feasible(line.problem.contacts, line.w.linear, to.positions);
+    const double share =
+        line.problem.layers ? line.problem.layers->free_share(line.w.now.positions, to.positions) : 1;
+    if (share == 1) break;
+    length *= share;
+    if (cut < most_cuts) continue;
+    to.positions = line.w.now.positions;
+    break;
+  }
   line.problem.evaluate(to);
   return {length, potential_at(line.problem, line.w.now, to)};
 }

@@ -12,6 +12,7 @@ using data::Points;
 namespace {
 
 constexpr double sheet_neighbours = 6, solid_neighbours = 14;  ///< of a vertex, in a regular linear mesh
+constexpr int most_solves = 20, most_layered_solves = 100;     ///< of a linear problem
 constexpr double little = 0.01;  ///< share of the least eigenvalue that rounding may change
 
 /// The matrices on the vertices of the constraints: what each leaves free, and its coupling where there is
@@ -32,6 +33,26 @@ std::vector<VertexMatrix<Scalar>> vertex_matrices(const ContactSet& contacts,
 
 }  // namespace
 
+namespace {
+
+template <typename Scalar>
+std::vector<WeightedPart<Scalar>> weighted_parts(const std::vector<TouchStiffness>& layers,
+                                                 const std::vector<int>& position) {
+  std::vector<WeightedPart<Scalar>> parts(layers.size());
+  for (size_t p = 0; p < layers.size(); ++p) {
+    const auto& [touch, b] = layers[p];
+    for (size_t k = 0; k < 4; ++k) {
+      parts[p].positions[k] = position[touch.vertices[k]];
+      parts[p].weights[k] = static_cast<Scalar>(touch.weights[k]);
+    }
+    const double block[6] = {b.xx, b.xy, b.xz, b.yy, b.yz, b.zz};
+    for (int c = 0; c < 6; ++c) parts[p].block[c] = static_cast<Scalar>(block[c]);
+  }
+  return parts;
+}
+
+}  // namespace
+
 NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
     : plan_(std::move(plan)),
       factor_(plan_->symbolic, *plan_->kernels),
@@ -39,7 +60,8 @@ NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
       double_product_(*plan_->kernels) {}
 
 void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse,
-                          const std::vector<ScaledBending>& bending, double least_eigenvalue) {
+                          const std::vector<ScaledBending>& bending, double least_eigenvalue,
+                          const std::vector<TouchStiffness>& layers) {
   // Only blocks between vertices count: friction's stiffness, large where slip starts, rounds in its own
   // vertex's block alone.
   double largest = 0;
@@ -50,11 +72,16 @@ void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse,
   }
   for (size_t k = plan_->pattern.size; k < plan_->pattern.size + plan_->edge_count; ++k)
     for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(blocks[9 * k + 4 * c]));
+  for (const TouchStiffness& layer : layers) largest = std::max(largest, norm(layer.stiffness));
+  layered_ = !layers.empty();
   const double mean = 2.0 * static_cast<double>(plan_->edge_count) / plan_->pattern.size;
   const double neighbours = has_solids(plan_->sheet) ? std::max(solid_neighbours, mean) : sheet_neighbours;
   single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < little * least_eigenvalue;
   const ProductPattern& pattern = sparse ? plan_->triangle_product : plan_->full_product;
-  with_product([&](auto& product) { product.assign(pattern, blocks, std::move(scalar_parts)); });
+  with_product([&]<typename Scalar>(SheetProduct<Scalar>& product) {
+    product.assign(pattern, blocks, std::move(scalar_parts),
+                   weighted_parts<Scalar>(layers, plan_->symbolic->position));
+  });
 }
 
 template <typename Scalar>
@@ -68,7 +95,8 @@ RestrictedProblem<Scalar> NewtonMatrix::restricted(SheetProduct<Scalar>& product
                                     vertex_matrices<Scalar>(contacts, {}, position),
                                     Vector::Zero(size),
                                     Vector::Zero(size),
-                                    tolerance};
+                                    tolerance,
+                                    layered_ ? most_layered_solves : most_solves};
   for (int i = 0; i < gradient.rows(); ++i)
     problem.right.template segment<3>(4L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
   for (const VertexConstraint& constraint : contacts.constraints)

@@ -5,6 +5,7 @@
 #include "sim/newton/krylov.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/step/contact_set.h"
+#include "sim/step/layer_contact.h"
 
 namespace flash::sim {
 
@@ -12,6 +13,12 @@ namespace flash::sim {
 struct ScaledBending {
   const BendingOperator& bending;
   double rigidity;
+};
+
+/// The stiffness between four vertices that touch, as stiffness_of says [N/m].
+struct TouchStiffness {
+  const LayerTouch& touch;
+  Symmetric3 stiffness;
 };
 
 /// The matrix of a Newton iteration, its preconditioner and the solution of its linear problem.
@@ -26,10 +33,10 @@ class NewtonMatrix {
   /// Factorizes the preconditioner, which has to be positive definite. Returns false where it is not.
   bool factorize(const BlockValues<double>& positive) { return factor_.factorize(positive); }
 
-  /// The matrix: blocks, and the stiffness of quadratic bending models. `sparse`: all blocks across a hinge
-  /// are zero. `least_eigenvalue`: of the mass [N/m].
+  /// The matrix: blocks, the stiffness of quadratic bending models, and that of layers that touch. `sparse`:
+  /// all blocks across a hinge are zero. `least_eigenvalue`: of the mass [N/m].
   void assign(const BlockValues<double>& blocks, bool sparse, const std::vector<ScaledBending>& bending,
-              double least_eigenvalue);
+              double least_eigenvalue, const std::vector<TouchStiffness>& layers = {});
 
   /// Sets `direction` to the solution of matrix * direction = -gradient over the free directions, and to the
   /// constraints' corrections in the others. It is solved to a residual of `tolerance` [N] or a tenth of the
@@ -59,7 +66,8 @@ class NewtonMatrix {
 
   std::shared_ptr<const SheetPlan> plan_;
   BlockCholesky<float> factor_;
-  bool single_ = true;  ///< whether single precision does
+  bool single_ = true;    ///< whether single precision does
+  bool layered_ = false;  ///< whether layers touch, whose pairs the preconditioner does not know
   SheetProduct<float> single_product_;
   SheetProduct<double> double_product_;
 };

@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <limits>
+#include <string>
 #include <utility>
 
+#include "data/error.h"
+#include "data/text.h"
 #include "sim/law/feasible_place.h"
 #include "sim/newton/newton_iteration.h"
+#include "sim/pairs/intersection.h"
 #include "sim/step/exits.h"
 #include "sim/step/feasible_positions.h"
 
@@ -31,26 +35,50 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWo
   return elastic;
 }
 
-/// Fills in w.now where the search for the end of the step starts: where speeds take the vertices.
-void start_search(const StepProblem& problem, NewtonWorkspace& w) {
+/// Where speeds take the vertices in a `share` of the step, and what holds carry all the same.
+void advance_freely(const StepProblem& problem, double share, Iterate& to) {
   const State& start = problem.contacts.environment.state;
-  w.now.positions = start.positions + problem.contacts.time_step * start.velocities;
-  w.now.contacts = begin_step(problem.contacts, w.now.positions);
-  project_to_feasible(problem.contacts, w.now.contacts, w.now.positions);
+  to.positions = start.positions + share * problem.contacts.time_step * start.velocities;
+  to.contacts = begin_step(problem.contacts, to.positions);
+  project_to_feasible(problem.contacts, to.contacts, to.positions);
+}
+
+/// Fills in w.now where the search for the end of the step starts: where speeds take the vertices, or as far
+/// as they do not take the surface through itself. Returns false where holds alone would.
+bool start_search(const StepProblem& problem, NewtonWorkspace& w) {
+  constexpr int most_cuts = 8;
+  const Points& start = problem.contacts.environment.state.positions;
+  advance_freely(problem, 1, w.now);
+  bool free = true;
+  if (problem.layers) {
+    double share = problem.layers->free_share(start, w.now.positions), part = share;
+    for (int cut = 0; share < 1 && cut <= most_cuts; ++cut) {
+      if (cut == most_cuts) part = 0;
+      advance_freely(problem, part, w.now);
+      share = problem.layers->free_share(start, w.now.positions);
+      part *= share;
+    }
+    free = share == 1;
+    if (!free) w.now.positions = start + share * (w.now.positions - start);
+  }
   problem.evaluate(w.now);
+  return free;
 }
 
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
 /// solved, or to all that rounding allows.
 bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
-  const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
-  start_search(problem, w);
+  ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
+  const bool free = start_search(problem, w);
+  // Holds that close or open change which pairs there are.
+  if (problem.layers)
+    elastic_at_start.layers = problem.layers->energy(problem.contacts.environment.state.positions);
   iterate_to_balance(problem, w, report);
 
   report.residual = problem.relative_residual(w.now);
   report_contacts(problem, w.now, report);
   const bool energy_is_sound = account_for_energy(problem, elastic_at_start, w.now, report);
-  const bool sound = report.complementarity <= gap_tolerance && energy_is_sound;
+  const bool sound = free && report.complementarity <= gap_tolerance && energy_is_sound;
   report.converged = sound && problem.balanced(w.now, w.settings.tolerance);
   return sound && problem.balanced(w.now, std::max(w.settings.tolerance, rounding_tolerance));
 }
@@ -59,7 +87,8 @@ bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& repo
 /// takes the first exit that does not tear it. Returns whether the step is solved.
 bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport& report) {
   const double exit_speed = w.settings.exit_speed;
-  const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed});
+  PairSurface* surface = environment.self_contact ? w.surface.get() : nullptr;
+  const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed}, surface);
   bool solved = solve_step(problem, w, report);
   if (report.start_penetration.depth > 0) {
     const auto inside = vertices_inside(problem.contacts, w.now.contacts);
@@ -70,7 +99,7 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
       if (!solved && k > 1) k = exits.size() - 1;
       const StepReport given_up = std::exchange(report, {});
       w.refactor = true;
-      solved = solve_step(StepProblem(*w.plan, environment, h, exits[k]), w, report);
+      solved = solve_step(StepProblem(*w.plan, environment, h, exits[k], surface), w, report);
       add_work(given_up, report);
     }
   }
@@ -84,6 +113,7 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
   }
   environment.state.velocities = (w.now.positions - environment.state.positions) / h;
   environment.state.bristles = bristles_at_end(problem.contacts, w.now.contacts, w.now.positions);
+  if (problem.layers) environment.state.pair_bristles = problem.layers->bristles_at_end(w.now.layers);
   environment.state.positions = w.now.positions;
   return solved;
 }
@@ -105,6 +135,40 @@ StepReport advance(Environment& environment, double h, int halvings, NewtonWorks
   return parts;
 }
 
+/// Layers thicker than the cells of a mesh would meet their own neighbours.
+void check_thickness(const Sheet& sheet, const PairSurface& surface, double thickness) {
+  for (std::size_t b = 0; b < sheet.bodies.size(); ++b) {
+    double sum = 0;
+    int count = 0;
+    for (const auto& [i, j] : surface.edges) {
+      if (surface.body[static_cast<std::size_t>(i)] != static_cast<int>(b)) continue;
+      sum += (surface.rest.row(i) - surface.rest.row(j)).norm();
+      ++count;
+    }
+    const std::string& name = sheet.bodies[b].name;
+    if (thickness * count >= sum)
+      throw data::input_error("self_contact", "thickness",
+                              "found " + data::format_short(thickness) + " m, expected less than " +
+                                  data::format_short(sum / count) + " m, the mean edge of the mesh" +
+                                  (name.empty() ? "" : " of " + name));
+  }
+}
+
+/// Layers that start on both sides of each other would stay so.
+void check_start(const Sheet& sheet, PairSurface& surface, const Points& positions) {
+  const auto passing = first_intersection(surface, positions);
+  if (!passing) return;
+  const auto name_of = [&](int triangle) {
+    const Body& body = sheet.bodies[static_cast<size_t>(body_of(sheet, surface.triangles(triangle, 0)))];
+    const int first = body.is_solid() ? 0 : body.first_triangle;
+    return "triangle " + std::to_string(triangle - first) + (body.name.empty() ? "" : " of " + body.name);
+  };
+  throw data::input_error("self_contact", "start",
+                          "found " + name_of(passing->first) + " passing through " +
+                              name_of(passing->second) +
+                              ", expected a surface that does not pass through itself");
+}
+
 }  // namespace
 
 Solver::Solver(std::shared_ptr<const SheetPlan> plan, const SolverSettings& settings)
@@ -116,6 +180,11 @@ Solver::Solver(Solver&&) noexcept = default;
 
 StepReport Solver::step(Environment& environment) {
   NewtonWorkspace& w = *workspace_;
+  if (environment.self_contact && !w.surface) {
+    w.surface = std::make_unique<PairSurface>(w.plan->sheet);
+    check_thickness(w.plan->sheet, *w.surface, environment.self_contact->thickness);
+    check_start(w.plan->sheet, *w.surface, environment.state.positions);
+  }
   const double h = w.settings.time_step;
   update_holds(environment, environment.state.time + h);
   return advance(environment, h, w.settings.halvings, w);

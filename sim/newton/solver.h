@@ -27,7 +27,8 @@ class Solver {
   Solver(Solver&&) noexcept;
 
   /// Advances environment.state by one time step. An unconverged step is reported, never thrown. Throws
-  /// data::InputError for a material that the sheet cannot have, such as a plate with a rest shape not flat.
+  /// data::InputError for a material that the sheet cannot have, such as a plate with a rest shape not flat,
+  /// and where the surface that meets itself passes through itself at the first step.
   StepReport step(Environment& environment);
 
   /// The next step starts as that of a new Solver does.

@@ -7,14 +7,30 @@
 
 namespace flash::sim {
 
+namespace {
+
+/// Which vertices holds carry in all axes.
+std::vector<bool> carried_vertices(const ContactSet& contacts) {
+  std::vector<bool> carried(contacts.place.size(), false);
+  for (std::size_t k = 0; k < contacts.held; ++k)
+    carried[contacts.constraints[k].vertex] = is_zero(contacts.constraints[k].free);
+  return carried;
+}
+
+}  // namespace
+
 StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
-                         const WayOut<double>& way_out)
+                         const WayOut<double>& way_out, PairSurface* surface)
     : laws(body_laws(plan, environment)),
       potential(plan, laws, environment, time_step),
       contacts(plan.sheet, environment, time_step, way_out),
       gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81) {
   for (const BodyLaw& law : laws)
     force_scales.push_back(rows_of(law.place.body, potential.mass()).norm() * gravity);
+  if (surface == nullptr) return;
+  layers = std::make_unique<LayerStep>(*surface, environment, time_step);
+  data::Points positions = environment.state.positions;
+  layers->set_carried(carried_vertices(begin_step(contacts, positions)));
 }
 
 double StepProblem::relative_residual(const Iterate& iterate) const {
@@ -28,6 +44,11 @@ void StepProblem::evaluate(Iterate& iterate) const {
   iterate.materials = contacts.environment.materials;
   iterate.solids = contacts.environment.solids;
   iterate.incremental_potential = potential.evaluate(iterate.positions, iterate.force, iterate.elastic);
+  if (layers) {
+    layers->add_forces(iterate.positions, iterate.layers, iterate.force);
+    iterate.elastic.layers = iterate.layers.energy;
+    iterate.incremental_potential += iterate.layers.energy;
+  }
   update_contacts(contacts, iterate.positions, iterate.force, iterate.contacts);
   iterate.residual = iterate.force;
   for (const VertexConstraint& constraint : iterate.contacts.constraints)

@@ -1,8 +1,10 @@
 #pragma once
 #include <map>
+#include <memory>
 
 #include "sim/step/contact_set.h"
 #include "sim/step/incremental_potential.h"
+#include "sim/step/layer_contact.h"
 
 namespace flash::sim {
 
@@ -12,6 +14,7 @@ struct Iterate {
   data::Points force;      ///< what each vertex needs from outside [N]
   data::Points residual;   ///< what the constraints leave of it [N]
   ContactSet contacts;
+  LayerContact layers;                         ///< of the surface with itself
   std::vector<data::SheetMaterial> materials;  ///< of `elastic`
   std::map<int, data::SolidMaterial> solids;   ///< likewise
   ElasticEnergy elastic;
@@ -23,12 +26,14 @@ struct StepProblem {
   std::vector<BodyLaw> laws;
   IncrementalPotential potential;
   ContactStep contacts;
-  double gravity;                    ///< [m/s^2]; 9.81 without
-  std::vector<double> force_scales;  ///< |M g| of each body [N]
+  double gravity;                     ///< [m/s^2]; 9.81 without
+  std::vector<double> force_scales;   ///< |M g| of each body [N]
+  std::unique_ptr<LayerStep> layers;  ///< the contact of the surface with itself; none: it passes through
 
-  /// The arguments but `way_out` have to outlive the problem.
+  /// The arguments but `way_out` have to outlive the problem. `surface`: of the plan's sheet, where it meets
+  /// itself; else null.
   StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
-              const WayOut<double>& way_out);
+              const WayOut<double>& way_out, PairSurface* surface = nullptr);
   StepProblem(const StepProblem&) = delete;  // the potential refers to the laws
 
   /// Fills in an iterate from its positions.

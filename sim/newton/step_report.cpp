@@ -48,6 +48,12 @@ void report_contacts(const StepProblem& problem, const Iterate& end, StepReport&
       report.complementarity = worst(report.complementarity, -gap.distance);
     }
   }
+  if (problem.layers) {
+    report.layer_distance = end.layers.closest;
+    report.layer_touches = static_cast<int>(end.layers.touches.size());
+    report.layer_pairs = problem.layers->counts().pairs;
+    report.layer_ways = problem.layers->counts().ways;
+  }
   report.held_penetration = deepest_held(problem.contacts, end.contacts, end.positions);
   report.penetration_max = std::max(report.penetration_max, report.held_penetration.depth);
   report.start_penetration =
@@ -68,6 +74,7 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
   report.membrane = end.elastic.membrane;
   report.bending = end.elastic.bending;
   report.solid = end.elastic.solid;
+  report.layers = end.elastic.layers;
   double falls = 0, unbalanced = 0, bristles = 0;
   bool start_is_feasible = report.start_penetration.depth == 0;
   for (int i = 0; i < mass.size(); ++i) {
@@ -92,6 +99,7 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
       report.work += touch.starts_inside ? std::max(0.0, dot(force, way)) : dot(force, touch.surface_moved);
     }
   }
+  if (problem.layers) bristles += problem.layers->bristle_energy(end.layers);
   for (const Load& load : environment.loads) falls += load.force.dot(moved.row(load.vertex));
   for (const MovingObstacle<double>& obstacle : problem.contacts.obstacles)
     start_is_feasible = start_is_feasible && !obstacle.moves;
@@ -121,6 +129,8 @@ void add_work(const StepReport& given_up, StepReport& report) {
   report.iterations += given_up.iterations;
   report.solves += given_up.solves;
   report.factorizations += given_up.factorizations;
+  report.layer_pairs = std::max(report.layer_pairs, given_up.layer_pairs);
+  report.layer_ways += given_up.layer_ways;
 }
 
 namespace {
@@ -140,6 +150,9 @@ StepReport joined(const StepReport& first, const StepReport& second) {
   whole.penetration_max = worst(first.penetration_max, second.penetration_max);
   whole.held_penetration = deeper(first.held_penetration, second.held_penetration);
   whole.start_penetration = first.start_penetration;
+  whole.layer_distance = std::min(first.layer_distance, second.layer_distance);
+  whole.layer_pairs = std::max(first.layer_pairs, second.layer_pairs);
+  whole.layer_ways += first.layer_ways;
   whole.complementarity = worst(first.complementarity, second.complementarity);
   whole.work += first.work;
   for (size_t k = 0; k < whole.hold_forces.size(); ++k)

@@ -7,6 +7,9 @@
 
 namespace flash::sim {
 
+/// Distance where no features of the surface may meet [m].
+inline constexpr double no_layers = 1e300;
+
 /// How one step of one environment went.
 struct StepReport {
   double residual = 0;  ///< largest |r| / |M g| of a body; without gravity as if it were 9.81 m/s^2
@@ -20,8 +23,13 @@ struct StepReport {
   double penetration_max = 0;     ///< deepest vertex below a surface, held ones too [m]
   Penetration held_penetration;   ///< the deepest that a hold carries below a surface
   Penetration start_penetration;  ///< the deepest other that started the step inside an obstacle
+  double layer_distance =
+      no_layers;               ///< of the nearest features of the surface that may meet, at the end [m]
+  int layer_touches = 0;       ///< pairs of features that press each other at the end
+  long layer_pairs = 0;        ///< of features that were looked at, the most at a time
+  long layer_ways = 0;         ///< of pairs that were followed by continuous detection
   double complementarity = 0;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
-  double kinetic = 0, membrane = 0, bending = 0, solid = 0, gravitational = 0;  ///< energies [J]
+  double kinetic = 0, membrane = 0, bending = 0, solid = 0, layers = 0, gravitational = 0;  ///< energies [J]
   double work = 0;  ///< work done on the sheet by holds and obstacles [J]
   // Forces of a step in parts are their means over time.
   std::vector<Eigen::Vector3d> hold_forces;      ///< hold on sheet, one a hold of the environment [N]

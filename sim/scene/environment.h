@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -71,6 +73,23 @@ struct PointMass {
   double mass;  ///< [kg]
 };
 
+/// How the surface of the sheets meets itself.
+struct SelfContact {
+  double thickness = 1e-3;   ///< distance from which on layers feel each other [m]
+  double friction = 0.3;     ///< Coulomb coefficient of layer on layer
+  double pressure = 2500.0;  ///< that presses layers to 0.53 of the thickness [Pa]
+
+  bool operator==(const SelfContact&) const = default;
+};
+
+/// Bristles of the friction between two features of a surface, by their vertices: a vertex and the three of a
+/// face, or those of two edges.
+struct PairBristle {
+  std::array<int, 4> vertices{};
+  bool edges = false;
+  Eigen::Vector3d share = Eigen::Vector3d::Zero();  ///< as State::bristles, of the first on the second
+};
+
 struct State {
   double time = 0.0;        ///< [s]
   data::Points positions;   ///< [m]
@@ -79,7 +98,8 @@ struct State {
   /// 1 at most, against the friction force. A row for each vertex on the first obstacle, then on the next.
   /// None: zero.
   data::Points bristles = {};
-  std::vector<HeldVertices> held;  ///< by each hold of the environment
+  std::vector<PairBristle> pair_bristles = {};  ///< of features that touch, ascending
+  std::vector<HeldVertices> held;               ///< by each hold of the environment
 };
 
 /// One simulated world: its own materials, motion and state over a shared Sheet.
@@ -91,6 +111,7 @@ struct Environment {
   std::vector<Hold> holds;
   std::vector<Load> loads;
   std::vector<PointMass> point_masses = {};
+  std::optional<SelfContact> self_contact = {};  ///< none: the surface passes through itself
   std::shared_ptr<const Schedule>
       schedule;  ///< of the frames that holds and obstacles name; none: all at rest
   State state;

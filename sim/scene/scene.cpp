@@ -11,6 +11,7 @@
 #include "data/obstacle_mesh.h"
 #include "data/text.h"
 #include "sim/law/surface_mesh.h"
+#include "sim/scene/joined_bodies.h"
 #include "sim/scene/solid.h"
 
 namespace flash::sim {
@@ -257,6 +258,12 @@ std::vector<SceneBody> scene_bodies(const data::Scene& scene, int steps, std::ve
   for (const data::Trajectory* trajectory : parts.trajectories) trajectories.push_back(*trajectory);
   const auto schedule = make_schedule(trajectories, 0.0, scene.time_step, steps);
   for (SceneBody& body : bodies) body.environment.schedule = schedule;
+  if (scene.self_contact) {
+    const data::SceneSelfContact& contact = *scene.self_contact;
+    bodies = {joined(bodies)};
+    bodies.front().environment.self_contact =
+        SelfContact{contact.thickness, contact.friction, contact.pressure};
+  }
   if (bodies.size() > 1) notices.push_back("the objects of this scene do not touch each other");
   if (scene.solver.integrator == "newton" && scene.solver.constraint_solver.starts_with("Lite"))
     notices.push_back(

@@ -9,12 +9,14 @@ struct ElasticEnergy {
   double membrane = 0.0;  ///< [J]
   double bending = 0.0;   ///< [J]
   double solid = 0.0;     ///< of tetrahedra [J]
+  double layers = 0.0;    ///< of the pressure between layers of the surface [J]
 
-  double total() const { return membrane + bending + solid; }
+  double total() const { return membrane + bending + solid + layers; }
   ElasticEnergy& operator+=(const ElasticEnergy& other) {
     membrane += other.membrane;
     bending += other.bending;
     solid += other.solid;
+    layers += other.layers;
     return *this;
   }
 };

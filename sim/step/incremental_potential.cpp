@@ -68,7 +68,7 @@ double IncrementalPotential::evaluate(const Points& positions, Points& force, El
 double IncrementalPotential::at_start(const ElasticEnergy& elastic) const {
   const Points inertial = environment_.state.positions - target_;
   return 0.5 / (h_ * h_) * (mass_.asDiagonal() * inertial).cwiseProduct(inertial).sum() + elastic.membrane +
-         elastic.bending + elastic.solid;
+         elastic.bending + elastic.solid + elastic.layers;
 }
 
 double IncrementalPotential::add_drag(const BodyLaw& law, const Points& moved, Points& force) const {

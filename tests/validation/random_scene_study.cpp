@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "data/parallel.h"
+#include "tests/sim/random_layer_scenes.h"
 #include "tests/sim/random_scenes.h"
 
 namespace {
@@ -27,26 +28,76 @@ std::string material_of(const flash::sim::RandomScene& scene) {
   return text;
 }
 
+/// What an observer finds in `count` random scenes whose surface meets itself.
+void print_layer_scenes(unsigned long first, std::size_t count, double fastest, bool list) {
+  using namespace flash::sim;
+  std::vector<LayerFindings> findings(count);
+  std::vector<LayerSceneKind> kinds(count);
+  flash::data::for_each_in_parallel(count, 0, [&](std::size_t k) {
+    const RandomLayerScene scene = random_layer_scene(first + k, fastest);
+    const LayerFindings found = observe(scene);
+    kinds[k] = scene.kind;
+    findings[k] = found;
+    if (list &&
+        (found.unconverged > 0 || found.passing > 0 || !found.finite || found.energy_gain_share > 1e-2))
+      std::printf("%lu %s: h %.4f s, %s: %d steps not converged (residual %.2g), %d passing, gain %.2g%s\n",
+                  first + k, to_string(scene.kind), scene.settings.time_step, scene.description.c_str(),
+                  found.unconverged, found.residual_max, found.passing, found.energy_gain_share,
+                  found.finite ? "" : ", not finite");
+  });
+  struct Sum {
+    int scenes = 0, unsolved_scenes = 0, touching = 0, steps = 0, unsolved = 0, halved = 0, infinite = 0,
+        passing = 0, gains = 0;
+  };
+  std::map<std::string, Sum> sums;
+  for (std::size_t k = 0; k < count; ++k)
+    for (const std::string& key : {std::string(to_string(kinds[k])), std::string("~ all")}) {
+      Sum& sum = sums[key];
+      ++sum.scenes;
+      sum.unsolved_scenes += findings[k].unconverged > 0;
+      sum.touching += findings[k].touching > 0;
+      sum.steps += findings[k].steps;
+      sum.unsolved += findings[k].unconverged;
+      sum.halved += findings[k].halved;
+      sum.infinite += !findings[k].finite;
+      sum.passing += findings[k].passing > 0;
+      sum.gains += findings[k].energy_gain_share > 1e-2;
+    }
+  std::printf("%-7s %7s %9s %9s | %6s %9s %7s | %10s %8s %7s\n", "kind", "scenes", "touching", "unsolved",
+              "steps", "unsolved", "halved", "not finite", "passing", "energy");
+  for (const auto& [key, sum] : sums)
+    std::printf("%-7s %7d %9d %9d | %6d %9d %7d | %10d %8d %7d\n", key.c_str(), sum.scenes, sum.touching,
+                sum.unsolved_scenes, sum.steps, sum.unsolved, sum.halved, sum.infinite, sum.passing,
+                sum.gains);
+}
+
 }  // namespace
 
 // What an observer finds in many random scenes, by kind and in all. Arguments: first seed, number of scenes,
 // then --list to name those with something to say, --deep for sheets that start across obstacles, --solid for
-// blocks of tetrahedra, --round and the share of boxes and cylinders that are capsules and spheres instead,
+// blocks of tetrahedra, --layers and a speed [m/s] for scenes whose surface meets itself, --round and the
+// share of boxes and cylinders that are capsules and spheres instead,
 // --mesh and that of surfaces of triangles.
 int main(int argc, char** argv) {
   using namespace flash;
   const unsigned long first = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 1;
   const std::size_t count = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 1000;
   bool list = false, deep = false, solid = false;
+  double layers = 0;
   sim::ShapeShares shares;
   for (int k = 3; k < argc; ++k) {
     list = list || std::string(argv[k]) == "--list";
     solid = solid || std::string(argv[k]) == "--solid";
     deep = deep || std::string(argv[k]) == "--deep";
+    if (std::string(argv[k]) == "--layers" && k + 1 < argc) layers = std::strtod(argv[k + 1], nullptr);
     if (std::string(argv[k]) == "--round" && k + 1 < argc) shares.round = std::strtod(argv[k + 1], nullptr);
     if (std::string(argv[k]) == "--mesh" && k + 1 < argc) shares.meshes = std::strtod(argv[k + 1], nullptr);
   }
 
+  if (layers > 0) {
+    print_layer_scenes(first, count, layers, list);
+    return 0;
+  }
   std::vector<sim::RandomScene> scenes(count);
   std::vector<sim::SceneFindings> findings(count);
   data::for_each_in_parallel(count, 0, [&](std::size_t k) {

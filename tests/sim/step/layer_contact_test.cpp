@@ -1,0 +1,173 @@
+#include "sim/step/layer_contact.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "sim/step/moving_obstacles.h"
+#include "tests/sim/sheet_scene.h"
+
+namespace flash::sim {
+namespace {
+
+using data::Points;
+using Eigen::Vector3d;
+
+constexpr double time_step = 0.01;
+
+/// Two irregular sheets, the second above the first and turned against it, each somewhat bent.
+struct TwoLayers {
+  Sheet sheet;
+  Environment environment;
+
+  explicit TwoLayers(double distance, double friction, double bend = 2e-4) {
+    const Sheet both[2] = {small_sheet(6, 0.06), small_sheet(5, 0.05)};
+    sheet = joined(both);
+    environment = environment_of(sheet);
+    environment.materials.resize(2);
+    environment.self_contact = SelfContact{.thickness = 1e-3, .friction = friction, .pressure = 2500};
+    Points& x = environment.state.positions;
+    auto upper = rows_of(sheet.bodies[1], x);
+    upper = (upper * Eigen::AngleAxisd(0.3, Vector3d::UnitZ()).toRotationMatrix()).eval();
+    upper.col(2).array() += distance;
+    std::mt19937_64 engine(7);
+    std::uniform_real_distribution<> even(-bend, bend);
+    for (int i = 0; i < x.rows(); ++i) x(i, 2) += even(engine);
+  }
+};
+
+Points forces_at(LayerStep& step, const Points& x, LayerContact& contact) {
+  Points force = Points::Zero(x.rows(), 3);
+  step.add_forces(x, contact, force);
+  return force;
+}
+
+TEST(LayerContact, PressureIsTheDerivativeOfItsEnergyAndConservesMomentum) {
+  TwoLayers layers(6e-4, 0);
+  PairSurface surface(layers.sheet);
+  LayerStep step(surface, layers.environment, time_step);
+  const Points& x = layers.environment.state.positions;
+  LayerContact contact;
+  const Points force = forces_at(step, x, contact);
+  EXPECT_GT(contact.touches.size(), 50u);
+  const double size = force.cwiseAbs().sum();
+  EXPECT_LT(force.colwise().sum().norm(), 1e-14 * size);
+  Vector3d turn = Vector3d::Zero();
+  for (int i = 0; i < x.rows(); ++i) turn += Vector3d(x.row(i)).cross(Vector3d(force.row(i)));
+  EXPECT_LT(turn.norm(), 1e-14 * size);
+  // The step is a millionth of the distance; nearest points of edges that change their kind within it count
+  // to the order of the step as well.
+  constexpr double move = 1e-9;
+  std::mt19937_64 engine(2);
+  std::uniform_real_distribution<> even(-1, 1);
+  for (int draw = 0; draw < 20; ++draw) {
+    Points along(x.rows(), 3);
+    for (double& value : along.reshaped()) value = even(engine);
+    const double slope = (step.energy(x + move * along) - step.energy(x - move * along)) / (2 * move);
+    EXPECT_NEAR(slope, force.cwiseProduct(along).sum(), 1e-5 * size);
+  }
+}
+
+TEST(LayerContact, FrictionIsTheDerivativeOfItsPotentialAtTheForcesOfTheIterate) {
+  TwoLayers layers(6e-4, 0.4);
+  PairSurface surface(layers.sheet);
+  LayerStep step(surface, layers.environment, time_step);
+  TwoLayers smooth(6e-4, 0);
+  LayerStep without(surface, smooth.environment, time_step);
+  std::mt19937_64 engine(2);
+  std::uniform_real_distribution<> even(-1, 1);
+  for (const double slip : {3e-7, 1e-5}) {  // bristles bend over 1e-6 m
+    Points x = layers.environment.state.positions;
+    for (double& value : x.reshaped()) value += slip * even(engine);
+    LayerContact contact, other;
+    const Points force = forces_at(step, x, contact) - forces_at(without, x, other);
+    const double size = force.cwiseAbs().sum();
+    ASSERT_GT(size, 0);
+    EXPECT_LT(force.colwise().sum().norm(), 1e-12 * size);
+    constexpr double move = 1e-10;
+    for (int draw = 0; draw < 10; ++draw) {
+      Points along(x.rows(), 3);
+      for (double& value : along.reshaped()) value = even(engine);
+      const double slope = (step.friction_potential(contact, x + move * along) -
+                            step.friction_potential(contact, x - move * along)) /
+                           (2 * move);
+      EXPECT_NEAR(slope, force.cwiseProduct(along).sum(), 1e-4 * size) << slip;
+    }
+  }
+}
+
+/// A triangle that comes down on another with a corner, or with an edge on an edge. It moves as a whole, and
+/// so the normal does not turn: nothing is left out of the stiffness.
+TEST(LayerContact, StiffnessIsTheDerivativeOfTheForce) {
+  const auto triangle = [](const Vector3d& a, const Vector3d& b, const Vector3d& c) {
+    data::TriangleMesh mesh;
+    mesh.vertices.resize(3, 3);
+    mesh.vertices << a.transpose(), b.transpose(), c.transpose();
+    mesh.triangles.resize(1, 3);
+    mesh.triangles << 0, 1, 2;
+    return make_sheet(mesh);
+  };
+  constexpr double above = 6e-4, friction = 0.4;
+  const Sheet corner[2] = {triangle({-0.1, -0.1, 0}, {0.1, -0.1, 0}, {0, 0.1, 0}),
+                           triangle({0, 0, above}, {0.03, 0, 0.05}, {-0.03, 0.01, 0.05})};
+  const Sheet edges[2] = {triangle({-0.1, 0.01, 0}, {0.1, -0.02, 0}, {0, 0, -0.1}),
+                          triangle({0, -0.1, above}, {0.02, 0.1, above}, {0, 0, 0.1})};
+  for (const bool by_edges : {false, true}) {
+    Environment environment;
+    const Sheet sheet = joined(by_edges ? edges : corner);
+    environment = environment_of(sheet);
+    environment.self_contact = SelfContact{.thickness = 1e-3, .friction = friction, .pressure = 2500};
+    PairSurface surface(sheet);
+    LayerStep step(surface, environment, time_step);
+    for (const double slip : {3e-7, 1e-5}) {  // the bristles bend, or slide
+      Points x = environment.state.positions;
+      x.bottomRows(3).rowwise() += Eigen::RowVector3d(slip, 0.5 * slip, 0);
+      LayerContact contact;
+      forces_at(step, x, contact);
+      ASSERT_EQ(contact.touches.size(), 1u);
+      ASSERT_EQ(contact.touches[0].kind == PairKind::edge_edge, by_edges);
+      const Eigen::Matrix3d expected = matrix3d(stiffness_of(contact.touches[0], friction, time_step));
+      constexpr double move = 1e-10;
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto pushed = [&](double way) {
+          Points y = x;
+          y.bottomRows(3).col(axis).array() += way;
+          LayerContact unused;
+          return Vector3d(forces_at(step, y, unused).bottomRows(3).colwise().sum().transpose());
+        };
+        const Vector3d slope = (pushed(move) - pushed(-move)) / (2 * move);
+        // Friction grows with the pressure, which the matrix leaves to the next iterate.
+        const int first = axis == 2 ? 2 : 0;
+        EXPECT_LT((slope - expected.col(axis)).tail(3 - first).norm(), 1e-4 * expected.norm())
+            << by_edges << axis;
+      }
+    }
+  }
+}
+
+TEST(LayerContact, BristlesComeBackInTheNextStep) {
+  TwoLayers layers(6e-4, 0.4);
+  PairSurface surface(layers.sheet);
+  Points x = layers.environment.state.positions;
+  rows_of(layers.sheet.bodies[1], x).col(0).array() += 5e-7;
+  LayerContact contact;
+  {
+    LayerStep step(surface, layers.environment, time_step);
+    forces_at(step, x, contact);
+    layers.environment.state.pair_bristles = step.bristles_at_end(contact);
+  }
+  ASSERT_EQ(layers.environment.state.pair_bristles.size(), contact.touches.size());
+  layers.environment.state.positions = x;
+  LayerStep next(surface, layers.environment, time_step);
+  LayerContact again;
+  forces_at(next, x, again);
+  ASSERT_EQ(again.touches.size(), contact.touches.size());
+  for (std::size_t k = 0; k < contact.touches.size(); ++k) {
+    ASSERT_EQ(again.touches[k].vertices, contact.touches[k].vertices);
+    EXPECT_NEAR(again.touches[k].slip, contact.touches[k].slip, 1e-12);
+    EXPECT_NEAR(norm(again.touches[k].slip_direction - contact.touches[k].slip_direction), 0, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace flash::sim
