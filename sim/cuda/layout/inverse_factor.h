@@ -7,12 +7,6 @@
 
 namespace flash::sim::cuda {
 
-/// How the numbers of an inverse are stored: in half precision, or each as the sum of two such numbers, the
-/// second times low_scale, which is as good as single precision.
-enum class InversePrecision { half, single };
-
-inline constexpr float low_scale = 2048;
-
 /// The numbers of an InverseTree for S A S, S = diag(A)^(-1/2), whose entries have the size of 1.
 struct InverseFactor {
   std::vector<std::uint16_t> tiles;  ///< as place_in_inverse_tile says; a second part behind each first one
@@ -25,8 +19,6 @@ inline int place_in_inverse_tile(int row, int column) {
   const int lane = row % 8 * 4 + column % 8 / 2;
   return lane * 8 + (column / 8 * 2 + row / 8) * 2 + column % 2;
 }
-
-inline int parts_of(InversePrecision precision) { return precision == InversePrecision::half ? 1 : 2; }
 
 /// Factorizes A without the rows and columns of held vertices. Throws std::domain_error where it is not
 /// positive definite.

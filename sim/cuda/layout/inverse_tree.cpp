@@ -80,6 +80,14 @@ void find_below(const BlockPattern& pattern, std::vector<Merged>& nodes) {
 
 }  // namespace
 
+BlockPattern pattern_of(const Eigen::SparseMatrix<double>& matrix) {
+  BlockPattern pattern{static_cast<int>(matrix.rows()), {}};
+  for (int column = 0; column < matrix.outerSize(); ++column)
+    for (Eigen::SparseMatrix<double>::InnerIterator entry(matrix, column); entry; ++entry)
+      if (entry.row() > column) pattern.pairs.emplace_back(static_cast<int>(entry.row()), column);
+  return pattern;
+}
+
 InverseTree plan_inverse(const BlockPattern& pattern, const data::Points& places, int leaf_size) {
   std::vector<Merged> merged = merged_nodes(dissect(pattern, places, leaf_size));
   find_below(pattern, merged);

@@ -1,36 +1,12 @@
 #pragma once
+#include <Eigen/SparseCore>
 #include <vector>
 
 #include "data/mesh.h"
 #include "sim/cpu/block_pattern.h"
+#include "sim/cuda/layout/inverse_layout.h"
 
 namespace flash::sim::cuda {
-
-/// Rows and columns of a tile of an inverse: what a tensor core multiplies by at once.
-inline constexpr int inverse_tile = 16;
-
-/// Numbers of a tile.
-inline constexpr int inverse_tile_numbers = inverse_tile * inverse_tile;
-
-/// Vertices that are eliminated together. Of them D^-1 is stored, the inverse of what is left of the matrix
-/// when those before them are gone, and W = B D^-1, B the rows below. All by whole tiles with zeros.
-struct InverseNode {
-  int first_block, column_tiles;  ///< own slots, sixteen a block
-  int first_below, below_tiles;   ///< slots below, in InverseTree::below
-  int first_tile;                 ///< D^-1 row of tiles after row of tiles, then W likewise
-};
-
-/// Up to two rows of tiles of a node, for a warp.
-struct InverseTask {
-  int node, first, count;
-};
-
-/// Nodes of one height, which do not depend on each other.
-struct InverseLevel {
-  int first_node, node_count;
-  int first_down, down_count;  ///< tasks of W, whose rows are those below
-  int first_up, up_count;      ///< tasks of D^-1 and of the transpose of W
-};
 
 /// How the inverse of a symmetric scalar matrix is applied to vectors by few, wide steps: nested dissection,
 /// with separators of two heights of the tree in one node. Vertices have slots, in whole blocks a node, the
@@ -51,6 +27,9 @@ struct InverseTree {
   int nothing() const { return slots; }
   long products = 0;  ///< of tiles with blocks of a vector, in one application
 };
+
+/// Which entries off its diagonal a symmetric matrix has.
+BlockPattern pattern_of(const Eigen::SparseMatrix<double>& matrix);
 
 /// The tree of a matrix with these entries. `places` of the vertices guide the order (dissection.h).
 InverseTree plan_inverse(const BlockPattern& pattern, const data::Points& places, int leaf_size = 64);

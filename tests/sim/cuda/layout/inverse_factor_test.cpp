@@ -10,15 +10,6 @@ namespace {
 
 using data::Points;
 
-/// Pairs of vertices that have an entry off the diagonal.
-BlockPattern pattern_of(const Eigen::SparseMatrix<double>& A) {
-  BlockPattern pattern{static_cast<int>(A.rows()), {}};
-  for (int column = 0; column < A.outerSize(); ++column)
-    for (Eigen::SparseMatrix<double>::InnerIterator entry(A, column); entry; ++entry)
-      if (entry.row() > column) pattern.pairs.emplace_back(static_cast<int>(entry.row()), column);
-  return pattern;
-}
-
 struct Matrices {
   std::shared_ptr<const SheetPlan> plan;
   ProjectiveSystem system;
@@ -73,8 +64,6 @@ TEST(InverseFactor, IsTheInverseOnWhatIsFree) {
         const double bound = precision == InversePrecision::single ? 1e-5 : 5e-3;
         EXPECT_LE((x - exact).norm(), bound * exact.norm()) << cells;
         EXPECT_EQ(x.row(0).norm(), 0);
-        printf("cells %d tiles %d products %ld levels %zu error %.3g\n", cells, m.tree.tiles, m.tree.products,
-               m.tree.levels.size(), (x - exact).norm() / exact.norm());
       }
     }
 }
@@ -82,9 +71,8 @@ TEST(InverseFactor, IsTheInverseOnWhatIsFree) {
 TEST(InverseFactor, AMatrixThatIsNotPositiveIsRefused) {
   const Matrices m(4);
   const Eigen::SparseMatrix<double> negative = -1.0 * m.system.matrix();
-  EXPECT_THROW(
-      factorize_inverse(m.tree, negative, std::vector<char>(m.tree.size, 0), InversePrecision::half),
-      std::domain_error);
+  EXPECT_THROW(factorize_inverse(m.tree, negative, std::vector<char>(m.tree.size, 0), InversePrecision::half),
+               std::domain_error);
 }
 
 }  // namespace
