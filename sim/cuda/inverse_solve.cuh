@@ -56,7 +56,7 @@ struct SplitVector {
 
 __device__ inline unsigned transposed_square(unsigned square) {
   unsigned turned;
-  asm volatile("movmatrix.sync.aligned.m8n8.trans.b16 %0, %1;" : "=r"(turned) : "r"(square));
+  asm("movmatrix.sync.aligned.m8n8.trans.b16 %0, %1;" : "=r"(turned) : "r"(square));
   return turned;
 }
 
@@ -128,7 +128,7 @@ __device__ void pass_down(const InverseWork& w, const InverseTask& task) {
   const int columns = node.column_tiles, first_W = node.first_tile + columns * columns;
   const int row = first_W + task.first * columns, next = row + (task.count > 1 ? columns : 0);
   TwoRows<parts> rows;
-#pragma unroll 2
+#pragma unroll 4
   for (int k = 0; k < columns; ++k)
     rows.template add<false>(w, row + k, next + k, w.right.block(node.first_block + k));
   const int c = lane() % 4;
@@ -149,11 +149,11 @@ __device__ void pass_up(const InverseWork& w, const InverseTask& task, bool keep
   const int columns = node.column_tiles, first_W = node.first_tile + columns * columns;
   const int row = node.first_tile + task.first * columns, next = row + (task.count > 1 ? columns : 0);
   TwoRows<parts> rows;
-#pragma unroll 2
+#pragma unroll 4
   for (int k = 0; k < columns; ++k)
     rows.template add<false>(w, row + k, next + k, w.right.block(node.first_block + k));
   const int column = first_W + task.first, beside = column + (task.count > 1 ? 1 : 0);
-#pragma unroll 2
+#pragma unroll 4
   for (int k = 0; k < node.below_tiles; ++k)
     rows.template add<true>(w, column + k * columns, beside + k * columns,
                             w.solved.minus(w.tables.below + node.first_below + inverse_tile * k));

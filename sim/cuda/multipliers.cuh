@@ -86,7 +86,7 @@ struct FoundContacts {
 
 /// The contacts at `positions` that the free motion may reach, with the multipliers that they had as the
 /// first set.
-__device__ __noinline__ FoundContacts find_contacts(const StepProblem& step, const VertexContacts& contacts,
+__device__ __noinline__ FoundContacts find_contacts(const StepProblem& step, VertexContacts contacts,
                                                     double tangent_angle, const Point* positions,
                                                     const float* free_motion) {
   constexpr double margin = 1e-6;
@@ -366,9 +366,9 @@ __device__ inline int another_set(int a, int b, int c) {
 /// Solves for the multipliers of all contacts, from those at hand, to `tolerance` [m]. free_motion: [m], of
 /// the forces with those multipliers. Returns what is left of the laws at the gaps of the iterate.
 __device__ __noinline__ double solve_multipliers(const SheetTables& tables, const StepProblem& step,
-                                                 const VertexContacts& contacts,
-                                                 const MultiplierSettings& settings, double tolerance,
-                                                 const float* free_motion, double* partial) {
+                                                 VertexContacts contacts, const MultiplierSettings& settings,
+                                                 double tolerance, const float* free_motion,
+                                                 double* partial) {
   const auto law = [&](int i) { return VertexLaw{step, contacts, settings, 1 / step.mass(tables, i), i}; };
   VertexMerit merit = merit_over_team(
       step.size, partial, [&](int i) { return begin_multipliers(law(i), way_at(free_motion, i)); });

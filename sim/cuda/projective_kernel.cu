@@ -1,8 +1,10 @@
 #include "sim/cuda/projective_kernel.h"
 
 #include <algorithm>
+#include <new>
 
 #include "sim/cuda/chip_memory.cuh"
+#include "sim/cuda/common_value.cuh"
 #include "sim/cuda/launch.h"
 #include "sim/cuda/projective_step.cuh"
 #include "sim/cuda/waiting_environments.cuh"
@@ -78,46 +80,71 @@ __device__ InverseTables tables_on_chip(const ProjectiveNumbers& numbers) {
   return tables;
 }
 
-/// Takes an environment from its step `first` up to `end`.
+/// What the threads of a block have in common.
+struct CommonState {
+  CommonValue<ProjectiveNumbers> numbers;
+  CommonValue<ProjectiveMemory> memory;
+  CommonValue<InverseTables> tables;
+  CommonValue<ProjectiveWork> work;
+  CommonValue<ReplayMaterial> material;
+  CommonValue<StepProblem> step;
+};
+
+/// What an environment is worked on with; its tiles and scale go to the chip.
 template <int parts>
-__device__ void advance(const ProjectiveNumbers& numbers, const InverseTables& tables,
-                        const ProjectiveMemory& memory, int e, int first, int end) {
-  const ReplayNumbers& replay = numbers.replay;
-  const int size = replay.sheet.size;
+__device__ const ProjectiveWork& begin_environment(CommonState& common, int e) {
+  const ProjectiveNumbers& numbers = common.numbers.get();
+  const ProjectiveMemory& memory = common.memory.get();
+  const InverseTables& tables = common.tables.get();
   char* chip = shared_memory<char>();
-  const auto split = [&](int at, __half* otherwise) {
-    return SplitVector{at >= 0 ? reinterpret_cast<__half*>(chip + at) : otherwise};
-  };
   const long factor = numbers.factor_of[e];
-  const uint4* tiles = numbers.tiles + factor * numbers.inverse.tiles * 32 * parts;
+  const uint4* tiles = numbers.tiles + factor * tables.tiles * 32 * parts;
   uint4* on_chip = reinterpret_cast<uint4*>(chip + numbers.tiles_at);
   const float* scale = numbers.scale + factor * tables.slots;
   if (numbers.scale_at >= 0) ChipTables{chip + numbers.scale_at}.fetch(scale, tables.slots);
   if (numbers.tiles_on_chip > 0) fetch_tiles<parts>(numbers, tiles, on_chip);
-  const ProjectiveWork w = {
-      numbers,
-      memory,
-      {tables, tiles, on_chip, numbers.tiles_on_chip, scale, split(numbers.right_at, memory.right),
-       split(numbers.solved_at, memory.solved),
-       numbers.passed_at >= 0 ? reinterpret_cast<float*>(chip + numbers.passed_at) : memory.passed},
-      shared_memory<double>(),
-      e};
+  return common.work.write([&](ProjectiveWork& work) {
+    const auto split = [&](int at, __half* otherwise) {
+      return SplitVector{at >= 0 ? reinterpret_cast<__half*>(chip + at) : otherwise};
+    };
+    float* passed =
+        numbers.passed_at >= 0 ? reinterpret_cast<float*>(chip + numbers.passed_at) : memory.passed;
+    new (&work) ProjectiveWork{
+        numbers,
+        memory,
+        {tables, tiles, on_chip, numbers.tiles_on_chip, scale, split(numbers.right_at, memory.right),
+         split(numbers.solved_at, memory.solved), passed},
+        shared_memory<double>(),
+        e};
+  });
+}
+
+/// Takes an environment from its step `first` up to `end`.
+template <int parts>
+__device__ void advance(CommonState& common, int e, int first, int end) {
+  const ReplayNumbers& replay = common.numbers.get().replay;
+  const ProjectiveWork& w = begin_environment<parts>(common, e);
+  const ProjectiveMemory& memory = w.memory;
+  const int size = replay.sheet.size;
   const SheetState state = replay.states.of(e, size, replay.most_obstacles_each);
-  const ReplayMaterial& material = replay.materials[e];
-  StepProblem step = {&material,
-                      replay.time_step,
-                      {},
-                      state.positions,
-                      state.velocities,
-                      state.bristles,
-                      size,
-                      replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
-                      {},
-                      memory.held_axes,
-                      0,
-                      {},
-                      {},
-                      {}};
+  const ReplayMaterial& material =
+      common.material.write([&](ReplayMaterial& own) { own = replay.materials[e]; });
+  StepProblem& step = common.step.write([&](StepProblem& own) {
+    own = {&material,
+           replay.time_step,
+           {},
+           state.positions,
+           state.velocities,
+           state.bristles,
+           size,
+           replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
+           {},
+           memory.held_axes,
+           0,
+           {},
+           {},
+           {}};
+  });
   PhaseClock{memory.clocks}.start();
   for (int at = first; at < end; ++at) {
     const long place = at - replay.stats_begin;
@@ -144,15 +171,18 @@ __device__ void advance(const ProjectiveNumbers& numbers, const InverseTables& t
 /// A team takes an environment through some steps, and then the one that is furthest behind.
 template <int parts>
 __global__ void __launch_bounds__(block_threads, 1)
-    projective_kernel(const __grid_constant__ ProjectiveNumbers numbers) {
-  const ProjectiveMemory& memory = numbers.teams[team_index()];
-  const ReplayNumbers& replay = numbers.replay;
+    projective_kernel(const __grid_constant__ ProjectiveNumbers given) {
+  __shared__ CommonState common;
+  const ProjectiveNumbers& numbers = common.numbers.write([&](ProjectiveNumbers& own) { own = given; });
+  common.memory.write([&](ProjectiveMemory& own) { own = given.teams[team_index()]; });
   // What is padding in vectors stays zero.
   int* chip = shared_memory<int>();
-  const int words = numbers.tiles_at / static_cast<int>(sizeof(int));
+  const int words = given.tiles_at / static_cast<int>(sizeof(int));
   for (int k = static_cast<int>(threadIdx.x); k < words; k += block_threads) chip[k] = 0;
   __syncthreads();
-  const InverseTables tables = tables_on_chip(numbers);
+  const InverseTables near = tables_on_chip(given);
+  common.tables.write([&](InverseTables& own) { own = near; });
+  const ReplayNumbers& replay = numbers.replay;
   while (true) {
     synchronize_team();
     int first = 0;
@@ -160,7 +190,7 @@ __global__ void __launch_bounds__(block_threads, 1)
     if (e < 0) return;
     const int interval = replay.restart_interval,
               end = min(replay.end_step, (first / interval + 1) * interval);
-    advance<parts>(numbers, tables, memory, e, first, end);
+    advance<parts>(common, e, first, end);
     synchronize_team();
     if (team_rank() == 0 && end < replay.end_step) add(replay.waiting, e, end);
   }
@@ -177,7 +207,8 @@ int bytes_of(const ProjectiveNumbers& numbers, int parts) {
 void place_on_chip(ProjectiveNumbers& numbers, InversePrecision precision, int blocks) {
   const int parts = parts_of(precision), most = most_memory();
   const InverseTables& inverse = numbers.inverse;
-  constexpr int reserved = 1024;  // what kernels and the device have on chip besides
+  // What the kernel and the device have on chip besides.
+  const int reserved = 1024 + rounded_up(static_cast<int>(sizeof(CommonState)), 128);
   int used = sum_bytes;
   const auto place = [&](int bytes, bool wanted) {
     if (!wanted || used + bytes > most - reserved) return -1;

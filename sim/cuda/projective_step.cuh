@@ -141,21 +141,31 @@ struct ProjectiveMotion {
   const FramePose* poses;  ///< of the frames at its start; those at its end follow
 };
 
-/// Fills in a step, and the iterate that the prediction is.
+/// Fills in a step, which the threads of a block have in common, and the iterate that the prediction is.
 __device__ __noinline__ void begin_step(const ProjectiveWork& w, StepProblem& step,
                                         const ProjectiveMotion& motion) {
   const ProjectiveMemory& m = w.memory;
   const ReplayMaterial& material = *step.material;
-  step.numbers = {material.law, material.lame, material.rigidity, 0};
-  step.damped_since = {};
-  if (material.stiffness_damping != 0) {
-    const double share = material.stiffness_damping / step.h;
-    step.numbers.damping = {share * material.damping.mu, share * material.damping.lambda};
-    step.numbers.damping_share = share;
+  const bool damped = material.stiffness_damping != 0;
+  __syncthreads();
+  if (threadIdx.x == 0) {
+    step.numbers = {material.law, material.lame, material.rigidity, 0};
+    step.damped_since = {};
+    if (damped) {
+      const double share = material.stiffness_damping / step.h;
+      step.numbers.damping = {share * material.damping.mu, share * material.damping.lambda};
+      step.numbers.damping_share = share;
+      step.damped_since = {m.start_metrics, m.start_angles};
+    }
+    step.obstacles = {};
+    if (motion.obstacle_count > 0)
+      step.obstacles = {m.obstacles, motion.obstacle_count, motion.several, step.h, {INFINITY, {}}};
+  }
+  __syncthreads();
+  if (damped) {
     const auto place = [&](int vertex) { return triple(step.start[vertex]); };
     write_metrics(w.tables(), place, m.start_metrics);
     if (w.tables().hinge_count > 0) write_angles(w.tables(), place, m.start_angles);
-    step.damped_since = {m.start_metrics, m.start_angles};
   }
   for (int i = team_rank(); i < step.size; i += team_size()) {
     const Triple x = triple(step.start[i]) + step.h * triple(step.velocities[i]);
@@ -163,12 +173,9 @@ __device__ __noinline__ void begin_step(const ProjectiveWork& w, StepProblem& st
     m.held_axes[i] = 0;
     for (int c = 0; c < 3; ++c) m.reaction[3 * i + c] = 0;
   }
-  step.obstacles = {};
-  if (motion.obstacle_count > 0) {
+  if (motion.obstacle_count > 0)
     place_obstacles(motion.obstacles, motion.obstacle_count, motion.poses, w.numbers.replay.frames, 0, 1,
                     m.obstacles);
-    step.obstacles = {m.obstacles, motion.obstacle_count, motion.several, step.h, {INFINITY, {}}};
-  }
   const VertexContacts contacts = {m, step.size, motion.obstacle_count};
   for (int i = team_rank(); i < step.size; i += team_size())
     for (int k = 0; k < motion.obstacle_count; ++k) {
