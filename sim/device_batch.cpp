@@ -41,10 +41,6 @@ std::string why_not_on_device(const ProjectiveSettings& settings) {
 
 namespace {
 
-double time_step_of(const BatchSettings& settings) {
-  return settings.projective ? settings.projective->time_step : settings.solver.time_step;
-}
-
 void check_on_device(const std::vector<Environment>& environments, const BatchSettings& settings) {
   if (settings.projective)
     if (const std::string why = why_not_on_device(*settings.projective); !why.empty())
@@ -59,6 +55,10 @@ void check_on_device(const std::vector<Environment>& environments, const BatchSe
 #ifdef FLASH_HAVE_CUDA
 
 namespace {
+
+double time_step_of(const BatchSettings& settings) {
+  return settings.projective ? settings.projective->time_step : settings.solver.time_step;
+}
 
 /// Environments that run together: over which steps, and which.
 struct Group {
