@@ -155,7 +155,7 @@ TEST(ProjectiveBatch, OnTheDeviceIsThatOfTheProcessor) {
     // Solves are exact to 1e-6 of a motion, and a step moves vertices by up to 3 cm. Five iterations leave
     // more than the weight; what they differ by grows from step to step, most where nothing bounds the law's
     // curvature (Saint Venant and Kirchhoff's).
-    constexpr double near = 1e-5 * side, at_end = 1e-3 * side;
+    constexpr double near = 1e-4 * side, at_end = 1e-3 * side;
     for (int e = 0; e < device.size(); ++e) {
       SCOPED_TRACE(testing::Message() << cells << " cells, environment " << e);
       EXPECT_LE(distance(device, cpu, e, 3), near);
@@ -190,8 +190,8 @@ TEST(ProjectiveBatch, AHalfFactorIsAsFarOffAsItsNumbers) {
   for (int e = 0; e < half.size(); ++e) {
     const Points moved = exact.state(e).positions - environments[e].state.positions;
     const double apart = (half.state(e).positions - exact.state(e).positions).rowwise().norm().maxCoeff();
-    // Eleven bits, and the motion of five iterations.
-    EXPECT_LE(apart, 5e-3 * moved.rowwise().norm().maxCoeff());
+    // Eleven bits, and the motion of five iterations; what rests moves by the rounding of places.
+    EXPECT_LE(apart, 5e-3 * moved.rowwise().norm().maxCoeff() + 1e-7 * side);
   }
 }
 
