@@ -70,7 +70,7 @@ ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const std::vector<data
     : factor_(std::make_unique<Factor>()) {
   ProjectiveMatrix made = projective_matrix(plan, materials, time_step);
   mass_ = std::move(made.mass);
-  matrix_ = std::move(made.matrix);
+  matrix_.swap(made.matrix);
   factor_->llt.compute(matrix_);
   if (factor_->llt.info() != Eigen::Success)
     throw data::InputError(
