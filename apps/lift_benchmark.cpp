@@ -12,7 +12,9 @@
 #include "data/worst.h"
 #include "sim/batch.h"
 #include "sim/cpu/block_cholesky.h"
+#include "sim/cuda/layout/inverse_tree.h"
 #include "sim/cuda/layout/step_cost.h"
+#include "sim/oracle/projective_system.h"
 #include "sim/step/elastic_energy.h"
 
 namespace flash::sim {
@@ -55,7 +57,20 @@ data::SheetMaterial lift_material(const LiftBenchmark& benchmark, int index) {
   material.poissons_ratio = benchmark.poissons_ratio;
   material.areal_density = benchmark.areal_density;
   material.friction = benchmark.friction;
+  if (benchmark.projective) material.bending_model = data::BendingModel::isometric;
   return material;
+}
+
+ProjectiveSettings published_budget(const LiftBenchmark& benchmark) {
+  ProjectiveSettings settings;
+  settings.time_step = benchmark.time_step;
+  settings.iterations = 5;
+  settings.tolerance = benchmark.tolerance;
+  settings.acceleration = 0;
+  settings.metric = ContactMetric::inertia;
+  settings.constraints.iterations = 10;
+  settings.constraints.tolerance = 1e-9;
+  return settings;
 }
 
 Environment lift_environment(const LiftBenchmark& benchmark, const Sheet& sheet,
@@ -117,6 +132,8 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   settings.solver.time_step = benchmark.time_step;
   settings.solver.tolerance = benchmark.tolerance;
   settings.solver.stop = &stop;
+  if (benchmark.projective) settings.projective = published_budget(benchmark);
+  settings.half_factor = benchmark.projective;
   settings.steps = benchmark.steps;
   settings.kept_steps = {benchmark.steps / 2};
   settings.threads = benchmark.threads;
@@ -179,6 +196,17 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   result.slowest_bending_rigidity = slowest_material.bending_rigidity;
   if (benchmark.device == Device::cuda) {
     result.step_milliseconds = 1e3 * result.wall_seconds / benchmark.steps;
+    if (benchmark.projective) {
+      // Of the factor, which each solve reads: two an iteration, and one for the report.
+      const ProjectiveMatrix matrix =
+          projective_matrix(*plan, {lift_material(benchmark, 0)}, benchmark.time_step);
+      const cuda::InverseTree tree =
+          cuda::plan_inverse(cuda::pattern_of(matrix.matrix), plan->sheet.rest.vertices);
+      const double solves = 2 * result.iterations + 1;
+      result.least_bytes = solves * 2 * cuda::inverse_tile_numbers * tree.tiles;
+      result.least_flops = solves * 6 * cuda::inverse_tile_numbers * static_cast<double>(tree.products);
+      return result;
+    }
     const cuda::FrontPlan fronts = cuda::plan_fronts(plan->pattern, plan->sheet.rest.vertices);
     const cuda::SheetLayout layout =
         cuda::lay_out(*plan, bending_operator(*plan, lift_material(benchmark, 0)), fronts);
@@ -190,7 +218,7 @@ LiftBenchmarkResult run_lift_benchmark(const LiftBenchmark& benchmark, const std
   }
   result.step_milliseconds =
       1e3 * result.wall_seconds * std::min(benchmark.threads, benchmark.environments) / total;
-  if (total < 1) return result;
+  if (total < 1 || benchmark.projective) return result;
 
   const Environment typical = lift_environment(benchmark, plan->sheet, schedule, benchmark.environments / 2);
   const BodyLaw law = body_laws(*plan, typical).front();

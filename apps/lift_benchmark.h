@@ -17,7 +17,10 @@ struct LiftBenchmark {
   int threads = 1;
   InstructionLevel level = highest_instruction_level();  ///< of the kernels
   Device device = Device::cpu;
-  std::vector<int> cuda_devices{};                                   ///< as in BatchSettings
+  std::vector<int> cuda_devices{};  ///< as in BatchSettings
+  /// The published method on its fixed budget, in place of Newton's: five local-global iterations, up to ten
+  /// of contact with the inertia metric, isometric bending. `tolerance` ends a step earlier.
+  bool projective = false;
   double time_step = 0.01;                                           ///< [s]
   double tolerance = 1e-3;                                           ///< on |r| / |M g|
   double membrane_stiffness_min = 10, membrane_stiffness_max = 300;  ///< E t [N/m]

@@ -10,6 +10,7 @@
 #include "data/error.h"
 #include "data/parallel.h"
 #include "sim/cuda/phase_clock.h"
+#include "sim/cuda/projective_phases.h"
 #include "sim/device_batch.h"
 
 namespace flash::sim {
@@ -20,7 +21,8 @@ struct Batch::Storage {
   std::shared_ptr<const SheetPlan> plan;
   std::vector<Environment> environments;
   BatchSettings settings;
-  std::vector<std::optional<Solver>> solvers;  ///< of environments under way
+  std::vector<std::optional<Solver>> solvers;                       ///< of environments under way
+  std::vector<std::optional<ProjectiveSolver>> projective_solvers;  ///< likewise
   int step = 0;
   std::ptrdiff_t vertices = 0, holds = 0;
   std::vector<double> positions, velocities, kept, hold_forces;
@@ -75,11 +77,21 @@ struct Batch::Storage {
     sim::advance_on_device(plan, environments, settings, before, count, results);
   }
 
-  void take_step(int e, int before) {
+  StepReport newton_step(int e, int before) {
     std::optional<Solver>& solver = solvers[e];
     if (!solver) solver.emplace(plan, settings.solver);
     if (before % restart_interval == 0) solver->forget();
-    const StepReport report = solver->step(environments[e]);
+    return solver->step(environments[e]);
+  }
+
+  StepReport projective_step(int e) {
+    std::optional<ProjectiveSolver>& solver = projective_solvers[e];
+    if (!solver) solver.emplace(plan, *settings.projective);
+    return solver->step(environments[e]);
+  }
+
+  void take_step(int e, int before) {
+    const StepReport report = settings.projective ? projective_step(e) : newton_step(e, before);
     const std::ptrdiff_t place = e * steps() + before - settings.first_step;
     stats[place] = {report.residual,       report.penetration_max, report.iterations, report.solves,
                     report.factorizations, report.substeps,        report.converged};
@@ -160,6 +172,7 @@ Batch::Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> env
   const std::size_t count = s.environments.size(), numbers = count * 3 * s.vertices;
   s.holds = count > 0 ? static_cast<std::ptrdiff_t>(s.environments.front().holds.size()) : 0;
   s.solvers.resize(count);
+  s.projective_solvers.resize(count);
   s.positions.resize(numbers);
   s.velocities.resize(numbers);
   s.kept.resize(numbers * s.settings.kept_steps.size());
@@ -202,7 +215,10 @@ void Batch::advance(int steps, const std::function<void(int)>& finished) {
       throw_if_stopped();
     }
     s.show(e);
-    if (first + steps == s.settings.steps) s.solvers[e].reset();
+    if (first + steps == s.settings.steps) {
+      s.solvers[e].reset();
+      s.projective_solvers[e].reset();
+    }
     if (finished) finished(e);
   });
   s.step = first + steps;
@@ -234,9 +250,10 @@ std::span<const StepStats> Batch::stats(int environment) const {
 std::vector<PhaseShare> Batch::phases() const {
   const std::vector<double>& ticks = storage_->phase_ticks;
   const double all = std::accumulate(ticks.begin(), ticks.end(), 0.0);
+  const char* const* names =
+      storage_->settings.projective ? cuda::projective_phase_names : cuda::replay_phase_names;
   std::vector<PhaseShare> shares;
-  for (std::size_t k = 0; k < ticks.size(); ++k)
-    shares.push_back({cuda::replay_phase_names[k], ticks[k] / all});
+  for (std::size_t k = 0; k < ticks.size(); ++k) shares.push_back({names[k], ticks[k] / all});
   return shares;
 }
 

@@ -2,12 +2,14 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "sim/device.h"
 #include "sim/newton/solver.h"
+#include "sim/oracle/projective.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 
@@ -36,6 +38,10 @@ struct PhaseShare {
 
 struct BatchSettings {
   SolverSettings solver{};
+  /// The projective method in place of Newton's, with the time step of its own; of `solver` only `stop`
+  /// holds.
+  std::optional<ProjectiveSettings> projective{};
+  bool half_factor = false;       ///< of the projective method on a device: its factor in half precision
   int steps = 0;                  ///< last step of the whole replay
   std::vector<int> kept_steps{};  ///< steps whose positions are kept, ascending; step 0 is the start
   int first_step = 0;             ///< step at which the states of the environments stand

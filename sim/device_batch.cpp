@@ -30,9 +30,22 @@ std::string why_not_on_device(const Environment& environment) {
   return {};
 }
 
+std::string why_not_on_device(const ProjectiveSettings& settings) {
+  if (settings.acceleration != 0)
+    return "the projective method runs without acceleration there: found a depth of " +
+           std::to_string(settings.acceleration) + ", expected 0";
+  if (settings.metric != ContactMetric::inertia)
+    return "the projective method has the inertia metric there (LiteNonSmoothNewton); full and automatic are "
+           "met on the CPU alone";
+  return {};
+}
+
 namespace {
 
-void check_on_device(const std::vector<Environment>& environments) {
+void check_on_device(const std::vector<Environment>& environments, const BatchSettings& settings) {
+  if (settings.projective)
+    if (const std::string why = why_not_on_device(*settings.projective); !why.empty())
+      throw data::InputError("--device cuda: " + why);
   for (const Environment& environment : environments)
     if (const std::string why = why_not_on_device(environment); !why.empty())
       throw data::InputError("--device cuda: " + why);
@@ -44,6 +57,10 @@ void check_on_device(const std::vector<Environment>& environments) {
 
 namespace {
 
+double time_step_of(const BatchSettings& settings) {
+  return settings.projective ? settings.projective->time_step : settings.solver.time_step;
+}
+
 /// Environments that run together: over which steps, and which.
 struct Group {
   int first, count;
@@ -52,13 +69,16 @@ struct Group {
 
 /// The groups of environments that stand at the step `at` of each, up to the step `end`.
 std::vector<Group> grouped(const SheetPlan& plan, const std::vector<Environment>& environments,
-                           const std::vector<int>& at, int end, double time_step) {
+                           const std::vector<int>& at, int end, const BatchSettings& settings) {
   std::map<std::tuple<const BendingOperator*, int, int>, std::vector<int>> groups;
   for (std::size_t e = 0; e < environments.size(); ++e) {
     if (at[e] >= end) continue;
     const data::SheetMaterial& material = environments[e].materials[0];
     const BendingOperator& bending = bending_operator(plan, material);
-    const int count = cuda::steps_before_a_hold_closes(environments[e], time_step, end - at[e]);
+    // A factor of the projective method goes with what is held.
+    const auto steps_alike =
+        settings.projective ? cuda::steps_before_a_hold_changes : cuda::steps_before_a_hold_closes;
+    const int count = steps_alike(environments[e], time_step_of(settings), end - at[e]);
     groups[{&bending, at[e], count}].push_back(static_cast<int>(e));
   }
   std::vector<Group> all;
@@ -71,12 +91,19 @@ std::vector<Group> grouped(const SheetPlan& plan, const std::vector<Environment>
 
 cuda::ReplaySettings settings_of(const BatchSettings& settings, int first, int count) {
   cuda::ReplaySettings own;
-  own.time_step = settings.solver.time_step;
+  own.time_step = time_step_of(settings);
   own.max_iterations = settings.solver.max_iterations;
   own.tolerance = settings.solver.tolerance;
   own.stale_factor_solves = settings.solver.stale_factor_solves;
   own.exit_speed = settings.solver.exit_speed;
   own.halvings = settings.solver.halvings;
+  if (settings.projective) {
+    own.projective = settings.projective;
+    own.tolerance = settings.projective->tolerance;
+    own.precision = settings.half_factor ? cuda::InversePrecision::half : cuda::InversePrecision::single;
+    own.threads = settings.threads;
+    own.restart_interval = restart_interval;
+  }
   own.first_step = first;
   own.steps = first + count;
   for (const int step : settings.kept_steps)
@@ -87,7 +114,7 @@ cuda::ReplaySettings settings_of(const BatchSettings& settings, int first, int c
 /// Runs a group, whose environments advance.
 void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, const BatchSettings& settings,
          std::vector<Environment>& environments, const DeviceResults& results) {
-  const double h = settings.solver.time_step;
+  const double h = time_step_of(settings);
   const cuda::ReplaySettings own = settings_of(settings, group.first, group.count);
   std::vector<std::vector<HeldVertices>> held;
   std::vector<cuda::ReplayEnvironment> replays;
@@ -171,11 +198,11 @@ void run_on_devices(const std::shared_ptr<const SheetPlan>& plan, const Group& g
 
 void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment>& environments,
                        const BatchSettings& settings, int first, int steps, const DeviceResults& results) {
-  check_on_device(environments);
+  check_on_device(environments, settings);
   std::vector<int> at(environments.size(), first);
   const int end = first + steps;
-  for (auto groups = grouped(*plan, environments, at, end, settings.solver.time_step); !groups.empty();
-       groups = grouped(*plan, environments, at, end, settings.solver.time_step))
+  for (auto groups = grouped(*plan, environments, at, end, settings); !groups.empty();
+       groups = grouped(*plan, environments, at, end, settings))
     for (const Group& group : groups) {
       run_on_devices(plan, group, settings, environments, results);
       for (const int e : group.environments) at[static_cast<std::size_t>(e)] += group.count;
@@ -188,8 +215,8 @@ void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector
 #else
 
 void advance_on_device(const std::shared_ptr<const SheetPlan>&, std::vector<Environment>& environments,
-                       const BatchSettings&, int, int, const DeviceResults&) {
-  check_on_device(environments);
+                       const BatchSettings& settings, int, int, const DeviceResults&) {
+  check_on_device(environments, settings);
   throw data::InputError("--device cuda: this program was built without CUDA");
 }
 

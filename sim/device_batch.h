@@ -12,6 +12,9 @@ namespace flash::sim {
 /// What a device cannot do yet of an environment, in a line; empty where it can all of it.
 std::string why_not_on_device(const Environment& environment);
 
+/// The same of the projective method's settings.
+std::string why_not_on_device(const ProjectiveSettings& settings);
+
 /// Results of one environment over some steps of a batch.
 struct DeviceSteps {
   int environment;

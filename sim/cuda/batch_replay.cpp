@@ -12,6 +12,7 @@
 
 #include "sim/cuda/device_plan.h"
 #include "sim/cuda/devices.h"
+#include "sim/cuda/projective_replay.h"
 #include "sim/cuda/replay_kernel.h"
 #include "sim/cuda/team_memory.h"
 #include "sim/law/membrane.h"
@@ -178,6 +179,7 @@ struct BatchReplay::Memory {
   DeviceArray<TeamMemory> team_memory;
   int teams = 0, team_blocks = 1;
   ReplayNumbers numbers{};
+  std::unique_ptr<ProjectiveReplay> projection;  ///< of the projective method
 
   Memory(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments,
          ReplaySettings replay_settings)
@@ -196,9 +198,11 @@ struct BatchReplay::Memory {
                                     [](const auto& e) { return e.material.stiffness_damping != 0; });
     const int most_obstacles_each = upload_obstacles(environments);
     upload_bristles(environments, most_obstacles_each);
-    team_blocks = settings.team_blocks > 0 ? settings.team_blocks : team_blocks_for(plan.fronts, count);
-    plan.share_out_solves(front_plan, team_blocks);
-    lay_out_teams({plan.fronts, layout, damped, most_held, most_obstacles_each});
+    if (!settings.projective) {
+      team_blocks = settings.team_blocks > 0 ? settings.team_blocks : team_blocks_for(plan.fronts, count);
+      plan.share_out_solves(front_plan, team_blocks);
+      lay_out_teams({plan.fronts, layout, damped, most_held, most_obstacles_each});
+    }
     steps = DeviceArray<int>(environments.size());
 
     numbers.fronts = plan.fronts;
@@ -207,7 +211,7 @@ struct BatchReplay::Memory {
     check(cudaMallocHost(&stop, sizeof(int)));
     *stop = 0;
     numbers.waiting = {steps.data(), count, stop};
-    place_on_chip(numbers, team_blocks);
+    if (!settings.projective) place_on_chip(numbers, team_blocks);
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
     numbers.max_iterations = settings.max_iterations;
@@ -236,6 +240,13 @@ struct BatchReplay::Memory {
     numbers.kept = kept.data();
     check(cudaStreamCreateWithFlags(&stream, cudaStreamNonBlocking));
     keep_start(environments);
+    if (!settings.projective) return;
+    projection = std::make_unique<ProjectiveReplay>(
+        ProjectiveSizes{sheet, layout, front_plan.position, damped, most_obstacles_each}, environments,
+        settings, numbers);
+    teams = projection->teams();
+    team_blocks = projection->team_blocks();
+    require(teams > 0, "the sheet is too large for the device");
   }
   ~Memory() {
     cudaFreeHost(stop);
@@ -365,7 +376,10 @@ struct BatchReplay::Memory {
     const std::vector<int> stand(static_cast<std::size_t>(count), step);
     steps.write(0, stand.data(), stand.size());
     numbers.end_step = end;
-    run_replay(numbers, teams, team_blocks, stream);
+    if (projection)
+      projection->run(end, stream);
+    else
+      run_replay(numbers, teams, team_blocks, stream);
     step = end;
   }
 
@@ -437,6 +451,7 @@ std::vector<double> BatchReplay::hold_forces(int environment) const {
 std::vector<double> BatchReplay::phase_ticks() const {
   const Memory& m = *memory_;
   m.wait();
+  if (m.projection) return m.projection->phase_ticks();
   std::vector<double> ticks(replay_phases, 0.0);
   for (const TeamMemory& team : m.team_memory.read(0, m.team_memory.size())) {
     long long clocks[replay_phases];

@@ -3,12 +3,15 @@
 #include <array>
 #include <atomic>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "data/material.h"
 #include "data/mesh.h"
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/layout/front_plan.h"
+#include "sim/cuda/layout/inverse_layout.h"
+#include "sim/oracle/projective.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 
@@ -56,6 +59,12 @@ struct ReplaySettings {
   int restart_interval = 10;      ///< steps after which a solver forgets its factor and may change its team
   int team_blocks = 0;  ///< processors that work on an environment, 1, 2, 4 or 8; 0: as many as there are
   FrontSettings fronts{};
+
+  /// The projective method in place of Newton's; its time step and tolerance are those above. Without
+  /// acceleration and with the inertia metric; the same vertices are held in all steps, in all axes.
+  std::optional<ProjectiveSettings> projective{};
+  InversePrecision precision = InversePrecision::single;  ///< of its constant factor
+  int threads = 1;                                        ///< of the processor, which factorize
 };
 
 /// How one step of one environment went, as in StepReport.

@@ -55,6 +55,15 @@ int steps_before_a_hold_closes(const Environment& environment, double time_step,
   return most;
 }
 
+int steps_before_a_hold_changes(const Environment& environment, double time_step, int most) {
+  double time = environment.state.time;
+  for (int k = 0; k < most; ++k, time += time_step)
+    for (const Hold& hold : environment.holds)
+      if (k > 0 && is_closed(hold, time, time + time_step) != is_closed(hold, time - time_step, time))
+        return k;
+  return most;
+}
+
 HoldMotion motion_of_holds(Environment& environment, double time_step, int steps) {
   HoldMotion motion;
   const double start = environment.state.time;

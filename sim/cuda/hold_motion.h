@@ -8,6 +8,9 @@ namespace flash::sim::cuda {
 /// before another hold closes. It takes vertices from where they are then.
 int steps_before_a_hold_closes(const Environment& environment, double time_step, int most);
 
+/// How many of the next `most` steps have the same holds closed.
+int steps_before_a_hold_changes(const Environment& environment, double time_step, int most);
+
 /// What the holds carry in the next steps, which steps_before_a_hold_closes allows. environment.state.held
 /// becomes that at their end, as update_holds has it; the rest of the state stays.
 HoldMotion motion_of_holds(Environment& environment, double time_step, int steps);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sim/law/contact_newton.h"
+
 namespace flash::sim {
 namespace {
 
@@ -25,64 +27,45 @@ VectorXd diagonal_of(const ContactProblem& problem) {
 /// Squared violations summed, the merit of the step length.
 double violations(const ContactProblem& problem, const VectorXd& diagonal, const VectorXd& gap,
                   const VectorXd& multiplier, double& worst) {
-  const double h2 = problem.time_step * problem.time_step;
   double sum = 0;
   worst = 0;
   for (Index k = 0; k < problem.friction.size(); ++k) {
-    const double* c = &gap[3 * k];
-    const double* l = &multiplier[3 * k];
-    const double r_t = 0.5 * h2 * (diagonal[3 * k + 1] + diagonal[3 * k + 2]);
-    const double normal = normal_violation(c[0], l[0], h2 * diagonal[3 * k]);
-    const double tangential = friction_violation(c + 1, l + 1, l[0], problem.friction[k], r_t);
-    sum += normal * normal + tangential * tangential;
-    worst = std::max({worst, normal, tangential});
+    const ContactViolation of_contact = contact_violation(
+        &gap[3 * k], &multiplier[3 * k], problem.friction[k], &diagonal[3 * k], problem.time_step);
+    sum += of_contact.normal * of_contact.normal + of_contact.tangential * of_contact.tangential;
+    worst = std::max({worst, of_contact.normal, of_contact.tangential});
   }
   return sum;
 }
 
-/// The rows of all contacts, tangential ones in the frame (cosine, sine) of their contact.
+/// The rows of all contacts.
 struct Linearisation {
-  std::vector<ConstraintRow> rows;
-  VectorXd cosine, sine;
-  std::vector<bool> slides;
+  std::vector<ContactRows> contacts;
+
+  std::vector<ConstraintRow> rows() const {
+    std::vector<ConstraintRow> all;
+    for (const ContactRows& contact : contacts) all.insert(all.end(), contact.rows, contact.rows + 3);
+    return all;
+  }
 };
 
 Linearisation linearise(const ContactProblem& problem, const ConstraintSettings& settings,
                         const VectorXd& diagonal, const VectorXd& gap, const VectorXd& multiplier) {
-  const double h = problem.time_step;
-  const auto normal_row = settings.complementarity == Complementarity::fischer_burmeister
-                              ? normal_row_fischer_burmeister
-                              : normal_row_minimum_map;
-  const Index contacts = problem.friction.size();
-  Linearisation at{{}, VectorXd::Ones(contacts), VectorXd::Zero(contacts), std::vector<bool>(contacts)};
-  at.rows.reserve(gap.size());
-  for (Index k = 0; k < contacts; ++k) {
-    const double* c = &gap[3 * k];
-    const double* l = &multiplier[3 * k];
-    const double tangential = 0.5 * (diagonal[3 * k + 1] + diagonal[3 * k + 2]);
-    at.rows.push_back(normal_row(c[0], c[0], l[0], h * h * diagonal[3 * k], h));
-    if (settings.friction == FrictionRow::newton) {
-      const SlipRows t = slip_rows(c + 1, c + 1, l + 1, l[0], problem.friction[k], h * h * tangential, h);
-      at.rows.push_back(t.along);
-      at.rows.push_back(t.across);
-      at.cosine[k] = t.direction[0];
-      at.sine[k] = t.direction[1];
-      at.slides[k] = t.along.omega == 0;
-    } else {
-      const FrictionRows t = friction_rows(c + 1, c + 1, l + 1, l[0], problem.friction[k], h * tangential, h);
-      at.rows.push_back({t.omega, t.compliance, t.rhs[0]});
-      at.rows.push_back({t.omega, t.compliance, t.rhs[1]});
-    }
-  }
+  const ContactRowKind kind = {settings.complementarity == Complementarity::fischer_burmeister,
+                               settings.friction == FrictionRow::fixed_point};
+  Linearisation at;
+  for (Index k = 0; k < problem.friction.size(); ++k)
+    at.contacts.push_back(contact_rows(kind, &gap[3 * k], &multiplier[3 * k], problem.friction[k],
+                                       &diagonal[3 * k], problem.time_step));
   return at;
 }
 
 /// Tangential rows of x from the contacts' bases into the frames of their rows (direction 1) or back (-1).
 template <typename Matrix>
 void turn(const Linearisation& at, int direction, Matrix&& x) {
-  for (Index k = 0; k < at.cosine.size(); ++k) {
-    if (at.sine[k] == 0 && at.cosine[k] == 1) continue;
-    const double c = at.cosine[k], s = direction * at.sine[k];
+  for (Index k = 0; k < static_cast<Index>(at.contacts.size()); ++k) {
+    const double c = at.contacts[k].cosine, s = direction * at.contacts[k].sine;
+    if (s == 0 && c == 1) continue;
     const auto first = x.row(3 * k + 1).eval(), second = x.row(3 * k + 2).eval();
     x.row(3 * k + 1) = c * first + s * second;
     x.row(3 * k + 2) = c * second - s * first;
@@ -96,7 +79,7 @@ DualSolution newton_step(const ContactProblem& problem, const Linearisation& at,
     Eigen::MatrixXd W = problem.W;
     turn(at, 1, W);
     turn(at, 1, W.transpose());
-    step = solve_dual(W, at.rows, problem.time_step, settings);
+    step = solve_dual(W, at.rows(), problem.time_step, settings);
   } else {
     const Operator turned = [&](const VectorXd& l, VectorXd& w) {
       VectorXd own = l;
@@ -104,26 +87,15 @@ DualSolution newton_step(const ContactProblem& problem, const Linearisation& at,
       problem.apply_W(own, w);
       turn(at, 1, w);
     };
-    step = solve_dual(turned, diagonal, at.rows, problem.time_step, settings);
+    step = solve_dual(turned, diagonal, at.rows(), problem.time_step, settings);
   }
   turn(at, -1, step.x);
   return step;
 }
 
-/// Sliding contacts follow their normal force to the new rim of the disc, which the frozen one has missed.
-void follow_rim(const ContactProblem& problem, const Linearisation& at, VectorXd& multiplier) {
-  for (Index k = 0; k < problem.friction.size(); ++k) {
-    const double limit = problem.friction[k] * std::max(multiplier[3 * k], 0.0);
-    const double size = multiplier.segment<2>(3 * k + 1).norm();
-    if (at.slides[k] && size > 0) multiplier.segment<2>(3 * k + 1) *= limit / size;
-  }
-}
-
 void project(const ContactProblem& problem, double max_force, VectorXd& multiplier) {
-  for (Index k = 0; k < problem.friction.size(); ++k) {
-    multiplier[3 * k] = std::clamp(multiplier[3 * k], 0.0, max_force);
-    project_on_disc(&multiplier[3 * k + 1], multiplier[3 * k], problem.friction[k]);
-  }
+  for (Index k = 0; k < problem.friction.size(); ++k)
+    project_multiplier(max_force, problem.friction[k], &multiplier[3 * k]);
 }
 
 }  // namespace
@@ -154,7 +126,9 @@ ConstraintReport solve_contacts(const ContactProblem& problem, const ConstraintS
     const double last = settings.damping > 0 ? settings.damping : 0.125;
     for (double length = first; length >= last; length *= 0.5) {
       VectorXd trial = start + length * step.x;
-      follow_rim(problem, at, trial);
+      for (std::size_t k = 0; k < at.contacts.size(); ++k)
+        follow_rim(at.contacts[k], problem.friction[static_cast<Index>(k)],
+                   &trial[3 * static_cast<Index>(k)]);
       project(problem, settings.max_force, trial);
       const VectorXd trial_gap = gaps(problem, trial);
       double worst = 0;

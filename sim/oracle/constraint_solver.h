@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "sim/oracle/constraint_row.h"
+#include "sim/law/constraint_row.h"
 
 namespace flash::sim {
 

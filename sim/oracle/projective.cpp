@@ -7,6 +7,7 @@
 #include <limits>
 #include <list>
 #include <map>
+#include <utility>
 
 #include "sim/oracle/anderson.h"
 #include "sim/oracle/projective_contact.h"
@@ -131,8 +132,10 @@ void report_forces(const Environment& environment, const ProjectiveSettings& set
 }  // namespace
 
 ProjectiveSolver::ProjectiveSolver(const Sheet& sheet, const ProjectiveSettings& settings)
+    : ProjectiveSolver(make_sheet_plan(sheet), settings) {}
+ProjectiveSolver::ProjectiveSolver(std::shared_ptr<const SheetPlan> plan, const ProjectiveSettings& settings)
     : workspace_(std::make_unique<Workspace>()) {
-  workspace_->plan = make_sheet_plan(sheet);
+  workspace_->plan = std::move(plan);
   workspace_->settings = settings;
 }
 ProjectiveSolver::~ProjectiveSolver() = default;

@@ -47,6 +47,7 @@ struct ProjectiveReport : StepReport {
 class ProjectiveSolver {
  public:
   ProjectiveSolver(const Sheet& sheet, const ProjectiveSettings& settings);
+  ProjectiveSolver(std::shared_ptr<const SheetPlan> plan, const ProjectiveSettings& settings);
   ~ProjectiveSolver();
   ProjectiveSolver(ProjectiveSolver&&) noexcept;
 

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <utility>
 
 #include "data/error.h"
 #include "sim/law/membrane.h"
@@ -53,14 +54,23 @@ struct ProjectiveSystem::Factor {
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> llt;
 };
 
-ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const std::vector<data::SheetMaterial>& materials,
-                                   double time_step)
-    : mass_(plan.sheet.vertex_area), factor_(std::make_unique<Factor>()) {
+ProjectiveMatrix projective_matrix(const SheetPlan& plan, const std::vector<data::SheetMaterial>& materials,
+                                   double time_step) {
+  ProjectiveMatrix made{plan.sheet.vertex_area, {}};
   std::vector<Eigen::Triplet<double>> entries;
   for (std::size_t b = 0; b < materials.size(); ++b)
-    add_body(plan.sheet, plan.sheet.bodies[b], materials[b], time_step, mass_, entries);
-  matrix_.resize(mass_.size(), mass_.size());
-  matrix_.setFromTriplets(entries.begin(), entries.end());
+    add_body(plan.sheet, plan.sheet.bodies[b], materials[b], time_step, made.mass, entries);
+  made.matrix.resize(made.mass.size(), made.mass.size());
+  made.matrix.setFromTriplets(entries.begin(), entries.end());
+  return made;
+}
+
+ProjectiveSystem::ProjectiveSystem(const SheetPlan& plan, const std::vector<data::SheetMaterial>& materials,
+                                   double time_step)
+    : factor_(std::make_unique<Factor>()) {
+  ProjectiveMatrix made = projective_matrix(plan, materials, time_step);
+  mass_ = std::move(made.mass);
+  matrix_.swap(made.matrix);
   factor_->llt.compute(matrix_);
   if (factor_->llt.info() != Eigen::Success)
     throw data::InputError(

@@ -10,6 +10,14 @@
 
 namespace flash::sim {
 
+/// The matrix of a ProjectiveSystem, and its masses [kg].
+struct ProjectiveMatrix {
+  Eigen::VectorXd mass;
+  Eigen::SparseMatrix<double> matrix;
+};
+ProjectiveMatrix projective_matrix(const SheetPlan& plan, const std::vector<data::SheetMaterial>& materials,
+                                   double time_step);
+
 /// The constant system matrix of projective dynamics, one scalar matrix for the three coordinates,
 ///
 ///     A = M (1 + h air_drag) + (h^2 + h stiffness_damping) (sum_e w a_e G_e^T G_e + K_b)   [kg],

@@ -1,4 +1,4 @@
-#include "sim/oracle/constraint_row.h"
+#include "sim/law/constraint_row.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,22 @@
+#pragma once
+#include <cuda_runtime.h>
+
+#include "sim/cuda/projective_numbers.h"
+
+namespace flash::sim::cuda {
+
+/// Decides what stands on chip in a team of so many blocks: vectors of solves and tiles of the factor in that
+/// of one block; several share them in memory.
+void place_on_chip(ProjectiveNumbers& numbers, InversePrecision precision, int blocks);
+
+/// Teams of so many blocks that the device works with at the same time.
+int resident_projective_teams(const ProjectiveNumbers& numbers, InversePrecision precision, int blocks);
+
+/// Blocks of a team: as many as leave each environment a team of its own.
+int projective_team_blocks(ProjectiveNumbers numbers, InversePrecision precision, int environments);
+
+/// Queues steps of the environments that wait, up to numbers.replay.end_step.
+void run_projective(const ProjectiveNumbers& numbers, InversePrecision precision, int teams, int blocks,
+                    cudaStream_t stream);
+
+}  // namespace flash::sim::cuda
