@@ -44,15 +44,18 @@ struct Scored {
   }
 };
 
-void use_device(Scored& scored, benchmark::State& state, int on_device) {
-  if (on_device == 0) return;
-  if (const std::string why = sim::why_no_cuda(); !why.empty()) state.SkipWithError(why.c_str());
+/// Whether the device can be used, where it is asked for.
+bool use_device(Scored& scored, benchmark::State& state, long on_device) {
+  if (on_device == 0) return true;
   scored.replay.settings.device = sim::Device::cuda;
+  const std::string why = sim::why_no_cuda();
+  if (!why.empty()) state.SkipWithError(why.c_str());
+  return why.empty();
 }
 
 void register_and_score(benchmark::State& state) {
-  Scored scored(static_cast<int>(state.range(1)), 64);
-  use_device(scored, state, static_cast<int>(state.range(0)));
+  Scored scored(static_cast<int>(state.range(1)), 32);
+  if (!use_device(scored, state, state.range(0))) return;
   const CloudSearches searches = device_searches(scored.replay, RegistrationSettings().points_per_keyframe);
   for (auto _ : state)
     data::for_each_in_parallel(scored.motions.size(), static_cast<int>(state.range(2)), [&](std::size_t c) {
@@ -72,9 +75,8 @@ BENCHMARK(register_and_score)
 /// One search of a thread: of the points that a registration is fitted to, then of all. Items are points.
 void search(benchmark::State& state) {
   Scored scored(static_cast<int>(state.range(0)), 1);
-  use_device(scored, state, 1);
+  if (!use_device(scored, state, 1)) return;
   const CloudSearches searches = device_searches(scored.replay, RegistrationSettings().points_per_keyframe);
-  if (!searches) return;
   const CloudSearch in_motion = searches(scored.motions.front());
   std::vector<std::vector<int>> triangles;
   const CloudPoints which = state.range(1) == 0 ? CloudPoints::thinned : CloudPoints::all;
