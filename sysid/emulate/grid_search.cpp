@@ -22,7 +22,7 @@ ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettin
 }
 
 CandidateResult score_motions(const std::vector<Replay>& replays, const std::vector<ReplayResult>& results,
-                              const ScoreSettings& settings) {
+                              const ScoreSettings& settings, const std::vector<CloudSearches>& searches) {
   CandidateResult result;
   result.converged = true;
   bool finite = true;
@@ -33,6 +33,7 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
     result.penetration_max = data::worst(result.penetration_max, results[r].penetration_max);
     finite = finite && results[r].finite;
     problems.push_back(registration_problem(replays[r], results[r].motion));
+    if (!searches.empty()) problems.back().searches = searches[r];
   }
   if (!finite) {
     result.status = CandidateStatus::diverged;
@@ -111,6 +112,7 @@ class Results {
 
 /// Simulates candidates on every replay, as a batch each, and scores each on the thread that finished it.
 void score_candidates(const std::vector<Replay>& replays, const ScoreSettings& settings,
+                      const std::vector<CloudSearches>& searches,
                       const std::vector<ReplayCandidate>& candidates, const std::optional<MotionStore>& kept,
                       const std::function<void(std::size_t, CandidateResult)>& scored) {
   std::vector<std::vector<ReplayResult>> motions(candidates.size());
@@ -118,7 +120,7 @@ void score_candidates(const std::vector<Replay>& replays, const ScoreSettings& s
     const auto finished = [&](std::size_t i, ReplayResult result) {
       motions[i].push_back(std::move(result));
       if (r + 1 < replays.size()) return;
-      scored(i, score_motions(replays, motions[i], settings));
+      scored(i, score_motions(replays, motions[i], settings, searches));
       motions[i].clear();
     };
     if (kept)
@@ -148,6 +150,9 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
   }
   const std::optional<MotionStore> kept =
       settings.rollouts.empty() ? std::nullopt : std::optional<MotionStore>(settings.rollouts);
+  std::vector<CloudSearches> searches;
+  for (const Replay& replay : batched)
+    searches.push_back(device_searches(replay, settings.score.registration.points_per_keyframe));
   Results results(store, static_cast<int>(grid.size()), progress);
   const auto at_once = static_cast<std::size_t>(std::max(1, settings.envs));
   for (std::size_t first = 0; first < wanted.size(); first += at_once) {
@@ -155,12 +160,13 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
     for (std::size_t i = first; i < std::min(wanted.size(), first + at_once); ++i)
       candidates.push_back(make_candidate(settings.base, axes, grid[wanted[i]]));
     try {
-      score_candidates(batched, settings.score, candidates, kept, [&](std::size_t i, CandidateResult result) {
-        const std::vector<double>& values = grid[wanted[first + i]];
-        result.id = wanted[first + i];
-        result.values.assign(values.begin(), values.begin() + std::ssize(settings.axes));
-        results.take(first + i, std::move(result));
-      });
+      score_candidates(batched, settings.score, searches, candidates, kept,
+                       [&](std::size_t i, CandidateResult result) {
+                         const std::vector<double>& values = grid[wanted[first + i]];
+                         result.id = wanted[first + i];
+                         result.values.assign(values.begin(), values.begin() + std::ssize(settings.axes));
+                         results.take(first + i, std::move(result));
+                       });
     } catch (const data::Stopped&) {
       return results.complete();
     }

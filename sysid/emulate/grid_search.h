@@ -41,9 +41,9 @@ struct Progress {
 /// Candidate of a search at values that need not be on the grid, one an axis.
 ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettings& grid);
 
-/// Registers and scores simulated motions, one a replay.
+/// Registers and scores simulated motions, one a replay. `searches`: for each replay's clouds, or none.
 CandidateResult score_motions(const std::vector<Replay>& replays, const std::vector<ReplayResult>& results,
-                              const ScoreSettings& settings);
+                              const ScoreSettings& settings, const std::vector<CloudSearches>& searches = {});
 
 /// Simulates and scores every candidate of the grid that `store` does not hold yet and appends it there,
 /// `envs` candidates at a time, a batch a recording. Candidates that diverge or miss the

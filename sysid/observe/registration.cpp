@@ -17,37 +17,24 @@ Eigen::Matrix<double, kParameters, 1> half_widths(const RegistrationBounds& boun
   return widths;
 }
 
-std::vector<Observation> thinned(const std::vector<Observation>& observations, int points) {
-  const auto thin = [points](data::Points& cloud) {
-    const Eigen::Index count = cloud.rows();
-    if (count <= points) return;
-    data::Points kept(points, 3);
-    for (Eigen::Index i = 0; i < points; ++i) kept.row(i) = cloud.row(i * count / points);
-    cloud = kept;
-  };
-  std::vector<Observation> result = observations;
-  for (Observation& observation : result) {
-    thin(observation.points);
-    thin(observation.contour);
-  }
-  return result;
-}
-
-/// One problem with its thinned points, the hierarchy and the last nearest triangles.
+/// One problem with its thinned points, the hierarchy and the last nearest triangles. A search of its own
+/// finds them where there is one; else the hierarchy does, and begins with them.
 struct Side {
   const RegistrationProblem& problem;
   std::vector<Observation> observations;
   SheetDistance sheet;
-  std::vector<std::vector<int>> hints;
+  CloudSearch search;
+  std::vector<std::vector<int>> nearest;
   double total_weight = 0;
   Eigen::Matrix<int, kParameters, 1> index;  // into the vector of unknowns
 
   Side(const RegistrationProblem& p, int points)
       : problem(p),
         observations(thinned(*p.observations, points)),
-        sheet(p.sheet ? *p.sheet : SheetDistance(*p.triangles, p.motion->positions.front())) {
+        sheet(p.sheet ? *p.sheet : SheetDistance(*p.triangles, p.motion->positions.front())),
+        search(p.searches ? p.searches(*p.motion) : CloudSearch()) {
     for (const Observation& observation : observations) {
-      hints.emplace_back(observation.points.rows(), -1);
+      nearest.emplace_back(observation.points.rows(), -1);
       if (observation.seen()) total_weight += observation.weight;
     }
   }
@@ -128,12 +115,16 @@ void add_side(Side& side, const Eigen::VectorXd& unknowns, const Objective& obje
               NormalEquations& sum) {
   if (side.total_weight == 0) return;
   const Registration registration = side.at(unknowns);
+  if (side.search) side.search(CloudPoints::thinned, registration, side.nearest);
   data::Points positions, velocities;
   for (std::size_t k = 0; k < side.observations.size(); ++k) {
     const Observation& observation = side.observations[k];
     if (!observation.seen() || observation.weight == 0) continue;
     surface_at(*side.problem.motion, observation.t + registration.time_offset, positions, &velocities);
-    side.sheet.move(positions);
+    if (side.search)
+      side.sheet.move_border(positions);
+    else
+      side.sheet.move(positions);
     const std::array<double, 5> weights = term_weights(observation, objective);
     const double keyframe_weight = observation.weight / side.total_weight;
     const auto add = [&](const data::Points& points, double weight, const auto& match) {
@@ -141,9 +132,11 @@ void add_side(Side& side, const Eigen::VectorXd& unknowns, const Objective& obje
                velocities, side.index, objective.robust, softening, sum);
     };
     add(observation.points, weights[0], [&](std::size_t i, const Eigen::Vector3d& point) {
-      const SurfacePoint nearest = side.sheet.nearest(point, side.hints[k][i]);
-      side.hints[k][i] = nearest.triangle;
-      return nearest;
+      int& triangle = side.nearest[k][i];
+      if (side.search) return side.sheet.on_triangle(triangle, point);
+      const SurfacePoint found = side.sheet.nearest(point, triangle);
+      triangle = found.triangle;
+      return found;
     });
     add(observation.contour, weights[1],
         [&](std::size_t, const Eigen::Vector3d& point) { return side.sheet.nearest_on_border(point); });
@@ -254,10 +247,11 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
   for (Side& side : sides) {
     RegistrationFit& fit = fits.emplace_back();
     fit.registration = side.at(best);
-    for (const Observation& observation : *side.problem.observations) {
-      fit.keyframe_scores.push_back(keyframe_score(*side.problem.motion, observation, fit.registration,
-                                                   objective, side.problem.crop, side.sheet));
-    }
+    if (side.search) side.search(CloudPoints::all, fit.registration, side.nearest);
+    for (std::size_t k = 0; k < side.problem.observations->size(); ++k)
+      fit.keyframe_scores.push_back(keyframe_score(*side.problem.motion, (*side.problem.observations)[k],
+                                                   fit.registration, objective, side.problem.crop, side.sheet,
+                                                   side.search ? &side.nearest[k] : nullptr));
     fit.score = weighted_mean_score(fit.keyframe_scores, *side.problem.observations);
     for (int k = 0; k < kParameters; ++k) {
       const int i = side.index[k];

@@ -2,6 +2,7 @@
 #include <string>
 #include <vector>
 
+#include "sysid/observe/cloud_search.h"
 #include "sysid/observe/score.h"
 #include "sysid/replay/replay.h"
 
@@ -38,6 +39,8 @@ struct RegistrationProblem {
   RegistrationBounds bounds;
   Registration start;  ///< pivot and up are kept, the rest is where the fit starts
   data::CropBox crop{};
+  /// Of the observations' clouds, thinned as the settings say; none: the processor searches.
+  CloudSearches searches = {};
 };
 
 /// Nuisance bounds and pivot of the recording; `replay` and `motion` must outlive it.

@@ -43,12 +43,16 @@ std::array<double, 5> term_weights(const Observation& observation, const Objecti
 }
 
 double keyframe_score(const Motion& motion, const Observation& observation, const Registration& registration,
-                      const Objective& objective, const data::CropBox& crop, SheetDistance& sheet) {
+                      const Objective& objective, const data::CropBox& crop, SheetDistance& sheet,
+                      const std::vector<int>* triangles) {
   const std::array<double, 5> weights = term_weights(observation, objective);
   const double t = observation.t + registration.time_offset;
   data::Points positions;
   surface_at(motion, t, positions);
-  sheet.move(positions);
+  if (triangles != nullptr)
+    sheet.move_border(positions);
+  else
+    sheet.move(positions);
   const Eigen::Isometry3d simulated_from_observed = registration.observed_from_simulated().inverse();
   const auto mean_distance = [&](const data::Points& points, const auto& match) {
     std::vector<double> distances(static_cast<std::size_t>(points.rows()));
@@ -59,7 +63,8 @@ double keyframe_score(const Motion& motion, const Observation& observation, cons
     return robust_mean(distances, objective.robust);
   };
   int hint = -1;
-  const auto on_surface = [&](Eigen::Index, const Eigen::Vector3d& point) {
+  const auto on_surface = [&](Eigen::Index i, const Eigen::Vector3d& point) {
+    if (triangles != nullptr) return sheet.on_triangle((*triangles)[static_cast<std::size_t>(i)], point);
     const SurfacePoint nearest = sheet.nearest(point, hint);
     hint = nearest.triangle;
     return nearest;

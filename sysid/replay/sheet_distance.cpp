@@ -19,14 +19,26 @@ SheetDistance::SheetDistance(const data::Triangles& triangles, const data::Point
 }
 
 void SheetDistance::move(const data::Points& positions) {
-  positions_ = positions;
   surface_.move(positions);
+  move_border(positions);
+}
+
+void SheetDistance::move_border(const data::Points& positions) {
+  positions_ = positions;
   for (BorderEdge& edge : border_) {
     edge.a = positions.row(triangles_(edge.triangle, edge.first));
     edge.ab = positions.row(triangles_(edge.triangle, (edge.first + 1) % 3)).transpose() - edge.a;
     const double squared = edge.ab.squaredNorm();
     edge.inverse_squared = squared > 0 ? 1 / squared : 0;
   }
+}
+
+SurfacePoint SheetDistance::on_triangle(int triangle, const Eigen::Vector3d& query) const {
+  const Eigen::Vector3i corner = triangles_.row(triangle);
+  SurfacePoint result = nearest_on_triangle(query, positions_.row(corner[0]), positions_.row(corner[1]),
+                                            positions_.row(corner[2]));
+  result.triangle = triangle;
+  return result;
 }
 
 SurfacePoint SheetDistance::nearest_on_border(const Eigen::Vector3d& query) const {

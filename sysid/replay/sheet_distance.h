@@ -14,11 +14,19 @@ class SheetDistance {
   SheetDistance(const data::Triangles& triangles, const data::Points& layout);
 
   void move(const data::Points& positions);
+  /// Moves it for all that searches the border alone, or not at all, in less time.
+  void move_border(const data::Points& positions);
 
   /// Nearest point of the surface, as SurfaceDistance::nearest finds it.
   SurfacePoint nearest(const Eigen::Vector3d& query, int hint = -1) const {
     return surface_.nearest(query, hint);
   }
+
+  /// Nearest point of one triangle.
+  SurfacePoint on_triangle(int triangle, const Eigen::Vector3d& query) const;
+
+  /// All triangles, neighbours on the sheet one after the other.
+  std::vector<int> triangles_in_order() const { return surface_.triangles_in_order(); }
 
   /// Nearest point of the border, the edges of one triangle only; triangle -1 where there is no border.
   SurfacePoint nearest_on_border(const Eigen::Vector3d& query) const;

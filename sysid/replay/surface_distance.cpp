@@ -136,6 +136,10 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& query, int hint) co
   return result;
 }
 
+std::vector<int> SurfaceDistance::triangles_in_order() const {
+  return {order_.begin(), order_.begin() + static_cast<std::ptrdiff_t>(slot_of_.size())};
+}
+
 SurfacePoint nearest_on_triangle(const Eigen::Vector3d& query, const Eigen::Vector3d& a,
                                  const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a, ac = c - a, ap = query - a, bp = query - b, cp = query - c;

@@ -36,6 +36,9 @@ class SurfaceDistance {
   /// `hint`: a triangle likely to be near, as the last answer for the same point; it changes speed only.
   SurfacePoint nearest(const Eigen::Vector3d& query, int hint = -1) const;
 
+  /// All triangles, neighbours in the layout one after the other.
+  std::vector<int> triangles_in_order() const;
+
  private:
   const SurfaceKernels* kernels_;
   data::Triangles triangles_;

@@ -1,0 +1,179 @@
+// Nearest triangles of the device beside a search of all, with a formula of its own.
+#ifdef FLASH_HAVE_CUDA
+#include "sim/cuda/nearest_triangles.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <random>
+#include <string>
+
+#include "data/procedural_mesh.h"
+#include "sim/cuda/devices.h"
+
+namespace flash::sim::cuda {
+namespace {
+
+using data::Points;
+using Eigen::Vector3d;
+
+#define SKIP_WITHOUT_DEVICE() \
+  if (const std::string why = why_no_device(); !why.empty()) GTEST_SKIP() << why
+
+double to_segment(const Vector3d& q, const Vector3d& a, const Vector3d& b) {
+  const double length2 = (b - a).squaredNorm();
+  const double s = length2 > 0 ? std::clamp((q - a).dot(b - a) / length2, 0.0, 1.0) : 0.0;
+  return (q - a - s * (b - a)).norm();
+}
+
+/// The plane's foot point where it lies inside, else the nearest of the three edges.
+double to_triangle(const Vector3d& q, const Points& x, const Eigen::RowVector3i& corners) {
+  const Vector3d a = x.row(corners[0]), b = x.row(corners[1]), c = x.row(corners[2]);
+  const double on_edges = std::min({to_segment(q, a, b), to_segment(q, b, c), to_segment(q, c, a)});
+  const Vector3d normal = (b - a).cross(c - a);
+  if (normal.norm() == 0) return on_edges;
+  const Vector3d foot = q - normal * normal.dot(q - a) / normal.squaredNorm();
+  const bool inside = normal.dot((b - a).cross(foot - a)) >= 0 && normal.dot((c - b).cross(foot - b)) >= 0 &&
+                      normal.dot((a - c).cross(foot - c)) >= 0;
+  return inside ? std::min(on_edges, (q - foot).norm()) : on_edges;
+}
+
+/// A mesh, two shapes of it, and what it is searched for.
+struct Scene {
+  std::string name;
+  data::Triangles triangles;
+  std::vector<Points> motion;
+  std::vector<Points> clouds;
+};
+
+/// A sheet that lies in three layers 2 mm apart, and then waves.
+Points folded(const Points& rest) {
+  Points x = rest;
+  for (Eigen::Index i = 0; i < x.rows(); ++i) {
+    const double u = rest(i, 0), third = 0.4 / 3;
+    const int layer = std::min(2, static_cast<int>(u / third));
+    const double along = u - layer * third;
+    x.row(i) << (layer % 2 ? third - along : along), rest(i, 1), 0.002 * layer;
+  }
+  return x;
+}
+Points waving(const Points& rest) {
+  Points x = rest;
+  for (Eigen::Index i = 0; i < x.rows(); ++i)
+    x(i, 2) = 0.05 * std::sin(20 * rest(i, 0)) + 0.03 * std::cos(25 * rest(i, 1));
+  return x;
+}
+
+/// Points on vertices, edges and triangles of a surface, near it, and far away.
+Points around(const Points& x, const data::Triangles& triangles, int count, std::mt19937& random) {
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::normal_distribution<double> normal(0, 1);
+  Points points(count, 3);
+  for (int i = 0; i < count; ++i) {
+    const auto corners =
+        triangles.row(static_cast<Eigen::Index>(uniform(random) * static_cast<double>(triangles.rows())));
+    Vector3d weights(uniform(random), uniform(random), uniform(random));
+    if (i % 4 == 0) weights[0] = 0;       // on an edge
+    if (i % 8 == 0) weights = {0, 0, 1};  // on a vertex
+    weights /= weights.sum();
+    const double away = i % 3 == 0 ? 0 : i % 3 == 1 ? 1e-3 : i % 7 == 0 ? 10 : 0.1;
+    points.row(i) = weights[0] * x.row(corners[0]) + weights[1] * x.row(corners[1]) +
+                    weights[2] * x.row(corners[2]) +
+                    away * Eigen::RowVector3d(normal(random), normal(random), normal(random));
+  }
+  return points;
+}
+
+std::vector<Scene> scenes() {
+  std::mt19937 random(11);
+  std::vector<Scene> all;
+  for (const int cells : {1, 4, 15, 44}) {
+    const data::TriangleMesh mesh =
+        data::rectangle({.width = 0.4, .height = 0.4, .cells_x = cells, .cells_y = cells});
+    all.push_back({"sheet of " + std::to_string(cells),
+                   mesh.triangles,
+                   {folded(mesh.vertices), waving(mesh.vertices)},
+                   {}});
+  }
+  // Triangles without order, some without area, some without extent.
+  std::uniform_real_distribution<double> uniform(-0.3, 0.3);
+  Scene soup{"soup", data::Triangles(500, 3), {Points(300, 3), Points(300, 3)}, {}};
+  for (Points& x : soup.motion) x = x.unaryExpr([&](double) { return uniform(random); });
+  std::uniform_int_distribution<int> vertex(0, 299);
+  for (Eigen::Index t = 0; t < 500; ++t) {
+    soup.triangles.row(t) << vertex(random), vertex(random), vertex(random);
+    if (t % 10 == 0) soup.triangles(t, 2) = soup.triangles(t, 1);
+    if (t % 50 == 0) soup.triangles.row(t).setConstant(vertex(random));
+  }
+  all.push_back(soup);
+  for (Scene& scene : all)
+    for (const int count : {700, 0, 33})
+      scene.clouds.push_back(around(scene.motion[0], scene.triangles, count, random));
+  return all;
+}
+
+TEST(NearestTriangles, AreThoseOfASearchOfAll) {
+  SKIP_WITHOUT_DEVICE();
+  for (const Scene& scene : scenes()) {
+    SCOPED_TRACE(scene.name);
+    std::vector<int> order(static_cast<std::size_t>(scene.triangles.rows()));
+    std::iota(order.begin(), order.end(), 0);
+    const std::vector<Points> few = {Points(0, 3), scene.clouds[2], Points(0, 3)};
+    NearestTriangles search(0, scene.triangles, scene.motion[0].rows(), order, {scene.clouds, few});
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    for (const double turn : {0.0, 0.3}) {
+      pose.linear() = Eigen::AngleAxisd(turn, Vector3d(1, 2, 2) / 3).toRotationMatrix();
+      pose.translation() = Vector3d(0.02, -0.01, 0.005) * turn;
+      const std::vector<BetweenSteps> times = {{0, 1, turn}, {1, 1, 0}, {0, 0, 0}};
+      for (const std::size_t set : {0, 1}) {
+        std::vector<std::vector<int>> nearest;
+        search.find(set, scene.motion, times, pose, nearest);
+        ASSERT_EQ(nearest.size(), 3u);
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Points& cloud = set == 0 ? scene.clouds[k] : few[k];
+          const double s = times[k].fraction;
+          const Points x = (1 - s) * scene.motion[static_cast<std::size_t>(times[k].first)] +
+                           s * scene.motion[static_cast<std::size_t>(times[k].last)];
+          ASSERT_EQ(std::ssize(nearest[k]), cloud.rows());
+          for (Eigen::Index i = 0; i < cloud.rows(); ++i) {
+            const Vector3d q = pose * cloud.row(i).transpose();
+            double least = std::numeric_limits<double>::infinity();
+            for (Eigen::Index t = 0; t < scene.triangles.rows(); ++t)
+              least = std::min(least, to_triangle(q, x, scene.triangles.row(t)));
+            // Squared distances are rounded to 1e-16 of the squares of coordinates, 30 m at most.
+            EXPECT_NEAR(to_triangle(q, x, scene.triangles.row(nearest[k][static_cast<std::size_t>(i)])),
+                        least, 1e-12 * (1 + q.norm()))
+                << "point " << i << " of cloud " << k;
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(NearestTriangles, OfAnotherMotionAreNotThoseOfTheFirst) {
+  SKIP_WITHOUT_DEVICE();
+  const data::TriangleMesh mesh = data::rectangle({.width = 0.4, .height = 0.4, .cells_x = 9, .cells_y = 9});
+  std::vector<int> order(static_cast<std::size_t>(mesh.triangles.rows()));
+  std::iota(order.begin(), order.end(), 0);
+  Points cloud(1, 3);
+  cloud << 0.01, 0.02, 0.1;
+  NearestTriangles search(0, mesh.triangles, mesh.vertices.rows(), order, {{cloud}});
+  Points turned = mesh.vertices;
+  turned.col(0) = 0.4 - mesh.vertices.col(0).array();
+  std::vector<std::vector<int>> first, second, again;
+  search.find(0, {mesh.vertices}, {{0, 0, 0}}, Eigen::Isometry3d::Identity(), first);
+  search.begin_motion();
+  search.find(0, {turned}, {{0, 0, 0}}, Eigen::Isometry3d::Identity(), second);
+  search.begin_motion();
+  search.find(0, {mesh.vertices}, {{0, 0, 0}}, Eigen::Isometry3d::Identity(), again);
+  EXPECT_NE(first, second);
+  EXPECT_EQ(first, again);
+}
+
+}  // namespace
+}  // namespace flash::sim::cuda
+#endif
