@@ -24,7 +24,7 @@ function(flash_install)
   foreach(module data sim)
     install(DIRECTORY ${PROJECT_SOURCE_DIR}/${module} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/flash
             FILES_MATCHING PATTERN "*.h" PATTERN json_reader.h EXCLUDE PATTERN kernels EXCLUDE
-            PATTERN cuda EXCLUDE PATTERN oracle EXCLUDE)
+            PATTERN cuda EXCLUDE)
   endforeach()
   set(destination ${CMAKE_INSTALL_LIBDIR}/cmake/flash)
   set(has_calib OFF)
