@@ -92,7 +92,7 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
     std::printf("  %-28s +- (%.2f, %.2f, %.2f) mm, (%.3f, %.3f, %.3f) deg\n", what, 1e3 * sd[0], 1e3 * sd[1],
                 1e3 * sd[2], kDegrees * sd[3], kDegrees * sd[4], kDegrees * sd[5]);
   };
-  deviations("in the true frames", c.covariance);
+  deviations(extrinsics.pixels ? "in the true frames" : "by scatter alone", c.covariance);
   if (extrinsics.pixels) deviations("repeatable in such poses", c.repeatable);
   if (c.use.value)
     std::printf("for %s: %s %.3g %s\n", calib::to_string(c.use.use), c.use.measure, *c.use.value, c.use.unit);
@@ -117,7 +117,9 @@ void print(const calib::Calibration& c, const calib::Extrinsics& extrinsics) {
     std::printf("joints are farther than they say by");
     for (Eigen::Index i = 0; i < zeros->estimate.size(); ++i)
       std::printf(" %s +- %.3f", fixed(kDegrees * zeros->estimate[i], 3).c_str(), kDegrees * zeros->sd[i]);
-    std::printf(" deg\n");
+    std::printf(
+        " deg; the links were taken as the URDF has them: where they may be off by 0.3 mm, the deviations do "
+        "not hold\n");
   }
   const std::optional<calib::DepthUse>& depth = extrinsics.inputs.depth;
   if (depth && depth->used)

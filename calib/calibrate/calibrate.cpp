@@ -109,15 +109,17 @@ void report_views(Calibration& result) {
   }
 }
 
-/// Of the projected middle of the target against where the view's own pose puts it.
-double centre_rms(const Bundle& bundle, const std::vector<Eigen::Isometry3d>& T_camera_target) {
+/// Of the projected middle of the target against where the view's own pose puts it, by the lens as `stated`,
+/// with which that pose was found.
+double centre_rms(const Bundle& bundle, const data::CameraIntrinsics& stated,
+                  const std::vector<Eigen::Isometry3d>& T_camera_target) {
+  const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics.front()), own = to_vector(stated);
   double sum = 0;
   for (const BundleView& view : bundle.views) {
-    const IntrinsicsVector intrinsics = to_vector(bundle.intrinsics.front());
     const Eigen::Vector3d centre = view.points.rowwise().mean();
     const Eigen::Vector3d true_centre = true_points(bundle, view).rowwise().mean();
     sum += (project(intrinsics, predicted_pose(bundle, view, false) * true_centre) -
-            project(intrinsics, T_camera_target[static_cast<std::size_t>(view.pose)] * centre))
+            project(own, T_camera_target[static_cast<std::size_t>(view.pose)] * centre))
                .squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(bundle.views.size()));
@@ -416,7 +418,7 @@ Calibration solve(Setup setup, const data::CameraIntrinsics& camera, const Eigen
   result.poses = result.comparison.back().poses;
   result.corner_rms = reprojection_rms(bundle, true);
   result.chain_rms = result.comparison.back().px;
-  result.centre_rms = centre_rms(answer_of(result), target_poses(observations));
+  result.centre_rms = centre_rms(answer_of(result), camera, target_poses(observations));
   const double grown = add_systematic(result, sized.systematic);
   if (result.method == Method::pixels) {
     result.covariance = pixels->covariance;

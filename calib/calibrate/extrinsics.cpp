@@ -70,6 +70,7 @@ data::CameraIntrinsics read_lens(const data::JsonObject& lens) {
   camera.height = size.y();
   IntrinsicsVector values = IntrinsicsVector::Zero();
   values.head<2>() = two_numbers(lens, "focal_px");
+  if (!(values.head<2>().array() > 0).all()) throw lens.error("focal_px", "two numbers above 0");
   values.segment<2>(2) = two_numbers(lens, "centre_px");
   const std::vector<double> distortion = numbers(lens, "distortion");
   for (std::size_t i = 0; i < std::min<std::size_t>(8, distortion.size()); ++i)

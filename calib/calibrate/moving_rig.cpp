@@ -82,15 +82,22 @@ BundleSettings judged_with(const Calibration& result) {
   return settings;
 }
 
-/// Of a view in time: -1 for the first of all, 0 for the last.
-double time_of(std::size_t view, std::size_t count) {
-  return static_cast<double>(view) / static_cast<double>(count - 1) - 1;
+/// Of all views in time: -1 for the first, 0 for the last. A copy has the time of what it is a copy of.
+std::vector<double> times_of_views(const Calibration& result) {
+  const std::vector<ViewVerdict>& views = result.selection.views;
+  std::vector<double> times;
+  double count = 0;
+  for (const ViewVerdict& view : views)
+    times.push_back(view.copy_of < 0 ? count++ : times[static_cast<std::size_t>(view.copy_of)]);
+  for (double& time : times) time = time / (count - 1) - 1;
+  return times;
 }
 
+/// Of the views in use.
 std::vector<double> times_of(const Calibration& result) {
+  const std::vector<double> all = times_of_views(result);
   std::vector<double> times;
-  for (const int view : result.used)
-    times.push_back(time_of(static_cast<std::size_t>(view), result.views.size()));
+  for (const int view : result.used) times.push_back(all[static_cast<std::size_t>(view)]);
   return times;
 }
 
@@ -104,11 +111,11 @@ std::vector<Observation> without_drift(std::vector<Observation> views, const Cal
                                        const Drift& drift) {
   const Eigen::Isometry3d& T = drift.camera ? result.poses.X : result.poses.Z;
   const bool in_hand = result.setup == Setup::eye_in_hand;
+  const std::vector<double> times = times_of_views(result);
   for (std::size_t i = 0; i < views.size(); ++i) {
     const double sign = drift.camera == in_hand ? 1 : -1;
     const Eigen::Isometry3d motion =
-        T * moved(Eigen::Isometry3d::Identity(), sign * time_of(i, views.size()) * drift.motion) *
-        T.inverse();
+        T * moved(Eigen::Isometry3d::Identity(), sign * times[i] * drift.motion) * T.inverse();
     Eigen::Isometry3d& G = views[i].T_base_gripper;
     G = drift.camera == in_hand ? G * motion : motion * G;
   }

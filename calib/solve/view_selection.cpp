@@ -38,11 +38,12 @@ void drop_unusable(const std::vector<Observation>& observations, std::vector<Vie
     if (observations[i].T_camera_target.empty()) drop(views[i], "the target was not found");
     for (std::size_t j = 0; j < i && views[i].used; ++j) {
       if (!views[j].used) continue;
-      if (same_pair(observations[i], observations[j])) drop(views[i], "a copy of " + observations[j].image);
-      if (!same_pixels(observations[i], observations[j])) continue;
+      const bool pair = same_pair(observations[i], observations[j]);
+      if (!pair && !same_pixels(observations[i], observations[j])) continue;
       const bool moved_robot = motion_between(observations[i].T_base_gripper, observations[j].T_base_gripper)
                                    .cwiseAbs()
                                    .maxCoeff() > 1e-6;
+      if (!moved_robot) views[i].copy_of = static_cast<int>(j);
       drop(views[i], moved_robot ? "the same picture as " + observations[j].image + ", but another robot pose"
                                  : "a copy of " + observations[j].image);
     }

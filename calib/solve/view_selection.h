@@ -17,6 +17,7 @@ struct ViewVerdict {
   bool used = true;
   std::string reason;   ///< why not
   bool misfit = false;  ///< left out as it does not fit the others
+  int copy_of = -1;     ///< the view of which it is a copy; none: -1
   int symmetry = 0;     ///< by which the points were renumbered
   ClosingError error;
 };

@@ -292,6 +292,7 @@ TEST_P(Traps, CopiesCountOnce) {
   const Calibration twice = calibrated(scene);
   EXPECT_EQ(twice.used.size(), 20U);
   EXPECT_EQ(twice.views[20].reason, "a copy of 0.png");
+  EXPECT_EQ(twice.selection.views[20].copy_of, 0);
   // The seed differs, and noise levels are iterated until the deviance stands still to 1e-3: with 60 numbers
   // each their logarithms are then right to sqrt(1e-3 / 120), and variances to twice that.
   EXPECT_LT((once.covariance - twice.covariance).norm(), 1e-2 * once.covariance.norm());
