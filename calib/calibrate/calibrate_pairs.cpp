@@ -104,12 +104,12 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .held_out = result.held_out});
   check_halves_in_time(result, loops);
   finish(result, observations);
-  if (compared.size() < loops.size())
-    result.warnings.push_back("other methods are compared on " + std::to_string(compared.size()) + " of " +
-                              std::to_string(loops.size()) + " pairs, evenly spread");
   result.warnings.emplace_back(
       "pairs of poses tell the scatter alone: what the errors of an arm's model have in common is not in the "
       "stated standard deviations; pictures tell of it");
+  if (compared.size() < loops.size())
+    result.warnings.push_back("other methods are compared on " + std::to_string(compared.size()) + " of " +
+                              std::to_string(loops.size()) + " pairs, evenly spread");
   return result;
 }
 
