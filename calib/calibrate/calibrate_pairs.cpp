@@ -36,24 +36,30 @@ HeldOut hold_out_pairs(const std::vector<PoseLoop>& loops, int folds, const Fit&
   return held;
 }
 
-/// First and second half of the pairs, each solved by itself: where they put the camera and the target must
-/// agree, or something moved meanwhile.
-void check_halves_in_time(Calibration& result, const std::vector<PoseLoop>& loops) {
+/// Halves of the pairs in time and by the gripper's places, each solved by itself: where they put the camera
+/// must agree, and in time the target too. Else something moved meanwhile, or the robot errs by its pose.
+void check_halves(Calibration& result, const std::vector<PoseLoop>& loops,
+                  const std::vector<Eigen::Vector3d>& places) {
   constexpr std::size_t kEnough = 16;
   if (loops.size() < kEnough) return;
-  const auto middle = loops.begin() + static_cast<std::ptrdiff_t>(loops.size() / 2);
-  const auto solved = [&](const std::vector<PoseLoop>& half) {
-    return fit_pose_space(half, better_of(half, shah(half), result.poses));
-  };
-  const PoseSpaceFit first = solved({loops.begin(), middle}), second = solved({middle, loops.end()});
-  const auto check = [&](const Eigen::Isometry3d& before, const Eigen::Isometry3d& after, Eigen::Index at) {
-    SplitCheck halves{.split = Split::consecutive, .apart = motion_between(before, after)};
-    const Matrix6d covariance = (first.covariance + second.covariance).block<6, 6>(at, at);
-    halves.chi_square = halves.apart.dot(covariance.ldlt().solve(halves.apart));
-    return halves;
-  };
-  const std::vector<SplitCheck> checks = {check(first.poses.X, second.poses.X, 0),
-                                          check(first.poses.Z, second.poses.Z, 6)};
+  std::vector<SplitCheck> checks;
+  for (const Split split : {Split::consecutive, Split::place_1, Split::place_2, Split::place_3}) {
+    const std::vector<int> half = halves_of(places, split);
+    std::vector<PoseLoop> parts[2];
+    for (std::size_t i = 0; i < loops.size(); ++i) parts[half[i]].push_back(loops[i]);
+    PoseSpaceFit fits[2];
+    for (int k = 0; k < 2; ++k)
+      fits[k] = fit_pose_space(parts[k], better_of(parts[k], shah(parts[k]), result.poses));
+    const auto check = [&](const Eigen::Isometry3d& before, const Eigen::Isometry3d& after, Eigen::Index at) {
+      SplitCheck halves{.split = split, .apart = motion_between(before, after)};
+      const Matrix6d covariance = (fits[0].covariance + fits[1].covariance).block<6, 6>(at, at);
+      halves.chi_square = halves.apart.dot(covariance.ldlt().solve(halves.apart));
+      return halves;
+    };
+    checks.push_back(check(fits[0].poses.X, fits[1].poses.X, 0));
+    if (split == Split::consecutive) checks.push_back(check(fits[0].poses.Z, fits[1].poses.Z, 6));
+  }
+  const SplitCheck* const target = &checks[1];
   result.splits = {checks.front()};
   const SplitCheck* worst = nullptr;
   result.covariance_factor = split_inflation(checks, &worst);
@@ -67,7 +73,7 @@ void check_halves_in_time(Calibration& result, const std::vector<PoseLoop>& loop
       "%s put the %s at places %.1f mm and %.2f deg apart, more than noise explains: camera or target "
       "moved meanwhile, or the robot's errors depend on its pose; the stated standard deviations were "
       "raised by %.1f",
-      describe(worst->split).c_str(), worst == checks.data() ? "camera" : "target",
+      describe(worst->split).c_str(), worst == target ? "target" : "camera",
       1e3 * worst->apart.head<3>().norm(), worst->apart.tail<3>().norm() * 180 / M_PI,
       std::sqrt(result.covariance_factor));
   result.warnings.emplace_back(text);
@@ -102,7 +108,10 @@ Calibration calibrate_pairs(Setup setup, const std::vector<Observation>& all,
                                .poses = fit.poses,
                                .relative = relative_rms(compared, fit.poses.X),
                                .held_out = result.held_out});
-  check_halves_in_time(result, loops);
+  std::vector<Eigen::Vector3d> places;
+  for (const Observation& observation : observations)
+    places.push_back(observation.T_base_gripper.translation());
+  check_halves(result, loops, places);
   finish(result, observations);
   result.warnings.emplace_back(
       "pairs of poses tell the scatter alone: what the errors of an arm's model have in common is not in the "

@@ -48,18 +48,25 @@ std::vector<int> halves_of(const Bundle& bundle, Split split) {
       poses.push_back(i);
       places.emplace_back(bundle.poses[i].T_base_gripper.translation());
     }
-    if (poses.empty()) continue;
-    const std::vector<double> order = order_of(places, split);
-    std::vector<std::size_t> rank(poses.size());
-    for (std::size_t i = 0; i < rank.size(); ++i) rank[i] = i;
-    std::stable_sort(rank.begin(), rank.end(),
-                     [&](std::size_t a, std::size_t b) { return order[a] < order[b]; });
-    for (std::size_t i = rank.size() / 2; i < rank.size(); ++i) half[poses[rank[i]]] = 1;
+    const std::vector<int> own = halves_of(places, split);
+    for (std::size_t i = 0; i < own.size(); ++i) half[poses[i]] = own[i];
   }
   return half;
 }
 
 }  // namespace
+
+std::vector<int> halves_of(const std::vector<Eigen::Vector3d>& places, Split split) {
+  if (places.empty()) return {};
+  const std::vector<double> order = order_of(places, split);
+  std::vector<std::size_t> rank(places.size());
+  for (std::size_t i = 0; i < rank.size(); ++i) rank[i] = i;
+  std::stable_sort(rank.begin(), rank.end(),
+                   [&](std::size_t a, std::size_t b) { return order[a] < order[b]; });
+  std::vector<int> half(places.size(), 0);
+  for (std::size_t i = rank.size() / 2; i < rank.size(); ++i) half[rank[i]] = 1;
+  return half;
+}
 
 SplitCheck check_halves(const Refinement& refined, const BundleSettings& settings, Split split,
                         std::size_t base) {
@@ -94,8 +101,8 @@ std::vector<SplitCheck> check_systematic(const Refinement& refined, const Bundle
 }
 
 double split_inflation(const std::vector<SplitCheck>& checks, const SplitCheck** worst) {
-  // Chi-square with 6 degrees of freedom at 0.95, and at 1 - 0.05 / 4 for four splits.
-  const double limit = checks.size() > 1 ? 16.245 : 12.592;
+  // Chi-square with 6 degrees of freedom at 0.95, at 1 - 0.05 / 4 for four splits, and at 1 - 0.05 / 5.
+  const double limit = checks.size() > 4 ? 16.812 : checks.size() > 1 ? 16.245 : 12.592;
   const auto largest = std::max_element(
       checks.begin(), checks.end(), [](const auto& a, const auto& b) { return a.chi_square < b.chi_square; });
   if (largest == checks.end() || largest->chi_square <= limit) return 1;

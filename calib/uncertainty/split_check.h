@@ -22,6 +22,9 @@ struct SplitCheck {
   double chi_square = 0;              ///< of it under the stated uncertainty, 6 degrees of freedom
 };
 
+/// 0 or 1 for each gripper place of one arm, in the order of its poses [m].
+std::vector<int> halves_of(const std::vector<Eigen::Vector3d>& places, Split split);
+
 /// base: of the arm whose base is compared; 0: the first camera.
 SplitCheck check_halves(const Refinement& refined, const BundleSettings& settings, Split split,
                         std::size_t base = 0);
@@ -32,7 +35,7 @@ std::vector<SplitCheck> check_systematic(const Refinement& refined, const Bundle
 
 /// By how much a covariance has to grow to be true to halves that should agree: the largest chi-square over
 /// its 6 degrees of freedom, where it lies beyond what the best of that many agreeing splits passes once in
-/// twenty (Bonferroni); otherwise 1. `worst` names the split.
+/// twenty (Bonferroni, at most five); otherwise 1. `worst` names the split.
 double split_inflation(const std::vector<SplitCheck>& checks, const SplitCheck** worst = nullptr);
 
 const char* to_string(Split split);  ///< the names above
