@@ -11,6 +11,7 @@ SCENES ?= 1000
 ROUND ?= 0.3
 MESHES ?= 0.3
 RUNS ?= 20
+KIND ?= lift
 
 PYTHON ?= /usr/bin/python3
 REFERENCE ?= tests/reference
@@ -70,9 +71,9 @@ routes: configure-test  ## Say whether every route to an answer gives the same o
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/routes.py --sysid $(sysid) --out $(BUILD)/routes
 
-coverage: configure-test  ## Say whether intervals hold the truth of RUNS strips from SEED on, and of as many that the model is wrong of
+coverage: configure-test  ## Say whether intervals hold the truth of RUNS twins from SEED on, of KIND lift, drape or bar_pull
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
-	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage --seed $(SEED) --runs $(RUNS)
+	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage_$(KIND) --kind $(KIND) --seed $(SEED) --runs $(RUNS)
 
 other-simulators: configure-test  ## Search the lifts that other simulators made, from $(DATA)/twin, and say what holds
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid

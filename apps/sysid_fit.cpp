@@ -106,12 +106,6 @@ std::vector<sysid::Axis> held_axes(const sysid::GridSettings& grid) {
   return held;
 }
 
-// "sheet:0.2x0.2:0.02 (121 vertices)".
-std::string mesh_of(const sysid::Summary& found) {
-  const auto mesh = found.settings.find("mesh");
-  return mesh == found.settings.end() ? "" : mesh->second.substr(0, mesh->second.rfind(" ("));
-}
-
 // What differs from the search, whose grasps, times and tolerances are not taken over by themselves.
 std::vector<std::string> other_settings(const std::string& start, const sysid::Fingerprint& print) {
   const sysid::GridFile search = sysid::load_grid_file((fs::path(start) / "grid.json").string());
@@ -161,7 +155,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);
   replay.element_order = asset.element_order;
   place_simulation(options.common, asset, replay);
-  if (replay.mesh.empty()) replay.mesh = mesh_of(found.summary);
+  if (replay.mesh.empty()) replay.mesh = sysid::mesh_of(found.summary);
   std::vector<sysid::Replay> replays;
   std::vector<std::string> names;
   for (const data::Recording& recording : recordings) {

@@ -6,6 +6,7 @@
 #include "data/text.h"
 #include "sysid/emulate/focused_axes.h"
 #include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/agreement.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/verdict.h"
@@ -427,6 +428,13 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         "more values");
 
   warn_of_held(task, found->look.likelihood, found->errors, answer.warnings);
+  if (replays.size() > 1) {
+    std::vector<std::string> names;
+    for (const Replay& replay : replays) names.push_back(replay.recording.name);
+    const Agreement agreement = agreement_of(found->emulator, found->axes, found->look.likelihood, usable);
+    if (std::string text = contradiction_text(agreement, found->axes, names); !text.empty())
+      answer.warnings.push_back(std::move(text));
+  }
 
   Posterior posterior = found->look.posterior;
   answer.values = posterior.values();

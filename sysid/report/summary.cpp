@@ -348,6 +348,11 @@ double duration_of(const SummaryRecording& recording) {
   return std::max(0.0, last - first);
 }
 
+std::string mesh_of(const Summary& summary) {
+  const auto mesh = summary.settings.find("mesh");  // "sheet:0.2x0.2:0.02 (121 vertices)"
+  return mesh == summary.settings.end() ? "" : mesh->second.substr(0, mesh->second.rfind(" ("));
+}
+
 bool model_fits(const SummaryRecording& recording) {
   constexpr double kTold = 1e-5;  // [m]
   const Misfit& misfit = recording.misfit;

@@ -88,6 +88,9 @@ struct Summary {
   int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used
 };
 
+/// The specification of the mesh that was searched, or its file; empty where an earlier program did not say.
+std::string mesh_of(const Summary& summary);
+
 /// The text of summary.json. Its last field, `digest`, covers the others: 16 digits of a SHA-256.
 std::string summary_text(const Summary& summary);
 

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
-"""Whether the stated intervals hold the truth: a strip of cells of 6.25 mm searched for E t, D and friction in
-recordings of one of 1.6 mm and a quarter of the step, with unknown registration and clock. A second half has an error that the model does not know of."""
+"""Whether the stated intervals hold the truth: cloth of cells of 6.25 mm (of a pull, 25) searched in recordings of one of a
+quarter of the cell or less and a quarter of the step, with unknown registration and clock. A second half has an error that the
+model does not know of."""
 import argparse
+import dataclasses
 import json
 import math
 import pathlib
@@ -15,18 +17,69 @@ import runs as kept
 import synthetic
 
 BOUNDS = {"offset_m": [0.01, 0.01, 0.01], "yaw_rad": 0.02, "time_s": 0.03}
-RANGES = {"young": (3, 30, 5), "bending": (5e-5, 2e-3, 7), "friction": (0.15, 0.6, 4)}  # lowest, highest, values
-WRONG = ("damping", "grasp", "weight", "depth", "clock", "diagonals")
+
+
+@dataclasses.dataclass(frozen=True)
+class Kind:
+    """An experiment: what is recorded, what is searched, and what may be wrong."""
+    motion: tuple
+    truth: str  # mesh, and that of the searches
+    searched: str
+    ranges: dict  # lowest, highest, values
+    wrong: tuple
+    held: tuple = ()
+
+
+STRIP = {"young": (3, 30, 5), "bending": (5e-5, 2e-3, 7), "friction": (0.15, 0.6, 4)}
+STRIP_WRONG = ("damping", "grasp", "weight", "depth", "clock", "diagonals")
+
+
+def moved(motion, **values):
+    """Words of a motion with other values of its options."""
+    words = list(motion)
+    for name, value in values.items():
+        at = next(i for i, word in enumerate(words) if word.split("=")[0] == f"--{name}")
+        if "=" in words[at]:
+            words[at] = f"--{name}={value}"
+        else:
+            words[at + 1] = value
+    return tuple(words)
+
+
+KINDS = {
+    "lift": Kind(synthetic.LIFT, synthetic.TRUTH, synthetic.FIT, STRIP, STRIP_WRONG),
+    # Held level by its end, lifted off the table: it hangs over as in a cantilever test.
+    "drape": Kind((*moved(synthetic.LIFT, displacement="0,0,0.25"), "--rest", "0.5"), synthetic.TRUTH, synthetic.FIT, STRIP, STRIP_WRONG),
+    # Two opposite sides held, one of them drawn away, its force measured.
+    "bar_pull": Kind(synthetic.BAR, synthetic.BAR_MESH, "sheet:0.3x0.3:0.025",
+                     {"young": (20, 200, 5), "poisson": (0.05, 0.45, 5)}, ("damping", "weight", "depth", "clock", "diagonals"),
+                     ("--hold", "friction=0.3:measured")),
+}
 TRUTH_STEP = "0.0025"  # of time: a quarter of that of the searches, as cloth takes none [s]
 NORMAL = 1.96  # half width of 95 % over the standard deviation
 WEIGHT, SCALES = 0.2, 0.004  # areal density as weighed and its standard deviation [kg/m^2]
-USUAL = {"young": (10, 2000), "bending": (1.1e-6, 1.1e-4), "friction": (0.1, 1)}  # against which bits count (verdict.cpp)
+USUAL = {"young": (10, 2000), "bending": (1.1e-6, 1.1e-4), "friction": (0.1, 1), "poisson": (0, 0.5)}  # against which bits count (verdict.cpp)
 
 
-def truth_of(seed):
-    """Log-uniform over the searched range."""
+def is_logarithmic(name):
+    return name != "poisson"
+
+
+def coordinate(name, value):
+    """In which a parameter is even over its range."""
+    return math.log(value) if is_logarithmic(name) else value
+
+
+def truth_of(kind, seed):
+    """Even over the searched range."""
     draw = random.Random(seed)
-    return {name: low * (high / low) ** draw.random() for name, (low, high, _) in RANGES.items()}
+    return {name: low * (high / low) ** draw.random() if is_logarithmic(name) else low + (high - low) * draw.random()
+            for name, (low, high, _) in kind.ranges.items()}
+
+
+def axes(kind):
+    return [word for name, (low, high, count) in kind.ranges.items()
+            for word in (f"--{name}", f"{low}:{high}:{count}" + (":log" if is_logarithmic(name) else ""))]
 
 
 def rewrite_points(path, change):
@@ -55,21 +108,21 @@ def spoil_clock(recording, seed):
     path.write_text(json.dumps(record))
 
 
-def recorded(runs, asset, seed, wrong):
-    """A recording of a strip of the seed's material; `wrong`: what the model is not told of."""
+def recorded(runs, asset, kind, seed, wrong):
+    """A recording of cloth of the seed's material; `wrong`: what the model is not told of."""
     draw = random.Random(-seed)
     name = f"recording_{seed}_{wrong or 'right'}"
     fresh = not (runs.out / name / "recording.json").exists()
-    words = list(synthetic.LIFT)
-    fixed = dict(truth_of(seed))
-    mesh = synthetic.TRUTH
+    words = kind.motion
+    fixed = dict(truth_of(kind, seed))
+    mesh = kind.truth
     if wrong == "damping":
         fixed["air_drag"] = 2.0
     if wrong == "grasp":
-        words[words.index("--grasp-within") + 1] = "0.0551"
+        words = moved(words, **{"grasp-within": "0.0551"})
     fixed["areal_density"] = 1.1 * WEIGHT if wrong == "weight" else round(draw.gauss(WEIGHT, SCALES), 5)
     if wrong == "diagonals":
-        mesh = synthetic.FIT + ":alternating_by_row"
+        mesh = kind.searched + ":alternating_by_row"
     offset = ",".join(f"{draw.gauss(0, 0.003):.5f}" for _ in range(3))
     recording = runs.synth(name, asset, "--mesh", mesh, *words, "--time-step", TRUTH_STEP, "--seed", str(seed), f"--offset-error={offset}",
                            f"--time-offset-error={draw.gauss(0, 0.01):.5f}", *synthetic.settings(fixed))
@@ -85,12 +138,13 @@ def recorded(runs, asset, seed, wrong):
     return recording
 
 
-def searched(runs, asset, seed, wrong=None):
-    recording = recorded(runs, asset, seed, wrong)
+def searched(runs, asset, kind, seed, wrong=None):
+    recording = recorded(runs, asset, kind, seed, wrong)
+    slopes = ("--clamp-slopes",) if "--clamp-slopes" in kind.motion else ()
     weighed = () if wrong == "weight" else ("--hold", f"areal_density={WEIGHT}+-{SCALES}:measured")
-    summary = runs.grid(f"run_{seed}_{wrong or 'right'}", [recording], "--asset", asset, "--mesh", synthetic.FIT, "--clamp-slopes",
-                        *synthetic.axes(RANGES), *weighed, "--no-plan", "--rollouts", str(runs.out / "motions"))
-    return {"seed": seed, "wrong": wrong, "truth": truth_of(seed), "parameters": summary["parameters"],
+    summary = runs.grid(f"run_{seed}_{wrong or 'right'}", [recording], "--asset", asset, "--mesh", kind.searched, *slopes,
+                        *axes(kind), *kind.held, *weighed, "--no-plan", "--rollouts", str(runs.out / "motions"))
+    return {"seed": seed, "wrong": wrong, "truth": truth_of(kind, seed), "parameters": summary["parameters"],
             "noise": summary["recordings"][0]["noise_m"],
             "told": any(not r["model_fits"] for r in summary["recordings"]), "recording": recording}
 
@@ -107,18 +161,18 @@ def meshes(runs, twin, name, parameters):
     return numpy.array(vertices), faces
 
 
-def least_spread(runs, twin):
+def least_spread(runs, kind, twin):
     """Standard deviation of the logarithm of each parameter by Cramer and Rao: all points, white noise along the normal, the
     truth's own cells, registration and clock unknown, the weight to what the scales tell, ranges known."""
     step, name = 0.02, f"bound_{twin['seed']}"
     middle, faces = meshes(runs, twin, name, twin["truth"])
     rates = []
-    for parameter in RANGES:
+    for parameter in kind.ranges:
         ends = []
         for sign in (-1, 1):
-            moved = dict(twin["truth"])
-            moved[parameter] *= math.exp(sign * step)
-            ends.append(meshes(runs, twin, f"{name}_{parameter}_{sign}", moved)[0])
+            other = dict(twin["truth"])
+            other[parameter] *= math.exp(sign * step)
+            ends.append(meshes(runs, twin, f"{name}_{parameter}_{sign}", other)[0])
         rates.append((ends[1] - ends[0]) / (2 * step))
     record = json.loads((twin["recording"] / "recording.json").read_text())
     times = [frame["t"] for frame in record["keyframes"]]
@@ -136,25 +190,25 @@ def least_spread(runs, twin):
         normals /= numpy.linalg.norm(normals, axis=1, keepdims=True)
         nearest = ((points[:, None, :] - x[None]) ** 2).sum(-1).argmin(1)
         n = normals[nearest]
-        moved = dict(zip(RANGES, [(rate[k][nearest] * n).sum(1) for rate in rates]))
-        weight = -(moved["young"] + moved["bending"])  # motion knows stiffness over weight alone
+        changes = dict(zip(kind.ranges, [(rate[k][nearest] * n).sum(1) for rate in rates]))
+        weight = -(changes["young"] + changes["bending"])  # motion knows stiffness over weight alone
         x_rel = x[nearest] - middle.mean((0, 1))
         yaw = x_rel[:, 0] * n[:, 1] - x_rel[:, 1] * n[:, 0]
-        rows.append(numpy.column_stack([*moved.values(), n, yaw, (speeds[k][nearest] * n).sum(1), weight]))
+        rows.append(numpy.column_stack([*changes.values(), n, yaw, (speeds[k][nearest] * n).sum(1), weight]))
     rows = numpy.concatenate(rows)
     information = rows.T @ rows / twin["noise"] ** 2
-    widths = [math.log(high / low) for low, high, _ in RANGES.values()]
+    widths = [math.log(high / low) for low, high, _ in kind.ranges.values()]
     widths += [2 * bound for bound in (*BOUNDS["offset_m"], BOUNDS["yaw_rad"], BOUNDS["time_s"])]
     priors = [*(12 / numpy.square(widths)), (WEIGHT / SCALES) ** 2]  # even over each range; the weight as weighed
     information += numpy.diag(priors)
     scale = 1 / numpy.sqrt(numpy.diag(information))
     spread = numpy.sqrt(numpy.diag(numpy.linalg.inv(information * numpy.outer(scale, scale)))) * scale
-    return dict(zip(RANGES, spread))
+    return dict(zip(kind.ranges, spread))
 
 
-def could_claim(name, truth, spread):
+def could_claim(kind, name, truth, spread):
     """Whether an interval of the Cramer-Rao width about the truth would be a claim, by the rules of verdict.cpp."""
-    (first, last), (least, most) = (tuple(map(math.log, ends[:2])) for ends in (RANGES[name], USUAL[name]))
+    (first, last), (least, most) = (tuple(map(math.log, ends[:2])) for ends in (kind.ranges[name], USUAL[name]))
     low, high = (math.log(truth) + side * NORMAL * spread for side in (-1, 1))
     open_below, open_above = low < first, high > last
     low = min(least, max(low, first)) if open_below else low
@@ -162,10 +216,10 @@ def could_claim(name, truth, spread):
     return not (open_below and open_above) and 2 * (high - low) < most - least
 
 
-def interval_score(finding, truth):
-    """Of the logarithm (Gneiting and Raftery 2007): the width, and 40 times what the truth lies outside."""
-    low, high = (math.log(end) for end in finding["interval95"])
-    x = math.log(truth)
+def interval_score(name, finding, truth):
+    """Of the logarithm, of nu itself (Gneiting and Raftery 2007): the width, and 40 times what the truth lies outside."""
+    low, high = (coordinate(name, end) for end in finding["interval95"])
+    x = coordinate(name, truth)
     return high - low + 40 * (max(0, low - x) + max(0, x - high))
 
 
@@ -174,11 +228,11 @@ def median(values):
     return values[len(values) // 2] if values else math.nan
 
 
-def print_right(twins, bounds):
+def print_right(kind, twins, bounds):
     print("\nThe model is right\n")
     print(f"{'':10} {'twins':>6} {'claims':>7} {'two-sided held':>15} {'one-sided held':>15} {'score':>7} {'width / bound':>14}"
           f" {'the bound would claim':>22}")
-    for name in RANGES:
+    for name in kind.ranges:
         sides = {True: [], False: []}
         for twin in twins:
             finding = twin["parameters"][name]
@@ -188,20 +242,20 @@ def print_right(twins, bounds):
         shares = [f"{sum(h for h, _, _ in sides[two])} of {len(sides[two])}" for two in (True, False)]
         ratios = [math.log(f["interval95"][1] / f["interval95"][0]) / (2 * NORMAL * bounds[twin["seed"]][name])
                   for _, twin, f in sides[True] if twin["seed"] in bounds]
-        score = numpy.mean([interval_score(twin["parameters"][name], twin["truth"][name]) for twin in twins])
+        score = numpy.mean([interval_score(name, twin["parameters"][name], twin["truth"][name]) for twin in twins])
         bounded = [twin for twin in twins if twin["seed"] in bounds]
-        claims = sum(could_claim(name, twin["truth"][name], bounds[twin["seed"]][name]) for twin in bounded)
+        claims = sum(could_claim(kind, name, twin["truth"][name], bounds[twin["seed"]][name]) for twin in bounded)
         print(f"{name:10} {len(twins):6} {len(sides[True]) + len(sides[False]):7} {shares[0]:>15} {shares[1]:>15} {score:7.2f} "
               f"{median(ratios):14.2f} {f'{claims} of {len(bounded)}':>22}")
 
 
-def print_wrong(twins):
+def print_wrong(kind, twins):
     print("\nThe model is wrong: a claim holds, or the answer says that the model does not fit\n")
-    print(f"{'':12} {'twins':>6} {'told':>6} " + " ".join(f"{name + ' held or told':>24}" for name in RANGES))
-    for wrong in (*WRONG, None):
+    print(f"{'':12} {'twins':>6} {'told':>6} " + " ".join(f"{name + ' held or told':>24}" for name in kind.ranges))
+    for wrong in (*kind.wrong, None):
         of_kind = [twin for twin in twins if wrong is None or twin["wrong"] == wrong]
         cells = []
-        for name in RANGES:
+        for name in kind.ranges:
             held = [synthetic.holds(twin["parameters"][name], twin["truth"][name]) for twin in of_kind]
             claimed = [h or twin["told"] for h, twin in zip(held, of_kind) if h is not None]
             cells.append(f"{sum(claimed)} of {len(claimed)} claims")
@@ -213,27 +267,30 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sysid", required=True, help="the program flash-sysid")
     parser.add_argument("--out", required=True, type=pathlib.Path)
+    parser.add_argument("--kind", choices=KINDS, default="lift", help="the experiment")
     parser.add_argument("--seed", type=int, default=9001, help="of the first twin; the others follow")
     parser.add_argument("--runs", type=int, default=20, help="twins of each half")
-    parser.add_argument("--bounds", type=int, help="twins whose Cramer-Rao widths are computed; without it, all")
+    parser.add_argument("--bounds", type=int, help="twins whose Cramer-Rao widths are computed; without it, all; of a pull none, "
+                                                  "as they are of points alone")
     parser.add_argument("--jobs", type=int, default=2, help="searches at a time; the same command again goes on where it stopped")
     parser.add_argument("--threads", type=int, help="of each search; without it, as many as there are processors")
     parser.add_argument("--minutes", type=float, help="after which no search is begun: the tables are of what was done by then")
     options = parser.parse_args()
+    kind = KINDS[options.kind]
     runs = kept.Runs(options.sysid, options.out, options.threads)
     asset = synthetic.write_asset(options.out)
     seeds = range(options.seed, options.seed + options.runs)
-    jobs = [(seed, None) for seed in seeds] + [(seed, WRONG[i % len(WRONG)]) for i, seed in enumerate(seeds)]
+    jobs = [(seed, None) for seed in seeds] + [(seed, kind.wrong[i % len(kind.wrong)]) for i, seed in enumerate(seeds)]
     jobs = [job for pair in zip(jobs[:options.runs], jobs[options.runs:]) for job in pair]
     begin = time.monotonic()
-    found = [searched(kept.Runs(options.sysid, options.out), asset, *jobs[0])]  # fills the store
+    found = [searched(kept.Runs(options.sysid, options.out), asset, kind, *jobs[0])]  # fills the store
 
     def done(job):
-        twin = searched(runs, asset, *job)
-        bound = least_spread(runs, twin) if not twin["wrong"] and twin["seed"] in bounded else None
+        twin = searched(runs, asset, kind, *job)
+        bound = least_spread(runs, kind, twin) if not twin["wrong"] and twin["seed"] in bounded else None
         return twin, bound
 
-    bounded = seeds[:options.bounds]
+    bounded = seeds[:0 if options.kind == "bar_pull" else options.bounds]
     left = None if options.minutes is None else options.minutes - (time.monotonic() - begin) / 60
     bounds = {}
     for _, (twin, bound) in kept.each_in_time(done, jobs[1:], options.jobs, left):
@@ -241,13 +298,13 @@ def main():
         if bound is not None:
             bounds[twin["seed"]] = bound
     if found[0]["seed"] in bounded:
-        bounds[found[0]["seed"]] = least_spread(runs, found[0])
+        bounds[found[0]["seed"]] = least_spread(runs, kind, found[0])
     rows = [twin | {"recording": str(twin["recording"]), "bounds": bounds.get(twin["seed"]) if not twin["wrong"] else None}
             for twin in sorted(found, key=lambda twin: (twin["seed"], twin["wrong"] or ""))]
     (options.out / "coverage.json").write_text(json.dumps(rows, indent=1))
-    print(f"\nseeds {seeds.start} to {seeds.stop - 1}, {len(found)} of {len(jobs)} searched")
-    print_right([twin for twin in found if not twin["wrong"]], bounds)
-    print_wrong([twin for twin in found if twin["wrong"]])
+    print(f"\n{options.kind}, seeds {seeds.start} to {seeds.stop - 1}, {len(found)} of {len(jobs)} searched")
+    print_right(kind, [twin for twin in found if not twin["wrong"]], bounds)
+    print_wrong(kind, [twin for twin in found if twin["wrong"]])
     return 0
 
 

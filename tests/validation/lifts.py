@@ -1,5 +1,7 @@
 """The recorded lifts: what fits them, what one trial says about the other, what is left."""
 import json
+import math
+import shutil
 
 MESH = "sheet:0.278x0.278:0.02"
 MEDIAN_FABRIC = 1.4e-5  # flexural rigidity of a median fabric at 0.2 kg/m^2 [N m]
@@ -88,6 +90,7 @@ def predict(runs, data, asset, source, search, target):
     common = ["--asset", asset, *window(target), *options]
     recording = data / "lift" / target
     return {"predicted": runs.replay(f"{target}/from_{source}", recording, parameters, *common),
+            "band": runs.predict(f"{target}/band_from_{source}", f"{source}/material", recording, *common),
             "median": runs.replay(f"{target}/median_fabric", recording,
                                   {**parameters, "bending": MEDIAN_FABRIC}, *common)}
 
@@ -104,6 +107,44 @@ def fit_pair(runs, data, asset, pair, search):
     return joint
 
 
+def turned(runs, name, recording, yaw):
+    """The recording with its sheet turned about where the gripper starts, as a start yaw does."""
+    folder = runs.out / name
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(recording, folder)
+    path = folder / "recording.json"
+    path.chmod(0o644)
+    record = json.loads(path.read_text())
+    pose = record["object"]["start"]["T_base_object"]
+    first = (folder / record["trajectories"]["gripper"]).read_text().split("\n")
+    pivot = [float(word) for word in next(line for line in first if line.strip() and not line.startswith("#")).split()[1:4]]
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, y = pose[0] - pivot[0], pose[1] - pivot[1]
+    half_c, half_s = math.cos(yaw / 2), math.sin(yaw / 2)
+    qx, qy, qz, qw = pose[3:]
+    record["object"]["start"]["T_base_object"] = [
+        pivot[0] + c * x - s * y, pivot[1] + s * x + c * y, pose[2],
+        half_c * qx - half_s * qy, half_c * qy + half_s * qx, half_c * qz + half_s * qw, half_c * qw - half_s * qz]
+    path.write_text(json.dumps(record, indent=1))
+    return folder
+
+
+def lifts_and_fold(runs, data, asset, material, folded):
+    """One D for the two lifts of paper, for the fold, and for all three; what the lifts say of the fold. Each recording lies as
+    its own search found it, in the grasp of the first."""
+    grasp = GRASPS[material["lift_paper"]["grasp"]]
+    lying = [turned(runs, f"turned/{clip}", data / "lift" / clip, material[clip]["best"]["parameters"]["start_yaw"])
+             for clip in PAIRS["paper"]]
+    lying.append(turned(runs, "turned/fold_paper", folded["recording"], folded["search"]["best"]["parameters"]["start_yaw"]))
+    options = ["--asset", asset, *window("fold_paper"), *grasp]
+    found = {}
+    for name, recordings in (("lifts", lying[:2]), ("fold", lying[2:]), ("all", lying)):
+        found[name] = runs.grid(f"one_bending/{name}", recordings, *options, "--bending", "2e-5:4e-3:9:log", "--repeatability",
+                                "0.0028", "--no-solver-check")
+    found["band"] = runs.predict("one_bending/fold_from_lifts", "one_bending/lifts", lying[2], *options)
+    return found
+
+
 def fold(runs, data, asset, joint):
     """The paper towel folded: what the D of the lifts, stiffer and softer ones make of another motion. The
     recording's start pose points away from its clouds, so it is made anew from clouds and path."""
@@ -116,7 +157,7 @@ def fold(runs, data, asset, joint):
     values = sorted({MEDIAN_FABRIC, 1e-4, 2.5e-4, from_lifts})
     search = runs.grid("fold_paper", [recording], "--asset", asset, *window("fold_paper"), *GRASPS[joint["grasp"]],
                        "--bending", ",".join(map(repr, values)), "--start-yaw=-0.3,-0.2,-0.1,0", "--no-solver-check")
-    return {"search": search, "from_lifts": from_lifts,
+    return {"recording": recording, "search": search, "from_lifts": from_lifts,
             "by_bending": {value: best_row(search["rows"], bending=value) for value in values}}
 
 

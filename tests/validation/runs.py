@@ -43,6 +43,14 @@ class Runs:
             (folder / "score.json").write_text(text)
         return json.loads((folder / "score.json").read_text())
 
+    def predict(self, name, run, recording, *options):
+        """What the search `run` expects of a recording that it has not used, and what was observed."""
+        folder = self.out / name
+        command = ["predict", str(self.out / run), str(recording), *options, "--quiet", "-o", str(folder / "prediction.json")]
+        if not self._done(folder, command, "prediction.json"):
+            self._call(folder, command, ["--force"])
+        return json.loads((folder / "prediction.json").read_text())
+
     def synth(self, name, asset, *options):
         """The folder of a recording made with known truth."""
         folder = self.out / name

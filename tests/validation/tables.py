@@ -87,7 +87,8 @@ def lift_tables(results):
     for pair, (first, second) in lifts.PAIRS.items():
         for source, target, found in ((first, second, pairs[pair]["there"]), (second, first, pairs[pair]["back"])):
             cross.append([source, target, mm(found["predicted"]["score"]),
-                          mm(fits[target]["material"]["best"]["score_on_mesh"]), mm(found["median"]["score"])])
+                          mm(fits[target]["material"]["best"]["score_on_mesh"]), mm(found["median"]["score"]),
+                          *band_of(found["band"])])
     joint = [[pair, number(search["best"]["parameters"]["bending"]), finding_text(search, "bending"),
               " / ".join(mm(recording["score"]) for recording in search["recordings"])]
              for pair, search in ((pair, pairs[pair]["joint"]) for pair in lifts.PAIRS)]
@@ -95,9 +96,26 @@ def lift_tables(results):
         "lifts": clip_table(fits),
         "offsets": table(["clip", "offset x / y / z mm", "yaw rad", "clock ms", "at a bound"], offsets),
         "shapes": table(["clip", "clamp mm", "point mm", "pinch mm", "start yaw rad: mm"], shapes),
-        "cross": table(["fitted on", "predicted", "residual mm", "its own fit mm", "median fabric mm"], cross),
+        "cross": table(["fitted on", "predicted", "residual mm", "its own fit mm", "median fabric mm", "keyframes in their bands",
+                        "chance of as many outside"], cross),
         "joint": table(["both trials of", "D N m", "95 % of D", "residuals mm"], joint),
-        "fold": fold_table(results["fold"]), "limits": limits_table(results["limits"])}
+        "fold": fold_table(results["fold"]), "one_bending": one_bending_table(results["one_bending"]), "limits": limits_table(results["limits"])}
+
+
+def band_of(prediction):
+    return [f"{prediction['held']} of {len(prediction['keyframes'])}", f"{prediction['chance']:.3f}"]
+
+
+def one_bending_table(found):
+    names = {"lifts": "both lifts", "fold": "the fold", "all": "lifts and fold"}
+    rows = [[what, number(found[name]["best"]["parameters"]["bending"]), finding_text(found[name], "bending"),
+             " / ".join(mm(recording["score"]) for recording in found[name]["recordings"]),
+             "; ".join(warning.split(": the intervals")[0] for warning in found[name]["warnings"] if "contradict" in warning) or "-"]
+            for name, what in names.items()]
+    held, chance = band_of(found["band"])
+    rows.append(["the fold, predicted from the lifts", "-", "-", mm(found["band"]["score_m"]),
+                 f"{held} keyframes in their bands, chance {chance}"])
+    return table(["of", "D N m", "95 % of D", "residuals mm", "what is said"], rows)
 
 
 def fold_table(fold):

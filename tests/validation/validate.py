@@ -85,7 +85,9 @@ def run_lifts(runs, data):
                        "back": lifts.predict(runs, data, asset, second, material[second], first),
                        "joint": lifts.fit_pair(runs, data, asset, pair, material[first])}
     lifts.best_replay(runs, data, asset, "lift_paper", fits["lift_paper"]["material"], "picture", "20")
-    return {"fits": fits, "pairs": pairs, "fold": lifts.fold(runs, data, asset, pairs["paper"]["joint"]),
+    fold = lifts.fold(runs, data, asset, pairs["paper"]["joint"])
+    material = {clip: fits[clip]["material"] for clip in lifts.PAIRS["paper"]}
+    return {"fits": fits, "pairs": pairs, "fold": fold, "one_bending": lifts.lifts_and_fold(runs, data, asset, material, fold),
             "limits": {clip: limits.measure(runs, data, asset, clip, fits[clip]["material"])
                        for clip in ("lift_paper", "lift_navy", "lift_tan")}}
 

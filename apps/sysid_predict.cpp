@@ -1,0 +1,217 @@
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "apps/command_line.h"
+#include "apps/option_checks.h"
+#include "apps/sysid_options.h"
+#include "apps/sysid_verbs.h"
+#include "data/atomic_file.h"
+#include "data/error.h"
+#include "data/json_reader.h"
+#include "data/recording_digest.h"
+#include "data/text.h"
+#include "data/writable.h"
+#include "sysid/infer/prediction.h"
+#include "sysid/observe/registration_parameter.h"
+#include "sysid/replay/memory_estimate.h"
+#include "sysid/report/search_folder.h"
+
+namespace flash {
+namespace {
+
+constexpr double kContradicts = 0.01;  // chance of what was observed, below which the search does not hold
+
+struct PredictOptions {
+  CommonOptions common;
+  ReplayOptions replay;
+  std::string run;
+  std::string recording;
+  std::string asset;
+  std::vector<std::string> holds;
+  int draws = 24;
+  std::string out;
+};
+
+// What candidates of the search have in common, and the values of its estimate and of draws.
+struct Found {
+  sysid::Summary summary;
+  sysid::GridSettings grid;
+  std::vector<std::vector<double>> values;
+};
+
+// `holds` differ from what the search found or held, as the start yaw of another trial may.
+Found take_search(const PredictOptions& options) {
+  const sysid::SearchFolder search = sysid::load_search_folder(options.run);
+  Found found{search.summary, {}, {}};
+  const sysid::Summary& summary = found.summary;
+  if (summary.samples.rows() < 2 || summary.recordings.empty())
+    throw data::InputError(options.run + ": found no posterior, expected a search that came to an estimate");
+  const std::vector<sysid::Axis> holds = parse_values(options.holds);
+  const auto held = [&](const std::string& name) {
+    return std::find_if(holds.begin(), holds.end(),
+                        [&](const sysid::Axis& axis) { return axis.name == name; });
+  };
+  found.grid.axes = search.results.axes;
+  for (const sysid::Axis& axis : holds)
+    if (std::none_of(found.grid.axes.begin(), found.grid.axes.end(),
+                     [&](const sysid::Axis& searched) { return searched.name == axis.name; }))
+      found.grid.axes.push_back(axis);
+  for (const auto& [name, fixed] : summary.fixed)
+    if ((fixed.source == "measured" || fixed.deviation) && held(name) == holds.end())
+      found.grid.fixed.push_back({name, {fixed.value}, false});
+  // A column of the samples for each axis that was searched.
+  for (Eigen::Index draw = -1; draw < std::min<Eigen::Index>(options.draws, summary.samples.rows()); ++draw) {
+    std::vector<double>& values = found.values.emplace_back();
+    Eigen::Index column = 0;
+    for (const sysid::Axis& axis : found.grid.axes) {
+      const bool searched = axis.values.size() > 1;
+      if (const auto hold = held(axis.name); hold != holds.end())
+        values.push_back(hold->values.front());
+      else if (!searched)
+        values.push_back(axis.values.front());
+      else
+        values.push_back(
+            draw < 0 ? summary.best.at(axis.name)
+                     : summary.samples(draw * summary.samples.rows() /
+                                           std::min<Eigen::Index>(options.draws, summary.samples.rows()),
+                                       column));
+      column += searched ? 1 : 0;
+    }
+  }
+  return found;
+}
+
+int exit_code_of(const sysid::Prediction& prediction) {
+  return prediction.chance < kContradicts ? exit_unusable : exit_done;
+}
+
+nlohmann::ordered_json prediction_json(const sysid::Prediction& prediction, const PredictOptions& options,
+                                       const data::Recording& recording) {
+  nlohmann::ordered_json json;
+  json["schema"] = "flash-sysid-prediction/1";
+  json["run"] = std::filesystem::absolute(options.run).lexically_normal().string();
+  json["recording"] = recording.name;
+  const sysid::Registration& fit = prediction.fit.registration;
+  json["registration"] = {{"offset_m", {fit.offset[0], fit.offset[1], fit.offset[2]}},
+                          {"yaw_rad", fit.yaw},
+                          {"time_offset_s", fit.time_offset}};
+  json["bounds_hit"] = prediction.fit.bounds_hit;
+  json["score_m"] = prediction.fit.score;
+  json["keyframes"] = nlohmann::ordered_json::array();
+  for (const sysid::PredictedKeyframe& keyframe : prediction.keyframes)
+    json["keyframes"].push_back({{"t", keyframe.t},
+                                 {"distance_m", keyframe.distance},
+                                 {"band95_m", keyframe.band},
+                                 {"holds", keyframe.holds()}});
+  json["held"] = std::count_if(prediction.keyframes.begin(), prediction.keyframes.end(),
+                               [](const auto& keyframe) { return keyframe.holds(); });
+  json["chance"] = prediction.chance;
+  json["exit_code"] = exit_code_of(prediction);
+  return json;
+}
+
+void print_prediction(const sysid::Prediction& prediction) {
+  std::printf("%8s %12s %20s\n", "t [s]", "distance mm", "expected, 95 % mm");
+  std::size_t held = 0;
+  for (const sysid::PredictedKeyframe& keyframe : prediction.keyframes) {
+    held += keyframe.holds() ? 1 : 0;
+    std::printf("%8.3f %12.2f %9.2f to %7.2f%s\n", keyframe.t, 1e3 * keyframe.distance,
+                1e3 * keyframe.band[0], 1e3 * keyframe.band[1], keyframe.holds() ? "" : "  outside");
+  }
+  std::printf(
+      "%zu of %zu keyframes are as expected; as many outside, or more, in %s %% of what is expected\n", held,
+      prediction.keyframes.size(), data::format_short(100 * prediction.chance).c_str());
+}
+
+int run_predict(const CLI::App& verb, const PredictOptions& options) {
+  stop_on_signals();
+  Found found = take_search(options);
+  const data::Recording recording = data::load_recording(options.recording);
+  const data::Asset asset =
+      load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recording);
+  check_kind(asset, recording);
+  check_options(options.replay, asset);
+  sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
+  simulated.element_order = asset.element_order;
+  place_simulation(options.common, asset, simulated);
+  if (simulated.mesh.empty()) simulated.mesh = sysid::mesh_of(found.summary);
+  const sysid::Replay replay = sysid::make_replay(recording, simulated);
+  std::vector<std::string> notices;
+  found.grid.base = material_base(asset, replay.sheet(), notices, found.grid.fixed);
+  sysid::check_grasp_axes(found.grid.axes, {replay});
+  found.grid.score = score_settings(options.replay);
+  sysid::check_job({replay}, static_cast<double>(found.values.size()),
+                   sysid::estimate_batch({replay}, found.values.size()));
+  if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
+  for (const sysid::SummaryRecording& used : found.summary.recordings)
+    if (used.sha256 == data::recording_sha256(recording))
+      warn(recording.name + " is a recording that the search used: nothing is predicted");
+  for (const std::string& warning : found.summary.warnings) say(options.common, "the search: " + warning);
+
+  std::vector<sysid::ReplayCandidate> candidates;
+  for (const std::vector<double>& values : found.values)
+    candidates.push_back(sysid::candidate_at(values, found.grid));
+  const sysid::MotionStore store((std::filesystem::path(options.run) / "motions").string());
+  std::vector<sysid::ReplayResult> motions(candidates.size());
+  store.run(replay, candidates,
+            [&](std::size_t i, sysid::ReplayResult result) { motions[i] = std::move(result); });
+  end_after_signal();
+  if (!motions.front().finite)
+    throw std::runtime_error(recording.name + ": the simulation diverged; lower --time-step");
+  std::erase_if(motions, [](const sysid::ReplayResult& motion) { return !motion.finite; });
+  std::vector<sysid::Misfit> misfits;
+  for (const sysid::SummaryRecording& used : found.summary.recordings) misfits.push_back(used.misfit);
+  const sysid::Prediction prediction =
+      sysid::predict(replay, motions, sysid::correction_of(replay, candidates.front(), store), misfits,
+                     found.grid.score, options.common.seed);
+  end_after_signal();
+
+  const std::string text = data::format_json(prediction_json(prediction, options, recording));
+  if (!options.out.empty()) data::write_atomically(options.out, text);
+  warn_of_camera(recording);
+  for (const sysid::RegistrationParameter& parameter : sysid::registration_parameters)
+    if (sysid::is_at_bound(prediction.fit.bounds_hit, parameter))
+      warn(sysid::at_bound_text(parameter, recording.nuisance));
+  if (options.common.json)
+    std::cout << text;
+  else
+    print_prediction(prediction);
+  if (exit_code_of(prediction) == exit_unusable)
+    warn(recording.name + " contradicts the search: so many keyframes leave their bands by chance once in " +
+         data::format_short(std::round(1 / std::max(prediction.chance, 1e-3))) + " recordings, or less");
+  return exit_code_of(prediction);
+}
+
+}  // namespace
+
+void add_predict_verb(CLI::App& app, Action& action) {
+  const auto options = std::make_shared<PredictOptions>();
+  CLI::App* verb = app.add_subcommand(
+      "predict",
+      "Judge a search by a recording that it has not used: what it expects, and what was observed");
+  verb->add_option("run", options->run, "Folder of the search")->required();
+  verb->add_option("recording", options->recording, "Folder with recording.json")->required();
+  verb->add_option("--asset", options->asset, "The object; without one, that of the search");
+  add_hold_option(*verb, options->holds,
+                  "A value in place of the search's, as start_yaw=0.1 of another trial");
+  verb->add_option("--draws", options->draws, "Draws of the posterior that are simulated")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
+  verb->add_option("-o,--out", options->out, "prediction.json");
+  add_replay_options(*verb, options->replay);
+  add_seed_option(*verb, options->common);
+  add_device_option(*verb, options->common);
+  add_common_options(*verb, options->common);
+  verb->footer(
+      "The mesh is that of the search. Grasp, times and tolerance are not: give the options of the search.\n"
+      "Exit code 3: the recording contradicts the search (chance below 1 %).\n"
+      "Example:\n  flash-sysid predict run lift_again -o prediction.json");
+  verb->callback(
+      [verb, options, &action] { action = [verb, options] { return run_predict(*verb, *options); }; });
+}
+
+}  // namespace flash
