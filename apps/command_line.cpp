@@ -21,6 +21,7 @@
 #include <system_error>
 #include <vector>
 
+#include "apps/value_names.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/json_reader.h"
@@ -278,6 +279,7 @@ int run_tool(CLI::App& app, int argc, char** argv, const std::function<int()>& b
     check_verb(app, argc, argv);
     if (CLI::Option* const config = app.get_config_ptr()) config->check(check_config);
     app.allow_config_extras(CLI::config_extras_mode::error);
+    name_values(app);
     try {
       app.parse(argc, argv);
     } catch (const CLI::ConfigError& error) {

@@ -198,10 +198,12 @@ void add_parameter_options(CLI::App& verb, std::vector<std::pair<std::string, st
                                            "low:high:count[:log] or a list a,b,c; --hold takes one value");
   for (const sysid::ParameterInfo& info : sysid::known_parameters()) {
     const std::string unit = info.unit.empty() ? "" : " [" + info.unit + "]";
-    group.add_option_function<std::string>(
-        sysid::option_of(info.name),
-        [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
-        info.meaning + unit);
+    group
+        .add_option_function<std::string>(
+            sysid::option_of(info.name),
+            [&values, name = info.name](const std::string& text) { values.emplace_back(name, text); },
+            info.meaning + unit)
+        ->type_name("VALUES");
   }
 }
 

@@ -43,6 +43,9 @@ def window(clip):
     return ["--from", CLIPS.get(clip, {}).get("from", "1.0"), "--to", "2.4", "--mesh", MESH, "--tolerance", "1e-5"]
 
 
+SEARCH = ("--no-plan",)  # what to record next is not asked
+
+
 def axes(ranges):
     return [f"--{name}={values}" for name, values in ranges.items()]
 
@@ -60,14 +63,14 @@ def fit(runs, data, asset, clip):
     """Grasp shape, start yaw and D first; then D against E t at the best grasp and start yaw."""
     shapes = {}
     for shape in CLIPS[clip]["grasps"]:
-        shapes[shape] = runs.grid(f"{clip}/{shape}", [data / "lift" / clip], "--asset", asset, *window(clip),
+        shapes[shape] = runs.grid(f"{clip}/{shape}", [data / "lift" / clip], "--asset", asset, *SEARCH, *window(clip),
                                   *GRASPS[shape], *axes(CLIPS[clip]["axes"]), "--no-solver-check")
         shapes[shape]["grasp"] = shape
     best = min(shapes.values(), key=lambda search: search["best"]["score_on_mesh"])
     parameters = best["best"]["parameters"]
     stiffness = parameters["bending"]
     material = runs.grid(
-        f"{clip}/material", [data / "lift" / clip], "--asset", asset, *window(clip), *GRASPS[best["grasp"]],
+        f"{clip}/material", [data / "lift" / clip], "--asset", asset, *SEARCH, *window(clip), *GRASPS[best["grasp"]],
         "--hold", f"start_yaw={parameters['start_yaw']!r}", "--young", "30,100,300",
         f"--bending={stiffness / 4!r}:{stiffness * 4!r}:5:log",
         *(["--repeatability", repr(CLIPS[clip]["floor"] / 1000)] if "floor" in CLIPS[clip] else []),
@@ -99,7 +102,7 @@ def fit_pair(runs, data, asset, pair, search):
     """One D for both trials, with the start yaw of the first."""
     found = search["best"]["parameters"]
     stiffness, yaw = found["bending"], found["start_yaw"]
-    joint = runs.grid(f"{pair}_joint", [data / "lift" / clip for clip in PAIRS[pair]], "--asset", asset,
+    joint = runs.grid(f"{pair}_joint", [data / "lift" / clip for clip in PAIRS[pair]], "--asset", asset, *SEARCH,
                       *window(PAIRS[pair][0]), *GRASPS[search["grasp"]],
                       f"--bending={stiffness / 4!r}:{stiffness * 4!r}:5:log",
                       "--hold", f"start_yaw={yaw!r}", "--repeatability", "0.0028", "--no-solver-check")
@@ -139,8 +142,8 @@ def lifts_and_fold(runs, data, asset, material, folded):
     options = ["--asset", asset, *window("fold_paper"), *grasp]
     found = {}
     for name, recordings in (("lifts", lying[:2]), ("fold", lying[2:]), ("all", lying)):
-        found[name] = runs.grid(f"one_bending/{name}", recordings, *options, "--bending", "2e-5:4e-3:9:log", "--repeatability",
-                                "0.0028", "--no-solver-check")
+        found[name] = runs.grid(f"one_bending/{name}", recordings, *options, *SEARCH, "--bending", "2e-5:4e-3:9:log",
+                                "--repeatability", "0.0028", "--no-solver-check")
     found["band"] = runs.predict("one_bending/fold_from_lifts", "one_bending/lifts", lying[2], *options)
     return found
 
@@ -155,7 +158,7 @@ def fold(runs, data, asset, joint):
         "--start-yaw-bound", "0.35", "--kind", "free", "--name", "fold_paper")
     from_lifts = joint["best"]["parameters"]["bending"]
     values = sorted({MEDIAN_FABRIC, 1e-4, 2.5e-4, from_lifts})
-    search = runs.grid("fold_paper", [recording], "--asset", asset, *window("fold_paper"), *GRASPS[joint["grasp"]],
+    search = runs.grid("fold_paper", [recording], "--asset", asset, *SEARCH, *window("fold_paper"), *GRASPS[joint["grasp"]],
                        "--bending", ",".join(map(repr, values)), "--start-yaw=-0.3,-0.2,-0.1,0", "--no-solver-check")
     return {"recording": recording, "search": search, "from_lifts": from_lifts,
             "by_bending": {value: best_row(search["rows"], bending=value) for value in values}}

@@ -6,7 +6,7 @@ import surface
 def measure(runs, data, asset, clip, search):
     recording = data / "lift" / clip
     options, parameters = lifts.grasp_of(search)
-    material = ["--asset", asset, *lifts.window(clip), "--hold", f"bending={parameters['bending']!r}:measured", "--hold",
+    material = ["--asset", asset, *lifts.SEARCH, *lifts.window(clip), "--hold", f"bending={parameters['bending']!r}:measured", "--hold",
                 f"young={parameters['young']!r}:measured", "--no-solver-check"]
     yaw = ["--hold", f"start_yaw={parameters['start_yaw']!r}"]
     table = runs.grid(f"{clip}/table_and_friction", [recording], *material, *yaw, *lifts.GRASPS[search["grasp"]],

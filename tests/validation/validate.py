@@ -2,6 +2,7 @@
 """Runs flash-calib on recorded hand-eye sets, flash-sysid on recorded lifts and on recordings of an independent
 simulator, and writes what came out into docs/validation/. Finished runs are kept: called again, it goes on where it was."""
 import argparse
+import concurrent.futures
 import pathlib
 import shutil
 
@@ -32,9 +33,11 @@ def main():
     parser.add_argument("--only", help="handeye, lifts, twins, synthetic, convergence, beam or reference: that part "
                                        "of the document; a recording: its fits alone, printed")
     parser.add_argument("--twins", type=int, default=len(synthetic.TWINS), help="how many of the coverage study")
+    parser.add_argument("--jobs", type=int, default=1, help="recorded lifts searched at a time")
+    parser.add_argument("--threads", type=int, help="of each search; without it, as many as there are processors")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    runs = Runs(options.sysid, options.out)
+    runs = Runs(options.sysid, options.out, options.threads)
     if options.only in lifts.CLIPS:
         fit = lifts.fit(runs, options.data, lifts.write_asset(runs.out), options.only)
         return print(tables.clip_table({options.only: fit}), end="")
@@ -52,7 +55,7 @@ def main():
         document |= beam.tables(options.sim, options.data / "beam", options.out, tables.table)
         document |= beam_search.tables(runs, options.data / "beam", tables.table)
     if options.only in (None, "lifts"):
-        results = run_lifts(runs, options.data)
+        results = run_lifts(runs, options.data, options.jobs)
         document |= tables.lift_tables(results)
         copy_pictures(options.out, options.documents.parent / "images")
     if options.only in (None, "twins"):
@@ -74,22 +77,27 @@ def copy_pictures(out, images):
         shutil.copyfile(out / source, images / name)
 
 
-def run_lifts(runs, data):
+def run_lifts(runs, data, jobs):
+    """So many recordings at a time."""
     asset = lifts.write_asset(runs.out)
-    fits, pairs = {}, {}
-    for clip in lifts.CLIPS:
-        fits[clip] = lifts.fit(runs, data, asset, clip)
-    for pair, (first, second) in lifts.PAIRS.items():
-        material = {clip: fits[clip]["material"] for clip in (first, second)}
-        pairs[pair] = {"there": lifts.predict(runs, data, asset, first, material[first], second),
-                       "back": lifts.predict(runs, data, asset, second, material[second], first),
-                       "joint": lifts.fit_pair(runs, data, asset, pair, material[first])}
-    lifts.best_replay(runs, data, asset, "lift_paper", fits["lift_paper"]["material"], "picture", "20")
-    fold = lifts.fold(runs, data, asset, pairs["paper"]["joint"])
-    material = {clip: fits[clip]["material"] for clip in lifts.PAIRS["paper"]}
-    return {"fits": fits, "pairs": pairs, "fold": fold, "one_bending": lifts.lifts_and_fold(runs, data, asset, material, fold),
-            "limits": {clip: limits.measure(runs, data, asset, clip, fits[clip]["material"])
-                       for clip in ("lift_paper", "lift_navy", "lift_tan")}}
+    with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
+        fits = dict(zip(lifts.CLIPS, pool.map(lambda clip: lifts.fit(runs, data, asset, clip), lifts.CLIPS)))
+        material = {clip: fit["material"] for clip, fit in fits.items()}
+        limited = ("lift_paper", "lift_navy", "lift_tan")
+        limits_of = pool.map(lambda clip: limits.measure(runs, data, asset, clip, material[clip]), limited)
+        pairs_of = pool.map(lambda pair: run_pair(runs, data, asset, pair, material), lifts.PAIRS)
+        pairs = dict(zip(lifts.PAIRS, pairs_of))
+        fold = lifts.fold(runs, data, asset, pairs["paper"]["joint"])
+        one_bending = lifts.lifts_and_fold(runs, data, asset, material, fold)
+        lifts.best_replay(runs, data, asset, "lift_paper", material["lift_paper"], "picture", "20")
+        return {"fits": fits, "pairs": pairs, "fold": fold, "one_bending": one_bending, "limits": dict(zip(limited, limits_of))}
+
+
+def run_pair(runs, data, asset, pair, material):
+    first, second = lifts.PAIRS[pair]
+    return {"there": lifts.predict(runs, data, asset, first, material[first], second),
+            "back": lifts.predict(runs, data, asset, second, material[second], first),
+            "joint": lifts.fit_pair(runs, data, asset, pair, material[first])}
 
 
 def run_twins(runs, data, only=None):
