@@ -188,8 +188,9 @@ std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
   return motions;
 }
 
-/// Friction, weight, start yaw and table height, and what was stated with a deviation, to both sides.
-std::size_t most_held_motions(const GridSettings& grid) { return 2 * (4 + grid.deviations.size()); }
+/// Friction, weight, two angles of a pinch, start yaw and table height, and what was stated with a deviation,
+/// to both sides.
+std::size_t most_held_motions(const GridSettings& grid) { return 2 * (6 + grid.deviations.size()); }
 
 std::vector<std::size_t> stiffnesses_of(const std::vector<Axis>& axes) {
   std::vector<std::size_t> stiffnesses;

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sysid/replay/recorded_grasp.h"
+
 namespace flash::sysid {
 namespace {
 
 constexpr double kFriction = 2, kWeight = 1.1;  // factors within which both are known unless measured
+constexpr double kPinch = 0.2;                  // angles of the ridge that two fingers fold [rad]
 
 bool is_searched(const std::string& name, const GridSettings& grid) {
   return std::any_of(grid.axes.begin(), grid.axes.end(),
@@ -31,6 +34,15 @@ const Axis* axis_of(const std::string& name, const GridSettings& grid) {
 std::array<double, 2> within(double value, double deviation, double lowest) {
   if (value - deviation > lowest || value <= 0) return {value - deviation, value + deviation};
   return {value * value / (value + deviation), value + deviation};
+}
+
+/// The first grasp that folds the sheet to a ridge before it moves.
+const data::RecordedGrasp* pinch_of(const std::vector<Replay>& replays) {
+  for (const Replay& replay : replays)
+    for (const data::RecordedGrasp& grasp : replay.recording.grasps)
+      if (grasp.from <= replay.beginning && shape_of(grasp, replay.settings) == data::GraspShape::pinch)
+        return &grasp;
+  return nullptr;
 }
 
 }  // namespace
@@ -64,6 +76,15 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
     if (bound > 0 && !is_stated(name, grid))
       held.push_back({name, {-bound / std::sqrt(3.0), bound / std::sqrt(3.0)}, false});
   };
+  const auto add_angle = [&](const char* name, double recorded) {
+    const Axis* const axis = axis_of(name, grid);
+    const double angle = axis != nullptr ? axis->values.front() : recorded;
+    if (!is_stated(name, grid)) held.push_back({name, {angle - kPinch, angle + kPinch}, false});
+  };
+  if (const data::RecordedGrasp* const pinch = pinch_of(replays)) {
+    if (pinch->direction.isZero()) add_angle("grasp_direction", 0);
+    add_angle("grasp_pitch", pinch->pitch);
+  }
   add_bound("start_yaw", yaw);
   add_bound("table_height", height);
   return held;

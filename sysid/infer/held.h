@@ -17,7 +17,9 @@ struct HeldParameter {
 /// What was stated with a standard deviation. Friction within a factor of 2 of the value that the search
 /// holds it at: it competes with bending where a sheet is lifted off a table. The weight within 10 %:
 /// stiffnesses are known as ratios to it. The bounds of a recording on start yaw and table height, over
-/// sqrt(3), where it has any. The other properties of the asset, the grasp and what was fixed count as known.
+/// sqrt(3), where it has any. Of a pinch its pitch, and its direction where the recording does not give one,
+/// within 0.2 rad: fingers fold what they find. The other properties of the asset, shape and size of the
+/// grasp and what was fixed count as known.
 std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::vector<Replay>& replays);
 
 /// The candidate at `values`, with one parameter at another value than the search holds it at.

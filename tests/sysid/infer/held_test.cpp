@@ -91,5 +91,27 @@ TEST(Held, BoundsOfTheRecordingAreThoseOfAnEvenDistribution) {
   EXPECT_FALSE(held[0].shared);
 }
 
+TEST(Held, APinchIsFoldedAboutAsItIsSaid) {
+  const data::TemporaryFolder folder;
+  std::vector<Replay> replays = {short_lift(folder)};
+  replays[0].recording.has_table = false;
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  grid.fixed = {parse_hold("areal_density=0.2:measured").axis};
+  EXPECT_TRUE(held_parameters(grid, replays).empty());  // a clamp has no ridge
+  data::RecordedGrasp& grasp = replays[0].recording.grasps.at(0);
+  grasp.shape = data::GraspShape::pinch;
+  grasp.pitch = 0.1;
+  const std::vector<HeldParameter> held = held_parameters(grid, replays);
+  ASSERT_EQ(names_of(held), (std::vector<std::string>{"grasp_direction", "grasp_pitch"}));
+  EXPECT_DOUBLE_EQ(held[0].values[1], 0.2);
+  EXPECT_DOUBLE_EQ(held[1].values[1], 0.3);
+  EXPECT_FALSE(held[1].shared);  // each trial folds anew
+  grid.axes.push_back(parse_axis("grasp_pitch", "-0.5:0.5:3"));
+  grasp.direction = {1, 0, 0};
+  EXPECT_TRUE(held_parameters(grid, replays).empty());
+}
+
 }  // namespace
 }  // namespace flash::sysid
