@@ -199,7 +199,7 @@ void add_predict_verb(CLI::App& app, Action& action) {
   add_hold_option(*verb, options->holds,
                   "A value in place of the search's, as start_yaw=0.1 of another trial");
   verb->add_option("--draws", options->draws, "Draws of the posterior that are simulated")
-      ->check(CLI::Range(1, 64))
+      ->check(whole_number(1, 64))
       ->capture_default_str();
   verb->add_option("-o,--out", options->out, "prediction.json");
   add_replay_options(*verb, options->replay);
