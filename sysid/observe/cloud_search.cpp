@@ -6,8 +6,9 @@
 #include <utility>
 
 #ifdef FLASH_HAVE_CUDA
-#include "sim/cuda/out_of_memory.h"
+#include "sim/cuda/device_error.h"
 #include "sim/cuda/surface_feet.h"
+#include "sim/device_error.h"
 #endif
 
 namespace flash::sysid {
@@ -33,6 +34,16 @@ std::vector<Observation> thinned(const std::vector<Observation>& observations, i
 namespace {
 
 using sim::cuda::SurfaceFeet;
+
+/// What `work` returns; a device that fails becomes an error of who searches.
+template <class Work>
+auto on_device(const Work& work) {
+  try {
+    return work();
+  } catch (const sim::cuda::DeviceError& error) {
+    throw sim::DeviceError(error.what());
+  }
+}
 
 /// Where and how fast surface_at has the surface: in the span always between two steps, where it knows both.
 sim::cuda::BetweenSteps time_on(const Motion& motion, double t) {
@@ -107,15 +118,17 @@ CloudSearches device_searches(const Replay& replay, int points_per_keyframe) {
     pool->clouds[1].push_back(all[k].weight > 0 ? few[k].points : data::Points(0, 3));
   }
   return [pool](const Motion& motion) -> CloudSearch {
-    std::unique_ptr<SurfaceFeet> free = pool->take();
+    std::unique_ptr<SurfaceFeet> free = on_device([&] { return pool->take(); });
     if (free == nullptr) return {};
     const std::shared_ptr<SurfaceFeet> feet(
         free.release(), [pool](SurfaceFeet* used) { pool->give_back(std::unique_ptr<SurfaceFeet>(used)); });
     return [pool, feet, &motion](CloudPoints points, const Registration& registration) {
       std::vector<sim::cuda::BetweenSteps> times;
       for (const double t : pool->times) times.push_back(time_on(motion, t + registration.time_offset));
-      return feet->find(points == CloudPoints::all ? 0 : 1, motion.positions, motion.step, times,
-                        registration.observed_from_simulated().inverse());
+      return on_device([&] {
+        return feet->find(points == CloudPoints::all ? 0 : 1, motion.positions, motion.step, times,
+                          registration.observed_from_simulated().inverse());
+      });
     };
   };
 }
