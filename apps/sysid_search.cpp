@@ -10,6 +10,7 @@
 #include "data/error.h"
 #include "data/message_line.h"
 #include "data/text.h"
+#include "sim/device_error.h"
 #include "sysid/design/rank_experiments.h"
 #include "sysid/report/next_steps.h"
 #include "sysid/report/overlay.h"
@@ -194,8 +195,8 @@ int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& 
   say(options, "then the answer: at most " + data::format_count(static_cast<std::size_t>(most.motions)) +
                    " motions more and " + data::format_count(static_cast<std::size_t>(most.scores)) +
                    " scores between them");
-  const auto kept = [&] {
-    warn("stopped with " + data::format_count(store.results().candidates.size()) + " of " +
+  const auto kept = [&](const std::string& why = {}) {
+    warn(why + "stopped with " + data::format_count(store.results().candidates.size()) + " of " +
          data::format_count(total) + " candidates, kept in " + search.out + "; --resume goes on");
     return exit_failed;
   };
@@ -211,6 +212,8 @@ int run_search(Search& search, sysid::ResultsStore& store, const CommonOptions& 
     return conclude(search, store, options);
   } catch (const data::Stopped&) {
     return kept();
+  } catch (const sim::DeviceError& error) {
+    return kept(std::string(error.what()) + "; ");
   }
 }
 

@@ -12,6 +12,7 @@
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/projective_phases.h"
 #include "sim/device_batch.h"
+#include "sim/device_error.h"
 
 namespace flash::sim {
 
@@ -271,7 +272,11 @@ void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t
     for (std::size_t i = first; i < std::min(count, first + at_once); ++i)
       environments.push_back(environment_of(i));
     Batch batch(plan, std::move(environments), settings);
-    batch.advance(settings.steps - settings.first_step, [&](int e) { finished(first + e, batch, e); });
+    try {
+      batch.advance(settings.steps - settings.first_step, [&](int e) { finished(first + e, batch, e); });
+    } catch (const DeviceError& error) {
+      throw error.renumbered([first](std::size_t e) { return first + e; });
+    }
   }
 }
 

@@ -71,8 +71,8 @@ class Batch {
 
   /// Takes the next `steps` steps of each environment. The thread that took them calls `finished` with the
   /// number of the environment, so that its results can be used while others go on. Unconverged steps are
-  /// in the statistics, never thrown. Throws what a worker threw, data::Stopped where settings.solver.stop
-  /// ended it; a batch that has thrown cannot advance any more.
+  /// in the statistics, never thrown. Throws what a worker threw, a DeviceError as advance_on_device does,
+  /// data::Stopped where settings.solver.stop ended it; a batch that has thrown cannot advance any more.
   void advance(int steps, const std::function<void(int)>& finished = {});
 
   /// The state of one environment: another batch can go on from it.
@@ -97,7 +97,7 @@ class Batch {
 
 /// Replays any number of environments whole, in batches of at most `at_once`, so that memory holds those
 /// alone. `environment_of` makes number i just before its batch. `finished` gets i, its batch and its place
-/// there, on the thread that simulated it. Throws as Batch does.
+/// there, on the thread that simulated it. Throws as Batch does; a DeviceError goes by the numbers i.
 void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t count, int at_once,
                        const BatchSettings& settings,
                        const std::function<Environment(std::size_t)>& environment_of,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <mutex>
 #include <stdexcept>
 #include <utility>
 
@@ -9,9 +10,10 @@
 #include "data/parallel.h"
 #include "sim/cuda/most_obstacles.h"
 #ifdef FLASH_HAVE_CUDA
+#include "sim/cuda/device_error.h"
 #include "sim/cuda/devices.h"
 #include "sim/cuda/hold_motion.h"
-#include "sim/cuda/out_of_memory.h"
+#include "sim/device_error.h"
 #endif
 
 namespace flash::sim {
@@ -60,6 +62,28 @@ namespace {
 double time_step_of(const BatchSettings& settings) {
   return settings.projective ? settings.projective->time_step : settings.solver.time_step;
 }
+
+/// Environments of which devices gave no result, and what the first device said.
+class Failures {
+ public:
+  void add(const std::string& why, const std::vector<int>& environments) {
+    const std::scoped_lock lock(mutex_);
+    if (environments_.empty()) why_ = why;
+    environments_.insert(environments_.end(), environments.begin(), environments.end());
+  }
+  bool has(int environment) const {
+    return std::find(environments_.begin(), environments_.end(), environment) != environments_.end();
+  }
+  void throw_any() const {
+    if (!environments_.empty())
+      throw DeviceError(why_, std::vector<std::size_t>(environments_.begin(), environments_.end()));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::string why_;
+  std::vector<int> environments_;
+};
 
 /// Environments that run together: over which steps, and which.
 struct Group {
@@ -157,31 +181,51 @@ void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, const
   });
 }
 
-/// Runs a group in parts that fit into the device's memory.
-void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& group,
+/// Hands over environments at their end. A search for scores may work on the device too.
+void finish(const std::vector<int>& environments, const BatchSettings& settings, const DeviceResults& results,
+            Failures& failures) {
+  data::for_each_in_parallel(environments.size(), settings.threads, [&](std::size_t k) {
+    try {
+      results.finished(environments[k]);
+    } catch (const DeviceError& error) {
+      failures.add(error.why(), {environments[k]});
+    }
+  });
+}
+
+/// Runs a group in parts that fit into the device's memory; `end`: the step at which environments finish.
+void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& group, int end,
                   const BatchSettings& settings, std::vector<Environment>& environments,
-                  const DeviceResults& results) {
+                  const DeviceResults& results, Failures& failures) {
   std::size_t at_once = group.environments.size();
   for (std::size_t begin = 0; begin < group.environments.size();) {
     const std::size_t count = std::min(at_once, group.environments.size() - begin);
     const auto from = group.environments.begin() + static_cast<std::ptrdiff_t>(begin);
+    const Group wave = {group.first, group.count, {from, from + static_cast<std::ptrdiff_t>(count)}};
+    begin += count;
     try {
-      run(plan, {group.first, group.count, {from, from + static_cast<std::ptrdiff_t>(count)}}, settings,
-          environments, results);
-      begin += count;
-    } catch (const cuda::OutOfMemory&) {
-      if (count == 1)
-        throw data::InputError("--device cuda: one environment does not fit into the memory of the device");
+      run(plan, wave, settings, environments, results);
+    } catch (const cuda::OutOfMemory& error) {
+      if (count == 1) {
+        failures.add(error.what(), wave.environments);
+        continue;
+      }
+      begin -= count;
       at_once = (count + 1) / 2;
+      continue;
+    } catch (const cuda::DeviceError& error) {
+      failures.add(error.what(), wave.environments);
+      continue;
     }
+    if (group.first + group.count == end) finish(wave.environments, settings, results, failures);
   }
 }
 
 /// Runs a group on all devices at the same time. Each takes every so many-th environment: neighbours in a
 /// search take about as long.
-void run_on_devices(const std::shared_ptr<const SheetPlan>& plan, const Group& group,
+void run_on_devices(const std::shared_ptr<const SheetPlan>& plan, const Group& group, int end,
                     const BatchSettings& settings, std::vector<Environment>& environments,
-                    const DeviceResults& results) {
+                    const DeviceResults& results, Failures& failures) {
   const std::vector<int> devices =
       settings.cuda_devices.empty() ? std::vector<int>{0} : settings.cuda_devices;
   const std::size_t count = std::min(devices.size(), group.environments.size());
@@ -189,8 +233,12 @@ void run_on_devices(const std::shared_ptr<const SheetPlan>& plan, const Group& g
   for (std::size_t k = 0; k < group.environments.size(); ++k)
     parts[k % count].environments.push_back(group.environments[k]);
   data::for_each_in_parallel(count, static_cast<int>(count), [&](std::size_t part) {
-    cuda::use_device(devices[part]);
-    run_in_waves(plan, parts[part], settings, environments, results);
+    try {
+      cuda::use_device(devices[part]);
+    } catch (const cuda::DeviceError& error) {
+      return failures.add(error.what(), parts[part].environments);
+    }
+    run_in_waves(plan, parts[part], end, settings, environments, results, failures);
   });
 }
 
@@ -201,15 +249,15 @@ void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector
   check_on_device(environments, settings);
   std::vector<int> at(environments.size(), first);
   const int end = first + steps;
+  Failures failures;
   for (auto groups = grouped(*plan, environments, at, end, settings); !groups.empty();
        groups = grouped(*plan, environments, at, end, settings))
     for (const Group& group : groups) {
-      run_on_devices(plan, group, settings, environments, results);
-      for (const int e : group.environments) at[static_cast<std::size_t>(e)] += group.count;
-      if (group.first + group.count < end) continue;
-      data::for_each_in_parallel(group.environments.size(), settings.threads,
-                                 [&](std::size_t k) { results.finished(group.environments[k]); });
+      run_on_devices(plan, group, end, settings, environments, results, failures);
+      for (const int e : group.environments)
+        at[static_cast<std::size_t>(e)] = failures.has(e) ? end : group.first + group.count;
     }
+  failures.throw_any();
 }
 
 #else

@@ -35,7 +35,9 @@ struct DeviceResults {
 /// bending operator, whose holds close in the same steps, run together, as many as fit into a device's
 /// memory. What an environment gets depends neither on the others nor on how many devices there are, bitwise.
 /// Throws data::InputError where the device cannot do what an environment asks for, data::Stopped once
-/// settings.solver.stop is set, and std::runtime_error with the device's message.
+/// settings.solver.stop is set. Where a device is lost or one environment alone does not fit into its memory
+/// it goes on with what it can, and throws a DeviceError at the end, which names the environments without a
+/// result; all others have finished.
 void advance_on_device(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment>& environments,
                        const BatchSettings& settings, int first, int steps, const DeviceResults& results);
 

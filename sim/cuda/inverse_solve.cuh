@@ -86,14 +86,31 @@ template <int parts>
 struct TwoRows {
   float sums[parts][2][4] = {};
 
-  template <bool transposed>
-  __device__ void add(const InverseWork& w, int first, int second, const RightInputs& right) {
+  /// Adds `count` products of tiles, from the first ones of both rows on, `step` tiles apart, with right(k).
+  /// All of what a few products read is on its way together; those beyond the last one are with zeros.
+  template <bool transposed, typename Right>
+  __device__ void add(const InverseWork& w, int first, int second, int step, int count, const Right& right) {
+    constexpr int together = 4 / parts;
+    for (int base = 0; base < count; base += together) {
+      LeftTileHalf left[together][parts][2];
+      RightInputs inputs[together];
 #pragma unroll
-    for (int part = 0; part < parts; ++part) {
-      const LeftTileHalf a = load_inverse_tile<parts, transposed>(w, first, part),
-                         b = load_inverse_tile<parts, transposed>(w, second, part);
-      add_tile_product(sums[part][0], a, right);
-      add_tile_product(sums[part][1], b, right);
+      for (int k = 0; k < together; ++k) {
+        const int at = min(base + k, count - 1);
+#pragma unroll
+        for (int part = 0; part < parts; ++part) {
+          left[k][part][0] = load_inverse_tile<parts, transposed>(w, first + at * step, part);
+          left[k][part][1] = load_inverse_tile<parts, transposed>(w, second + at * step, part);
+        }
+        inputs[k] = right(at);
+        if (base + k >= count) inputs[k] = {{0, 0}};
+      }
+#pragma unroll
+      for (int k = 0; k < together; ++k)
+#pragma unroll
+        for (int part = 0; part < parts; ++part)
+#pragma unroll
+          for (int row = 0; row < 2; ++row) add_tile_product(sums[part][row], left[k][part][row], inputs[k]);
     }
   }
   /// Of the lane's column in row 8 `half` + lane() / 4 of a row of tiles: the product with both parts.
@@ -128,9 +145,8 @@ __device__ void pass_down(const InverseWork& w, const InverseTask& task) {
   const int columns = node.column_tiles, first_W = node.first_tile + columns * columns;
   const int row = first_W + task.first * columns, next = row + (task.count > 1 ? columns : 0);
   TwoRows<parts> rows;
-#pragma unroll 4
-  for (int k = 0; k < columns; ++k)
-    rows.template add<false>(w, row + k, next + k, w.right.block(node.first_block + k));
+  rows.template add<false>(w, row, next, 1, columns,
+                           [&](int k) { return w.right.block(node.first_block + k); });
   const int c = lane() % 4;
   if (c == 3) return;
 #pragma unroll
@@ -149,14 +165,12 @@ __device__ void pass_up(const InverseWork& w, const InverseTask& task, bool keep
   const int columns = node.column_tiles, first_W = node.first_tile + columns * columns;
   const int row = node.first_tile + task.first * columns, next = row + (task.count > 1 ? columns : 0);
   TwoRows<parts> rows;
-#pragma unroll 4
-  for (int k = 0; k < columns; ++k)
-    rows.template add<false>(w, row + k, next + k, w.right.block(node.first_block + k));
+  rows.template add<false>(w, row, next, 1, columns,
+                           [&](int k) { return w.right.block(node.first_block + k); });
   const int column = first_W + task.first, beside = column + (task.count > 1 ? 1 : 0);
-#pragma unroll 4
-  for (int k = 0; k < node.below_tiles; ++k)
-    rows.template add<true>(w, column + k * columns, beside + k * columns,
-                            w.solved.minus(w.tables.below + node.first_below + inverse_tile * k));
+  rows.template add<true>(w, column, beside, columns, node.below_tiles, [&](int k) {
+    return w.solved.minus(w.tables.below + node.first_below + inverse_tile * k);
+  });
   const int c = lane() % 4;
   if (c == 3) return;
 #pragma unroll

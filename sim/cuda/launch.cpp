@@ -1,18 +1,20 @@
 #include "sim/cuda/launch.h"
 
-#include <stdexcept>
 #include <string>
 
-#include "sim/cuda/out_of_memory.h"
+#include "sim/cuda/device_error.h"
 
 namespace flash::sim::cuda {
 
 void check(cudaError_t status) {
   if (status == cudaSuccess) return;
-  const std::string message = std::string("CUDA: ") + cudaGetErrorString(status);
+  int device = 0;
+  const bool numbered = cudaGetDevice(&device) == cudaSuccess;
+  const std::string message =
+      "CUDA device" + (numbered ? " " + std::to_string(device) : "") + ": " + cudaGetErrorString(status);
   cudaGetLastError();  // an error that has been told is not told again
   if (status == cudaErrorMemoryAllocation) throw OutOfMemory(message);
-  throw std::runtime_error(message);
+  throw DeviceError(message);
 }
 
 int most_memory() {

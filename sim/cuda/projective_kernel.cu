@@ -227,7 +227,8 @@ void place_on_chip(ProjectiveNumbers& numbers, InversePrecision precision, int b
   numbers.scale_at = place(static_cast<int>(sizeof(float)) * inverse.slots, true);
   numbers.passed_at = place(3 * static_cast<int>(sizeof(float)) * inverse.below_count, alone);
   numbers.tiles_at = rounded_up(used, 128);
-  const int room = (most - reserved - numbers.tiles_at) / (parts * solve_tile_bytes<half_parts>);
+  // As much is left to the first-level cache.
+  const int room = (most - reserved - numbers.tiles_at) / (2 * parts * solve_tile_bytes<half_parts>);
   numbers.tiles_on_chip = alone ? std::max(0, std::min(room, inverse.tiles)) : 0;
 }
 

@@ -9,6 +9,7 @@
 
 #include "data/error.h"
 #include "data/worst.h"
+#include "sim/device_error.h"
 #include "sysid/replay/motion_store.h"
 
 namespace flash::sysid {
@@ -169,6 +170,9 @@ bool grid_search(const std::vector<Replay>& replays, const GridSettings& setting
                        });
     } catch (const data::Stopped&) {
       return results.complete();
+    } catch (const sim::DeviceError& error) {
+      const auto id_of = [&](std::size_t i) { return static_cast<std::size_t>(wanted[first + i]); };
+      throw error.renumbered(id_of, "candidate");
     }
   }
   return results.complete();

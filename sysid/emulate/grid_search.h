@@ -50,7 +50,7 @@ CandidateResult score_motions(const std::vector<Replay>& replays, const std::vec
 /// tolerance are marked, never a reason to stop. Results are appended in order of id, so that the files do
 /// not depend on threads; an end at any moment loses at most `envs` of them. `progress` is called after each
 /// candidate, one thread at a time; `stop`, once set, ends the search after the steps in work, and the
-/// candidates in work are left out. True when the grid is complete.
+/// candidates in work are left out, as after a sim::DeviceError, which names its. True when all is there.
 bool grid_search(const std::vector<Replay>& replays, const GridSettings& settings, ResultsStore& store,
                  const std::function<void(const Progress&)>& progress = {},
                  const std::atomic<bool>* stop = nullptr);

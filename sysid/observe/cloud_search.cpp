@@ -6,8 +6,9 @@
 #include <utility>
 
 #ifdef FLASH_HAVE_CUDA
-#include "sim/cuda/nearest_triangles.h"
-#include "sim/cuda/out_of_memory.h"
+#include "sim/cuda/device_error.h"
+#include "sim/cuda/surface_feet.h"
+#include "sim/device_error.h"
 #endif
 
 namespace flash::sysid {
@@ -32,12 +33,29 @@ std::vector<Observation> thinned(const std::vector<Observation>& observations, i
 
 namespace {
 
-using Places = sim::cuda::NearestTriangles;
+using sim::cuda::SurfaceFeet;
 
+/// What `work` returns; a device that fails becomes an error of who searches.
+template <class Work>
+auto on_device(const Work& work) {
+  try {
+    return work();
+  } catch (const sim::cuda::DeviceError& error) {
+    throw sim::DeviceError(error.what());
+  }
+}
+
+/// Where and how fast surface_at has the surface: in the span always between two steps, where it knows both.
 sim::cuda::BetweenSteps time_on(const Motion& motion, double t) {
   const auto [first, last] = steps_at(motion, t);
-  const double fraction = first == last ? 0 : (t - motion.start) / motion.step - static_cast<double>(first);
-  return {static_cast<int>(first), static_cast<int>(last), fraction};
+  const double steps = (t - motion.start) / motion.step;
+  const auto below = static_cast<std::size_t>(std::max(steps, 0.0));
+  const auto at = [](std::size_t step) { return static_cast<int>(step); };
+  if (first != last) return {at(first), at(last), steps - static_cast<double>(first)};
+  const bool inside = steps > 0 && below + 1 < motion.positions.size() &&
+                      motion.positions[below].rows() > 0 && motion.positions[below + 1].rows() > 0;
+  if (!inside) return {at(first), at(first), 0};
+  return {at(below), at(below + 1), first == below ? 0.0 : 1.0};
 }
 
 /// What searches of one replay share: memory of devices that no thread uses at the moment.
@@ -49,32 +67,33 @@ struct Pool {
   std::vector<std::vector<data::Points>> clouds;  // all, thinned
   std::vector<int> devices;
   std::mutex mutex;  // of what follows
-  std::vector<std::unique_ptr<Places>> idle;
+  std::vector<std::unique_ptr<SurfaceFeet>> idle;
   std::size_t made = 0;
 
   /// Empty where a device has no room.
-  std::unique_ptr<Places> take() {
+  std::unique_ptr<SurfaceFeet> take() {
     std::size_t number = 0;
     {
       const std::scoped_lock lock(mutex);
       if (!idle.empty()) {
-        std::unique_ptr<Places> places = std::move(idle.back());
+        std::unique_ptr<SurfaceFeet> feet = std::move(idle.back());
         idle.pop_back();
-        places->begin_motion();
-        return places;
+        feet->begin_motion();
+        return feet;
       }
       number = made++;
     }
     try {
-      return std::make_unique<Places>(devices[number % devices.size()], triangles, vertices, order, clouds);
+      return std::make_unique<SurfaceFeet>(devices[number % devices.size()], triangles, vertices, order,
+                                           clouds);
     } catch (const sim::cuda::OutOfMemory&) {
       return nullptr;
     }
   }
 
-  void give_back(std::unique_ptr<Places> places) {
+  void give_back(std::unique_ptr<SurfaceFeet> feet) {
     const std::scoped_lock lock(mutex);
-    idle.push_back(std::move(places));
+    idle.push_back(std::move(feet));
   }
 };
 
@@ -99,16 +118,17 @@ CloudSearches device_searches(const Replay& replay, int points_per_keyframe) {
     pool->clouds[1].push_back(all[k].weight > 0 ? few[k].points : data::Points(0, 3));
   }
   return [pool](const Motion& motion) -> CloudSearch {
-    std::unique_ptr<Places> free = pool->take();
+    std::unique_ptr<SurfaceFeet> free = on_device([&] { return pool->take(); });
     if (free == nullptr) return {};
-    const std::shared_ptr<Places> places(
-        free.release(), [pool](Places* used) { pool->give_back(std::unique_ptr<Places>(used)); });
-    return [pool, places, &motion](CloudPoints points, const Registration& registration,
-                                   std::vector<std::vector<int>>& triangles) {
+    const std::shared_ptr<SurfaceFeet> feet(
+        free.release(), [pool](SurfaceFeet* used) { pool->give_back(std::unique_ptr<SurfaceFeet>(used)); });
+    return [pool, feet, &motion](CloudPoints points, const Registration& registration) {
       std::vector<sim::cuda::BetweenSteps> times;
       for (const double t : pool->times) times.push_back(time_on(motion, t + registration.time_offset));
-      places->find(points == CloudPoints::all ? 0 : 1, motion.positions, times,
-                   registration.observed_from_simulated().inverse(), triangles);
+      return on_device([&] {
+        return feet->find(points == CloudPoints::all ? 0 : 1, motion.positions, motion.step, times,
+                          registration.observed_from_simulated().inverse());
+      });
     };
   };
 }

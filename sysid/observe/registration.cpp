@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace flash::sysid {
 namespace {
@@ -17,14 +18,14 @@ Eigen::Matrix<double, kParameters, 1> half_widths(const RegistrationBounds& boun
   return widths;
 }
 
-/// One problem with its thinned points, the hierarchy and the last nearest triangles. A search of its own
-/// finds them where there is one; else the hierarchy does, and begins with them.
+/// One problem with its thinned points and the last nearest triangles, which the hierarchy begins with. A
+/// search of the clouds takes its place where there is one.
 struct Side {
   const RegistrationProblem& problem;
   std::vector<Observation> observations;
   SheetDistance sheet;
   CloudSearch search;
-  std::vector<std::vector<int>> nearest;
+  std::vector<std::vector<int>> hints;
   double total_weight = 0;
   Eigen::Matrix<int, kParameters, 1> index;  // into the vector of unknowns
 
@@ -34,7 +35,7 @@ struct Side {
         sheet(p.sheet ? *p.sheet : SheetDistance(*p.triangles, p.motion->positions.front())),
         search(p.searches ? p.searches(*p.motion) : CloudSearch()) {
     for (const Observation& observation : observations) {
-      nearest.emplace_back(observation.points.rows(), -1);
+      hints.emplace_back(observation.points.rows(), -1);
       if (observation.seen()) total_weight += observation.weight;
     }
   }
@@ -54,12 +55,28 @@ struct NormalEquations {
   Eigen::VectorXd gradient;
 };
 
+/// The foot of a point that belongs to a place of the sheet.
+sim::SurfaceFoot foot_at(const SurfacePoint& place, const Eigen::Vector3d& point,
+                         const data::Triangles& triangles, const data::Points& positions,
+                         const data::Points& velocities) {
+  const Eigen::Vector3i corner = triangles.row(place.triangle);
+  Eigen::Vector3d direction = point - place.position;
+  if (place.distance < 1e-9) {
+    const Eigen::Vector3d a = positions.row(corner[0]), b = positions.row(corner[1]),
+                          c = positions.row(corner[2]);
+    direction = (b - a).cross(c - a);
+  }
+  direction.normalize();
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  for (int c = 0; c < 3; ++c) velocity += place.barycentric[c] * velocities.row(corner[c]).transpose();
+  return {place.distance, {direction.x(), direction.y(), direction.z()}, direction.dot(velocity)};
+}
+
 /// Adds to the normal equations what one term of one keyframe says: Gauss-Newton matrix and gradient of the
-/// sum of w d^2 / 2 with w = 1 / d, and the term's mean distance to the score. `match` gives the place of
+/// sum of w d^2 / 2 with w = 1 / d, and the term's mean distance to the score. `match` gives the foot of
 /// point i on the sheet.
 template <class Match>
 void add_term(const data::Points& points, const Match& match, double weight, const Registration& registration,
-              const data::Triangles& triangles, const data::Points& positions, const data::Points& velocities,
               const Eigen::Matrix<int, kParameters, 1>& index, const Robust& robust, double softening,
               NormalEquations& sum) {
   const auto count = static_cast<std::size_t>(points.rows());
@@ -70,21 +87,12 @@ void add_term(const data::Points& points, const Match& match, double weight, con
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector3d point =
         simulated_from_observed * points.row(static_cast<Eigen::Index>(i)).transpose();
-    const SurfacePoint place = match(i, point);
-    distances[i] = place.distance;
-    const Eigen::Vector3i corner = triangles.row(place.triangle);
-    Eigen::Vector3d direction = point - place.position;
-    if (place.distance < 1e-9) {
-      const Eigen::Vector3d a = positions.row(corner[0]), b = positions.row(corner[1]),
-                            c = positions.row(corner[2]);
-      direction = (b - a).cross(c - a);
-    }
-    direction.normalize();
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
-    for (int c = 0; c < 3; ++c) velocity += place.barycentric[c] * velocities.row(corner[c]).transpose();
+    const sim::SurfaceFoot foot = match(i, point);
+    distances[i] = foot.distance;
+    const Eigen::Vector3d direction(foot.direction.x, foot.direction.y, foot.direction.z);
     rows[i].head<3>() = -(simulated_from_observed.linear().transpose() * direction);
     rows[i][3] = -direction.dot(registration.up.cross(point - registration.pivot));
-    rows[i][4] = -direction.dot(velocity);
+    rows[i][4] = -foot.speed;
   }
   std::vector<double> ranked = distances;
   sum.score += weight * robust_mean(ranked, robust);
@@ -115,33 +123,39 @@ void add_side(Side& side, const Eigen::VectorXd& unknowns, const Objective& obje
               NormalEquations& sum) {
   if (side.total_weight == 0) return;
   const Registration registration = side.at(unknowns);
-  if (side.search) side.search(CloudPoints::thinned, registration, side.nearest);
+  std::vector<std::span<const sim::SurfaceFoot>> feet;
+  if (side.search) feet = side.search(CloudPoints::thinned, registration);
   data::Points positions, velocities;
   for (std::size_t k = 0; k < side.observations.size(); ++k) {
     const Observation& observation = side.observations[k];
     if (!observation.seen() || observation.weight == 0) continue;
-    surface_at(*side.problem.motion, observation.t + registration.time_offset, positions, &velocities);
-    if (side.search)
-      side.sheet.move_border(positions);
-    else
-      side.sheet.move(positions);
+    if (!side.search || observation.contour.rows() > 0 || observation.markers.rows() > 0) {
+      surface_at(*side.problem.motion, observation.t + registration.time_offset, positions, &velocities);
+      if (side.search)
+        side.sheet.move_border(positions);
+      else
+        side.sheet.move(positions);
+    }
     const std::array<double, 5> weights = term_weights(observation, objective);
     const double keyframe_weight = observation.weight / side.total_weight;
     const auto add = [&](const data::Points& points, double weight, const auto& match) {
-      add_term(points, match, keyframe_weight * weight, registration, *side.problem.triangles, positions,
-               velocities, side.index, objective.robust, softening, sum);
+      add_term(points, match, keyframe_weight * weight, registration, side.index, objective.robust, softening,
+               sum);
+    };
+    const auto foot = [&](const SurfacePoint& place, const Eigen::Vector3d& point) {
+      return foot_at(place, point, *side.problem.triangles, positions, velocities);
     };
     add(observation.points, weights[0], [&](std::size_t i, const Eigen::Vector3d& point) {
-      int& triangle = side.nearest[k][i];
-      if (side.search) return side.sheet.on_triangle(triangle, point);
-      const SurfacePoint found = side.sheet.nearest(point, triangle);
-      triangle = found.triangle;
-      return found;
+      if (side.search) return feet[k][i];
+      const SurfacePoint nearest = side.sheet.nearest(point, side.hints[k][i]);
+      side.hints[k][i] = nearest.triangle;
+      return foot(nearest, point);
     });
-    add(observation.contour, weights[1],
-        [&](std::size_t, const Eigen::Vector3d& point) { return side.sheet.nearest_on_border(point); });
+    add(observation.contour, weights[1], [&](std::size_t, const Eigen::Vector3d& point) {
+      return foot(side.sheet.nearest_on_border(point), point);
+    });
     add(observation.markers, weights[2], [&](std::size_t i, const Eigen::Vector3d& point) {
-      return side.sheet.mark(observation.marks[i], point);
+      return foot(side.sheet.mark(observation.marks[i], point), point);
     });
   }
 }
@@ -247,11 +261,12 @@ std::vector<RegistrationFit> register_motions(const std::vector<RegistrationProb
   for (Side& side : sides) {
     RegistrationFit& fit = fits.emplace_back();
     fit.registration = side.at(best);
-    if (side.search) side.search(CloudPoints::all, fit.registration, side.nearest);
+    std::vector<std::span<const sim::SurfaceFoot>> feet;
+    if (side.search) feet = side.search(CloudPoints::all, fit.registration);
     for (std::size_t k = 0; k < side.problem.observations->size(); ++k)
       fit.keyframe_scores.push_back(keyframe_score(*side.problem.motion, (*side.problem.observations)[k],
                                                    fit.registration, objective, side.problem.crop, side.sheet,
-                                                   side.search ? &side.nearest[k] : nullptr));
+                                                   side.search ? &feet[k] : nullptr));
     fit.score = weighted_mean_score(fit.keyframe_scores, *side.problem.observations);
     for (int k = 0; k < kParameters; ++k) {
       const int i = side.index[k];

@@ -44,12 +44,12 @@ std::array<double, 5> term_weights(const Observation& observation, const Objecti
 
 double keyframe_score(const Motion& motion, const Observation& observation, const Registration& registration,
                       const Objective& objective, const data::CropBox& crop, SheetDistance& sheet,
-                      const std::vector<int>* triangles) {
+                      const std::span<const sim::SurfaceFoot>* feet) {
   const std::array<double, 5> weights = term_weights(observation, objective);
   const double t = observation.t + registration.time_offset;
   data::Points positions;
   surface_at(motion, t, positions);
-  if (triangles != nullptr)
+  if (feet != nullptr)
     sheet.move_border(positions);
   else
     sheet.move(positions);
@@ -64,7 +64,7 @@ double keyframe_score(const Motion& motion, const Observation& observation, cons
   };
   int hint = -1;
   const auto on_surface = [&](Eigen::Index i, const Eigen::Vector3d& point) {
-    if (triangles != nullptr) return sheet.on_triangle((*triangles)[static_cast<std::size_t>(i)], point);
+    if (feet != nullptr) return SurfacePoint{.distance = (*feet)[static_cast<std::size_t>(i)].distance};
     const SurfacePoint nearest = sheet.nearest(point, hint);
     hint = nearest.triangle;
     return nearest;

@@ -2,10 +2,12 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "data/mesh.h"
 #include "data/recording.h"
+#include "sim/law/surface_foot.h"
 #include "sysid/replay/motion.h"
 #include "sysid/replay/observation.h"
 #include "sysid/replay/sheet_distance.h"
@@ -50,11 +52,11 @@ double robust_mean(std::vector<double>& distances, const Robust& robust);
 
 /// Score of one keyframe [m]: the mean over its terms of mean distance times cloud_sigma / sigma of the term.
 /// One-sided: the simulated surface is not cropped, so hidden or cropped cloth costs nothing; `two_sided`
-/// adds keyframe_coverage inside `crop`. Zero where nothing was seen. `triangles`: those that the points of
-/// the cloud are nearest to, where they are known; else they are searched for.
+/// adds keyframe_coverage inside `crop`. Zero where nothing was seen. `feet`: those of the
+/// cloud's points, where they are known; else they are searched for.
 double keyframe_score(const Motion& motion, const Observation& observation, const Registration& registration,
                       const Objective& objective, const data::CropBox& crop, SheetDistance& sheet,
-                      const std::vector<int>* triangles = nullptr);
+                      const std::span<const sim::SurfaceFoot>* feet = nullptr);
 
 /// keyframe_score of each observation.
 std::vector<double> keyframe_scores(const data::Triangles& triangles, const Motion& motion,

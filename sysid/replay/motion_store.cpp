@@ -12,6 +12,7 @@
 #include "data/error.h"
 #include "data/parallel.h"
 #include "data/sha256.h"
+#include "sim/device_error.h"
 #include "sim/law/vertex_contact.h"
 
 namespace flash::sysid {
@@ -209,10 +210,14 @@ void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& 
     missing.push_back(i);
     simulated.push_back(candidates[i]);
   }
-  sysid::run(replay, simulated, kept, [&](std::size_t k, ReplayResult result) {
-    save(result, kept, keys[k], path_of(keys[k]));
-    finished(missing[k], std::move(result));
-  });
+  try {
+    sysid::run(replay, simulated, kept, [&](std::size_t k, ReplayResult result) {
+      save(result, kept, keys[k], path_of(keys[k]));
+      finished(missing[k], std::move(result));
+    });
+  } catch (const sim::DeviceError& error) {
+    throw error.renumbered([&](std::size_t k) { return missing.at(k); });
+  }
 }
 
 ReplayResult MotionStore::run(const Replay& replay, const ReplayCandidate& candidate) const {

@@ -33,14 +33,6 @@ void SheetDistance::move_border(const data::Points& positions) {
   }
 }
 
-SurfacePoint SheetDistance::on_triangle(int triangle, const Eigen::Vector3d& query) const {
-  const Eigen::Vector3i corner = triangles_.row(triangle);
-  SurfacePoint result = nearest_on_triangle(query, positions_.row(corner[0]), positions_.row(corner[1]),
-                                            positions_.row(corner[2]));
-  result.triangle = triangle;
-  return result;
-}
-
 SurfacePoint SheetDistance::nearest_on_border(const Eigen::Vector3d& query) const {
   SurfacePoint result;
   double best = std::numeric_limits<double>::infinity();

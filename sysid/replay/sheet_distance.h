@@ -22,9 +22,6 @@ class SheetDistance {
     return surface_.nearest(query, hint);
   }
 
-  /// Nearest point of one triangle.
-  SurfacePoint on_triangle(int triangle, const Eigen::Vector3d& query) const;
-
   /// All triangles, neighbours on the sheet one after the other.
   std::vector<int> triangles_in_order() const { return surface_.triangles_in_order(); }
 

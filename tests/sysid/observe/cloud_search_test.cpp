@@ -5,6 +5,7 @@
 #include <cmath>
 #include <memory>
 #include <random>
+#include <string>
 
 #include "data/parallel.h"
 #include "sim/device.h"
@@ -61,24 +62,31 @@ struct Lift {
   }
 };
 
-/// Searches on the processor, without the replay's hierarchy at rest.
+/// Searches on the processor, with a hierarchy of its own for each surface.
 CloudSearches processor_searches(const Replay& replay) {
   return [&replay](const Motion& motion) -> CloudSearch {
-    return [&replay, &motion](CloudPoints points, const Registration& registration,
-                              std::vector<std::vector<int>>& triangles) {
-      triangles.clear();
-      const auto seen = points == CloudPoints::all ? replay.observations : thinned(replay.observations, 400);
+    const auto found = std::make_shared<std::vector<std::vector<sim::SurfaceFoot>>>();
+    return [&replay, &motion, found](CloudPoints which, const Registration& registration) {
+      const auto seen = which == CloudPoints::all ? replay.observations : thinned(replay.observations, 400);
+      const data::Triangles& triangles = replay.surface.triangles;
+      found->clear();
       for (const Observation& observation : seen) {
-        data::Points positions;
-        surface_at(motion, observation.t + registration.time_offset, positions);
-        const SurfaceDistance surface(replay.surface.triangles, positions);
-        std::vector<int>& nearest = triangles.emplace_back();
-        for (Eigen::Index i = 0; i < observation.points.rows(); ++i)
-          nearest.push_back(surface
-                                .nearest(registration.observed_from_simulated().inverse() *
-                                         observation.points.row(i).transpose())
-                                .triangle);
+        data::Points x, velocities;
+        surface_at(motion, observation.t + registration.time_offset, x, &velocities);
+        const SurfaceDistance surface(triangles, x);
+        std::vector<sim::SurfaceFoot>& feet = found->emplace_back();
+        for (Eigen::Index i = 0; i < observation.points.rows(); ++i) {
+          const Eigen::Vector3d point =
+              registration.observed_from_simulated().inverse() * observation.points.row(i).transpose();
+          const SurfacePoint nearest = surface.nearest(point);
+          const Eigen::Vector3d direction = (point - nearest.position) / nearest.distance;
+          double speed = 0;
+          for (int k = 0; k < 3; ++k)
+            speed += nearest.barycentric[k] * velocities.row(triangles(nearest.triangle, k)).dot(direction);
+          feet.push_back({nearest.distance, {direction.x(), direction.y(), direction.z()}, speed});
+        }
       }
+      return std::vector<std::span<const sim::SurfaceFoot>>(found->begin(), found->end());
     };
   };
 }
@@ -107,24 +115,28 @@ TEST(CloudSearch, ThatHasNoRoomLeavesItToTheProcessor) {
   expect_alike(lift.fit([](const Motion&) { return CloudSearch(); }), expected, 0);
 }
 
-class CloudSearchOnDevice : public testing::TestWithParam<sim::Device> {
+class CloudSearchOnDevice : public testing::TestWithParam<const char*> {
  protected:
+  bool on_cuda = std::string(GetParam()) != "cpu";
   void SetUp() override {
-    if (GetParam() == sim::Device::cuda && !sim::why_no_cuda().empty()) GTEST_SKIP() << sim::why_no_cuda();
+    if (on_cuda && !sim::why_no_cuda().empty()) GTEST_SKIP() << sim::why_no_cuda();
+  }
+  /// Where the replay is simulated, and so searched.
+  void place(Replay& replay) const {
+    const sim::DeviceChoice choice = sim::choose_device(GetParam());
+    replay.settings.device = choice.device;
+    replay.settings.cuda_devices = choice.cuda_devices;
   }
 };
-INSTANTIATE_TEST_SUITE_P(, CloudSearchOnDevice, testing::Values(sim::Device::cpu, sim::Device::cuda),
-                         [](const auto& device) {
-                           return device.param == sim::Device::cuda ? "cuda" : "cpu";
-                         });
+INSTANTIATE_TEST_SUITE_P(Devices, CloudSearchOnDevice, testing::Values("cpu", "cuda", "cuda:all"));
 
 TEST_P(CloudSearchOnDevice, RegistersAndScoresAsTheProcessorDoesOnAnyThreads) {
   for (const int cells : {4, 16, 44}) {
     Lift lift(cells);
     const RegistrationFit expected = lift.fit({});
-    lift.replay.settings.device = GetParam();
+    place(lift.replay);
     const CloudSearches searches = device_searches(lift.replay, RegistrationSettings().points_per_keyframe);
-    EXPECT_EQ(static_cast<bool>(searches), GetParam() == sim::Device::cuda);
+    EXPECT_EQ(static_cast<bool>(searches), on_cuda);
     std::vector<RegistrationFit> fits(8);
     data::for_each_in_parallel(fits.size(), 4, [&](std::size_t k) { fits[k] = lift.fit(searches); });
     for (const RegistrationFit& fit : fits) {
@@ -136,7 +148,7 @@ TEST_P(CloudSearchOnDevice, RegistersAndScoresAsTheProcessorDoesOnAnyThreads) {
 
 TEST_P(CloudSearchOnDevice, OfAReplayWithoutCloudsIsNone) {
   Lift lift(4);
-  lift.replay.settings.device = GetParam();
+  place(lift.replay);
   for (Observation& observation : lift.replay.observations) observation.points.resize(0, 3);
   EXPECT_FALSE(device_searches(lift.replay, 400));
 }

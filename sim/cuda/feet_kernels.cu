@@ -1,4 +1,4 @@
-#include "sim/cuda/nearest_kernels.h"
+#include "sim/cuda/feet_kernels.h"
 
 #include <cmath>
 
@@ -10,6 +10,7 @@ namespace {
 constexpr int warp = 32;
 constexpr int warps = 8;  // of a block
 constexpr unsigned all_lanes = 0xffffffffu;
+constexpr double on_surface = 1e-9;  // where away from the surface is not told any more [m]
 static_assert(group_triangles == warp);
 
 using Place = Vector3<double>;
@@ -45,13 +46,13 @@ __device__ Owned least_of_warp(Owned mine) {
 struct Surface {
   double *placed, *boxes;
 };
-__device__ Surface surface_at(const NearestNumbers& n, int surface) {
+__device__ Surface surface_at(const FeetNumbers& n, int surface) {
   const long slots = static_cast<long>(n.groups) * group_triangles;
   return {n.placed + 9 * slots * surface, n.boxes + 6L * n.groups * surface};
 }
 
 /// A warp places the triangles of a group, and bounds them.
-__global__ void __launch_bounds__(warp* warps) place_kernel(const __grid_constant__ NearestNumbers n) {
+__global__ void __launch_bounds__(warp* warps) place_kernel(const __grid_constant__ FeetNumbers n) {
   const int group = warp_number(), slots = n.groups * group_triangles;
   if (group >= n.groups) return;
   const Surface surface = surface_at(n, static_cast<int>(blockIdx.y));
@@ -81,29 +82,49 @@ __global__ void __launch_bounds__(warp* warps) place_kernel(const __grid_constan
 __device__ double ratio(double x, double y) { return y > 0 ? x / y : 0; }
 __device__ double clamped(double x) { return fmin(fmax(x, 0.0), 1.0); }
 
-/// Squared distance of q to the triangle of a slot: that of the plane where its foot lies inside, else that
-/// of the nearest edge.
-__device__ double distance2(const Surface& surface, int slots, int slot, const Place& q) {
+/// A triangle: corner a, b - a and c - a.
+struct Corners {
+  Place a, e, f;
+};
+__device__ Corners corners_of(const Surface& surface, int slots, int slot) {
   const auto read = [&](int first) {
     return Place{surface.placed[first * slots + slot], surface.placed[(first + 1) * slots + slot],
                  surface.placed[(first + 2) * slots + slot]};
   };
-  const Place v = q - read(0), e = read(3), f = read(6);
+  return {read(0), read(3), read(6)};
+}
+
+/// The point a + b e + c f of a triangle that is nearest to a + v.
+struct OnTriangle {
+  double distance2, b, c;
+};
+
+/// The foot on the plane where that lies inside, else the nearest point of the edges.
+__device__ OnTriangle nearest_on(const Corners& at, const Place& v) {
+  const Place &e = at.e, &f = at.f;
   const double ee = dot(e, e), ef = dot(e, f), ff = dot(f, f), ve = dot(v, e), vf = dot(v, f);
   const Place normal = cross(e, f);
   const double area2 = dot(normal, normal);
-  const double weight_b = ff * ve - ef * vf, weight_c = ee * vf - ef * ve;  // times area2
-  if (area2 > 0 && weight_b >= 0 && weight_c >= 0 && weight_b + weight_c <= area2) {
+  const double b = ff * ve - ef * vf, c = ee * vf - ef * ve;  // times area2
+  if (area2 > 0 && b >= 0 && c >= 0 && b + c <= area2) {
     const double height = dot(v, normal);
-    return height * height / area2;
+    return {height * height / area2, b / area2, c / area2};
   }
-  const auto off = [&](double s, double r) {
-    const Place rest = v - s * e - r * f;
-    return dot(rest, rest);
+  const auto on = [&](double on_e, double on_f) {
+    const Place rest = v - on_e * e - on_f * f;
+    return OnTriangle{dot(rest, rest), on_e, on_f};
   };
-  // Along c - b from b: (v - e) . (f - e) = vf - ve - ef + ee.
+  const auto nearer = [](const OnTriangle& x, const OnTriangle& y) {
+    return y.distance2 < x.distance2 ? y : x;
+  };
+  // Along f - e from b: (v - e) . (f - e) = vf - ve - ef + ee.
   const double s = clamped(ratio(vf - ve - ef + ee, ee - 2 * ef + ff));
-  return fmin(off(1 - s, s), fmin(off(clamped(ratio(ve, ee)), 0), off(0, clamped(ratio(vf, ff)))));
+  return nearer(nearer(on(clamped(ratio(ve, ee)), 0), on(0, clamped(ratio(vf, ff)))), on(1 - s, s));
+}
+
+__device__ double distance2(const Surface& surface, int slots, int slot, const Place& q) {
+  const Corners at = corners_of(surface, slots, slot);
+  return nearest_on(at, q - at.a).distance2;
 }
 
 /// Squared distance of q to the box of a group; infinite beyond the last.
@@ -118,9 +139,29 @@ __device__ double box_distance2(const Surface& surface, int groups, int group, c
   return sum;
 }
 
-/// A warp finds the triangle of a point: first in the group whose box is nearest, then in all whose boxes are
+__device__ SurfaceFoot foot_of(const FeetNumbers& n, const Surface& surface, int slot,
+                               const SurfaceTime& time, const Place& q) {
+  const Corners at = corners_of(surface, n.groups * group_triangles, slot);
+  const Place v = q - at.a;
+  const OnTriangle nearest = nearest_on(at, v);
+  const Place away = v - nearest.b * at.e - nearest.c * at.f;
+  const double distance = norm(away);
+  const Place along = distance < on_surface ? cross(at.e, at.f) : away;
+  const double length = norm(along);
+  const Place direction = length > 0 ? (1 / length) * along : along;
+  const auto moved = [&](int vertex) {
+    return n.steps[static_cast<long>(time.to) * n.vertices + vertex] -
+           n.steps[static_cast<long>(time.from) * n.vertices + vertex];
+  };
+  const Vector3<int> corners = n.corners[slot];
+  const Place move = (1 - nearest.b - nearest.c) * moved(corners.x) + nearest.b * moved(corners.y) +
+                     nearest.c * moved(corners.z);
+  return {distance, direction, n.steps_per_second * dot(direction, move)};
+}
+
+/// A warp finds the foot of a point: first in the group whose box is nearest, then in all whose boxes are
 /// nearer than what was found.
-__global__ void __launch_bounds__(warp* warps) search_kernel(const __grid_constant__ NearestNumbers n) {
+__global__ void __launch_bounds__(warp* warps) search_kernel(const __grid_constant__ FeetNumbers n) {
   const int point = warp_number(), slots = n.groups * group_triangles;
   if (point >= n.points) return;
   const Surface surface = surface_at(n, n.surface_of[point]);
@@ -146,14 +187,15 @@ __global__ void __launch_bounds__(warp* warps) search_kernel(const __grid_consta
     }
   }
   const int slot = least_of_warp(mine).owner;
-  if (lane() == 0) n.nearest[point] = n.triangles[slot];
+  const SurfaceFoot foot = foot_of(n, surface, slot, n.times[n.surface_of[point]], q);
+  if (lane() == 0) n.feet[point] = foot;
 }
 
 unsigned blocks_for(int count) { return static_cast<unsigned>((count + warps - 1) / warps); }
 
 }  // namespace
 
-void place_and_search(const NearestNumbers& numbers, cudaStream_t stream) {
+void place_and_search(const FeetNumbers& numbers, cudaStream_t stream) {
   if (numbers.points == 0) return;
   place_kernel<<<dim3(blocks_for(numbers.groups), static_cast<unsigned>(numbers.surfaces)), warp * warps, 0,
                  stream>>>(numbers);

@@ -1,6 +1,6 @@
-// Nearest triangles of the device beside a search of all, with a formula of its own.
+// Feet on the device beside a search of all triangles, with a formula of its own.
 #ifdef FLASH_HAVE_CUDA
-#include "sim/cuda/nearest_triangles.h"
+#include "sim/cuda/surface_feet.h"
 
 #include <gtest/gtest.h>
 
@@ -115,38 +115,56 @@ std::vector<Scene> scenes() {
   return all;
 }
 
-TEST(NearestTriangles, AreThoseOfASearchOfAll) {
+double to_surface(const Vector3d& q, const Points& x, const data::Triangles& triangles) {
+  double least = std::numeric_limits<double>::infinity();
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t)
+    least = std::min(least, to_triangle(q, x, triangles.row(t)));
+  return least;
+}
+
+std::vector<int> in_turn(const data::Triangles& triangles) {
+  std::vector<int> order(static_cast<std::size_t>(triangles.rows()));
+  std::iota(order.begin(), order.end(), 0);
+  return order;
+}
+
+Vector3d vector(const Vector3<double>& v) { return {v.x, v.y, v.z}; }
+
+Points between(const std::vector<Points>& motion, const BetweenSteps& time) {
+  return (1 - time.fraction) * motion[static_cast<std::size_t>(time.first)] +
+         time.fraction * motion[static_cast<std::size_t>(time.last)];
+}
+
+TEST(SurfaceFeet, AreThoseOfASearchOfAll) {
   SKIP_WITHOUT_DEVICE();
   for (const Scene& scene : scenes()) {
     SCOPED_TRACE(scene.name);
-    std::vector<int> order(static_cast<std::size_t>(scene.triangles.rows()));
-    std::iota(order.begin(), order.end(), 0);
     const std::vector<Points> few = {Points(0, 3), scene.clouds[2], Points(0, 3)};
-    NearestTriangles search(0, scene.triangles, scene.motion[0].rows(), order, {scene.clouds, few});
+    SurfaceFeet search(0, scene.triangles, scene.motion[0].rows(), in_turn(scene.triangles),
+                       {scene.clouds, few});
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     for (const double turn : {0.0, 0.3}) {
       pose.linear() = Eigen::AngleAxisd(turn, Vector3d(1, 2, 2) / 3).toRotationMatrix();
       pose.translation() = Vector3d(0.02, -0.01, 0.005) * turn;
       const std::vector<BetweenSteps> times = {{0, 1, turn}, {1, 1, 0}, {0, 0, 0}};
       for (const std::size_t set : {0, 1}) {
-        std::vector<std::vector<int>> nearest;
-        search.find(set, scene.motion, times, pose, nearest);
-        ASSERT_EQ(nearest.size(), 3u);
+        const auto feet = search.find(set, scene.motion, 0.01, times, pose);
+        ASSERT_EQ(feet.size(), 3u);
         for (std::size_t k = 0; k < 3; ++k) {
           const Points& cloud = set == 0 ? scene.clouds[k] : few[k];
-          const double s = times[k].fraction;
-          const Points x = (1 - s) * scene.motion[static_cast<std::size_t>(times[k].first)] +
-                           s * scene.motion[static_cast<std::size_t>(times[k].last)];
-          ASSERT_EQ(std::ssize(nearest[k]), cloud.rows());
+          const Points x = between(scene.motion, times[k]);
+          ASSERT_EQ(std::ssize(feet[k]), cloud.rows());
           for (Eigen::Index i = 0; i < cloud.rows(); ++i) {
+            SCOPED_TRACE("point " + std::to_string(i) + " of cloud " + std::to_string(k));
+            const SurfaceFoot& foot = feet[k][static_cast<std::size_t>(i)];
             const Vector3d q = pose * cloud.row(i).transpose();
-            double least = std::numeric_limits<double>::infinity();
-            for (Eigen::Index t = 0; t < scene.triangles.rows(); ++t)
-              least = std::min(least, to_triangle(q, x, scene.triangles.row(t)));
-            // Squared distances are rounded to 1e-16 of the squares of coordinates, 30 m at most.
-            EXPECT_NEAR(to_triangle(q, x, scene.triangles.row(nearest[k][static_cast<std::size_t>(i)])),
-                        least, 1e-12 * (1 + q.norm()))
-                << "point " << i << " of cloud " << k;
+            // Rounding of coordinates of order |q|; squares of distances below 1e-9 m leave of it 1e-16 / d.
+            const double rounding = 1e-12 * (1 + q.norm());
+            EXPECT_NEAR(foot.distance, to_surface(q, x, scene.triangles), rounding);
+            if (foot.distance < 1e-9) continue;
+            EXPECT_NEAR(vector(foot.direction).norm(), 1, 1e-12);
+            EXPECT_NEAR(to_surface(q - foot.distance * vector(foot.direction), x, scene.triangles), 0,
+                        rounding);
           }
         }
       }
@@ -154,24 +172,52 @@ TEST(NearestTriangles, AreThoseOfASearchOfAll) {
   }
 }
 
-TEST(NearestTriangles, OfAnotherMotionAreNotThoseOfTheFirst) {
+TEST(SurfaceFeet, MoveAsFastAsDistancesShrink) {
+  SKIP_WITHOUT_DEVICE();
+  const Scene scene = scenes()[2];
+  constexpr double step = 0.01, apart = 1e-4;
+  SurfaceFeet search(0, scene.triangles, scene.motion[0].rows(), in_turn(scene.triangles),
+                     {{scene.clouds[0]}});
+  for (const double fraction : {0.2, 0.9}) {
+    const BetweenSteps time = {0, 1, fraction}, before = {0, 1, fraction - apart},
+                       after = {0, 1, fraction + apart};
+    const auto feet = search.find(0, scene.motion, step, {time}, Eigen::Isometry3d::Identity());
+    const Points x[3] = {between(scene.motion, before), between(scene.motion, time),
+                         between(scene.motion, after)};
+    int compared = 0;
+    for (Eigen::Index i = 0; i < scene.clouds[0].rows(); ++i) {
+      const SurfaceFoot& foot = feet[0][static_cast<std::size_t>(i)];
+      double d[3];
+      for (int k = 0; k < 3; ++k)
+        d[k] = to_surface(scene.clouds[0].row(i).transpose(), x[k], scene.triangles);
+      // Beside a kink, as where another triangle becomes the nearest, and near zero there is no one
+      // derivative.
+      const double first = (d[1] - d[0]) / (apart * step), second = (d[2] - d[1]) / (apart * step);
+      if (d[1] < 2e-3 || std::abs(first - second) > 0.01 * std::abs(first)) continue;
+      ++compared;
+      EXPECT_NEAR(-foot.speed, (first + second) / 2, 1e-3 + 1e-3 * std::abs(first)) << i;
+    }
+    EXPECT_GT(compared, 100);
+    const auto at_rest = search.find(0, scene.motion, step, {{1, 1, 0}}, Eigen::Isometry3d::Identity());
+    for (const SurfaceFoot& foot : at_rest[0]) EXPECT_EQ(foot.speed, 0);
+  }
+}
+
+TEST(SurfaceFeet, OfAnotherMotionAreNotThoseOfTheFirst) {
   SKIP_WITHOUT_DEVICE();
   const data::TriangleMesh mesh = data::rectangle({.width = 0.4, .height = 0.4, .cells_x = 9, .cells_y = 9});
-  std::vector<int> order(static_cast<std::size_t>(mesh.triangles.rows()));
-  std::iota(order.begin(), order.end(), 0);
   Points cloud(1, 3);
   cloud << 0.01, 0.02, 0.1;
-  NearestTriangles search(0, mesh.triangles, mesh.vertices.rows(), order, {{cloud}});
-  Points turned = mesh.vertices;
-  turned.col(0) = 0.4 - mesh.vertices.col(0).array();
-  std::vector<std::vector<int>> first, second, again;
-  search.find(0, {mesh.vertices}, {{0, 0, 0}}, Eigen::Isometry3d::Identity(), first);
-  search.begin_motion();
-  search.find(0, {turned}, {{0, 0, 0}}, Eigen::Isometry3d::Identity(), second);
-  search.begin_motion();
-  search.find(0, {mesh.vertices}, {{0, 0, 0}}, Eigen::Isometry3d::Identity(), again);
-  EXPECT_NE(first, second);
-  EXPECT_EQ(first, again);
+  SurfaceFeet search(0, mesh.triangles, mesh.vertices.rows(), in_turn(mesh.triangles), {{cloud}});
+  Points raised = mesh.vertices;
+  raised.col(2).array() += 0.02;
+  const auto distance = [&](const Points& x) {
+    search.begin_motion();
+    return search.find(0, {x}, 0.01, {{0, 0, 0}}, Eigen::Isometry3d::Identity())[0][0].distance;
+  };
+  EXPECT_NEAR(distance(mesh.vertices), 0.1, 1e-15);
+  EXPECT_NEAR(distance(raised), 0.08, 1e-15);
+  EXPECT_NEAR(distance(mesh.vertices), 0.1, 1e-15);
 }
 
 }  // namespace

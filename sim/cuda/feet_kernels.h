@@ -1,7 +1,7 @@
 #pragma once
 #include <cuda_runtime.h>
 
-#include "sim/law/vector3.h"
+#include "sim/law/surface_foot.h"
 
 namespace flash::sim::cuda {
 
@@ -14,12 +14,11 @@ struct SurfaceTime {
   double fraction;
 };
 
-/// What the search for nearest triangles knows: several surfaces of one mesh, each with a cloud of its own.
-struct NearestNumbers {
+/// What the search for feet knows: several surfaces of one mesh, each with a cloud of its own.
+struct FeetNumbers {
   int surfaces, vertices, groups;
   const Vector3<int>*
-      corners;           ///< of each slot, groups * group_triangles; the last triangle again at the end
-  const int* triangles;  ///< of each slot
+      corners;  ///< of each slot, groups * group_triangles; the last triangle again at the end
   const Vector3<double>* steps;  ///< vertices one after the other, a step behind the other [m]
   const SurfaceTime* times;      ///< one a surface
   /// Of each surface: 9 numbers a slot, all first ones together, then the second ones: corner a, b - a, c -
@@ -31,10 +30,11 @@ struct NearestNumbers {
   const Vector3<double>* cloud = nullptr;  ///< of all surfaces [m]
   const int* surface_of = nullptr;         ///< each point
   Frame<double> surface_from_cloud{};
-  int* nearest = nullptr;  ///< result: number of the triangle of each point
+  double steps_per_second = 0;
+  SurfaceFoot* feet = nullptr;  ///< result, one a point
 };
 
-/// Queues both: places the surfaces at their times, then finds the nearest triangle of each point.
-void place_and_search(const NearestNumbers& numbers, cudaStream_t stream);
+/// Queues both: places the surfaces at their times, then finds the foot of each point.
+void place_and_search(const FeetNumbers& numbers, cudaStream_t stream);
 
 }  // namespace flash::sim::cuda

@@ -1,11 +1,11 @@
-#include "sim/cuda/nearest_triangles.h"
+#include "sim/cuda/surface_feet.h"
 
 #include <array>
 #include <stdexcept>
 
 #include "sim/cuda/device_array.h"
 #include "sim/cuda/devices.h"
-#include "sim/cuda/nearest_kernels.h"
+#include "sim/cuda/feet_kernels.h"
 
 namespace flash::sim::cuda {
 namespace {
@@ -40,19 +40,24 @@ struct CloudSet {
   }
 };
 
+struct PinnedEnd {
+  void operator()(void* memory) const { cudaFreeHost(memory); }
+};
+
 }  // namespace
 
-struct NearestTriangles::Memory {
+struct SurfaceFeet::Memory {
   int device;
   std::size_t clouds, vertices;
   std::vector<CloudSet> sets;
   std::vector<std::array<int, steps_each>> held;  ///< steps that each cloud's places hold; -1: none
   DeviceArray<Vector3<int>> corners;
-  DeviceArray<int> triangles, nearest;
   DeviceArray<Place> steps;
   DeviceArray<SurfaceTime> times;
   DeviceArray<double> placed, boxes;
-  NearestNumbers numbers{};
+  DeviceArray<SurfaceFoot> feet;
+  std::unique_ptr<SurfaceFoot, PinnedEnd> feet_read;  // on the host
+  FeetNumbers numbers{};
 
   Memory(int used, const data::Triangles& mesh, Eigen::Index mesh_vertices, const std::vector<int>& order,
          const std::vector<std::vector<data::Points>>& clouds_of_sets)
@@ -67,12 +72,14 @@ struct NearestTriangles::Memory {
     std::vector<Vector3<int>> corners_of_slots;
     for (const int t : of_slots) corners_of_slots.push_back({mesh(t, 0), mesh(t, 1), mesh(t, 2)});
     corners = DeviceArray<Vector3<int>>(corners_of_slots);
-    triangles = DeviceArray<int>(of_slots);
     std::size_t most = 0;
     for (const std::vector<data::Points>& each : clouds_of_sets) {
       most = std::max(most, sets.emplace_back(each).points.size());
     }
-    nearest = DeviceArray<int>(most);
+    feet = DeviceArray<SurfaceFoot>(most);
+    SurfaceFoot* read = nullptr;
+    check(cudaMallocHost(&read, std::max<std::size_t>(most, 1) * sizeof(SurfaceFoot)));
+    feet_read.reset(read);
     steps = DeviceArray<Place>(clouds * steps_each * vertices);
     times = DeviceArray<SurfaceTime>(clouds);
     placed = DeviceArray<double>(9 * slots * clouds);
@@ -81,12 +88,11 @@ struct NearestTriangles::Memory {
                .vertices = static_cast<int>(vertices),
                .groups = static_cast<int>(groups),
                .corners = corners.data(),
-               .triangles = triangles.data(),
                .steps = steps.data(),
                .times = times.data(),
                .placed = placed.data(),
                .boxes = boxes.data(),
-               .nearest = nearest.data()};
+               .feet = feet.data()};
   }
 
   /// The place of a step of a cloud's two, which takes it to the device where it is not there yet.
@@ -96,7 +102,7 @@ struct NearestTriangles::Memory {
     if (there == step) return place;
     const data::Points& positions = motion.at(static_cast<std::size_t>(step));
     if (static_cast<std::size_t>(positions.rows()) != vertices)
-      throw std::invalid_argument("nearest triangles: a step without the positions of all vertices");
+      throw std::invalid_argument("surface feet: a step without the positions of all vertices");
     static_assert(sizeof(Place) == 3 * sizeof(double));
     check(cudaMemcpyAsync(steps.data() + static_cast<std::size_t>(place) * vertices, positions.data(),
                           vertices * sizeof(Place), cudaMemcpyHostToDevice, cudaStreamPerThread));
@@ -105,23 +111,23 @@ struct NearestTriangles::Memory {
   }
 };
 
-NearestTriangles::NearestTriangles(int device, const data::Triangles& triangles, Eigen::Index vertices,
-                                   const std::vector<int>& order,
-                                   const std::vector<std::vector<data::Points>>& sets)
+SurfaceFeet::SurfaceFeet(int device, const data::Triangles& triangles, Eigen::Index vertices,
+                         const std::vector<int>& order, const std::vector<std::vector<data::Points>>& sets)
     : memory_(std::make_unique<Memory>(device, triangles, vertices, order, sets)) {
   begin_motion();
 }
-NearestTriangles::~NearestTriangles() = default;
-NearestTriangles::NearestTriangles(NearestTriangles&&) noexcept = default;
+SurfaceFeet::~SurfaceFeet() = default;
+SurfaceFeet::SurfaceFeet(SurfaceFeet&&) noexcept = default;
 
-void NearestTriangles::begin_motion() {
+void SurfaceFeet::begin_motion() {
   for (auto& steps : memory_->held) steps.fill(-1);
 }
 
-void NearestTriangles::find(std::size_t set, const std::vector<data::Points>& motion,
-                            const std::vector<BetweenSteps>& times,
-                            const Eigen::Isometry3d& surface_from_cloud,
-                            std::vector<std::vector<int>>& nearest) {
+std::vector<std::span<const SurfaceFoot>> SurfaceFeet::find(std::size_t set,
+                                                            const std::vector<data::Points>& motion,
+                                                            double time_step,
+                                                            const std::vector<BetweenSteps>& times,
+                                                            const Eigen::Isometry3d& surface_from_cloud) {
   Memory& m = *memory_;
   use_device(m.device);
   const CloudSet& clouds = m.sets.at(set);
@@ -129,22 +135,24 @@ void NearestTriangles::find(std::size_t set, const std::vector<data::Points>& mo
   for (std::size_t k = 0; k < m.clouds; ++k)
     if (clouds.sizes[k] > 0)
       placed[k] = {m.place(k, times[k].first, motion), m.place(k, times[k].last, motion), times[k].fraction};
-  NearestNumbers numbers = m.numbers;
+  FeetNumbers numbers = m.numbers;
   numbers.points = static_cast<int>(clouds.points.size());
   numbers.cloud = clouds.points.data();
   numbers.surface_of = clouds.cloud_of.data();
   numbers.surface_from_cloud = frame_from(surface_from_cloud);
+  numbers.steps_per_second = 1 / time_step;
   check(cudaMemcpyAsync(m.times.data(), placed.data(), placed.size() * sizeof(SurfaceTime),
                         cudaMemcpyHostToDevice, cudaStreamPerThread));
   place_and_search(numbers, cudaStreamPerThread);
-  const std::vector<int> found = m.nearest.read(0, clouds.points.size());
-  nearest.resize(m.clouds);
-  auto at = found.begin();
-  for (std::size_t k = 0; k < m.clouds; ++k) {
-    const auto end = at + static_cast<std::ptrdiff_t>(clouds.sizes[k]);
-    nearest[k].assign(at, end);
-    at = end;
+  copy_to_end(m.feet_read.get(), m.feet.data(), clouds.points.size() * sizeof(SurfaceFoot),
+              cudaMemcpyDeviceToHost);
+  std::vector<std::span<const SurfaceFoot>> feet;
+  const SurfaceFoot* at = m.feet_read.get();
+  for (const std::size_t size : clouds.sizes) {
+    feet.emplace_back(at, size);
+    at += size;
   }
+  return feet;
 }
 
 }  // namespace flash::sim::cuda
