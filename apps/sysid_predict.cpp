@@ -4,6 +4,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "apps/command_line.h"
 #include "apps/option_checks.h"
@@ -60,9 +61,12 @@ Found take_search(const PredictOptions& options) {
     if (std::none_of(found.grid.axes.begin(), found.grid.axes.end(),
                      [&](const sysid::Axis& searched) { return searched.name == axis.name; }))
       found.grid.axes.push_back(axis);
-  for (const auto& [name, fixed] : summary.fixed)
-    if ((fixed.source == "measured" || fixed.deviation) && held(name) == holds.end())
+  for (const auto& [name, fixed] : summary.fixed) {
+    if (held(name) != holds.end()) continue;
+    if (fixed.source == "measured" || fixed.deviation)
       found.grid.fixed.push_back({name, {fixed.value}, false});
+    if (fixed.deviation) found.grid.deviations[name] = *fixed.deviation;
+  }
   // A column of the samples for each axis that was searched.
   for (Eigen::Index draw = -1; draw < std::min<Eigen::Index>(options.draws, summary.samples.rows()); ++draw) {
     std::vector<double>& values = found.values.emplace_back();
@@ -87,6 +91,36 @@ Found take_search(const PredictOptions& options) {
 
 int exit_code_of(const sysid::Prediction& prediction) {
   return prediction.chance < kContradicts ? exit_unusable : exit_done;
+}
+
+std::string setting(const sysid::Summary& summary, const std::string& name) {
+  const auto found = summary.settings.find(name);
+  return found == summary.settings.end() ? "" : found->second;
+}
+
+// An option that is not that of the search makes another motion.
+void warn_of_other_settings(const sysid::Summary& summary, const ReplayOptions& options) {
+  const auto compare = [&](const char* name, const char* option, double value) {
+    const std::optional<double> searched = data::parse_number(setting(summary, name));
+    if (searched && std::abs(*searched - value) > 1e-9 * value)
+      warn(std::string(option) + ": found " + data::format_short(value) + ", the search had " +
+           data::format_short(*searched));
+  };
+  compare("time_step_s", "--time-step", options.time_step);
+  compare("tolerance", "--tolerance", options.tolerance);
+}
+
+// Throws InputError where the recording is of a sheet of another size than the search's.
+void check_size(const sysid::Replay& replay, const data::Recording& recording, const std::string& run) {
+  const auto extent = [](const data::Points& vertices) {
+    return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
+  };
+  const double searched = extent(replay.recording.mesh.vertices), here = extent(recording.mesh.vertices);
+  if (std::abs(searched - here) > 0.02 * here)
+    throw data::input_error(recording.source, "object.mesh",
+                            "found an object " + data::format_short(here) + " m across, that of " + run +
+                                " is " + data::format_short(searched) +
+                                " m: give --mesh where both are of the same material");
 }
 
 nlohmann::ordered_json prediction_json(const sysid::Prediction& prediction, const PredictOptions& options,
@@ -122,9 +156,8 @@ void print_prediction(const sysid::Prediction& prediction) {
     std::printf("%8.3f %12.2f %9.2f to %7.2f%s\n", keyframe.t, 1e3 * keyframe.distance,
                 1e3 * keyframe.band[0], 1e3 * keyframe.band[1], keyframe.holds() ? "" : "  outside");
   }
-  std::printf(
-      "%zu of %zu keyframes are as expected; as many outside, or more, in %s %% of what is expected\n", held,
-      prediction.keyframes.size(), data::format_short(100 * prediction.chance).c_str());
+  std::printf("%zu of %zu keyframes are as expected; %s %% of what is expected is as far from its mean\n",
+              held, prediction.keyframes.size(), data::format_short(100 * prediction.chance).c_str());
 }
 
 int run_predict(const CLI::App& verb, const PredictOptions& options) {
@@ -138,8 +171,11 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
   simulated.element_order = asset.element_order;
   place_simulation(options.common, asset, simulated);
-  if (simulated.mesh.empty()) simulated.mesh = sysid::mesh_of(found.summary);
+  const bool own_mesh = simulated.mesh.empty();
+  if (own_mesh) simulated.mesh = sysid::mesh_of(found.summary);
   const sysid::Replay replay = sysid::make_replay(recording, simulated);
+  if (own_mesh) check_size(replay, recording, options.run);
+  warn_of_other_settings(found.summary, options.replay);
   std::vector<std::string> notices;
   found.grid.base = material_base(asset, replay.sheet(), notices, found.grid.fixed);
   sysid::check_grasp_axes(found.grid.axes, {replay});
@@ -165,9 +201,12 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   std::erase_if(motions, [](const sysid::ReplayResult& motion) { return !motion.finite; });
   std::vector<sysid::Misfit> misfits;
   for (const sysid::SummaryRecording& used : found.summary.recordings) misfits.push_back(used.misfit);
-  const sysid::Prediction prediction =
-      sysid::predict(replay, motions, sysid::correction_of(replay, candidates.front(), store), misfits,
-                     found.grid.score, options.common.seed);
+  const sysid::SolvedAs solved{setting(found.summary, "score_of").starts_with("cells of no size"),
+                               setting(found.summary, "solver_check") == "yes"};
+  const sysid::Prediction prediction = sysid::predict(
+      replay, motions,
+      sysid::errors_of_prediction(replay, found.grid, found.values.front(), motions.front(), solved, store),
+      misfits, found.grid.score, options.common.seed);
   end_after_signal();
 
   const std::string text = data::format_json(prediction_json(prediction, options, recording));
@@ -181,8 +220,8 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   else
     print_prediction(prediction);
   if (exit_code_of(prediction) == exit_unusable)
-    warn(recording.name + " contradicts the search: so many keyframes leave their bands by chance once in " +
-         data::format_short(std::round(1 / std::max(prediction.chance, 1e-3))) + " recordings, or less");
+    warn(recording.name + " contradicts the search: chance takes a recording so far once in " +
+         data::format_short(std::round(1 / std::max(prediction.chance, 5e-4))) + " times, or less");
   return exit_code_of(prediction);
 }
 
@@ -201,13 +240,14 @@ void add_predict_verb(CLI::App& app, Action& action) {
   verb->add_option("--draws", options->draws, "Draws of the posterior that are simulated")
       ->check(whole_number(1, 64))
       ->capture_default_str();
-  verb->add_option("-o,--out", options->out, "prediction.json");
+  verb->add_option("-o,--out", options->out, "File for the prediction, as prediction.json");
   add_replay_options(*verb, options->replay);
   add_seed_option(*verb, options->common);
   add_device_option(*verb, options->common);
   add_common_options(*verb, options->common);
   verb->footer(
-      "The mesh is that of the search. Grasp, times and tolerance are not: give the options of the search.\n"
+      "The mesh is that of the search. Grasp, times, step and tolerance are not: give the options of the "
+      "search.\n"
       "Exit code 3: the recording contradicts the search (chance below 1 %).\n"
       "Example:\n  flash-sysid predict run lift_again -o prediction.json");
   verb->callback(

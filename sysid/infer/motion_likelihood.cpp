@@ -79,13 +79,13 @@ void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
                                       recording.objective, shifts, near);
   const LinearObservations& places = *recording.near;
   const Eigen::Index count = places.rows();
-  recording.scale.resize(count);
+  recording.linear.scale.resize(count);
   Eigen::VectorXd residuals(count), of_rows(count);
   for (Eigen::Index i = 0; i < count; ++i) {
     const auto row = places.row(i);
-    recording.scale[i] = scale_of(row, recording.objective);
-    residuals[i] = recording.scale[i] * row.distance;
-    of_rows[i] = recording.scale[i] / row.weight;  // from the rows of the other functions
+    recording.linear.scale[i] = scale_of(row, recording.objective);
+    residuals[i] = recording.linear.scale[i] * row.distance;
+    of_rows[i] = recording.linear.scale[i] / row.weight;  // from the rows of the other functions
   }
   const auto columns_of = [&](const std::vector<SheetShifts>& all) {
     Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(count, static_cast<Eigen::Index>(all.size()));
@@ -103,7 +103,18 @@ void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
   rows.free = recording.registered * recording.bounds.asDiagonal();
   rows.rates = columns_of(rates);
   const Eigen::VectorXd left = residuals + recording.registered * at.registration + rows.known * at.errors;
+  recording.linear.rows = rows;
+  recording.linear.residuals = left;
   recording.likelihood.emplace(std::move(rows), left, repeatability, limit);
+}
+
+Eigen::VectorXd MotionLikelihood::away(std::size_t r, const Motion& reference, const Motion& motion) const {
+  const Recording& recording = recordings_[r];
+  const LinearObservations& places = *recording.near;
+  Eigen::VectorXd rows =
+      places.displacements(recording.replay, motion) - places.displacements(recording.replay, reference);
+  for (Eigen::Index i = 0; i < rows.size(); ++i) rows[i] *= recording.linear.scale[i] / places.row(i).weight;
+  return rows;
 }
 
 Eigen::MatrixXd MotionLikelihood::known_at(const Recording& recording, const Eigen::VectorXd& errors) {
@@ -149,7 +160,7 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     const Motion& motion = motion_at(at.registration[4]);
     if (!is_read(recording, motion, at.registration[4])) return {at, NAN};
     set_shifts(recording, at, shifts);
-    const Eigen::VectorXd residuals = recording.scale.cwiseProduct(recording.near->distances(
+    const Eigen::VectorXd residuals = recording.linear.scale.cwiseProduct(recording.near->distances(
         recording.replay, motion, registration_of(recording, at), shifts, sheet, triangles));
     const Eigen::MatrixXd known = known_at(recording, at.errors);
     fit = recording.likelihood->fit(residuals + recording.registered * at.registration + known * at.errors,

@@ -51,6 +51,17 @@ class MotionLikelihood {
 
   const ResidualLikelihood& of_recording(std::size_t r) const { return *recordings_[r].likelihood; }
 
+  /// What the likelihood of a recording is linear in, about its reference.
+  struct Linear {
+    ObservedRows rows;
+    Eigen::VectorXd residuals;  ///< of the reference, before registration and known errors are fitted [m]
+    Eigen::VectorXd scale;      ///< of each row: by its stated error
+  };
+  const Linear& linear(std::size_t r) const { return recordings_[r].linear; }
+
+  /// How far another motion of recording r is from the reference at each row, to first order [m].
+  Eigen::VectorXd away(std::size_t r, const Motion& reference, const Motion& motion) const;
+
  private:
   MotionLikelihood() = default;
 
@@ -65,9 +76,9 @@ class MotionLikelihood {
     SheetShifts correction;
     /// Of each keyframe: the correction, all errors and the bends there are.
     std::vector<SheetShapes> shapes;
-    std::vector<Eigen::Index> bent;                       ///< the errors that bend, in that order
-    Nuisance nuisance;                                    ///< of the reference
-    Eigen::VectorXd scale;                                ///< of each row: by its stated error
+    std::vector<Eigen::Index> bent;  ///< the errors that bend, in that order
+    Nuisance nuisance;               ///< of the reference
+    Linear linear;
     Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by what the registration moves each row
     Eigen::MatrixXd slopes, curves;                       ///< by what each known error does, and its square
     std::optional<LinearObservations> near;               ///< of the reference

@@ -1,85 +1,46 @@
 #include "sysid/infer/prediction.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "data/error.h"
 #include "sysid/infer/estimate_errors.h"
-#include "sysid/infer/observed_rows.h"
+#include "sysid/infer/local_noise.h"
+#include "sysid/infer/motion_likelihood.h"
 #include "sysid/infer/solver_check.h"
 #include "sysid/replay/half_cell.h"
 
 namespace flash::sysid {
 namespace {
 
-constexpr int kRecordings = 2000;    // expected ones: the ends of a band are known to 0.3 % of them
+constexpr int kRecordings = 4000;    // expected ones: a half of them tells chances of a thousandth
+constexpr double kLeast = 1e-9;      // of a distance of which the logarithm is taken [m]
 constexpr double kShortest = 0.125;  // reach of DiscrepancyModel over the sheet
 
-/// The observations as rows, and how each moves with what is unknown; lengths, whatever the term [m].
-struct Rows {
-  ObservedRows observed;
-  std::vector<LinearObservations::Term> terms;
-  Eigen::VectorXd residuals;
-  Eigen::MatrixXd motions;                              ///< of each draw over the estimate
-  Eigen::Matrix<double, Eigen::Dynamic, 5> registered;  ///< by each parameter at its bound
-  Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> registration;
-  SheetModes modes;
-};
-
-Rows rows_of(const Replay& replay, const std::vector<ReplayResult>& motions, const SheetShifts& correction,
-             const Registration& registration, const Objective& objective) {
-  const LinearObservations places(replay, motions.front().motion, registration, objective, correction);
-  // Displacements are those from the estimate as it was simulated.
-  const Eigen::VectorXd corrected =
-      correction.empty() ? Eigen::VectorXd::Zero(places.rows()).eval() : places.moved_by(replay, correction);
-  Rows rows;
-  rows.observed = observed_rows(replay, places, objective.robust);
-  Eigen::VectorXd lengths(places.rows());
-  rows.residuals.resize(places.rows());
-  for (Eigen::Index i = 0; i < places.rows(); ++i) {
-    const auto row = places.row(i);
-    rows.terms.push_back(row.term);
-    lengths[i] = scale_of(row, objective) / row.weight;
-    rows.residuals[i] = scale_of(row, objective) * row.distance;
+/// Mean distance of each keyframe, over its channels.
+std::vector<double> distances_of(const ObservedRows& rows, const Eigen::VectorXd& residuals,
+                                 const Robust& robust) {
+  const auto channels =
+      static_cast<std::size_t>(1 + *std::max_element(rows.channel.begin(), rows.channel.end()));
+  std::vector<std::vector<double>> parts(rows.times.size() * channels);
+  for (std::size_t i = 0; i < rows.keyframe.size(); ++i)
+    parts[static_cast<std::size_t>(rows.keyframe[i]) * channels + static_cast<std::size_t>(rows.channel[i])]
+        .push_back(std::abs(residuals[static_cast<Eigen::Index>(i)]));
+  std::vector<double> distances;
+  for (std::size_t k = 0; k < rows.times.size(); ++k) {
+    double sum = 0;
+    int count = 0;
+    for (std::size_t c = 0; c < channels; ++c) {
+      std::vector<double>& part = parts[k * channels + c];
+      if (part.empty()) continue;
+      sum += robust_mean(part, robust);
+      ++count;
+    }
+    distances.push_back(sum / count);
   }
-  rows.motions.resize(places.rows(), static_cast<Eigen::Index>(motions.size()) - 1);
-  for (std::size_t d = 1; d < motions.size(); ++d)
-    rows.motions.col(static_cast<Eigen::Index>(d) - 1) =
-        lengths.cwiseProduct(places.displacements(replay, motions[d].motion) + corrected);
-  const data::NuisanceBounds& bounds = replay.recording.nuisance;
-  Eigen::Matrix<double, 5, 1> ends;
-  ends << bounds.offset, bounds.yaw, bounds.time;
-  rows.registered = lengths.asDiagonal() * places.registration_derivatives() * ends.asDiagonal();
-  rows.registration.compute(rows.registered);
-  rows.modes = sheet_modes(rows.observed.places);
-  return rows;
-}
-
-/// Mean distance of each keyframe, over its terms.
-std::vector<double> distances_of(const Rows& rows, const Eigen::VectorXd& residuals, const Robust& robust) {
-  std::vector<double> sums(rows.observed.times.size()), terms(sums.size()), of_term;
-  const auto count = static_cast<std::size_t>(residuals.size());
-  for (std::size_t i = 0, next = 0; i < count; i = next) {
-    const auto keyframe = static_cast<std::size_t>(rows.observed.keyframe[i]);
-    of_term.clear();
-    for (next = i; next < count && rows.observed.keyframe[next] == rows.observed.keyframe[i] &&
-                   rows.terms[next] == rows.terms[i];
-         ++next)
-      of_term.push_back(std::abs(residuals[static_cast<Eigen::Index>(next)]));
-    sums[keyframe] += robust_mean(of_term, robust);
-    terms[keyframe] += 1;
-  }
-  for (std::size_t k = 0; k < sums.size(); ++k) sums[k] /= terms[k];
-  return sums;
-}
-
-/// What is left of residuals after the registration that makes them least. A parameter whose bound is zero is
-/// held.
-Eigen::VectorXd registered_anew(const Rows& rows, const Eigen::VectorXd& residuals) {
-  return residuals - rows.registered * rows.registration.solve(residuals);
+  return distances;
 }
 
 /// Draws errors of a misfit, of the rows. What is rough in the error of the model is neither smooth enough
@@ -87,117 +48,202 @@ Eigen::VectorXd registered_anew(const Rows& rows, const Eigen::VectorXd& residua
 /// anew in each keyframe.
 class ErrorDraws {
  public:
-  ErrorDraws(const Rows& rows, const Misfit& misfit)
-      : smooth_(field(rows, misfit.rms, misfit.reach_sheet)),
-        rough_(field(rows,
+  ErrorDraws(const ObservedRows& rows, const SheetModes& modes, const Misfit& misfit)
+      : smooth_(field(modes, misfit.rms, misfit.reach_sheet)),
+        rough_(field(modes,
                      std::sqrt(std::max(0.0, misfit.rough * misfit.rough - misfit.noise * misfit.noise)),
-                     kShortest * rows.modes.length)),
-        noise_(misfit.noise),
-        channels_(1 + *std::max_element(rows.observed.channel.begin(), rows.observed.channel.end())) {
-    const auto count = static_cast<Eigen::Index>(rows.observed.times.size());
+                     kShortest * modes.length)),
+        channels_(1 + *std::max_element(rows.channel.begin(), rows.channel.end())) {
+    const auto count = static_cast<Eigen::Index>(rows.times.size());
     Eigen::MatrixXd in_time(count, count);
     for (Eigen::Index k = 0; k < count; ++k)
       for (Eigen::Index l = 0; l < count; ++l)
-        in_time(k, l) = correlation_in_time(std::abs(rows.observed.times[static_cast<std::size_t>(k)] -
-                                                     rows.observed.times[static_cast<std::size_t>(l)]) /
-                                            std::max(misfit.reach_time, 1e-9));
+        in_time(k, l) = correlation_in_time(
+            std::abs(rows.times[static_cast<std::size_t>(k)] - rows.times[static_cast<std::size_t>(l)]) /
+            std::max(misfit.reach_time, 1e-9));
     constexpr double kRounding = 1e-9;  // keyframes that agree leave the matrix singular
     in_time.diagonal().array() += kRounding;
     in_time_ = in_time.llt().matrixL();
   }
 
+  /// `noises`: of each keyframe [m].
   template <typename Normal>
-  void add(const Rows& rows, Normal& normal, Eigen::VectorXd& residuals) const {
+  void add(const ObservedRows& rows, const Eigen::VectorXd& noises, Normal& normal,
+           Eigen::VectorXd& residuals) const {
     const auto draws = [&] { return Eigen::MatrixXd::NullaryExpr(in_time_.rows(), smooth_.cols(), normal); };
     for (int channel = 0; channel < channels_; ++channel) {
       const Eigen::MatrixXd smooth = in_time_ * draws(), rough = draws();
       for (Eigen::Index i = 0; i < residuals.size(); ++i) {
         const auto at = static_cast<std::size_t>(i);
-        if (rows.observed.channel[at] == channel)
-          residuals[i] += smooth_.row(i).dot(smooth.row(rows.observed.keyframe[at])) +
-                          rough_.row(i).dot(rough.row(rows.observed.keyframe[at])) + noise_ * normal();
+        if (rows.channel[at] == channel)
+          residuals[i] += smooth_.row(i).dot(smooth.row(rows.keyframe[at])) +
+                          rough_.row(i).dot(rough.row(rows.keyframe[at])) +
+                          noises[rows.keyframe[at]] * normal();
       }
     }
   }
 
  private:
   /// What each mode is at each row, of a field of standard deviation `size`.
-  static Eigen::MatrixXd field(const Rows& rows, double size, double reach) {
-    return size * rows.modes.values * variances_along(rows.modes, reach).cwiseSqrt().asDiagonal();
+  static Eigen::MatrixXd field(const SheetModes& modes, double size, double reach) {
+    return size * modes.values * variances_along(modes, reach).cwiseSqrt().asDiagonal();
   }
 
   Eigen::MatrixXd smooth_, rough_, in_time_;
-  double noise_;
   int channels_;
 };
 
-/// The distances of each keyframe (rows) in each expected recording (columns).
-Eigen::MatrixXd expected_distances(const Rows& rows, const std::vector<Misfit>& misfits, const Robust& robust,
-                                   unsigned seed) {
+/// What is left after registration and errors of known shape are fitted, as ResidualLikelihood fits them
+/// where every row counts by its square and no bound is reached.
+class LinearFit {
+ public:
+  LinearFit(const ObservedRows& rows, double noise) : columns_(rows.weights.size(), 0) {
+    constexpr double kFree = 1e-6;  // precision of what may be anything within its bounds
+    columns_.resize(rows.weights.size(), rows.free.cols() + rows.known.cols());
+    columns_ << rows.free, rows.known;
+    weighed_ = (columns_.transpose() * rows.weights.asDiagonal()) / (noise * noise);
+    Eigen::MatrixXd normal = weighed_ * columns_;
+    normal.diagonal().head(rows.free.cols()).array() += kFree;
+    normal.diagonal().tail(rows.known.cols()).array() += 1;
+    solver_.compute(normal);
+  }
+  Eigen::VectorXd left(const Eigen::VectorXd& residuals) const {
+    return residuals - columns_ * solver_.solve(weighed_ * residuals);
+  }
+
+ private:
+  Eigen::MatrixXd columns_, weighed_;
+  Eigen::LDLT<Eigen::MatrixXd> solver_;
+};
+
+/// By how much neighbours differ in each keyframe, and the standard deviation of its logarithm: noise along
+/// the view differs with the slope of what is seen.
+struct KeyframeNoise {
+  Eigen::VectorXd sizes, spreads;
+};
+
+KeyframeNoise noise_of_keyframes(const ObservedRows& rows, const Eigen::VectorXd& residuals, double all) {
+  const auto count = static_cast<Eigen::Index>(rows.times.size());
+  KeyframeNoise noise{Eigen::VectorXd::Constant(count, all), Eigen::VectorXd::Zero(count)};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    ObservedRows alone = rows;
+    for (Eigen::Index i = 0; i < residuals.size(); ++i)
+      if (alone.keyframe[static_cast<std::size_t>(i)] != k) alone.weights[i] = 0;
+    const double between = noise_between_neighbours(alone, residuals);
+    if (!(between > 0)) continue;  // too few
+    noise.sizes[k] = between;
+    // Of squares of differences of neighbours (Rice 1984).
+    noise.spreads[k] = std::sqrt(0.75 / static_cast<double>((alone.weights.array() > 0).count()));
+  }
+  return noise;
+}
+
+/// The distances of each keyframe (rows) in each expected recording (columns). `motions`: of draws, a column
+/// each, over the estimate.
+Eigen::MatrixXd expected_distances(const ObservedRows& rows, const Eigen::MatrixXd& motions,
+                                   const std::vector<Misfit>& misfits, const LinearFit& fit,
+                                   const KeyframeNoise& noise, const Robust& robust, unsigned seed) {
+  const SheetModes modes = sheet_modes(rows.places);
   std::vector<ErrorDraws> draws;
-  for (const Misfit& misfit : misfits) draws.emplace_back(rows, misfit);
+  for (const Misfit& misfit : misfits) draws.emplace_back(rows, modes, misfit);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> gauss;
   const auto normal = [&] { return gauss(random); };
-  Eigen::MatrixXd distances(static_cast<Eigen::Index>(rows.observed.times.size()), kRecordings);
+  Eigen::MatrixXd distances(static_cast<Eigen::Index>(rows.times.size()), kRecordings);
   for (Eigen::Index recording = 0; recording < kRecordings; ++recording) {
     const auto m = static_cast<std::size_t>(random() % misfits.size());
-    Eigen::VectorXd residuals = Eigen::VectorXd::Zero(rows.residuals.size());
-    if (rows.motions.cols() > 0)
-      residuals += rows.motions.col(
-          static_cast<Eigen::Index>(random() % static_cast<std::uint64_t>(rows.motions.cols())));
-    draws[m].add(rows, normal, residuals);
-    const std::vector<double> found = distances_of(rows, registered_anew(rows, residuals), robust);
+    Eigen::VectorXd residuals = rows.known * Eigen::VectorXd::NullaryExpr(rows.known.cols(), normal);
+    if (motions.cols() > 0)
+      residuals +=
+          motions.col(static_cast<Eigen::Index>(random() % static_cast<std::uint64_t>(motions.cols())));
+    const Eigen::VectorXd noises =
+        noise.sizes.array() *
+        (noise.spreads.array() * Eigen::VectorXd::NullaryExpr(noise.sizes.size(), normal).array()).exp();
+    draws[m].add(rows, noises, normal, residuals);
+    const std::vector<double> found = distances_of(rows, fit.left(residuals), robust);
     distances.col(recording) = Eigen::Map<const Eigen::VectorXd>(found.data(), distances.rows());
   }
   return distances;
 }
 
+/// Share of the second half of the columns that are as far from the mean of the first half as `observed` is.
+double chance_of(const Eigen::MatrixXd& expected, const Eigen::VectorXd& observed) {
+  const auto log = [](const auto& distances) { return distances.array().max(kLeast).log().matrix().eval(); };
+  const Eigen::Index half = expected.cols() / 2;
+  const Eigen::MatrixXd first = log(expected.leftCols(half));
+  const Eigen::VectorXd mean = first.rowwise().mean();
+  const Eigen::MatrixXd from_mean = first.colwise() - mean;
+  Eigen::MatrixXd covariance = from_mean * from_mean.transpose() / static_cast<double>(half - 1);
+  // Of many keyframes so many draws hardly tell the correlations (Ledoit and Wolf 2004, with a fixed share).
+  const double shrunk =
+      std::min(1.0, static_cast<double>(expected.rows()) / static_cast<double>(half)) + 1e-9;
+  const Eigen::VectorXd variances = covariance.diagonal();
+  covariance *= 1 - std::min(shrunk, 1.0);
+  covariance.diagonal() += std::min(shrunk, 1.0) * variances;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(covariance);
+  const auto distance = [&](const Eigen::VectorXd& from) { return from.dot(solver.solve(from)); };
+  const double there = distance(log(observed) - mean);
+  int as_far = 0;
+  for (Eigen::Index r = half; r < expected.cols(); ++r)
+    as_far += distance(log(expected.col(r)) - mean) >= there ? 1 : 0;
+  return static_cast<double>(as_far) / static_cast<double>(expected.cols() - half);
+}
+
 }  // namespace
 
-MotionChange correction_of(const Replay& replay, const ReplayCandidate& candidate, const MotionStore& store) {
-  const std::optional<Replay> half = on_half_the_cell(replay);
-  std::vector<FinerSettings> finer = finer_settings({replay});
-  std::vector<WantedMotion> wanted = {{&replay, candidate}};
-  if (half) wanted.push_back({&*half, candidate});
-  for (const FinerSettings& each : finer) wanted.push_back({each.replays.data(), candidate});
-  store.prepare(wanted);
-  const auto simulated = [&](const Replay& of) {
-    return std::make_shared<const Motions>(Motions{{of}, {store.run(of, candidate)}});
+std::vector<KnownError> errors_of_prediction(const Replay& replay, const GridSettings& grid,
+                                             const std::vector<double>& values, const ReplayResult& own,
+                                             const SolvedAs& solved, const MotionStore& store) {
+  const std::vector<Replay> replays = {replay}, none;
+  const AnswerSettings settings;
+  const TellWork untold;
+  const Task task{replays, none, grid, grid.axes, settings, store, untold};
+  const ReplayCandidate candidate = candidate_at(values, grid);
+  std::vector<KnownError> errors = errors_of_held(task, values, {own});
+  const auto from = std::make_shared<const Motions>(Motions{replays, {own}});
+  const auto add = [&](const std::string& name, double times, std::shared_ptr<const Motions> to) {
+    if (to->results.front().finite)
+      errors.push_back({{{-times, from}, {times, std::move(to)}}, true, true, {}, name});
   };
-  const std::shared_ptr<const Motions> own = simulated(replay);
-  MotionChange correction;
-  const auto add = [&](double times, std::shared_ptr<const Motions> to) {
-    correction.push_back({-times, own});
-    correction.push_back({times, std::move(to)});
-  };
-  if (half) add(no_cells, simulated(*half));
-  for (FinerSolution& each : finer_solutions(std::move(finer), candidate, store))
-    add(1, std::make_shared<const Motions>(Motions{std::move(each.replays), std::move(each.motions)}));
-  const bool finite = std::all_of(correction.begin(), correction.end(), [](const MotionTerm& term) {
-    return term.motions->results.front().finite;
-  });
-  return finite ? correction : MotionChange{};
+  if (const std::optional<Replay> half = solved.no_cells ? on_half_the_cell(replay) : std::nullopt) {
+    const auto to = std::make_shared<const Motions>(Motions{{*half}, {store.run(*half, candidate)}});
+    // Four equal parts correct by all of the step to cells of no size, and leave half of it unsure: twice the
+    // last third, as in an answer.
+    constexpr int kParts = 4;
+    for (int part = 0; part < kParts; ++part) add("double_mesh", no_cells / kParts, to);
+  }
+  if (solved.checked)
+    for (FinerSolution& finer : finer_solutions(finer_settings(replays), candidate, store))
+      add(finer.what, 1,
+          std::make_shared<const Motions>(Motions{std::move(finer.replays), std::move(finer.motions)}));
+  return errors;
 }
 
 Prediction predict(const Replay& replay, const std::vector<ReplayResult>& motions,
-                   const MotionChange& correction, const std::vector<Misfit>& misfits,
+                   const std::vector<KnownError>& errors, const std::vector<Misfit>& misfits,
                    const ScoreSettings& settings, unsigned seed) {
+  if (std::none_of(
+          replay.observations.begin(), replay.observations.end(),
+          [](const Observation& observation) { return observation.weight > 0 && observation.seen(); }))
+    throw data::InputError(replay.recording.source +
+                           ": no keyframe counts, expected one with enough points between --from and --to");
   Prediction prediction;
   prediction.fit = register_motions({registration_problem(replay, motions.front().motion)},
                                     settings.objective, settings.registration)
                        .front();
-  const Registration& registration = prediction.fit.registration;
-  const SheetShifts shifts =
-      correction.empty() ? SheetShifts() : shifts_of(correction, 0, replay, registration.time_offset);
-  const Rows rows = rows_of(replay, motions, shifts, registration, settings.objective);
-  if (rows.residuals.size() == 0)
-    throw data::InputError(replay.recording.source + ": no keyframe has points to predict");
+  const MotionLikelihood likelihood({replay}, {motions.front()}, settings, {}, errors, {});
+  const MotionLikelihood::Linear& linear = likelihood.linear(0);
+  Eigen::MatrixXd draws(linear.residuals.size(), static_cast<Eigen::Index>(motions.size()) - 1);
+  for (std::size_t d = 1; d < motions.size(); ++d)
+    draws.col(static_cast<Eigen::Index>(d) - 1) =
+        likelihood.away(0, motions.front().motion, motions[d].motion);
   const Robust& robust = settings.objective.robust;
-  const std::vector<double> observed = distances_of(rows, registered_anew(rows, rows.residuals), robust);
-  const Eigen::MatrixXd expected = expected_distances(rows, misfits, robust, seed);
-  Eigen::VectorXi left = Eigen::VectorXi::Zero(expected.cols());  // bands, by each expected recording
-  int left_by_observed = 0;
+  const Eigen::VectorXd left = likelihood.of_recording(0).fit(linear.residuals).left;
+  const std::vector<double> observed = distances_of(linear.rows, left, robust);
+  const double noise = likelihood.of_recording(0).misfit().noise;
+  const Eigen::MatrixXd expected =
+      expected_distances(linear.rows, draws, misfits, LinearFit(linear.rows, noise),
+                         noise_of_keyframes(linear.rows, left, noise), robust, seed);
   for (Eigen::Index k = 0; k < expected.rows(); ++k) {
     Eigen::VectorXd sorted = expected.row(k).transpose();
     std::sort(sorted.begin(), sorted.end());
@@ -205,14 +251,10 @@ Prediction predict(const Replay& replay, const std::vector<ReplayResult>& motion
       return sorted[static_cast<Eigen::Index>(std::lround(share * static_cast<double>(sorted.size() - 1)))];
     };
     const auto i = static_cast<std::size_t>(k);
-    const PredictedKeyframe keyframe{rows.observed.times[i], observed[i], {at(0.025), at(0.975)}};
-    left_by_observed += keyframe.holds() ? 0 : 1;
-    for (Eigen::Index r = 0; r < expected.cols(); ++r)
-      left[r] += expected(k, r) < keyframe.band[0] || expected(k, r) > keyframe.band[1] ? 1 : 0;
-    prediction.keyframes.push_back(keyframe);
+    prediction.keyframes.push_back({linear.rows.times[i], observed[i], {at(0.025), at(0.975)}});
   }
-  prediction.chance =
-      static_cast<double>((left.array() >= left_by_observed).count()) / static_cast<double>(expected.cols());
+  prediction.chance = chance_of(expected, Eigen::Map<const Eigen::VectorXd>(
+                                              observed.data(), static_cast<Eigen::Index>(observed.size())));
   return prediction;
 }
 

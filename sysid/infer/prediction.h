@@ -22,27 +22,37 @@ struct PredictedKeyframe {
 struct Prediction {
   RegistrationFit fit;                       ///< of the estimate's motion to the recording
   std::vector<PredictedKeyframe> keyframes;  ///< those that weigh
-  double chance = 0;  ///< of recordings that the search expects: share that leave as many bands, or more
+  double chance = 0;  ///< share of the recordings that the search expects which are as far from their mean
 };
 
-/// By what a candidate's motion differs from one on cells of no size and under finer settings, by which
-/// find_answer corrects too. A recording that cannot be meshed anew is taken as it is meshed. Empty where a
-/// finer motion diverges.
-MotionChange correction_of(const Replay& replay, const ReplayCandidate& candidate, const MotionStore& store);
+/// How the answer that is to predict was solved.
+struct SolvedAs {
+  bool no_cells = false;  ///< on cells of no size, extrapolated
+  bool checked = false;   ///< beside finer settings of the solver
+};
+
+/// Errors of known shape that a search's likelihood has, about `values` in a recording that it has not used:
+/// what it holds without a measurement, the step to cells of no size, finer settings. `own`: the motion at
+/// `values`. What diverges is left out.
+std::vector<KnownError> errors_of_prediction(const Replay& replay, const GridSettings& grid,
+                                             const std::vector<double>& values, const ReplayResult& own,
+                                             const SolvedAs& solved, const MotionStore& store);
 
 /// What a search expects of `replay`, which it has not used, beside what was observed: a posterior predictive
 /// check (Rubin 1984; Gelman, Meng and Stern 1996). `motions`: of its estimate, then of draws of its
-/// posterior. `correction`: by what all are off, as cells of no size would move; none where empty. `misfits`:
-/// of the recordings it used, all alike likely.
+/// posterior. `misfits`: of the recordings it used, all alike likely.
 ///
-/// An expected recording has the motion of one draw, a discrepancy of the size and the reaches of a misfit,
-/// as DiscrepancyModel has it, and noise. It is registered anew, as the observed one is. The distance of a
-/// keyframe is the mean over its terms of `settings.objective.robust`, on up to 200 points a term. All is to
-/// first order about the estimate.
+/// An expected recording has the motion of one draw, the errors of known shape under their prior, a
+/// discrepancy of the size and the reaches of a misfit, as DiscrepancyModel has it, what is rough in that
+/// misfit, and noise as large as that between neighbours of the recording itself. Registration and errors of
+/// known shape are fitted to it, as to the observed one (MotionLikelihood). The distance of a keyframe is the
+/// mean over its terms of `settings.objective.robust`. All but the fit of what was observed is to first order
+/// about the estimate. How far a recording is from what is expected is Mahalanobis' distance of the
+/// logarithms.
 ///
 /// Throws data::InputError where no keyframe weighs.
 Prediction predict(const Replay& replay, const std::vector<ReplayResult>& motions,
-                   const MotionChange& correction, const std::vector<Misfit>& misfits,
+                   const std::vector<KnownError>& errors, const std::vector<Misfit>& misfits,
                    const ScoreSettings& settings, unsigned seed = 1);
 
 }  // namespace flash::sysid

@@ -132,6 +132,7 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
   }
   for (const sim::RestTriangle& triangle : replay.sheet().triangles)
     if (triangle.stiff) bytes.add_matrix(triangle.vertices);
+  bytes.add(replay.steps);  // a file has the force of each
   for (const int step : kept) bytes.add(step);
   return data::sha256(bytes.text());
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "data/error.h"
 #include "sysid/infer/observed_rows.h"
 #include "tests/sysid/moving_sheet.h"
 
@@ -43,6 +44,12 @@ struct SeenCloth {
     result.finite = result.converged = true;
     return {result};
   }
+  Replay noisy(double noise) const {
+    std::mt19937_64 random(11);
+    std::normal_distribution<double> normal(0, noise);
+    return moved(Eigen::VectorXd::NullaryExpr(kKeyframes * replay.surface.triangles.rows(),
+                                              [&] { return normal(random); }));
+  }
   /// The points moved along the normals.
   Replay moved(const Eigen::VectorXd& distances) const {
     Replay other = replay;
@@ -73,17 +80,19 @@ Misfit misfit_of(double noise, double rms) {
 TEST(Prediction, OfNoiseAloneIsTheMeanOfItsSize) {
   const SeenCloth cloth;
   const Prediction prediction =
-      predict(cloth.replay, cloth.simulated(), {}, {misfit_of(1e-3, 0)}, ScoreSettings{});
+      predict(cloth.noisy(1e-3), cloth.simulated(), {}, {misfit_of(5e-4, 0)}, ScoreSettings{});
   ASSERT_EQ(prediction.keyframes.size(), static_cast<std::size_t>(kKeyframes));
   // Of |z|, z normal, without the largest 5 % (|z| > 1.96) the mean is 0.7168. That of 200 scatters as those
   // whose largest are 1.96, by 0.553, over 0.95 (Tukey and McLaughlin 1963).
   const double mean = 0.7168e-3, half = 1.96 * 0.553e-3 / 0.95 / std::sqrt(200);
+  int held = 0;
   for (const PredictedKeyframe& keyframe : prediction.keyframes) {
-    EXPECT_NEAR(keyframe.band[0], mean - half, 0.15 * half);  // of 2,000 draws an end is known to 3 %
-    EXPECT_NEAR(keyframe.band[1], mean + half, 0.15 * half);
-    EXPECT_LT(keyframe.distance, 1e-9);
-    EXPECT_FALSE(keyframe.holds());  // too good to be true
+    EXPECT_NEAR(keyframe.band[0], mean - half, 0.3 * half);  // the noise itself is estimated, to 3 %
+    EXPECT_NEAR(keyframe.band[1], mean + half, 0.3 * half);
+    held += keyframe.holds() ? 1 : 0;
   }
+  EXPECT_GE(held, 8);  // less once in a hundred times
+  EXPECT_GT(prediction.chance, 0.01);
 }
 
 // Recordings by the dense covariance that DiscrepancyModel states, not by the draws of the prediction.
@@ -132,6 +141,27 @@ TEST(Prediction, AnotherMotionContradictsIt) {
       predict(cloth.moved(errors), cloth.simulated(), {}, {misfit_of(5e-4, 5e-4)}, ScoreSettings{});
   EXPECT_LT(prediction.chance, 0.01);
   EXPECT_FALSE(prediction.keyframes.front().holds());
+
+  // One keyframe is enough.
+  Replay one = cloth.moved(errors);
+  for (std::size_t k = 1; k < one.observations.size(); ++k) one.observations[k].weight = 0;
+  EXPECT_LT(predict(one, cloth.simulated(), {}, {misfit_of(5e-4, 5e-4)}, ScoreSettings{}).chance, 0.01);
+  for (Observation& observation : one.observations) observation.weight = 0;
+  EXPECT_THROW(predict(one, cloth.simulated(), {}, {misfit_of(5e-4, 5e-4)}, ScoreSettings{}),
+               data::InputError);
+}
+
+// What registration may explain ends at its bounds.
+TEST(Prediction, ARecordingBeyondTheBoundsContradictsIt) {
+  const SeenCloth cloth;
+  Replay seen = cloth.noisy(5e-4);
+  for (Observation& observation : seen.observations) observation.points.col(2).array() += 0.01;
+  const auto chance = [&](double bound) {
+    seen.recording.nuisance.offset.setConstant(bound);
+    return predict(seen, cloth.simulated(), {}, {misfit_of(5e-4, 5e-4)}, ScoreSettings{}).chance;
+  };
+  EXPECT_LT(chance(0.002), 0.01);
+  EXPECT_GT(chance(0.02), 0.01);
 }
 
 // What the parameters leave open widens the bands; what is fitted to each recording does not count.
@@ -145,7 +175,8 @@ TEST(Prediction, DrawsOfThePosteriorWidenTheBandsAndRegistrationTakesItsPart) {
         for (Eigen::Index i = 0; i < positions.rows(); ++i)
           positions.row(i) += size * (offset + std::sin(15 * cloth.replay.surface.vertices(i, 0)) * bend);
     }
-    return predict(cloth.replay, motions, {}, {misfit_of(5e-4, 0)}, ScoreSettings{}).keyframes[5].band[1];
+    Replay seen = cloth.noisy(5e-4);
+    return predict(seen, motions, {}, {misfit_of(5e-4, 0)}, ScoreSettings{}).keyframes[5].band[1];
   };
   const Eigen::RowVector3d none = Eigen::RowVector3d::Zero(), by(1e-3, 1e-3, 3e-3);
   const double alone = with_draws(none, none);
