@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <utility>
 #include <vector>
 
 #include "data/error.h"
@@ -146,21 +146,51 @@ void make_rigid(const TriangleMesh& mesh, const std::vector<Corners>& own, doubl
   }
 }
 
-/// Turned and moved so that the least rectangle about it has its longer side along x and a corner at 0.
+/// Corners of the convex hull, counter-clockwise (Andrew 1979).
+std::vector<Vector2d> hull_of(const Layout& layout) {
+  std::vector<Vector2d> points, hull;
+  for (const auto& row : layout.rowwise()) points.emplace_back(row.transpose());
+  std::sort(points.begin(), points.end(), [](const Vector2d& a, const Vector2d& b) {
+    return std::pair(a.x(), a.y()) < std::pair(b.x(), b.y());
+  });
+  for (int half = 0; half < 2; ++half) {
+    const std::size_t start = hull.size();
+    for (const Vector2d& p : points) {
+      while (hull.size() >= start + 2 && cross(hull.back() - hull[hull.size() - 2], p - hull.back()) <= 0)
+        hull.pop_back();
+      hull.push_back(p);
+    }
+    hull.pop_back();  // where the other half begins
+    std::reverse(points.begin(), points.end());
+  }
+  return hull;
+}
+
+/// Turned and moved so that the least rectangle about it has its longer side along x and a corner at 0. A
+/// side of that rectangle lies along one of the hull (Freeman and Shapira 1975).
 void lay_straight(Layout& layout, double& width, double& height) {
-  constexpr int steps = 1800;  // of 0.05 degrees
+  const std::vector<Vector2d> hull = hull_of(layout);
   double least = std::numeric_limits<double>::infinity();
-  Layout best = layout;
-  for (int step = 0; step < steps; ++step) {
-    const double angle = step * EIGEN_PI / 2 / steps;
-    const Layout turned = layout * Eigen::Rotation2Dd(angle).toRotationMatrix();
-    const Eigen::RowVector2d sides = turned.colwise().maxCoeff() - turned.colwise().minCoeff();
+  Matrix2d best = Matrix2d::Identity();
+  for (std::size_t i = 0; i < hull.size(); ++i) {
+    const Vector2d along = (hull[(i + 1) % hull.size()] - hull[i]).normalized(),
+                   across(-along.y(), along.x());
+    Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity()), high = -low;
+    for (const Vector2d& p : hull) {
+      const Vector2d place(p.dot(along), p.dot(across));
+      low = low.cwiseMin(place);
+      high = high.cwiseMax(place);
+    }
+    const Vector2d sides = high - low;
     if (sides.prod() >= least) continue;
     least = sides.prod();
-    best = turned;
-    if (sides[0] < sides[1]) best = turned * Eigen::Rotation2Dd(EIGEN_PI / 2).toRotationMatrix();
+    if (sides[0] >= sides[1])
+      best << along, across;
+    else
+      best << across, -along;
   }
-  layout = best.rowwise() - Eigen::RowVector2d(best.colwise().minCoeff());
+  layout *= best;
+  layout.rowwise() -= Eigen::RowVector2d(layout.colwise().minCoeff());
   width = layout.col(0).maxCoeff();
   height = layout.col(1).maxCoeff();
 }

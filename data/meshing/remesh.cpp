@@ -363,7 +363,7 @@ TriangleMesh remeshed(const TriangleMesh& mesh, double edge) {
     changing.split_long();
     changing.collapse_short();
     changing.flip_to_delaunay();
-    changing.relax();
+    for (int step = 0; step < 3; ++step) changing.relax();
   }
   changing.flip_to_delaunay();
   return changing.result();
