@@ -114,9 +114,25 @@ class Changing {
     }
   }
 
-  void collapse_short() {
+  /// Those below `shortest`, where that makes none longer than `longest` [m].
+  void collapse_short(double shortest, double longest) {
     for (const Edge& edge : edges())
-      if (exists(edge) && length(edge) < 0.8 * edge_) collapse(edge);
+      if (exists(edge) && length(edge) < shortest) collapse(edge, longest);
+  }
+
+  /// One triangle for the three about an inner vertex of no more: they keep the edges around from collapsing.
+  void drop_threefold() {
+    for (int v = 0; v < int(vertices_.size()); ++v) {
+      const std::vector<int> three = around_[std::size_t(v)];
+      if (place(v) != Place::inner || three.size() != 3) continue;
+      Triangle t = triangle(three[0]);
+      const std::set<int> ring = neighbours(v);
+      if (ring.size() != 3) continue;
+      for (const int w : ring)
+        if (!has(t, w)) std::replace(t.begin(), t.end(), v, w);
+      for (const int i : three) remove(i);
+      add(t);
+    }
   }
 
   void flip_to_delaunay() {
@@ -146,7 +162,7 @@ class Changing {
       } else {
         at(v) = borders_.nearest(moved);
       }
-      if (turns_over(v, old)) at(v) = old;
+      if (spoils(v, old)) at(v) = old;
     }
   }
 
@@ -233,14 +249,15 @@ class Changing {
     return found;
   }
 
-  /// Whether a triangle about v looks another way than when v was at `old`.
-  bool turns_over(int v, const Vector3d& old) const {
+  /// Whether a triangle about v looks another way than when v was at `old`, or is small and has shrunk.
+  bool spoils(int v, const Vector3d& old) const {
     const auto moved = [&](int w) -> const Vector3d& { return w == v ? old : at(w); };
     return std::any_of(around_[std::size_t(v)].begin(), around_[std::size_t(v)].end(), [&](int i) {
       const Triangle& t = triangle(i);
       const Vector3d before = (moved(t[1]) - moved(t[0])).cross(moved(t[2]) - moved(t[0])),
                      now = area_vector(t);
-      return now.dot(before) < 0.2 * now.norm() * before.norm() || now.norm() < 1e-3 * edge_ * edge_;
+      const bool shrinks = now.norm() < std::min(0.3 * edge_ * edge_, before.norm());
+      return shrinks || now.dot(before) < 0.2 * now.norm() * before.norm();
     });
   }
 
@@ -259,7 +276,7 @@ class Changing {
   }
 
   /// Takes one end of the edge away where the surface stays one and no edge gets too long.
-  void collapse(const Edge& edge) {
+  void collapse(const Edge& edge, double longest) {
     auto [gone, kept] = edge;
     if (place(gone) > place(kept)) std::swap(gone, kept);
     if (place(gone) == Place::corner) return;
@@ -273,7 +290,7 @@ class Changing {
     if (both.size() == 1 && around_[std::size_t(third(triangle(both[0]), edge))].size() == 1) return;
     if (of_kept.size() <= 3 && place(kept) == Place::inner) return;
     const Vector3d target = place(gone) == place(kept) ? Vector3d((at(gone) + at(kept)) / 2) : at(kept);
-    const auto too_long = [&](int w) { return (at(w) - target).norm() > 4.0 / 3 * edge_; };
+    const auto too_long = [&](int w) { return (at(w) - target).norm() > longest; };
     if (std::any_of(of_gone.begin(), of_gone.end(), too_long)) return;
     if (std::any_of(of_kept.begin(), of_kept.end(), too_long)) return;
     for (const int v : {gone, kept})
@@ -361,10 +378,13 @@ TriangleMesh remeshed(const TriangleMesh& mesh, double edge) {
   Changing changing(mesh, edge);
   for (int round = 0; round < rounds; ++round) {
     changing.split_long();
-    changing.collapse_short();
+    changing.drop_threefold();
+    changing.collapse_short(0.8 * edge, 4.0 / 3 * edge);
     changing.flip_to_delaunay();
     for (int step = 0; step < 3; ++step) changing.relax();
   }
+  changing.drop_threefold();
+  changing.collapse_short(0.6 * edge, 1.5 * edge);  // what was too near others to go before
   changing.flip_to_delaunay();
   return changing.result();
 }
