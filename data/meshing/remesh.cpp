@@ -316,7 +316,7 @@ class Changing {
     const std::vector<int> both = beside(edge);
     if (both.size() != 2) return false;
     int first = both[0], second = both[1];
-    auto [a, b] = edge;
+    const int a = edge[0], b = edge[1];
     if (!runs(triangle(first), a, b)) std::swap(first, second);
     const int c = third(triangle(first), edge), d = third(triangle(second), edge);
     if (exists({c, d})) return false;
