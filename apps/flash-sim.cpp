@@ -15,12 +15,14 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  flash-sim run scene.json -o out\n"
       "  flash-sim bench --vertices 1000 --envs 64 --steps 250 --threads 2\n"
+      "  flash-sim mesh scan.ply -o cloth.obj --flat cloth_flat.obj\n"
       "  flash-sim picture out/frames/000100.ply table.obj -o picture.png\n"
       "Exit codes: 0 done; 1 failed; 2 bad usage or input; 3 finished, but more than 1 % of "
       "the steps did not converge, or one is out of balance by more than the weight.");
   flash::Action action;
   flash::add_run_verb(app, action);
   flash::add_bench_verb(app, action);
+  flash::add_mesh_verb(app, action);
   flash::add_picture_verb(app, action);
   return flash::run_tool(app, argc, argv, [&] { return action(); });
 }

@@ -13,6 +13,7 @@ using Action = std::function<int()>;
 /// Each adds one verb to `flash-sim`; parsing it sets `action`.
 void add_run_verb(CLI::App& app, Action& action);
 void add_bench_verb(CLI::App& app, Action& action);
+void add_mesh_verb(CLI::App& app, Action& action);
 void add_picture_verb(CLI::App& app, Action& action);
 
 }  // namespace flash

@@ -73,13 +73,25 @@ Geometry parse(const std::string& path) {
                    "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
 }
 
+void check_geometry(const Geometry& geometry, const std::string& path) {
+  check_points(geometry.points, path);
+  check_indices(geometry.triangles, geometry.points.rows(), "triangle", path);
+  check_indices(geometry.tetrahedra, geometry.points.rows(), "tetrahedron", path);
+}
+
+Points finite_points(const Points& points, std::size_t& left_out) {
+  std::vector<Eigen::Index> finite;
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    if (points.row(i).allFinite()) finite.push_back(i);
+  left_out += static_cast<std::size_t>(points.rows()) - finite.size();
+  return points(finite, Eigen::all);
+}
+
 }  // namespace
 
 Geometry load_geometry(const std::string& path) {
   Geometry geometry = parse(path);
-  check_points(geometry.points, path);
-  check_indices(geometry.triangles, geometry.points.rows(), "triangle", path);
-  check_indices(geometry.tetrahedra, geometry.points.rows(), "tetrahedron", path);
+  check_geometry(geometry, path);
   return geometry;
 }
 
@@ -169,12 +181,7 @@ TetMesh load_tet_mesh(const std::string& path) {
 }
 
 Points load_point_cloud(const std::string& path, std::size_t& left_out) {
-  const Points points = parse(path).points;
-  std::vector<Eigen::Index> finite;
-  for (Eigen::Index i = 0; i < points.rows(); ++i)
-    if (points.row(i).allFinite()) finite.push_back(i);
-  left_out += static_cast<std::size_t>(points.rows()) - finite.size();
-  return points(finite, Eigen::all);
+  return finite_points(parse(path).points, left_out);
 }
 
 Points load_point_cloud(const std::string& path) {
@@ -182,22 +189,38 @@ Points load_point_cloud(const std::string& path) {
   return load_point_cloud(path, left_out);
 }
 
-void save_triangle_mesh(const TriangleMesh& mesh, const std::string& path) {
+Geometry load_scan(const std::string& path, std::size_t& left_out) {
+  Geometry geometry = parse(path);
+  if (geometry.triangles.rows() > 0)
+    check_geometry(geometry, path);
+  else
+    geometry.points = finite_points(geometry.points, left_out);
+  return geometry;
+}
+
+std::string format_triangle_mesh(const TriangleMesh& mesh, const std::string& path) {
   const std::string extension = lower_extension(path);
-  if (extension == ".ply")
-    return write_atomically(path, format_ply(mesh.vertices, mesh.triangles, PlyNumbers::float64));
-  if (extension == ".obj") return write_atomically(path, format_obj(mesh));
-  if (extension == ".vtk") return write_atomically(path, format_vtk(mesh));
+  if (extension == ".ply") return format_ply(mesh.vertices, mesh.triangles, PlyNumbers::float64);
+  if (extension == ".obj") return format_obj(mesh);
+  if (extension == ".vtk") return format_vtk(mesh);
   throw InputError(path + ": ending \"" + extension +
                    "\" is not known for meshes, expected .ply, .obj or .vtk");
 }
 
-void save_tet_mesh(const TetMesh& mesh, const std::string& path) {
+std::string format_tet_mesh(const TetMesh& mesh, const std::string& path) {
   const std::string extension = lower_extension(path);
-  if (extension == ".vtk") return write_atomically(path, format_vtk(mesh));
-  if (extension == ".tet") return write_atomically(path, format_tet(mesh));
+  if (extension == ".vtk") return format_vtk(mesh);
+  if (extension == ".tet") return format_tet(mesh);
   throw InputError(path + ": ending \"" + extension +
                    "\" is not known for tetrahedra, expected .vtk or .tet");
+}
+
+void save_triangle_mesh(const TriangleMesh& mesh, const std::string& path) {
+  write_atomically(path, format_triangle_mesh(mesh, path));
+}
+
+void save_tet_mesh(const TetMesh& mesh, const std::string& path) {
+  write_atomically(path, format_tet_mesh(mesh, path));
 }
 
 void save_point_cloud(const Points& points, const std::string& path) {

@@ -32,6 +32,14 @@ Points load_point_cloud(const std::string& path);
 /// Loads likewise, and adds how many points were left out to `left_out`.
 Points load_point_cloud(const std::string& path, std::size_t& left_out);
 
+/// A mesh or, where the file has no triangles, a cloud, of which points that are not finite are left out and
+/// added to `left_out`. Throws as load_geometry does.
+Geometry load_scan(const std::string& path, std::size_t& left_out);
+
+/// What save_triangle_mesh and save_tet_mesh write to `path`, whose ending they read.
+std::string format_triangle_mesh(const TriangleMesh& mesh, const std::string& path);
+std::string format_tet_mesh(const TetMesh& mesh, const std::string& path);
+
 /// Format by ending: .ply (binary, double), .obj, .vtk (ascii); clouds .ply (binary, float), .pcd. Written
 /// atomically.
 void save_triangle_mesh(const TriangleMesh& mesh, const std::string& path);

@@ -1,0 +1,67 @@
+#include "data/meshing/fused_frames.h"
+
+#include <filesystem>
+
+#include "data/camera.h"
+#include "data/depth_image.h"
+#include "data/error.h"
+#include "data/extrinsics.h"
+#include "data/frame_files.h"
+#include "data/mesh_io.h"
+#include "data/text.h"
+#include "data/trajectory.h"
+
+namespace flash::data {
+namespace {
+
+constexpr std::size_t most_points = 20'000'000;
+
+/// Adds points to those that there are.
+void append(std::vector<double>& coordinates, const Points& points, const std::string& source) {
+  coordinates.insert(coordinates.end(), points.data(), points.data() + points.size());
+  if (coordinates.size() > 3 * most_points)
+    throw InputError(source + ": with it there are " + format_count(coordinates.size() / 3) +
+                     " points, expected at most " + format_count(most_points) + "; take fewer frames");
+}
+
+Points points_of(const std::vector<double>& coordinates) {
+  return Eigen::Map<const Points>(coordinates.data(), Eigen::Index(coordinates.size() / 3), 3);
+}
+
+}  // namespace
+
+Points fused_depth(const DepthFrames& frames, bool accept_unusable) {
+  const std::vector<std::string> files = files_in_order(frames.folder, {".png"});
+  if (files.empty()) throw InputError(frames.folder + ": found no .png");
+  const CameraIntrinsics camera = load_camera_intrinsics(frames.intrinsics);
+  std::vector<Eigen::Isometry3d> poses;
+  if (frames.poses.empty())
+    poses.assign(files.size(), load_camera_pose(frames.extrinsics, accept_unusable).transform.T);
+  else
+    poses = load_trajectory(frames.poses).poses;
+  if (poses.size() != files.size())
+    throw InputError(frames.poses + ": found " + format_count(poses.size()) + " poses, expected " +
+                     format_count(files.size()) + ", one a frame of " + frames.folder);
+  std::vector<double> coordinates;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    MaskImage mask;
+    if (!frames.masks.empty())
+      mask = load_mask(
+          (std::filesystem::path(frames.masks) / std::filesystem::path(files[i]).filename()).string());
+    const Points seen =
+        points_from_depth(load_depth_image(files[i]), mask, camera, frames.depth_scale, files[i]);
+    append(coordinates, (seen * poses[i].linear().transpose()).rowwise() + poses[i].translation().transpose(),
+           files[i]);
+  }
+  return points_of(coordinates);
+}
+
+Points fused_clouds(const std::string& folder, std::size_t& left_out) {
+  const std::vector<std::string> files = files_in_order(folder, {".ply", ".pcd"});
+  if (files.empty()) throw InputError(folder + ": found no .ply and no .pcd");
+  std::vector<double> coordinates;
+  for (const std::string& file : files) append(coordinates, load_point_cloud(file, left_out), file);
+  return points_of(coordinates);
+}
+
+}  // namespace flash::data
