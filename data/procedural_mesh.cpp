@@ -12,6 +12,7 @@
 #include "data/delaunay.h"
 #include "data/error.h"
 #include "data/text.h"
+#include "data/tshirt.h"
 
 namespace flash::data {
 namespace {
@@ -220,20 +221,31 @@ const char* to_string(DiagonalPattern pattern) {
   return "";
 }
 
-bool is_mesh_spec(const std::string& text) { return text.starts_with("sheet:") || text.starts_with("disc:"); }
+bool is_mesh_spec(const std::string& text) {
+  return text.starts_with("sheet:") || text.starts_with("disc:") || text.starts_with("tshirt:");
+}
 
 TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source, const std::string& field) {
   const auto fail = [&](const std::string& expected) {
     return input_error(source, field, "found \"" + spec + "\", expected " + expected);
   };
   const std::string form =
-      "sheet:WIDTHxHEIGHT:CELL[:PATTERN] or disc:RADIUS:CELL in metres, such as sheet:0.4x0.4:0.01";
+      "sheet:WIDTHxHEIGHT:CELL[:PATTERN], disc:RADIUS:CELL or tshirt:CELL in metres, such as "
+      "sheet:0.4x0.4:0.01";
   const auto length = [&](std::string_view word) {
     const std::optional<double> value = parse_number(word);
     if (!value || !std::isfinite(*value) || *value <= 0) throw fail(form);
     return *value;
   };
   const std::vector<std::string_view> parts = split(spec, ":");
+  if (spec.starts_with("tshirt:")) {
+    TshirtMesh settings;
+    constexpr double smallest = 1e-3;
+    settings.cell = parts.size() == 2 ? length(parts[1]) : length("");
+    if (settings.cell < smallest || settings.cell > settings.sleeve / 4)
+      throw fail("cells from 0.001 to 0.0425 m");
+    return tshirt(settings);
+  }
   if (!is_mesh_spec(spec) || parts.size() < 3) throw fail(form);
   const double cell = length(parts[2]);
   const auto expect_cells = [&](double cells) {

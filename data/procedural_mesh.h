@@ -35,8 +35,8 @@ TriangleMesh disc(double radius, double cell);
 TetMesh tet_box(const Eigen::Vector3d& size, const Eigen::Vector3i& cells);
 
 /// "sheet:0.278x0.278:0.01[:pattern]" (pattern one_way, alternating, alternating_by_row, jittered, delaunay)
-/// or "disc:0.2:0.01"; the last length is the cell, rounded so that a whole number of cells fits. Throws
-/// InputError naming `source` and `field`.
+/// or "disc:0.2:0.01" or "tshirt:0.014" (data/tshirt.h); the last length is the cell, rounded so that a whole
+/// number of cells fits. Throws InputError naming `source` and `field`.
 bool is_mesh_spec(const std::string& text);
 TriangleMesh parse_mesh_spec(const std::string& spec, const std::string& source = "mesh",
                              const std::string& field = "sheet");

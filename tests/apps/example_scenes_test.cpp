@@ -1,0 +1,140 @@
+// The shipped scenes, coarser where they would take long.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "apps/scene_run.h"
+#include "data/mesh_io.h"
+#include "data/scene.h"
+
+namespace flash::sim {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// One thing in the text of a file, and what takes its place.
+struct Change {
+  std::string from, to;
+};
+
+class ExampleScenes : public testing::Test {
+ protected:
+  ExampleScenes()
+      : folder_(
+            fs::temp_directory_path() /
+            ("flash_example_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()))) {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~ExampleScenes() override { fs::remove_all(folder_); }
+
+  /// Takes a file of the examples over, with some changes.
+  void take(const std::string& name, const std::vector<Change>& changes = {}) {
+    std::ifstream in(fs::path(FLASH_EXAMPLES) / name);
+    std::string text(std::istreambuf_iterator<char>(in), {});
+    for (const Change& change : changes) {
+      const std::size_t at = text.find(change.from);
+      ASSERT_NE(at, std::string::npos) << name << ": " << change.from;
+      text.replace(at, change.from.size(), change.to);
+    }
+    std::ofstream(folder_ / name) << text;
+  }
+
+  /// Runs a scene that was taken over, into a folder of its own.
+  SceneSummary run(const std::string& scene, int steps, const std::string& out, double tolerance = 1e-3) {
+    data::Scene read = data::load_scene((folder_ / scene).string());
+    read.steps = steps;
+    read.solver.tolerance = tolerance;
+    return run_scene(read, {}, (folder_ / out).string());
+  }
+
+  /// Where all vertices are in a frame, those inside of solids too.
+  data::Points frame(const std::string& out, int step) const {
+    char name[32];
+    std::snprintf(name, sizeof name, "frames/%06d.ply", step);
+    return data::load_geometry((folder_ / out / name).string()).points;
+  }
+
+  /// The last force of a body along z [N].
+  double last_force(const std::string& out, const std::string& body) const {
+    std::ifstream in(folder_ / out / "forces.csv");
+    double force = 0;
+    for (std::string line; std::getline(in, line);) {
+      std::istringstream stream(line);
+      std::vector<std::string> words;
+      for (std::string word; std::getline(stream, word, ',');) words.push_back(word);
+      if (words.at(1) == body) force = std::stod(words.at(4));
+    }
+    return force;
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(ExampleScenes, SticksAndSlipsOnTenDegrees) {
+  constexpr double g = 9.81, h = 0.01, friction = 0.1753, tolerance = 1e-6;
+  constexpr int steps = 100;
+  const double slope = 10 * M_PI / 180;
+  for (const char* name :
+       {"incline_cloth.json", "incline_cloth_beside.json", "incline_stick.json", "incline_slip.json"})
+    take(name);
+  const auto slid = [&](const std::string& scene) {
+    EXPECT_EQ(run(scene + ".json", steps, scene, tolerance).unconverged_steps, 0);
+    const data::Points moved = frame(scene, steps) - frame(scene, 0);
+    return moved.colwise().mean().norm();
+  };
+  EXPECT_LT(slid("incline_stick"), 2e-6);  // bristles of 1e-6 m, which tan(alpha) / mu of it bends
+  const double expected =
+      g * (std::sin(slope) - friction * std::cos(slope)) * h * h * steps * (steps + 1) / 2;
+  // What drives it is a thousandth of the weight, a thousand times the tolerance; and it starts by its
+  // bristles.
+  EXPECT_NEAR(slid("incline_slip"), expected, 1e-3 * expected + 2e-6);
+}
+
+TEST_F(ExampleScenes, ASoftGripperHoldsASoftCube) {
+  take("gripper.json");
+  take("soft_finger.json", {{":0.0075", ":0.015"}});
+  take("soft_cube.json", {{":0.006", ":0.01"}});
+  constexpr int steps = 160, cube_vertices = 4 * 4 * 4;
+  constexpr double lift = 0.08, cube_weight = 1000 * 0.03 * 0.03 * 0.03 * 9.81,
+                   finger_weight = 1000 * 0.016 * 0.03 * 0.06 * 9.81;
+  EXPECT_EQ(run("gripper.json", steps, "out").unconverged_steps, 0);
+  EXPECT_EQ(last_force("out", "table"), 0);
+  const double carried = last_force("out", "left_hand") + last_force("out", "right_hand");
+  EXPECT_NEAR(carried, cube_weight + 2 * finger_weight, 2e-3 * carried);  // the tolerance, twice
+  const auto height = [&](int step) { return frame("out", step).topRows(cube_vertices).col(2).mean(); };
+  EXPECT_NEAR(height(120) - height(60), lift, 0.05 * lift);
+}
+
+/// The published method on two local-global and two contact iterations stays bounded, at ten times the speed.
+TEST_F(ExampleScenes, TwoPlusTwoIterationsStayBounded) {
+  take("two_plus_two.json");
+  take("towel.json");
+  constexpr int steps = 150;
+  const SceneSummary budget = run("two_plus_two.json", steps, "budget");
+  EXPECT_EQ(budget.unconverged_steps, steps);  // and says so
+  take("two_plus_two.json", {{R"("type": "projective", "iterations": 2)", R"("type": "newton")"}});
+  const SceneSummary exact = run("two_plus_two.json", steps, "exact");
+  EXPECT_EQ(exact.unconverged_steps, 0);
+  const double diagonal = 0.3 * std::sqrt(2.0), lifted = 0.25;
+  const auto reach = [&](const std::string& out, int step) {
+    return (frame(out, step).rowwise() - Eigen::RowVector3d(0.25, 0.25, lifted)).rowwise().norm().maxCoeff();
+  };
+  // A towel that does not stretch reaches its diagonal; that of the budget lags behind, and stays on the
+  // scale of the scene.
+  EXPECT_LT(reach("exact", steps), 1.05 * diagonal);
+  for (const int step : {10, 20, 50, 100, 150}) EXPECT_LT(reach("budget", step), 2 * diagonal) << step;
+  EXPECT_GT(budget.penetration_max, 1e-4);
+  EXPECT_LT(exact.penetration_max, 1e-9);
+}
+
+}  // namespace
+}  // namespace flash::sim
