@@ -108,7 +108,17 @@ void check_memory(const data::Scene& scene, const std::vector<SceneBody>& bodies
                                 " MB that there are; a coarser mesh is needed");
 }
 
-std::string log_row(int step, double time, const std::vector<StepReport>& reports, bool self_contact) {
+/// Whether bending yields in any of them.
+bool any_yields(const std::vector<SceneBody>& bodies) {
+  return std::any_of(bodies.begin(), bodies.end(), [](const SceneBody& body) {
+    const auto& materials = body.environment.materials;
+    return std::any_of(materials.begin(), materials.end(),
+                       [](const auto& material) { return std::isfinite(material.yield_curvature); });
+  });
+}
+
+std::string log_row(int step, double time, const std::vector<StepReport>& reports, bool self_contact,
+                    bool yields) {
   StepReport largest, sum;
   bool converged = true;
   for (const StepReport& r : reports) {
@@ -120,6 +130,7 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
     sum.kinetic += r.kinetic;
     sum.membrane += r.membrane;
     sum.bending += r.bending;
+    sum.yielding += r.yielding;
     sum.solid += r.solid;
     sum.gravitational += r.gravitational;
     converged = converged && r.converged;
@@ -138,6 +149,7 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
            "," + std::to_string(r.layer_touches) + "," + std::to_string(r.layer_pairs) + "," +
            data::format_number(r.layers);
   }
+  if (yields) row += "," + data::format_number(sum.yielding);
   return row + "\n";
 }
 
@@ -278,7 +290,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   std::string log =
       "step,t,residual,iterations,penetration_max_m,complementarity,kinetic_J,elastic_J,potential_J,"
       "converged,membrane_J,bending_J,substeps";
-  log += scene.self_contact ? ",layer_distance_m,layer_touches,layer_pairs,layers_J\n" : "\n";
+  if (scene.self_contact) log += ",layer_distance_m,layer_touches,layer_pairs,layers_J";
+  const bool yields = any_yields(bodies);
+  log += yields ? ",yielding_J\n" : "\n";
   std::string forces = "t,body,fx,fy,fz\n";
   const auto write_tables = [&] {
     data::write_atomically((fs::path(output_dir) / "log.csv").string(), log);
@@ -324,7 +338,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       if (step == 1) begin_writing();  // what the first step refuses leaves nothing behind
 
       const double time = bodies.empty() ? step * scene.time_step : bodies.front().environment.state.time;
-      log += log_row(step, time, reports, summary.self_contact);
+      log += log_row(step, time, reports, summary.self_contact, yields);
       forces += force_rows(time, bodies, reports);
       bool converged = true, halved = false;
       inside_at_end = 0;

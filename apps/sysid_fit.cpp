@@ -12,6 +12,7 @@
 #include "data/writable.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
+#include "sysid/replay/half_cell.h"
 #include "sysid/report/search_folder.h"
 
 namespace flash {
@@ -110,9 +111,18 @@ std::vector<sysid::Axis> held_axes(const sysid::GridSettings& grid) {
 std::vector<std::string> other_settings(const std::string& start, const sysid::Fingerprint& print) {
   const sysid::GridFile search = sysid::load_grid_file((fs::path(start) / "grid.json").string());
   std::vector<std::string> lines;
-  for (const auto& [name, value] : search.fingerprint.value_or(sysid::Fingerprint())) {
+  if (!search.fingerprint) return lines;
+  for (const char* name : {"self_contact_m", "layer_friction"}) {
+    const auto of = [&](const sysid::Fingerprint& settings) {
+      return settings.contains(name) ? settings.at(name) : "none";
+    };
+    if (of(print) != of(*search.fingerprint))
+      lines.push_back(name + (": found " + of(print)) + ", the search had " + of(*search.fingerprint));
+  }
+  for (const auto& [name, value] : *search.fingerprint) {
     const auto here = print.find(name);
-    if (here == print.end() || here->second == value || name.starts_with("ax") || name.starts_with("fixed"))
+    if (here == print.end() || here->second == value || name.starts_with("ax") || name.starts_with("fixed") ||
+        name == "self_contact_m" || name == "layer_friction")
       continue;
     // Data stand there as hashes.
     lines.push_back(
@@ -162,6 +172,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
     replays.push_back(sysid::make_replay(recording, replay));
     names.push_back(recording.name);
   }
+  if (replay.self_contact) sysid::on_half_the_cell(replays);  // refused before anything is simulated
   std::vector<std::string> notices;
   grid.base = material_base(asset, replays.front().sheet(), notices, held_axes(grid));
   // One store of motions for the search and what goes on from it.

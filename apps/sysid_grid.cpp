@@ -14,6 +14,7 @@
 #include "data/writable.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
+#include "sysid/replay/half_cell.h"
 
 namespace flash {
 namespace {
@@ -123,6 +124,7 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
   const sysid::GridSettings settings = grid_settings(
       options, material_base(asset, replays.front().sheet(), notices, axes_of(parse_holds(options.holds))),
       threads);
+  if (simulated.self_contact) sysid::on_half_the_cell(replays);  // refused before anything is simulated
   sysid::check_grasp_axes(settings.axes, replays);
   sysid::check_grasp_axes(settings.fixed, replays);
   if (!options.no_solver_check)  // which halves the step

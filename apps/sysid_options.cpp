@@ -133,6 +133,18 @@ void add_replay_options(CLI::App& verb, ReplayOptions& options) {
       ->check(positive_number());
   group.add_flag("--clamp-slopes", options.clamp_slopes,
                  "A clamped patch does not bend: it holds the sheet's slope as well as its place");
+  CLI::Option* const layers =
+      group
+          .add_option(
+              "--self-contact", options.self_contact,
+              "The object meets itself: distance from which on its layers feel each other, as 0.001 [m]; "
+              "without it, it passes through itself")
+          ->check(positive_number());
+  group
+      .add_option("--layer-friction", options.layer_friction,
+                  "Coulomb coefficient of layer on layer; without it, that of the object")
+      ->check(number_from(0))
+      ->needs(layers);
   group.add_option("--from", options.from, "Keyframes before do not count, from the recording's start [s]")
       ->check(any_number());
   group.add_option("--to", options.to, "Keyframes after do not count, from the recording's start [s]")
@@ -167,6 +179,9 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
   settings.mesh = options.mesh;
   settings.threads = threads;
   settings.clamp_slopes = options.clamp_slopes;
+  if (options.self_contact > 0)
+    settings.self_contact =
+        sim::SelfContact{.thickness = options.self_contact, .friction = options.layer_friction};
   if (options.grasp_within > 0) settings.grasp_within = options.grasp_within;
   if (options.grasp_shape == "clamp") settings.grasp_shape = data::GraspShape::clamp;
   if (options.grasp_shape == "point") settings.grasp_shape = data::GraspShape::point;
@@ -273,10 +288,18 @@ int thread_count(const CommonOptions& options) {
                              : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
+void check_device(const CommonOptions& options, const sysid::ReplaySettings& settings) {
+  if (settings.self_contact && options.device.starts_with("cuda"))
+    throw data::InputError("--device " + options.device +
+                           ": --self-contact is simulated on the CPU alone; use --device cpu or auto");
+}
+
 void place_simulation(const CommonOptions& options, const data::Asset& asset,
                       sysid::ReplaySettings& settings) {
-  const bool open = options.device == "auto", solid = asset.element_type == data::ElementType::tetrahedron;
-  const sim::DeviceChoice choice = sim::choose_device(open && solid ? "cpu" : options.device);
+  check_device(options, settings);
+  const bool on_cpu = asset.element_type == data::ElementType::tetrahedron || settings.self_contact;
+  const sim::DeviceChoice choice =
+      sim::choose_device(options.device == "auto" && on_cpu ? "cpu" : options.device);
   settings.device = choice.device;
   settings.cuda_devices = choice.cuda_devices;
 }

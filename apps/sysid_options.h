@@ -38,6 +38,8 @@ struct ReplayOptions {
   std::string grasp_shape;
   double grasp_within = 0;  ///< 0: the recording's
   bool clamp_slopes = false;
+  double self_contact = 0;     ///< [m]; 0: none
+  double layer_friction = -1;  ///< below 0: that of the object
   double from = 0, to = 0;
   std::string distance = "trimmed";
   double trim = 0.05, huber = 0.02;
@@ -74,8 +76,11 @@ void warn_of_camera(const data::Recording& recording);
 
 int thread_count(const CommonOptions& options);
 
-/// Has candidates simulated where --device wants it. No device simulates solids: auto takes the CPU for
-/// them. Throws data::InputError for a CUDA device that is not there.
+/// Throws data::InputError where --device wants a CUDA device that cannot simulate what the options ask for.
+void check_device(const CommonOptions& options, const sysid::ReplaySettings& settings);
+
+/// Has candidates simulated where --device wants it. No device simulates solids or self-contact: auto takes
+/// the CPU for them. Throws data::InputError for a CUDA device that is not there, and as check_device does.
 void place_simulation(const CommonOptions& options, const data::Asset& asset,
                       sysid::ReplaySettings& settings);
 /// For verbs that no device simulates for yet. Throws data::InputError for cuda.

@@ -164,9 +164,9 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
   }
   for (const char* kind : sysid::virtual_experiments) {
     say(options.common, std::string("simulating ") + kind);
-    const sysid::Replay made =
-        sysid::virtual_experiment(kind, recordings.front(), material,
-                                  {replay.solver, threads, options.common.seed, replay.clamp_slopes});
+    const sysid::Replay made = sysid::virtual_experiment(
+        kind, recordings.front(), material,
+        {replay.solver, threads, options.common.seed, replay.clamp_slopes, replay.self_contact});
     experiments.push_back(sysid::plan_experiment(kind, {made}, settings, kept));
   }
   std::stable_sort(experiments.begin(), experiments.end(),

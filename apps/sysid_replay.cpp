@@ -146,6 +146,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   check_kind(asset, recording);
   check_options(options.replay, asset);
   sysid::ReplaySettings simulated = replay_settings(verb, options.replay, thread_count(options.common));
+  check_device(options.common, simulated);
   const sim::DeviceChoice device =
       sim::choose_device(options.common.device == "auto" ? "cpu" : options.common.device);
   simulated.device = device.device;

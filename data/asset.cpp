@@ -88,6 +88,15 @@ void read_weave(const JsonObject& props, Asset& asset) {
   asset.weave.warp_direction = props.number("warp_direction", 0) * std::numbers::pi / 180;
 }
 
+void read_yield(const JsonObject& props, Asset& asset) {
+  if (!props.has("yield_curvature")) return;
+  if (asset.format == AssetFormat::published || asset.element_type != ElementType::triangle)
+    throw props.error("yield_curvature", "no such field but for sheets in \"schema\": \"flash-asset/1\"");
+  if (asset.bending_model != BendingModel::hinge)
+    throw props.error("yield_curvature", "\"bending_model\": \"hinge\", the only one that yields");
+  asset.yield_curvature = props.positive("yield_curvature");
+}
+
 void read_properties(const JsonObject& props, Asset& asset) {
   const bool published = asset.format == AssetFormat::published;
   // The published coefficient is not D: under the wrong schema it would be off by a factor of 3 unnoticed.
@@ -97,8 +106,8 @@ void read_properties(const JsonObject& props, Asset& asset) {
     throw props.error("bending_rigidity", "bending, or \"schema\": \"flash-asset/1\"");
   props.expect_fields({"obj_mass", "mass", "density", "areal_density", "young", "poisson", "constitutive",
                        "thickness", published ? "bending" : "bending_rigidity", "bending_model",
-                       "bending_ratio", "twisting_ratio", "warp_direction", "friction", "air_drag",
-                       "stiffness_damping"});
+                       "bending_ratio", "twisting_ratio", "warp_direction", "yield_curvature", "friction",
+                       "air_drag", "stiffness_damping"});
   asset.constitutive =
       parse_constitutive(props.string("constitutive"), asset.source, props.name_of("constitutive"));
   const bool solid = asset.element_type == ElementType::tetrahedron;
@@ -116,6 +125,7 @@ void read_properties(const JsonObject& props, Asset& asset) {
     asset.bending_model =
         parse_bending_model(props.string("bending_model"), asset.source, props.name_of("bending_model"));
   read_weave(props, asset);
+  read_yield(props, asset);
   read_mass(props, asset);
   if (asset.density && !asset.thickness && !solid)
     throw props.error("thickness", "a thickness beside density, or areal_density");
@@ -226,6 +236,7 @@ void save_asset(const Asset& asset, const std::string& path) {
     if (weave.bending_ratio != 1) props["bending_ratio"] = weave.bending_ratio;
     if (weave.twisting_ratio != 1) props["twisting_ratio"] = weave.twisting_ratio;
     if (weave.warp_direction != 0) props["warp_direction"] = weave.warp_direction * 180 / std::numbers::pi;
+    if (asset.yield_curvature) props["yield_curvature"] = *asset.yield_curvature;
     props["friction"] = asset.friction;
     if (asset.air_drag != 0) props["air_drag"] = asset.air_drag;
     if (asset.stiffness_damping != 0) props["stiffness_damping"] = asset.stiffness_damping;
@@ -249,6 +260,7 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
   m.air_drag = asset.air_drag;
   m.stiffness_damping = asset.stiffness_damping;
   m.weave = asset.weave;
+  if (asset.yield_curvature) m.yield_curvature = *asset.yield_curvature;
   sheet.total_mass = m.areal_density * rest_area;
   sheet.uniform_vertex_mass = asset.object_mass.has_value();
 
@@ -281,6 +293,10 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
     sheet.notices.push_back(
         source + ": woven: D_2 = " + format_short(m.weave.bending_ratio * m.bending_rigidity) +
         " N m, warp at " + format_short(m.weave.warp_direction * 180 / std::numbers::pi) + " deg from x");
+  if (asset.yield_curvature)
+    sheet.notices.push_back(source + ": bending yields at " + format_short(m.yield_curvature) +
+                            " 1/m, at a moment of " + format_short(m.bending_rigidity * m.yield_curvature) +
+                            " N");
   sheet.notices.push_back(source + ": mass = " + format_short(sheet.total_mass) + " kg, " +
                           format_short(m.areal_density) + " kg/m^2" +
                           (asset.object_mass ? " (obj_mass, the total, spread evenly over vertices)" : ""));
@@ -353,6 +369,8 @@ Asset express_as(const Asset& asset, AssetFormat format, double rest_area,
     if (asset.weave != Weave{})
       lose("bending_ratio, twisting_ratio and warp_direction: its sheets are isotropic");
     result.weave = {};
+    if (asset.yield_curvature) lose("yield_curvature: bending does not yield");
+    result.yield_curvature.reset();
     if (!sheet.uniform_vertex_mass) lose("mass by area: obj_mass is spread evenly over vertices");
   }
   if (asset.element_order == ElementOrder::quadratic) lose("element_order 2: its tetrahedra are linear");
@@ -375,6 +393,7 @@ Asset asset_from_sheet(const SheetMaterial& material, std::optional<double> thic
   asset.bending_rigidity = material.bending_rigidity;
   asset.bending_model = material.bending_model;
   asset.weave = material.weave;
+  if (std::isfinite(material.yield_curvature)) asset.yield_curvature = material.yield_curvature;
   asset.areal_density = material.areal_density;
   asset.friction = material.friction;
   asset.air_drag = material.air_drag;

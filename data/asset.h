@@ -31,6 +31,7 @@ struct Asset {
   std::optional<double> thickness;          ///< [m]
   std::optional<double> bending_rigidity;   ///< D [N m]; empty: the plate formula, or w
   Weave weave;                              ///< flash-asset/1 alone
+  std::optional<double> yield_curvature;    ///< flash-asset/1 alone; absent: it does not yield [1/m]
   std::optional<double> published_bending;  ///< w of the published format [N m]
   std::optional<BendingModel> bending_model;
   std::optional<double> density;        ///< [kg/m^3]

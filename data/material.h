@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 
 namespace flash::data {
 
@@ -38,6 +39,8 @@ struct SheetMaterial {
   double air_drag = 0.0;              ///< mass-proportional damping [1/s]
   double stiffness_damping = 0.0;     ///< Rayleigh, stiffness-proportional [s]
   Weave weave = {};                   ///< `plate` alone
+  double yield_curvature =
+      std::numeric_limits<double>::infinity();  ///< at which bending begins to yield; `hinge` alone [1/m]
 
   bool operator==(const SheetMaterial&) const = default;
 };

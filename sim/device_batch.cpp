@@ -1,6 +1,7 @@
 #include "sim/device_batch.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <mutex>
 #include <stdexcept>
@@ -22,6 +23,9 @@ std::string why_not_on_device(const Environment& environment) {
   if (!environment.solids.empty()) return "solids (element_type TETRAHEDRON) are simulated on the CPU alone";
   if (!environment.point_masses.empty()) return "point masses (attached_mass) are simulated on the CPU alone";
   if (environment.self_contact) return "self-contact (self_contact) is simulated on the CPU alone";
+  if (std::any_of(environment.materials.begin(), environment.materials.end(),
+                  [](const auto& material) { return std::isfinite(material.yield_curvature); }))
+    return "bending that yields (yield_curvature) is simulated on the CPU alone";
   if (environment.materials.size() > 1) return "several bodies in one environment";
   if (std::any_of(environment.obstacles.begin(), environment.obstacles.end(),
                   [](const Obstacle& obstacle) { return std::holds_alternative<Mesh>(obstacle.shape); }))

@@ -12,6 +12,7 @@
 #include "sim/pairs/intersection.h"
 #include "sim/step/exits.h"
 #include "sim/step/feasible_positions.h"
+#include "sim/step/hinge_energy.h"
 
 namespace flash::sim {
 
@@ -27,7 +28,8 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWo
   const Environment& environment = problem.contacts.environment;
   const Points& start = environment.state.positions;
   if (w.now.materials == environment.materials && w.now.solids == environment.solids &&
-      w.now.positions.rows() == start.rows() && w.now.positions == start)
+      w.now.rest_angles == environment.state.rest_angles && w.now.positions.rows() == start.rows() &&
+      w.now.positions == start)
     return w.now.elastic;
   Points force = Points::Zero(start.rows(), 3);
   ElasticEnergy elastic;
@@ -112,6 +114,10 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
     return false;
   }
   environment.state.velocities = (w.now.positions - environment.state.positions) / h;
+  HingeFlow flow = hinge_flow(*w.plan, problem.laws, environment.state, w.now.positions);
+  environment.state.rest_angles = std::move(flow.rest_angles);
+  report.bending -= flow.lost;
+  report.yielding = flow.lost;
   environment.state.bristles = bristles_at_end(problem.contacts, w.now.contacts, w.now.positions);
   if (problem.layers) environment.state.pair_bristles = problem.layers->bristles_at_end(w.now.layers);
   environment.state.positions = w.now.positions;
@@ -188,6 +194,12 @@ StepReport Solver::step(Environment& environment) {
   const double h = w.settings.time_step;
   update_holds(environment, environment.state.time + h);
   return advance(environment, h, w.settings.halvings, w);
+}
+
+void check_self_contact(const Sheet& sheet, double thickness, const Points& positions) {
+  PairSurface surface(sheet);
+  check_thickness(sheet, surface, thickness);
+  check_start(sheet, surface, positions);
 }
 
 void Solver::forget() { workspace_->refactor = true; }

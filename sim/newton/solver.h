@@ -38,4 +38,8 @@ class Solver {
   std::unique_ptr<NewtonWorkspace> workspace_;
 };
 
+/// Throws data::InputError where a surface cannot meet itself: layers as thick as the mean edge of a body, or
+/// positions in which it passes through itself.
+void check_self_contact(const Sheet& sheet, double thickness, const data::Points& positions);
+
 }  // namespace flash::sim

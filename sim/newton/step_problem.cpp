@@ -43,6 +43,7 @@ double StepProblem::relative_residual(const Iterate& iterate) const {
 void StepProblem::evaluate(Iterate& iterate) const {
   iterate.materials = contacts.environment.materials;
   iterate.solids = contacts.environment.solids;
+  iterate.rest_angles = contacts.environment.state.rest_angles;
   iterate.incremental_potential = potential.evaluate(iterate.positions, iterate.force, iterate.elastic);
   if (layers) {
     layers->add_forces(iterate.positions, iterate.layers, iterate.force);

@@ -17,6 +17,7 @@ struct Iterate {
   LayerContact layers;                         ///< of the surface with itself
   std::vector<data::SheetMaterial> materials;  ///< of `elastic`
   std::map<int, data::SolidMaterial> solids;   ///< likewise
+  std::vector<double> rest_angles;             ///< likewise, as in State
   ElasticEnergy elastic;
   double incremental_potential = 0;  ///< [J]
 };

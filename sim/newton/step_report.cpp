@@ -154,6 +154,7 @@ StepReport joined(const StepReport& first, const StepReport& second) {
   whole.layer_pairs = std::max(first.layer_pairs, second.layer_pairs);
   whole.layer_ways += first.layer_ways;
   whole.complementarity = worst(first.complementarity, second.complementarity);
+  whole.yielding += first.yielding;
   whole.work += first.work;
   for (size_t k = 0; k < whole.hold_forces.size(); ++k)
     whole.hold_forces[k] = 0.5 * (first.hold_forces[k] + second.hold_forces[k]);

@@ -30,7 +30,8 @@ struct StepReport {
   long layer_ways = 0;         ///< of pairs that were followed by continuous detection
   double complementarity = 0;  ///< largest gap of a vertex that a surface pushes, or depth of any other [m]
   double kinetic = 0, membrane = 0, bending = 0, solid = 0, layers = 0, gravitational = 0;  ///< energies [J]
-  double work = 0;  ///< work done on the sheet by holds and obstacles [J]
+  double yielding = 0;  ///< lost over the step to bending that yields [J]
+  double work = 0;      ///< work done on the sheet by holds and obstacles [J]
   // Forces of a step in parts are their means over time.
   std::vector<Eigen::Vector3d> hold_forces;      ///< hold on sheet, one a hold of the environment [N]
   std::vector<Eigen::Vector3d> obstacle_forces;  ///< obstacle on sheet, one an obstacle [N]

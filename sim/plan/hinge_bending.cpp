@@ -1,6 +1,7 @@
 #include "sim/plan/hinge_bending.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "sim/plan/edge.h"
@@ -58,6 +59,12 @@ void add_area_gradient(const HingePositions& x, std::array<int, 3> triangle, dou
   gradient.col(c) += 0.5 * factor * normal.cross(x.col(b) - x.col(a));
 }
 
+/// Of the triangles (0, 1, 2) and (1, 0, 3).
+std::array<Presence, 2> presences(const Hinge& hinge, const HingePositions& x) {
+  return {presence_of(0.5 * left_normal(x).norm(), hinge.rest_areas[0]),
+          presence_of(0.5 * right_normal(x).norm(), hinge.rest_areas[1])};
+}
+
 double deviation(const Hinge& hinge, const HingePositions& x) {
   return std::remainder(hinge_angle(x) - hinge.rest_angle, 2 * M_PI);
 }
@@ -87,25 +94,37 @@ double hinge_angle(const HingePositions& x) {
 }
 
 void hinge_response(const Hinge& hinge, const HingePositions& x, double& energy, HingePositions& gradient,
-                    Matrix12* hessian) {
-  const Presence left = presence_of(0.5 * left_normal(x).norm(), hinge.rest_areas[0]),
-                 right = presence_of(0.5 * right_normal(x).norm(), hinge.rest_areas[1]);
+                    Matrix12* hessian, double yield_angle) {
+  const auto [left, right] = presences(hinge, x);
   const double weight = left.share * right.share * hinge.weight;
   energy = 0;
   gradient.setZero();
   if (hessian) hessian->setZero();
   if (weight == 0) return;
-  const double angle = deviation(hinge, x);
+  const double angle = deviation(hinge, x), bent = std::clamp(angle, -yield_angle, yield_angle);
+  const bool yields = bent != angle;
   const HingePositions g = angle_gradient(x);
-  energy = 0.5 * weight * angle * angle;
-  gradient = weight * angle * g;
-  const double energy_of_angle = 0.5 * hinge.weight * angle * angle;
+  energy = yields ? weight * bent * (angle - 0.5 * bent) : 0.5 * weight * angle * angle;
+  gradient = weight * bent * g;
+  const double energy_of_angle =
+      yields ? hinge.weight * bent * (angle - 0.5 * bent) : 0.5 * hinge.weight * angle * angle;
   if (left.slope > 0) add_area_gradient(x, {0, 1, 2}, energy_of_angle * left.slope * right.share, gradient);
   if (right.slope > 0) add_area_gradient(x, {1, 0, 3}, energy_of_angle * left.share * right.slope, gradient);
-  if (hessian) {
+  if (hessian && !yields) {
     const Eigen::Map<const Eigen::Matrix<double, 12, 1>> flat(g.data());
     hessian->noalias() = weight * flat * flat.transpose();
   }
+}
+
+double yield_angle(const Hinge& hinge, double yield_curvature) {
+  return yield_curvature * std::sqrt((hinge.rest_areas[0] + hinge.rest_areas[1]) / hinge.weight);
+}
+
+double flow_of(const Hinge& hinge, const HingePositions& x, double yield_angle) {
+  const auto [left, right] = presences(hinge, x);
+  if (left.share * right.share == 0) return 0;
+  const double angle = deviation(hinge, x);
+  return angle - std::clamp(angle, -yield_angle, yield_angle);
 }
 
 }  // namespace flash::sim

@@ -1,6 +1,7 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "data/mesh.h"
@@ -14,7 +15,7 @@ namespace flash::sim {
 struct Hinge {
   std::array<int, 4> vertices;
   double weight;                     ///< |e|^2 / (A_0 + A_1) of the rest shape
-  double rest_angle;                 ///< dihedral angle of the rest shape, 0 where flat [rad]
+  double rest_angle;                 ///< dihedral angle without moment, 0 where flat [rad]
   std::array<double, 2> rest_areas;  ///< of triangles (0, 1, 2) and (1, 0, 3) [m^2]
 };
 
@@ -35,7 +36,20 @@ double hinge_angle(const HingePositions& x);
 /// positive semi-definite, exact at the rest angle. A triangle without area has no normal, so that the force
 /// of the angle alone would grow without bound. So s = u^3 (10 - 15 u + 6 u^2) at u = area / (collapsed_share
 /// rest area) takes it out smoothly; s is 1 for u >= 1.
+///
+/// Beyond `yield_angle` from the rest angle the moment stays what it is there (elastic, perfectly plastic),
+/// and the energy grows linearly with the angle: what is stored and what flows, together. So a step in which
+/// hinges yield is a minimization still (the incremental potential of Ortiz, Stainier 1999). A hinge that
+/// yields has no Hessian.
 void hinge_response(const Hinge& hinge, const HingePositions& x, double& energy, HingePositions& gradient,
-                    Matrix12* hessian);
+                    Matrix12* hessian, double yield_angle = std::numeric_limits<double>::infinity());
+
+/// The angle from rest at which a hinge bends by `yield_curvature` [1/m]: that times (A_0 + A_1) / |e|, as
+/// its energy is that of the curvature angle |e| / (A_0 + A_1) over its two triangles.
+double yield_angle(const Hinge& hinge, double yield_curvature);
+
+/// How far the rest angle flows at the end of a step, so that the hinge is bent by `yield_angle` at most
+/// [rad].
+double flow_of(const Hinge& hinge, const HingePositions& x, double yield_angle);
 
 }  // namespace flash::sim

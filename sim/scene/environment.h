@@ -100,6 +100,7 @@ struct State {
   data::Points bristles = {};
   std::vector<PairBristle> pair_bristles = {};  ///< of features that touch, ascending
   std::vector<HeldVertices> held;               ///< by each hold of the environment
+  std::vector<double> rest_angles = {};         ///< of each hinge of the plan, once one has yielded [rad]
 };
 
 /// One simulated world: its own materials, motion and state over a shared Sheet.

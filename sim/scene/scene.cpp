@@ -194,6 +194,10 @@ void make_sheet_body(const data::Scene& scene, const data::Asset& asset, SceneBo
     throw data::input_error(scene.source, "bending_model",
                             std::string("found ") + data::to_string(material.bending_model) +
                                 ", expected plate, as " + asset.source + " is woven");
+  if (material.bending_model != data::BendingModel::hinge && asset.yield_curvature)
+    throw data::input_error(scene.source, "bending_model",
+                            std::string("found ") + data::to_string(material.bending_model) +
+                                ", expected hinge, as the bending of " + asset.source + " yields");
 }
 
 /// Mesh and material of an object of tetrahedra.

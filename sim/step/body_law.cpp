@@ -1,6 +1,10 @@
 #include "sim/step/body_law.h"
 
 #include <stdexcept>
+#include <string>
+
+#include "data/asset.h"
+#include "data/error.h"
 
 namespace flash::sim {
 
@@ -14,6 +18,17 @@ std::vector<BodyLaw> body_laws(const SheetPlan& plan, const Environment& environ
       throw std::invalid_argument("environment: the bodies in `solids` have to be those of tetrahedra");
     laws.push_back({plan.bodies[b], material, bending_operator(plan, material, b),
                     has_material ? &solid->second : nullptr});
+    BodyLaw& law = laws.back();
+    law.hinges = std::span(plan.hinges).subspan(law.place.first_hinge, law.place.hinge_count);
+    if (!law.yields()) continue;
+    if (material.bending_model != data::BendingModel::hinge)
+      throw data::input_error("yield_curvature", "bending_model",
+                              std::string("found ") + data::to_string(material.bending_model) +
+                                  ", expected hinge, the only one that yields");
+    if (environment.state.rest_angles.empty()) continue;
+    law.yielded.assign(law.hinges.begin(), law.hinges.end());
+    for (std::size_t e = 0; e < law.yielded.size(); ++e)
+      law.yielded[e].rest_angle = environment.state.rest_angles[law.place.first_hinge + e];
   }
   return laws;
 }

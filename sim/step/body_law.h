@@ -1,4 +1,6 @@
 #pragma once
+#include <cmath>
+#include <span>
 #include <vector>
 
 #include "sim/plan/sheet_plan.h"
@@ -13,7 +15,12 @@ struct BodyLaw {
   const data::SheetMaterial& material;
   const BendingOperator& bending;
   const data::SolidMaterial* solid = nullptr;  ///< null: a sheet
+  std::span<const Hinge> hinges = {};          ///< of the body, with the rest angles of the plan
+  std::vector<Hinge> yielded = {};             ///< the same with those of the state, once one has yielded
 
+  /// The hinges with the rest angles that hold.
+  std::span<const Hinge> hinges_now() const { return yielded.empty() ? hinges : yielded; }
+  bool yields() const { return solid == nullptr && std::isfinite(material.yield_curvature); }
   bool bends_at_hinges() const { return solid == nullptr && bending.model == data::BendingModel::hinge; }
   double air_drag() const { return solid != nullptr ? solid->air_drag : material.air_drag; }
   double stiffness_damping() const {
@@ -22,7 +29,8 @@ struct BodyLaw {
 };
 
 /// The laws of all bodies, in the order of the plan. Plan and environment have to outlive them. Throws as
-/// bending_operator does, and std::invalid_argument where the solids of both are not the same.
+/// bending_operator does, data::InputError where a sheet yields whose bending model does not, and
+/// std::invalid_argument where the solids of both are not the same.
 std::vector<BodyLaw> body_laws(const SheetPlan& plan, const Environment& environment);
 
 }  // namespace flash::sim

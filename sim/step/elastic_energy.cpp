@@ -39,8 +39,8 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, co
                                                         plan.triangle_groups.data() + place.first_group,
                                                         place.group_count, positions.data(), gradient.data());
   if (law.bends_at_hinges()) {
-    energy.bending =
-        add_hinge_gradient(hinges_of(place, plan.hinges), law.material.bending_rigidity, positions, gradient);
+    energy.bending = add_hinge_gradient(
+        law.hinges_now(), {law.material.bending_rigidity, law.material.yield_curvature}, positions, gradient);
     return energy;
   }
   // Far from the origin positions would round the energy: its differences between them are all that counts.
@@ -60,7 +60,9 @@ void add_elastic_hessian(const SheetPlan& plan, const BodyLaw& law, const Points
       membrane.law, membrane.lame, plan.triangle_groups.data() + law.place.first_group, law.place.group_count,
       positions.data(), scale, curvature == Curvature::positive, values.data());
   if (law.bends_at_hinges())
-    add_hinge_hessian(plan, law.place, plan.hinges, scale * law.material.bending_rigidity, positions, values);
+    add_hinge_hessian(plan, law.place, law.hinges_now(),
+                      {scale * law.material.bending_rigidity, law.material.yield_curvature}, positions,
+                      values);
 }
 
 void add_bending_stand_in(const BendingOperator& bending, double rigidity, BlockValues<double>& values) {

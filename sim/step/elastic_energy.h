@@ -7,7 +7,7 @@ namespace flash::sim {
 
 struct ElasticEnergy {
   double membrane = 0.0;  ///< [J]
-  double bending = 0.0;   ///< [J]
+  double bending = 0.0;   ///< with what flows over the step, where hinges yield [J]
   double solid = 0.0;     ///< of tetrahedra [J]
   double layers = 0.0;    ///< of the pressure between layers of the surface [J]
 

@@ -88,7 +88,7 @@ double IncrementalPotential::add_damping(const BodyLaw& law, const Points& posit
   const double potential =
       add_membrane_damping_gradient(plan_, law.place, start_metrics_, damping_lame(law), positions, force);
   if (law.bends_at_hinges())
-    return potential + add_hinge_gradient(hinges_of(law.place, start_hinges_), rigidity, positions, force);
+    return potential + add_hinge_gradient(hinges_of(law.place, start_hinges_), {rigidity}, positions, force);
   // Quadratic models know positions, not angles: what the body turned by as a whole is taken out.
   const Points own = rows_of(body, positions);
   const RigidTurn turn(rows_of(body, mass_), rows_of(body, environment_.state.positions), own);
@@ -117,8 +117,8 @@ void IncrementalPotential::assemble(const Points& positions, Curvature curvature
       add_membrane_damping_hessian(plan_, law.place, start_metrics_, damping_lame(law), positions, curvature,
                                    values);
       if (law.bends_at_hinges())
-        add_hinge_hessian(plan_, law.place, start_hinges_, damping_share(law) * law.material.bending_rigidity,
-                          positions, values);
+        add_hinge_hessian(plan_, law.place, hinges_of(law.place, start_hinges_),
+                          {damping_share(law) * law.material.bending_rigidity}, positions, values);
     }
     const double per_mass = 1 / (h_ * h_) + law.air_drag() / h_;
     const Body& body = law.place.body;

@@ -284,6 +284,7 @@ SynthRecording synthesize(const data::TriangleMesh& mesh, const std::string& mes
   replay.recording = synthetic.recording;
   replay.settings.solver = solver;
   replay.settings.clamp_slopes = settings.clamp_slopes;
+  replay.settings.self_contact = settings.self_contact;
   sim::Sheet sheet = sim::make_sheet(mesh);
   if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
   replay.plan = sim::make_sheet_plan(sheet);
@@ -372,6 +373,8 @@ std::string truth_text(const data::SheetMaterial& material, const SynthSettings&
                         {"friction", material.friction},
                         {"air_drag", material.air_drag},
                         {"stiffness_damping", material.stiffness_damping}};
+  if (std::isfinite(material.yield_curvature))
+    json["parameters"]["yield_curvature"] = material.yield_curvature;
   json["offset"] = {settings.cloud_offset.x(), settings.cloud_offset.y(), settings.cloud_offset.z()};
   json["time_offset"] = settings.time_offset;
   json["depth_noise_m"] = settings.depth_noise;

@@ -10,6 +10,7 @@
 #include "data/mesh.h"
 #include "data/recording.h"
 #include "sim/newton/solver.h"
+#include "sim/scene/environment.h"
 
 namespace flash::sysid {
 
@@ -35,8 +36,9 @@ struct SynthSettings {
   Eigen::Vector3d cloud_offset = Eigen::Vector3d::Zero();  ///< camera against robot: observed - true [m]
   double time_offset = 0.0;   ///< true time of an observation labelled t is t + time_offset [s]
   bool clamp_slopes = false;  ///< the grasped patch does not bend
-  bool forces = false;        ///< record the gripper's force on the sheet
-  bool raw = false;           ///< keep what the cameras see, table and gripper included
+  std::optional<sim::SelfContact> self_contact{};  ///< as in ReplaySettings
+  bool forces = false;                             ///< record the gripper's force on the sheet
+  bool raw = false;                                ///< keep what the cameras see, table and gripper included
   unsigned seed = 1;
 };
 

@@ -49,9 +49,9 @@ std::vector<PlannedExperiment> rank_experiments(const std::vector<Replay>& repla
   const data::SheetMaterial material = candidate_at(settings.at, settings.grid).material;
   for (const char* const kind : virtual_experiments)
     add(kind, [&] {
-      return virtual_experiment(
-          kind, sheet, material,
-          {first.settings.solver, first.settings.threads, 1, first.settings.clamp_slopes});
+      return virtual_experiment(kind, sheet, material,
+                                {first.settings.solver, first.settings.threads, 1,
+                                 first.settings.clamp_slopes, first.settings.self_contact});
     });
   std::stable_sort(experiments.begin(), experiments.end(),
                    [](const auto& one, const auto& other) { return one.bits > other.bits; });

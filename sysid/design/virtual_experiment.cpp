@@ -62,6 +62,7 @@ Replay virtual_experiment(const std::string& kind, const data::Recording& like,
   synth.forces = kind == "bar_pull" || kind == "bias_pull" || kind == "drag";
   synth.seed = settings.seed;
   synth.clamp_slopes = settings.clamp_slopes;
+  synth.self_contact = settings.self_contact;
   synth.grasp_within = std::max(0.0201, 0.08 * size);
   synth.cameras = two_cameras(0.5 * (low + high) + 0.3 * size * Eigen::Vector3d::UnitZ(), size);
   data::TriangleMesh mesh = like.mesh;
@@ -71,6 +72,7 @@ Replay virtual_experiment(const std::string& kind, const data::Recording& like,
   replay.solver = settings.solver;
   replay.threads = settings.threads;
   replay.clamp_slopes = settings.clamp_slopes;
+  replay.self_contact = settings.self_contact;
   const ScratchFolder scratch;  // after the simulation, so that it stands for a moment only
   save_synthetic(made, scratch.path);
   data::Recording recording = data::load_recording(scratch.path);

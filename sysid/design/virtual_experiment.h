@@ -1,5 +1,6 @@
 #pragma once
 #include <array>
+#include <optional>
 #include <string>
 
 #include "sysid/replay/replay.h"
@@ -15,9 +16,10 @@ inline constexpr double longest_virtual_experiment = 3.0;
 
 struct VirtualExperimentSettings {
   sim::SolverSettings solver;
-  int threads = 1;            ///< of the replay
-  unsigned seed = 1;          ///< of what is recorded
-  bool clamp_slopes = false;  ///< the grasped patch does not bend
+  int threads = 1;                                 ///< of the replay
+  unsigned seed = 1;                               ///< of what is recorded
+  bool clamp_slopes = false;                       ///< the grasped patch does not bend
+  std::optional<sim::SelfContact> self_contact{};  ///< as in ReplaySettings
 };
 
 /// The experiment `kind` with the sheet of the recording `like`, simulated and seen by two cameras without

@@ -1,6 +1,7 @@
 #include "sysid/emulate/fingerprint.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <set>
@@ -156,6 +157,10 @@ void add_replay(const Replay& replay, Fingerprint& print) {
   print["time_step_s"] = data::format_number(solver.time_step);
   print["tolerance"] = data::format_number(solver.tolerance);
   print["iterations"] = std::to_string(solver.max_iterations);
+  if (const auto& layers = replay.settings.self_contact) {
+    print["self_contact_m"] = data::format_number(layers->thickness);
+    print["layer_friction"] = layers->friction < 0 ? "friction" : data::format_number(layers->friction);
+  }
 }
 
 void add_solid(const data::SolidMaterial& m, Fingerprint& print) {
@@ -184,6 +189,8 @@ void add_material(const MaterialBase& base, Fingerprint& print) {
   if (m.weave != data::Weave{})
     print["asset weave"] =
         values_text({m.weave.bending_ratio, m.weave.twisting_ratio, m.weave.warp_direction});
+  if (std::isfinite(m.yield_curvature))
+    print["asset yield_curvature"] = data::format_number(m.yield_curvature);
   print["asset thickness"] = base.thickness ? data::format_number(*base.thickness) : "none";
 }
 

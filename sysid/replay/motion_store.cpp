@@ -130,6 +130,9 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
           solid.stiffness_damping})
       bytes.add(value);
   }
+  if (std::isfinite(m.yield_curvature)) bytes.add(m.yield_curvature);
+  if (const auto& layers = world.self_contact)
+    for (const double value : {layers->thickness, layers->friction, layers->pressure}) bytes.add(value);
   for (const sim::RestTriangle& triangle : replay.sheet().triangles)
     if (triangle.stiff) bytes.add_matrix(triangle.vertices);
   bytes.add(replay.steps);  // a file has the force of each

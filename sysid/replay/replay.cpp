@@ -172,6 +172,9 @@ Replay assemble(const data::Recording& recording, const ReplaySettings& settings
     if (settings.clamp_slopes) stiffen_clamped(replay, sheet);
     replay.plan = sim::make_sheet_plan(sheet);
   }
+  if (settings.self_contact)
+    sim::check_self_contact(replay.sheet(), settings.self_contact->thickness,
+                            sim::with_midsides(replay.sheet(), replay.recording.start));
   const double pre_roll = settings.pre_roll.value_or(closes ? 0.4 : 0.0);
   const double step = settings.solver.time_step;
   replay.start = replay.beginning - steps_in(pre_roll, step) * step;
@@ -249,6 +252,9 @@ sim::Environment make_environment(const Replay& replay, const ReplayCandidate& c
     environment.holds.push_back(make_hold(replay, recording.grasps[k], static_cast<int>(k), nuisance, flat));
   add_supports(replay, environment);
   environment.schedule = replay.schedule;
+  environment.self_contact = replay.settings.self_contact;
+  if (environment.self_contact && environment.self_contact->friction < 0)
+    environment.self_contact->friction = sim::friction_of(environment, 0);
   return environment;
 }
 

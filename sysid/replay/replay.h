@@ -25,6 +25,8 @@ struct ReplaySettings {
   std::optional<data::GraspShape> grasp_shape;  ///< in place of the recording's
   std::optional<double> grasp_within;           ///< in place of the recording's [m]
   bool clamp_slopes = false;  ///< clamp, from the beginning to the end: the patch does not bend either
+  std::optional<sim::SelfContact> self_contact{};  ///< friction below zero: the candidate's; absent: the
+                                                   ///< object passes through itself
   double score_from = -std::numeric_limits<double>::infinity();  ///< keyframes before carry no weight [s]
   double score_to = std::numeric_limits<double>::infinity();     ///< keyframes after carry no weight [s]
   int min_points = 20;  ///< keyframes of fewer points carry no weight

@@ -93,14 +93,16 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
 std::map<std::string, double> values_of_sheet(const data::Asset& asset) {
   const double area = sim::make_sheet(data::load_rest_mesh(asset)).vertex_area.sum();
   const data::SheetMaterial material = data::resolve_sheet(asset, area).material;
-  return {{"young", asset.young},
-          {"poisson", asset.poisson},
-          {"bending", material.bending_rigidity},
-          {"bending_ratio", asset.weave.bending_ratio},
-          {"friction", asset.friction},
-          {"areal_density", material.areal_density},
-          {"air_drag", asset.air_drag},
-          {"stiffness_damping", asset.stiffness_damping}};
+  std::map<std::string, double> values = {{"young", asset.young},
+                                          {"poisson", asset.poisson},
+                                          {"bending", material.bending_rigidity},
+                                          {"bending_ratio", asset.weave.bending_ratio},
+                                          {"friction", asset.friction},
+                                          {"areal_density", material.areal_density},
+                                          {"air_drag", asset.air_drag},
+                                          {"stiffness_damping", asset.stiffness_damping}};
+  if (asset.yield_curvature) values["yield_curvature"] = *asset.yield_curvature;
+  return values;
 }
 
 std::map<std::string, double> values_of_solid(const data::Asset& asset) {
@@ -136,12 +138,13 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
   const std::map<std::string, double> base_values = solid ? values_of_solid(asset) : values_of_sheet(asset);
 
   std::map<std::string, double> values = summary.best;
-  bool bending_found = summary.fixed.count("bending") > 0;
+  bool bending_found = summary.fixed.count("bending") > 0, yield_is_told = true;
   for (const ParameterFinding& finding : summary.parameters) {
     if (finding.identifiable == Identifiable::yes && finding.estimate)
       values[finding.name] = *finding.estimate;
     if (finding.identifiable == Identifiable::no && base_values.count(finding.name))
       values[finding.name] = base_values.at(finding.name);
+    yield_is_told &= finding.name != "yield_curvature" || finding.identifiable != Identifiable::no;
     bending_found |= finding.name == "bending" && finding.identifiable != Identifiable::no;
   }
   asset.format = data::AssetFormat::flash_1;
@@ -159,6 +162,8 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
   }
   if (const auto ratio = values.find("bending_ratio"); ratio != values.end())
     asset.weave.bending_ratio = ratio->second;
+  if (const auto yield = values.find("yield_curvature"); yield != values.end() && yield_is_told)
+    asset.yield_curvature = yield->second;
   asset.friction = values.at("friction");
   asset.air_drag = values.at("air_drag");
   asset.stiffness_damping = values.at("stiffness_damping");

@@ -10,6 +10,7 @@ ParameterLabel parameter_label(const std::string& name, bool has_thickness) {
       {"poisson", {"Poisson's ratio", "ν", ""}},
       {"bending", {"bending rigidity", "D", "N m"}},
       {"bending_ratio", {"bending, weft over warp", "D₂/D₁", ""}},
+      {"yield_curvature", {"curvature at which it yields", "κ", "1/m"}},
       {"friction", {"friction", "μ", ""}},
       {"areal_density", {"areal density", "ρ", "kg/m²"}},
       {"density", {"density", "ρ", "kg/m³"}},

@@ -30,14 +30,17 @@ const Axis* axis_named(const std::vector<Axis>& axes, const std::string& name) {
 
 std::map<std::string, double> parameters_of(const data::SheetMaterial& material,
                                             std::optional<double> thickness) {
-  return {{"young", material.membrane_stiffness / thickness.value_or(1.0)},
-          {"poisson", material.poissons_ratio},
-          {"bending", material.bending_rigidity},
-          {"bending_ratio", material.weave.bending_ratio},
-          {"friction", material.friction},
-          {"areal_density", material.areal_density},
-          {"air_drag", material.air_drag},
-          {"stiffness_damping", material.stiffness_damping}};
+  std::map<std::string, double> parameters = {
+      {"young", material.membrane_stiffness / thickness.value_or(1.0)},
+      {"poisson", material.poissons_ratio},
+      {"bending", material.bending_rigidity},
+      {"bending_ratio", material.weave.bending_ratio},
+      {"friction", material.friction},
+      {"areal_density", material.areal_density},
+      {"air_drag", material.air_drag},
+      {"stiffness_damping", material.stiffness_damping}};
+  if (std::isfinite(material.yield_curvature)) parameters["yield_curvature"] = material.yield_curvature;
+  return parameters;
 }
 
 std::map<std::string, double> parameters_of(const ReplayCandidate& candidate,
@@ -53,7 +56,8 @@ std::map<std::string, double> parameters_of(const ReplayCandidate& candidate,
 std::map<std::string, FixedParameter> fixed_of(const Summary& summary, const GridSettings& settings) {
   std::map<std::string, FixedParameter> fixed;
   for (const Axis& axis : settings.fixed) fixed[axis.name] = {axis.values.front(), "measured"};
-  for (const char* name : {"young", "poisson", "bending", "friction", "areal_density", "density"}) {
+  for (const char* name :
+       {"young", "poisson", "bending", "yield_curvature", "friction", "areal_density", "density"}) {
     if (summary.best.count(name) == 0) continue;
     const Axis* axis = axis_named(settings.axes, name);
     const bool follows_young = std::string(name) == "bending" && settings.base.bending_from_thickness;
@@ -214,6 +218,10 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
   texts["time_step_s"] = data::format_number(replay.settings.solver.time_step);
   texts["max_iterations"] = std::to_string(replay.settings.solver.max_iterations);
   texts["tolerance"] = data::format_number(replay.settings.solver.tolerance);
+  if (const auto& layers = replay.settings.self_contact) {
+    texts["self_contact_m"] = data::format_number(layers->thickness);
+    texts["layer_friction"] = layers->friction < 0 ? "friction" : data::format_number(layers->friction);
+  }
   if (settings.base.thickness) texts["thickness_m"] = data::format_number(*settings.base.thickness);
   const Robust& robust = settings.score.objective.robust;
   texts["distance"] =

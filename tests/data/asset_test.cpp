@@ -233,6 +233,32 @@ TEST(Asset, SheetsMayBeWoven) {
   EXPECT_NE(error(kPublished, {{"warp_direction", 10}}).find("flash-asset/1"), std::string::npos);
 }
 
+TEST(Asset, BendingOfHingesMayYield) {
+  const TemporaryFolder folder;
+  const auto load = [&](const char* text, const json& changes) {
+    json file = json::parse(text);
+    file["mechanical_props"].update(changes);
+    return load_asset(folder.write("towel.json", file.dump()));
+  };
+  const Asset paper = load(kFlash, {{"bending_model", "hinge"}, {"yield_curvature", 40}});
+  const SheetMaterial material = resolve_sheet(paper, 0.1).material;
+  EXPECT_EQ(material.yield_curvature, 40);
+  EXPECT_TRUE(std::isinf(resolve_sheet(load(kFlash, json::object()), 0.1).material.yield_curvature));
+  save_asset(paper, folder / "copy.json");
+  EXPECT_EQ(load_asset(folder / "copy.json").yield_curvature, 40);
+  EXPECT_EQ(asset_from_sheet(material, {}, "sheet:1x1:1").yield_curvature, 40);
+  std::vector<std::string> notices;
+  EXPECT_FALSE(express_as(paper, AssetFormat::published, 0.1, notices).yield_curvature);
+  const auto error = [&](const char* text, const json& changes) {
+    return input_error_of([&] { load(text, changes); });
+  };
+  EXPECT_NE(error(kFlash, {{"yield_curvature", 40}}).find("yield_curvature: found 40, expected"),
+            std::string::npos);
+  EXPECT_NE(error(kFlash, {{"bending_model", "hinge"}, {"yield_curvature", 0}}).find("a number above 0"),
+            std::string::npos);
+  EXPECT_NE(error(kPublished, {{"yield_curvature", 40}}).find("flash-asset/1"), std::string::npos);
+}
+
 TEST(Asset, ElementsMayBeQuadratic) {
   const TemporaryFolder folder;
   const auto load = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {

@@ -3,6 +3,8 @@ import json
 import math
 import shutil
 
+import surface
+
 MESH = "sheet:0.278x0.278:0.02"
 MEDIAN_FABRIC = 1.4e-5  # flexural rigidity of a median fabric at 0.2 kg/m^2 [N m]
 # E t, nu, weight and friction are assumed: nobody weighed the cloths.
@@ -28,12 +30,15 @@ CLIPS = {
                        "grasps": ["clamp", "pinch"], "from": "1.1", "independent": "6.4"},
 }
 CHECKED = ("lift_paper", "lift_paper2", "lift_navy")  # the best candidate is solved again under finer settings
+FOLD_BENDING = (1.1e-3, 1e-4)  # of both paper lifts, and what the fold asks for [N m]
+FOLD_YIELDS = (5, 20)  # assumed: nobody measured where a paper towel yields [1/m]
+FOLD_YAWS = (-0.3, -0.2, -0.1, 0.0)
 PAIRS = {"paper": ("lift_paper", "lift_paper2"), "navy": ("lift_navy", "lift_navy2")}
 
 
-def write_asset(out):
-    path = out / "cloth.json"
-    path.write_text(json.dumps(ASSET, indent=2) + "\n")
+def write_asset(out, name="cloth", **properties):
+    path = out / f"{name}.json"
+    path.write_text(json.dumps(ASSET | {"mechanical_props": ASSET["mechanical_props"] | properties}, indent=2) + "\n")
     return str(path)
 
 
@@ -148,20 +153,53 @@ def lifts_and_fold(runs, data, asset, material, folded):
     return found
 
 
-def fold(runs, data, asset, joint):
-    """The paper towel folded: what the D of the lifts, stiffer and softer ones make of another motion. The
-    recording's start pose points away from its clouds, so it is made anew from clouds and path."""
+def import_fold(runs, data):
+    """The paper towel folded. The recording's start pose points away from its clouds, so it is made anew from clouds and path."""
     clip = data / "lift" / "fold_paper"
-    recording = runs.import_clouds(
+    return runs.import_clouds(
         "fold_recording", clip / "frames", "--trajectory", str(clip / "tcp.tum"), "--times", "rate:10", "--mesh", "sheet:0.278x0.278:0.02", "--grasp", "corner", "--grasp-within", "0.021", "--crop-z", "0.085:0.45",
         "--crop-y", ":0.35", "--table-z", "0.07", "--offset-bound", "0.08,0.12,0.06", "--yaw-bound", "0.4", "--time-offset-bound", "0.2",
         "--start-yaw-bound", "0.35", "--kind", "free", "--name", "fold_paper")
+
+
+def fold(runs, data, asset, joint):
+    """What the D of the lifts, stiffer and softer ones make of the fold, another motion."""
+    recording = import_fold(runs, data)
     from_lifts = joint["best"]["parameters"]["bending"]
     values = sorted({MEDIAN_FABRIC, 1e-4, 2.5e-4, from_lifts})
     search = runs.grid("fold_paper", [recording], "--asset", asset, *SEARCH, *window("fold_paper"), *GRASPS[joint["grasp"]],
                        "--bending", ",".join(map(repr, values)), "--start-yaw=-0.3,-0.2,-0.1,0", "--no-solver-check")
     return {"recording": recording, "search": search, "from_lifts": from_lifts,
             "by_bending": {value: best_row(search["rows"], bending=value) for value in values}}
+
+
+def fold_models(runs, data):
+    """Navy at its best candidate, and the fold at the D of the lifts and a tenth of it: with and without self-contact, and with
+    bending that yields. The start yaw of the fold is searched for each."""
+    assets = {"plate": write_asset(runs.out), "hinge": write_asset(runs.out, "hinged", bending_model="hinge")}
+    navy = {"clip": "lift_navy", "model": "plate", "bending": 1e-5, "yields": None}
+    models = [navy | {"layers": layers} for layers in (False, True)]
+    models += [{"clip": "fold_paper", "model": model, "bending": bending, "yields": yields, "layers": layers}
+               for bending in FOLD_BENDING for model, yields in (("plate", None), ("hinge", None), *(("hinge", k) for k in FOLD_YIELDS))
+               for layers in (False, True)]
+    recordings = {"lift_navy": data / "lift" / "lift_navy", "fold_paper": import_fold(runs, data)}
+    return [model | best_yaw(runs, recordings[model["clip"]], assets[model["model"]], model) for model in models]
+
+
+def best_yaw(runs, recording, asset, model):
+    """The best of the start yaws, and in which keyframes that passes through itself away from the grasp."""
+    shape, yaws, grasp = {"lift_navy": ("pinch", [0.05], {"grasp_depth": 0.021}), "fold_paper": ("clamp", FOLD_YAWS, {})}[model["clip"]]
+    options = [word for word in GRASPS[shape] if word != "--hold" and "=" not in word]
+    options += ["--self-contact", "0.001"] if model["layers"] else []
+    found = []
+    for yaw in yaws:
+        name = "fold_models/" + "_".join(f"{value}" for value in [*model.values(), yaw])
+        material = {"bending": model["bending"]} | ({"yield_curvature": model["yields"]} if model["yields"] else {})
+        replay = runs.replay(name, recording, material | grasp | {"start_yaw": yaw}, "--asset", asset, *window(model["clip"]), *options)
+        found.append(replay | {"start_yaw": yaw, "folder": runs.out / name})
+    best = min(found, key=lambda replay: replay["score"])
+    pierced = surface.piercings_by_frame(best["folder"], range(10, 25))
+    return best | {"pierced": [frame for frame, count in pierced.items() if count]}
 
 
 def best_row(rows, **wanted):

@@ -127,6 +127,17 @@ def fold_table(fold):
     return table(["D N m", "from", "residual mm", "start yaw rad", "offset x / y / z mm", "at a bound"], rows)
 
 
+def fold_models_table(models):
+    rows = []
+    for found in models:
+        seen = [frame for frame in found["frames"] if frame["weight"] > 0]
+        rows.append([found["clip"], found["model"], number(found["bending"]), f"{found['yields']:g}" if found["yields"] else "never",
+                     "yes" if found["layers"] else "no", mm(found["score"]), mm(seen[-1]["score"]), f"{found['start_yaw']:+.2f}",
+                     ", ".join(map(str, found["pierced"])) or "none", f"{100 * found['unconverged_share']:.1f}"])
+    return table(["clip", "bending model", "D N m", "yields at 1/m", "self-contact", "residual mm", "last keyframe mm",
+                  "start yaw rad", "keyframes in which it passes through itself", "unsolved steps %"], rows)
+
+
 def limits_table(limits):
     rows = []
     for clip, found in limits.items():

@@ -30,8 +30,8 @@ def main():
     parser.add_argument("--sim", help="the program flash-sim")
     parser.add_argument("--scenes", type=pathlib.Path, help="folder of the reference scenes")
     parser.add_argument("--results", type=pathlib.Path, help="what make reference wrote of them")
-    parser.add_argument("--only", help="handeye, lifts, twins, synthetic, convergence, beam or reference: that part "
-                                       "of the document; a recording: its fits alone, printed")
+    parser.add_argument("--only", help="handeye, lifts, fold_models, twins, synthetic, convergence, beam or reference: "
+                                       "that part of the document; a recording: its fits alone, printed")
     parser.add_argument("--twins", type=int, default=len(synthetic.TWINS), help="how many of the coverage study")
     parser.add_argument("--jobs", type=int, default=1, help="recorded lifts searched at a time")
     parser.add_argument("--threads", type=int, help="of each search; without it, as many as there are processors")
@@ -58,6 +58,8 @@ def main():
         results = run_lifts(runs, options.data, options.jobs)
         document |= tables.lift_tables(results)
         copy_pictures(options.out, options.documents.parent / "images")
+    if options.only in (None, "fold_models"):
+        document["fold_models"] = tables.fold_models_table(lifts.fold_models(runs, options.data))
     if options.only in (None, "twins"):
         document |= tables.twin_tables(run_twins(runs, options.data), run_both(runs, options.data),
                                        run_horizons(runs))

@@ -122,6 +122,68 @@ TEST(HingeBending, GaussNewtonIsTheHessianAtTheRestAngle) {
   }
 }
 
+double yielding_energy(const Hinge& hinge, const HingePositions& x, double limit) {
+  double energy;
+  HingePositions gradient;
+  hinge_response(hinge, x, energy, gradient, nullptr, limit);
+  return energy;
+}
+
+TEST(HingeBending, EnergyOfAYieldingHingeIsTheLeastOverAllThatMayFlow) {
+  const Hinge hinge{{0, 1, 2, 3}, 1.7, 0.1, {0.5, 0.5}};
+  const double limit = 0.4;
+  for (const double fold : {-2.0, -0.35, -0.29, 0.2, 0.49, 0.51, 1.8}) {
+    const double angle = fold - hinge.rest_angle;
+    // 1/2 w (angle - p)^2 + w limit |p|: what is stored and what the flow p takes.
+    double least = 1e300, flow = 0;
+    for (int k = -200000; k <= 200000; ++k) {
+      const double p = 1e-5 * k;
+      const double energy = hinge.weight * (0.5 * (angle - p) * (angle - p) + limit * std::abs(p));
+      if (energy < least) least = energy, flow = p;
+    }
+    // The grid misses the least by half of 1e-5 at most, the energy by its square.
+    EXPECT_NEAR(yielding_energy(hinge, folded(fold), limit), least, 1e-10) << fold;
+    EXPECT_NEAR(flow_of(hinge, folded(fold), limit), flow, 1e-5) << fold;
+  }
+}
+
+TEST(HingeBending, ForceOfAYieldingHingeIsTheSlopeOfItsEnergy) {
+  std::mt19937 rng(6);
+  for (int k = 0; k < 20; ++k) {
+    const HingePositions x = random_hinge(rng);
+    // Within the limit and beyond it; the last pair of triangles is about to collapse.
+    const double size = k < 15 ? 0.45 : 4.5;
+    const Hinge hinge{{0, 1, 2, 3}, 1.7, hinge_angle(x) + 0.1 * (k % 5 - 2), {size, size}};
+    const double limit = 0.15, step = 1e-6;
+    double energy;
+    HingePositions gradient;
+    hinge_response(hinge, x, energy, gradient, nullptr, limit);
+    for (int i = 0; i < 12; ++i) {
+      HingePositions forward = x, backward = x;
+      forward.data()[i] += step;
+      backward.data()[i] -= step;
+      const double slope =
+          (yielding_energy(hinge, forward, limit) - yielding_energy(hinge, backward, limit)) / (2 * step);
+      EXPECT_NEAR(gradient.data()[i], slope, 1e-8) << k;  // rounding of 1e-16 over 1e-6, and its square
+    }
+  }
+}
+
+TEST(HingeBending, WhatDoesNotYieldIsElasticToTheLastBit) {
+  std::mt19937 rng(7);
+  const HingePositions x = random_hinge(rng);
+  const Hinge hinge{{0, 1, 2, 3}, 1.7, hinge_angle(x) + 0.2, {0.4, 0.45}};
+  double elastic, yielding;
+  HingePositions elastic_gradient, gradient;
+  Matrix12 elastic_hessian, hessian;
+  hinge_response(hinge, x, elastic, elastic_gradient, &elastic_hessian);
+  hinge_response(hinge, x, yielding, gradient, &hessian, 0.21);
+  EXPECT_EQ(yielding, elastic);
+  EXPECT_EQ(gradient, elastic_gradient);
+  EXPECT_EQ(hessian, elastic_hessian);
+  EXPECT_EQ(flow_of(hinge, x, 0.21), 0);
+}
+
 TEST(HingeBending, CurvedRestShapeIsAtRest) {
   data::TriangleMesh mesh;
   const HingePositions x = folded(0.7);

@@ -61,6 +61,17 @@ TEST(ParameterGrid, AWeaveIsSearchedWhereBendingIsThatOfAPlate) {
   EXPECT_EQ(make_candidate({}, axes, {3}).material.weave, (data::Weave{.bending_ratio = 3}));
 }
 
+TEST(ParameterGrid, AYieldIsSearchedWhereHingesBend) {
+  const std::vector<Axis> axes = {parse_axis("yield_curvature", "10:100:3:log")};
+  EXPECT_NE(message_of([&] {
+              check_axes(axes, {});
+            }).find("--yield-curvature: found bending_model plate, expected hinge"),
+            std::string::npos);
+  const MaterialBase base{{.bending_model = data::BendingModel::hinge}, {}};
+  EXPECT_EQ(message_of([&] { check_axes(axes, base); }), "");
+  EXPECT_EQ(make_candidate(base, axes, {30}).material.yield_curvature, 30);
+}
+
 TEST(ParameterGrid, OptionsAreCalledByTheNamesThatTheyHave) {
   EXPECT_EQ(message_of([] { parse_axis("table_height", "9"); }),
             "--table-height: found 9, expected -0.5 to 0.5 m");

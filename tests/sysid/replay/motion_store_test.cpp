@@ -74,6 +74,15 @@ TEST(MotionStore, AnotherMotionIsAnotherFileAndAnotherNoiseIsNot) {
   candidate.material.friction += 0.1;
   store.run(recorded(folder, "corner_lift", 1), candidate);
   EXPECT_EQ(files_in(folder / "rollouts"), 2);
+  Replay layered = recorded(folder, "corner_lift", 1);
+  layered.settings.self_contact = sim::SelfContact{.thickness = 1e-3, .friction = -1};
+  store.run(layered, candidate);
+  EXPECT_EQ(files_in(folder / "rollouts"), 3);
+  candidate.material.bending_model = data::BendingModel::hinge;
+  store.run(recorded(folder, "corner_lift", 1), candidate);
+  candidate.material.yield_curvature = 20;
+  store.run(recorded(folder, "corner_lift", 1), candidate);
+  EXPECT_EQ(files_in(folder / "rollouts"), 5);
 }
 
 TEST(MotionStore, AFileThatIsNotAsItWasWrittenIsNamed) {

@@ -6,10 +6,12 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/procedural_mesh.h"
+#include "sim/pairs/intersection.h"
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/grid_search.h"
 #include "sysid/replay/recorded_grasp.h"
@@ -199,6 +201,88 @@ TEST(Replay, AGraspInTwoPartsPullsAsOne) {
       EXPECT_LE((parts.forces[k] - one.forces[k]).norm(), 1e-12 + 1e-9 * one.forces[k].norm())
           << change << " " << k;
   }
+}
+
+/// The strip of short_lift hung up by one end, while the other end is carried over and through it.
+Replay carried_through(const data::TemporaryFolder& folder,
+                       const std::optional<sim::SelfContact>& self_contact) {
+  const Replay lift = short_lift(folder, "sheet:0.2x0.05:0.0125");
+  data::Recording recording = lift.recording;
+  data::Trajectory& path = recording.trajectories.at(recording.grasps[0].gripper);
+  const Eigen::Isometry3d start = path.poses.front();
+  const bool grasps_far_end = start.translation().x() > 0.1;
+  data::RecordedSupport bar;
+  for (Eigen::Index i = 0; i < recording.mesh.vertices.rows(); ++i)
+    if (grasps_far_end ? recording.mesh.vertices(i, 0) < 0.02 : recording.mesh.vertices(i, 0) > 0.18)
+      bar.select.vertices.push_back(static_cast<int>(i));
+  recording.supports = {bar};
+  recording.has_table = false;
+  const double duration = path.times.back(), way = grasps_far_end ? -0.23 : 0.23;
+  data::Trajectory through;
+  for (int k = 0; k <= 40; ++k) {
+    Eigen::Isometry3d pose = start;
+    pose.translation() += k / 40.0 * Eigen::Vector3d(way, 0, -0.04);
+    through.times.push_back(duration * k / 40);
+    through.poses.push_back(pose);
+  }
+  path = through;
+  ReplaySettings settings = lift.settings;
+  settings.self_contact = self_contact;
+  return make_replay(recording, settings);
+}
+
+/// In how many steps two triangles pass through each other, each pair of them looked at.
+int steps_passing_through(const Replay& replay, const ReplayCandidate& candidate) {
+  int count = 0;
+  run(replay, {candidate}, every_step(replay), [&](std::size_t, ReplayResult result) {
+    const data::Triangles& triangles = replay.surface.triangles;
+    for (const data::Points& x : result.motion.positions) {
+      bool passing = false;
+      for (Eigen::Index a = 0; a < triangles.rows() && !passing; ++a)
+        for (Eigen::Index b = 0; b < triangles.rows() && !passing; ++b) {
+          bool apart = true;
+          for (int i = 0; i < 9; ++i) apart = apart && triangles(a, i / 3) != triangles(b, i % 3);
+          if (!apart) continue;
+          Eigen::Vector3d corners[3];
+          for (int i = 0; i < 3; ++i) corners[i] = x.row(triangles(b, i));
+          for (int i = 0; i < 3; ++i)
+            passing =
+                passing || sim::passes(x.row(triangles(a, i)), x.row(triangles(a, (i + 1) % 3)), corners);
+        }
+      count += passing;
+    }
+  });
+  return count;
+}
+
+TEST(Replay, ASheetCarriedThroughItselfIsHeldUpBySelfContact) {
+  const data::TemporaryFolder folder;
+  ReplayCandidate candidate{short_lift_material(), {}};
+  candidate.material.bending_rigidity = 1e-6;
+  EXPECT_GT(steps_passing_through(carried_through(folder, {}), candidate), 0);
+  const Replay replay = carried_through(folder, sim::SelfContact{.thickness = 1e-3, .friction = -1});
+  EXPECT_EQ(steps_passing_through(replay, candidate), 0);
+}
+
+TEST(Replay, SelfContactHasTheFrictionOfTheSheetUnlessItHasItsOwn) {
+  const data::TemporaryFolder folder;
+  const Replay without = short_lift(folder);
+  ReplayCandidate candidate{short_lift_material(), {}};
+  candidate.material.friction = 0.7;
+  EXPECT_FALSE(make_environment(without, candidate).self_contact);
+  ReplaySettings settings = without.settings;
+  settings.self_contact = sim::SelfContact{.thickness = 2e-3, .friction = -1};
+  EXPECT_EQ(make_environment(make_replay(without, settings), candidate).self_contact,
+            (sim::SelfContact{.thickness = 2e-3, .friction = 0.7}));
+  settings.self_contact->friction = 0.1;
+  const Replay with = make_replay(without, settings);
+  EXPECT_EQ(make_environment(with, candidate).self_contact->friction, 0.1);
+  // A search does not go on under another setting.
+  EXPECT_EQ(difference(fingerprint({without}, {}), fingerprint({with}, {})),
+            "layer_friction was absent and is 0.1, and 1 more");
+  settings.self_contact->thickness = 0.1;
+  EXPECT_NE(data::input_error_of([&] { make_replay(without, settings); }).find("the mean edge of the mesh"),
+            std::string::npos);
 }
 
 TEST(Replay, AGraspThatActsInNoStepIsRefused) {

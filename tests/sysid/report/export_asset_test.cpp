@@ -66,6 +66,21 @@ TEST(ExportAsset, TakesEstimatesWhereKnownAndTheAssetsValueElsewhere) {
   EXPECT_EQ(identification["samples"]["values"][1], (std::vector<double>{0.3, 1.2e-4}));
 }
 
+TEST(ExportAsset, YieldsWhereTheSearchTellsSoAndAsTheAssetDoesElsewhere) {
+  Summary summary = example_summary();
+  summary.best["yield_curvature"] = 30;
+  summary.parameters[0].name = "yield_curvature";
+  summary.parameters[0].estimate = 32;
+  summary.parameters[0].identifiable = Identifiable::yes;
+  data::Asset asset = towel();
+  asset.bending_model = data::BendingModel::hinge;
+  EXPECT_EQ(tuned_asset(asset, summary).yield_curvature, 32);
+  summary.parameters[0].identifiable = Identifiable::no;
+  EXPECT_FALSE(tuned_asset(asset, summary).yield_curvature);
+  asset.yield_curvature = 50;
+  EXPECT_EQ(tuned_asset(asset, summary).yield_curvature, 50);
+}
+
 TEST(ExportAsset, AValueThatIsKeptKeepsItsSource) {
   data::Asset asset = towel();
   asset.identification = R"({"fixed": {"poisson": {"value": 0.3, "source": "measured"}}})";
