@@ -21,7 +21,7 @@ void name_values(CLI::App& app) {
       {"--offset-bound", "X,Y,Z"}, {"--gravity", "X,Y,Z"},    {"--resolution", "WIDTHxHEIGHT"},
       {"--crop-x", "LOW:HIGH"},    {"--crop-y", "LOW:HIGH"},  {"--crop-z", "LOW:HIGH"},
       {"--clamp-x", "LOW:HIGH"},   {"--clamp-y", "LOW:HIGH"}, {"--clamp-z", "LOW:HIGH"},
-      {"--device", "DEVICE"},      {"--map", "NAME"},    {"--name", "NAME"},
+      {"--device", "DEVICE"},      {"--map", "NAME"},         {"--name", "NAME"},
       {"--on-support", "NAME"},    {"--kind", "KIND"},        {"--target", "TARGET"}};
   for (CLI::App* verb : app.get_subcommands([](const CLI::App*) { return true; })) name_values(*verb);
   for (CLI::Option* option : app.get_options()) {
