@@ -97,6 +97,55 @@ FLASH_HOST_DEVICE inline NearestPoints nearest_points(PairKind kind, const Vecto
   return kind == PairKind::vertex_face ? nearest_of_vertex_and_face(x) : nearest_of_edges(x);
 }
 
+/// How the nearest points of a pair move along their features as its vertices move by m: up to two unit
+/// `along`, orthogonal to each other and to the normal, each with the derivatives of the weights by the place
+/// along it. With the turns r_a = sum_i turns[a][i] normal . m_i and what lies between the nearest points,
+/// y = sum_i weights[i] m_i, the changes are
+///
+///   of the normal:      -sum_a along_a r_a + (y less its parts along the normal and along_a) / distance
+///   of the weights:     -sum_a turns[a] (along_a . y + distance r_a)
+struct PairTurns {
+  int count = 0;
+  Vector3<double> along[2]{};
+  double turns[2][4] = {};  ///< [1/m]
+};
+
+/// Of the nearest points as nearest_points gives them: a weight of zero is that of a vertex that they do not
+/// depend on.
+FLASH_HOST_DEVICE inline PairTurns turns_of(PairKind kind, const Vector3<double>* x,
+                                            const NearestPoints& nearest) {
+  constexpr double parallel = 1e-12;  // squared sine below which two ways along the features are one
+  const int split = kind == PairKind::vertex_face ? 1 : 2;
+  PairTurns all;
+  for (int feature = 0; feature < 2; ++feature) {
+    const int begin = feature == 0 ? 0 : split, end = feature == 0 ? split : 4;
+    int first = begin;
+    while (first < end && nearest.weights[first] == 0) ++first;
+    for (int i = first + 1; i < end && all.count < 2; ++i) {
+      if (nearest.weights[i] == 0) continue;
+      // The weight of vertex i grows on account of the first one's.
+      const double sign = feature == 0 ? 1 : -1;
+      Vector3<double> way = sign * (x[i] - x[first]);
+      double turns[4] = {};
+      turns[i] = sign;
+      turns[first] = -sign;
+      const double whole = dot(way, way);
+      if (all.count == 1) {
+        const double share = dot(way, all.along[0]);
+        way = way - share * all.along[0];
+        for (int k = 0; k < 4; ++k) turns[k] -= share * all.turns[0][k];
+      }
+      const double left = dot(way, way);
+      if (!(left > parallel * whole)) continue;
+      const double length = square_root(left);
+      all.along[all.count] = (1 / length) * way;
+      for (int k = 0; k < 4; ++k) all.turns[all.count][k] = turns[k] / length;
+      ++all.count;
+    }
+  }
+  return all;
+}
+
 /// A share of the straight motions `move` that the vertices of a pair can take while the distance stays above
 /// a quarter of that at the start, or of `reach` where that is less: 1 where all of it is free. It is
 /// conservative, and ends where at most half is left. Additive advancement (Li, Kaufman, Jiang 2021,

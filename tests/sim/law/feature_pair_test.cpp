@@ -97,6 +97,57 @@ TEST(FeaturePair, WeightsAndNormalAreTheDerivativeOfTheDistance) {
     }
 }
 
+/// Whether two sets of nearest points are those of the same vertices.
+bool same_vertices(const NearestPoints& a, const NearestPoints& b) {
+  for (int i = 0; i < 4; ++i)
+    if ((a.weights[i] == 0) != (b.weights[i] == 0)) return false;
+  return true;
+}
+
+TEST(FeaturePair, TurnsAreTheDerivativesOfTheNormalAndTheWeights) {
+  constexpr double step = 1e-6;
+  int compared[3] = {};
+  Drawn drawn;
+  for (int draw = 0; draw < 4000; draw += 2)
+    for (const PairKind kind : kinds) {
+      const Places x = drawn.places(draw);
+      Places move;
+      for (Place& m : move) m = drawn.place(1);
+      const NearestPoints at = nearest_points(kind, x.data());
+      Places up = x, down = x;
+      for (int i = 0; i < 4; ++i) {
+        up[i] = up[i] + step * move[i];
+        down[i] = down[i] - step * move[i];
+      }
+      const NearestPoints after = nearest_points(kind, up.data()), before = nearest_points(kind, down.data());
+      if (at.distance < 0.05 || !same_vertices(at, after) || !same_vertices(at, before)) continue;
+      const PairTurns turns = turns_of(kind, x.data(), at);
+      const Place y = between(move, at.weights);
+      Place normal{}, across = y - dot(at.normal, y) * at.normal;
+      double weights[4] = {};
+      for (int a = 0; a < turns.count; ++a) {
+        const double turn = dot(at.normal, between(move, turns.turns[a])), along = dot(turns.along[a], y);
+        ASSERT_NEAR(norm(turns.along[a]), 1, 1e-9);
+        ASSERT_NEAR(dot(turns.along[a], at.normal), 0, 1e-9);
+        normal = normal - turn * turns.along[a];
+        across = across - along * turns.along[a];
+        for (int i = 0; i < 4; ++i) weights[i] -= turns.turns[a][i] * (along + at.distance * turn);
+      }
+      normal = normal + (1 / at.distance) * across;
+      // Truncation grows with the third derivative, by the least size of a feature or of the distance.
+      double size = 1;
+      for (int a = 0; a < turns.count; ++a)
+        for (int i = 0; i < 4; ++i) size = std::max(size, std::abs(turns.turns[a][i]));
+      if (size > 30) continue;
+      const double tolerance = 1e-5 * size;
+      ASSERT_NEAR(norm((1 / (2 * step)) * (after.normal - before.normal) - normal), 0, tolerance) << draw;
+      for (int i = 0; i < 4; ++i)
+        ASSERT_NEAR((after.weights[i] - before.weights[i]) / (2 * step), weights[i], tolerance) << draw;
+      ++compared[turns.count];
+    }
+  for (const int count : compared) EXPECT_GT(count, 50);
+}
+
 /// The least distance on a way, to within what it can change between samples.
 double least_on_way(PairKind kind, const Places& x, const Places& move, double share,
                     double& between_samples) {
