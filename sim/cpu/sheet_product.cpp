@@ -49,15 +49,31 @@ void add_weighted(const WeightedPart<Scalar>& part, const Scalar* x, Scalar* y) 
     for (int c = 0; c < 3; ++c) y[4L * part.positions[k] + c] += part.weights[k] * image[c];
 }
 
+template <typename Scalar>
+void add_four(const FourPart<Scalar>& part, const Scalar* x, Scalar* y) {
+  // Column by column: the matrix is symmetric, and sums of columns take vectors of numbers.
+  Scalar image[12] = {};
+  const Scalar* column = part.block;
+  for (const int position : part.positions)
+    for (int c = 0; c < 3; ++c, column += 12) {
+      const Scalar factor = x[4L * position + c];
+      for (int row = 0; row < 12; ++row) image[row] += factor * column[row];
+    }
+  for (int k = 0; k < 4; ++k)
+    for (int c = 0; c < 3; ++c) y[4L * part.positions[k] + c] += image[3 * k + c];
+}
+
 }  // namespace
 
 template <typename Scalar>
 void SheetProduct<Scalar>::assign(const ProductPattern& pattern, const BlockValues<double>& values,
                                   std::vector<ScalarPart> scalar_parts,
-                                  std::vector<WeightedPart<Scalar>> weighted_parts) {
+                                  std::vector<WeightedPart<Scalar>> weighted_parts,
+                                  std::vector<FourPart<Scalar>> four_parts) {
   pattern_ = &pattern;
   scalar_parts_ = std::move(scalar_parts);
   weighted_parts_ = std::move(weighted_parts);
+  four_parts_ = std::move(four_parts);
   blocks_.resize(12 * pattern.sources.size());
   linear<Scalar>(*kernels_).copy_blocks(static_cast<int>(pattern.sources.size()), pattern.sources.data(),
                                         pattern.transposed.data(), values.data(), blocks_.data());
@@ -71,6 +87,7 @@ void SheetProduct<Scalar>::multiply(const Scalar* x, Scalar* y) {
   for (const ScalarPart& part : scalar_parts_)
     add_product(*kernels_, *part.matrix, static_cast<Scalar>(part.scale), x, y);
   for (const WeightedPart<Scalar>& part : weighted_parts_) add_weighted(part, x, y);
+  for (const FourPart<Scalar>& part : four_parts_) add_four(part, x, y);
 }
 
 template class SheetProduct<float>;

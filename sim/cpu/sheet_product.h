@@ -34,9 +34,17 @@ struct WeightedPart {
   Scalar block[6];  ///< B, symmetric: xx, xy, xz, yy, yz, zz
 };
 
-/// y = (B + sum s S + sum w w^T C) x over the vertices of a sheet in elimination order, four numbers a
-/// vertex, the last of them zero: B of 3 x 3 blocks, each S scalar, each C between the weighted vertices of a
-/// part. A block is three columns of four numbers, so that a column is one vector multiply-add.
+/// A 12 x 12 matrix of four vertices, x, y and z of one after the other.
+template <typename Scalar>
+struct FourPart {
+  int positions[4];  ///< of the vertices in the elimination
+  Scalar block[144];
+};
+
+/// y = (B + sum s S + sum w w^T C + sum D) x over the vertices of a sheet in elimination order, four numbers
+/// a vertex, the last of them zero: B of 3 x 3 blocks, each S scalar, each C between the weighted vertices of
+/// a part, each D of four vertices. A block is three columns of four numbers, so that a column is one vector
+/// multiply-add.
 template <typename Scalar>
 class SheetProduct {
  public:
@@ -44,7 +52,8 @@ class SheetProduct {
 
   /// The pattern and the matrices of the scalar parts have to outlive the product.
   void assign(const ProductPattern& pattern, const BlockValues<double>& values,
-              std::vector<ScalarPart> scalar_parts, std::vector<WeightedPart<Scalar>> weighted_parts = {});
+              std::vector<ScalarPart> scalar_parts, std::vector<WeightedPart<Scalar>> weighted_parts = {},
+              std::vector<FourPart<Scalar>> four_parts = {});
   void multiply(const Scalar* x, Scalar* y);
 
  private:
@@ -52,6 +61,7 @@ class SheetProduct {
   const ProductPattern* pattern_ = nullptr;
   std::vector<ScalarPart> scalar_parts_;
   std::vector<WeightedPart<Scalar>> weighted_parts_;
+  std::vector<FourPart<Scalar>> four_parts_;
   AlignedStorage<Scalar> blocks_;  ///< 12 numbers each
 };
 

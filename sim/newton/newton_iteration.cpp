@@ -5,6 +5,7 @@
 
 #include "sim/newton/active_set.h"
 #include "sim/step/feasible_positions.h"
+#include "sim/step/layer_stiffness.h"
 
 namespace flash::sim {
 namespace {
@@ -31,22 +32,30 @@ bool couples_friction(const StepProblem& problem, const SolverSettings& settings
   return problem.contacts.time_step < settings.time_step && report.iterations > coupled_after;
 }
 
-/// The stiffness of all touches of layers at an iterate.
-std::vector<TouchStiffness> layer_stiffness(const StepProblem& problem, const Iterate& iterate) {
-  std::vector<TouchStiffness> all;
+/// The stiffness of layers that touch at an iterate. Each pair's is made positive, as with the exact
+/// ones searches take longer.
+LayerStiffness layer_stiffness(const StepProblem& problem, const Iterate& iterate) {
+  LayerStiffness all;
   if (!problem.layers) return all;
   for (const LayerTouch& touch : iterate.layers.touches)
-    all.push_back({touch, stiffness_of(touch, problem.layers->friction(), problem.layers->time_step())});
+    all.pressures.push_back(
+        {touch.vertices, pressure_stiffness(touch, iterate.positions, Curvature::positive)});
+  for (const LayerFriction& friction : iterate.layers.frictions)
+    all.frictions.push_back(
+        {friction.vertices,
+         {friction.weights[0], friction.weights[1], friction.weights[2], friction.weights[3]},
+         stiffness_of(friction, problem.layers->time_step())});
   return all;
 }
 
 /// Adds what layers that touch add to the blocks of their vertices. Those between them are not in the
 /// pattern.
-void add_layer_diagonal(const std::vector<TouchStiffness>& layers, BlockValues<double>& values) {
-  for (const auto& [touch, stiffness] : layers)
-    for (int k = 0; k < 4; ++k)
-      Eigen::Map<Eigen::Matrix3d>(values.data() + 9L * touch.vertices[k]) +=
-          touch.weights[k] * touch.weights[k] * matrix3d(stiffness);
+void add_layer_diagonal(const LayerStiffness& layers, BlockValues<double>& values) {
+  const auto own = [&](int vertex) { return Eigen::Map<Eigen::Matrix3d>(values.data() + 9L * vertex); };
+  for (const auto& [vertices, matrix] : layers.pressures)
+    for (int k = 0; k < 4; ++k) own(vertices[k]) += matrix.block<3, 3>(3L * k, 3L * k);
+  for (const auto& [vertices, weights, matrix] : layers.frictions)
+    for (int k = 0; k < 4; ++k) own(vertices[k]) += weights[k] * weights[k] * matrix3d(matrix);
 }
 
 /// Factorizes the positive Hessian at w.now. Returns false where it is not positive definite after all.

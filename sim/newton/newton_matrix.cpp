@@ -31,22 +31,30 @@ std::vector<VertexMatrix<Scalar>> vertex_matrices(const ContactSet& contacts,
   return matrices;
 }
 
-}  // namespace
-
-namespace {
-
 template <typename Scalar>
-std::vector<WeightedPart<Scalar>> weighted_parts(const std::vector<TouchStiffness>& layers,
+std::vector<WeightedPart<Scalar>> weighted_parts(const LayerStiffness& layers,
                                                  const std::vector<int>& position) {
-  std::vector<WeightedPart<Scalar>> parts(layers.size());
-  for (size_t p = 0; p < layers.size(); ++p) {
-    const auto& [touch, b] = layers[p];
+  std::vector<WeightedPart<Scalar>> parts(layers.frictions.size());
+  for (size_t p = 0; p < parts.size(); ++p) {
+    const LayerStiffness::Friction& friction = layers.frictions[p];
+    const Symmetric3& b = friction.matrix;
     for (size_t k = 0; k < 4; ++k) {
-      parts[p].positions[k] = position[touch.vertices[k]];
-      parts[p].weights[k] = static_cast<Scalar>(touch.weights[k]);
+      parts[p].positions[k] = position[friction.vertices[k]];
+      parts[p].weights[k] = static_cast<Scalar>(friction.weights[k]);
     }
     const double block[6] = {b.xx, b.xy, b.xz, b.yy, b.yz, b.zz};
     for (int c = 0; c < 6; ++c) parts[p].block[c] = static_cast<Scalar>(block[c]);
+  }
+  return parts;
+}
+
+template <typename Scalar>
+std::vector<FourPart<Scalar>> four_parts(const LayerStiffness& layers, const std::vector<int>& position) {
+  std::vector<FourPart<Scalar>> parts(layers.pressures.size());
+  for (size_t p = 0; p < parts.size(); ++p) {
+    for (size_t k = 0; k < 4; ++k) parts[p].positions[k] = position[layers.pressures[p].vertices[k]];
+    Eigen::Map<Eigen::Matrix<Scalar, 12, 12>>(parts[p].block) =
+        layers.pressures[p].matrix.template cast<Scalar>();
   }
   return parts;
 }
@@ -61,7 +69,7 @@ NewtonMatrix::NewtonMatrix(std::shared_ptr<const SheetPlan> plan)
 
 void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse,
                           const std::vector<ScaledBending>& bending, double least_eigenvalue,
-                          const std::vector<TouchStiffness>& layers) {
+                          const LayerStiffness& layers) {
   // Only blocks between vertices count: friction's stiffness, large where slip starts, rounds in its own
   // vertex's block alone.
   double largest = 0;
@@ -72,15 +80,17 @@ void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse,
   }
   for (size_t k = plan_->pattern.size; k < plan_->pattern.size + plan_->edge_count; ++k)
     for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(blocks[9 * k + 4 * c]));
-  for (const TouchStiffness& layer : layers) largest = std::max(largest, norm(layer.stiffness));
-  layered_ = !layers.empty();
+  for (const LayerStiffness::Pressure& p : layers.pressures) largest = std::max(largest, p.matrix.norm());
+  for (const LayerStiffness::Friction& f : layers.frictions) largest = std::max(largest, norm(f.matrix));
+  layered_ = !layers.pressures.empty();
   const double mean = 2.0 * static_cast<double>(plan_->edge_count) / plan_->pattern.size;
   const double neighbours = has_solids(plan_->sheet) ? std::max(solid_neighbours, mean) : sheet_neighbours;
   single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < little * least_eigenvalue;
   const ProductPattern& pattern = sparse ? plan_->triangle_product : plan_->full_product;
   with_product([&]<typename Scalar>(SheetProduct<Scalar>& product) {
     product.assign(pattern, blocks, std::move(scalar_parts),
-                   weighted_parts<Scalar>(layers, plan_->symbolic->position));
+                   weighted_parts<Scalar>(layers, plan_->symbolic->position),
+                   four_parts<Scalar>(layers, plan_->symbolic->position));
   });
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -15,10 +16,19 @@ struct ScaledBending {
   double rigidity;
 };
 
-/// The stiffness between four vertices that touch, as stiffness_of says [N/m].
-struct TouchStiffness {
-  const LayerTouch& touch;
-  Symmetric3 stiffness;
+/// How layers that touch are stiff at an iterate.
+struct LayerStiffness {
+  struct Pressure {
+    std::array<int, 4> vertices;
+    Eigen::Matrix<double, 12, 12> matrix;  ///< pressure_stiffness [N/m]
+  };
+  struct Friction {
+    std::array<int, 4> vertices;
+    std::array<double, 4> weights;
+    Symmetric3 matrix;  ///< stiffness_of, between the weighted vertices [N/m]
+  };
+  std::vector<Pressure> pressures;
+  std::vector<Friction> frictions;
 };
 
 /// The matrix of a Newton iteration, its preconditioner and the solution of its linear problem.
@@ -36,7 +46,7 @@ class NewtonMatrix {
   /// The matrix: blocks, the stiffness of quadratic bending models, and that of layers that touch. `sparse`:
   /// all blocks across a hinge are zero. `least_eigenvalue`: of the mass [N/m].
   void assign(const BlockValues<double>& blocks, bool sparse, const std::vector<ScaledBending>& bending,
-              double least_eigenvalue, const std::vector<TouchStiffness>& layers = {});
+              double least_eigenvalue, const LayerStiffness& layers = {});
 
   /// Sets `direction` to the solution of matrix * direction = -gradient over the free directions, and to the
   /// constraints' corrections in the others. It is solved to a residual of `tolerance` [N] or a tenth of the

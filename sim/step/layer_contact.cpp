@@ -4,7 +4,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "sim/law/layer_law.h"
+#include "sim/law/edge_crossing.h"
 #include "sim/law/vertex_contact.h"
 #include "sim/step/moving_obstacles.h"
 
@@ -36,24 +36,6 @@ bool may_come_near(PairKind kind, const Vector3<double>* x, double reach) {
   return true;
 }
 
-/// A factor that takes parallel edges out smoothly, and its derivatives by the edges. The nearest points of
-/// parallel edges jump; their ends meet the faces beside them anyway (Li et al. 2020).
-struct Crossing {
-  double factor = 1;
-  Vector3<double> by_first{}, by_second{};
-};
-
-Crossing crossing_of(const Vector3<double>* x) {
-  constexpr double least_squared_sine = 1e-2;
-  const Vector3<double> u = x[1] - x[0], v = x[3] - x[2];
-  const double uu = dot(u, u), vv = dot(v, v), uv = dot(u, v);
-  const double q = (1 - uv * uv / (uu * vv)) / least_squared_sine;
-  if (q >= 1) return {};
-  // The derivative of the squared sine by u: -2 (u.v) / (uu vv) (v - u (u.v) / uu).
-  const double slope = (2 - 2 * q) * -2 * uv / (uu * vv * least_squared_sine);
-  return {q * (2 - q), slope * (v - (uv / uu) * u), slope * (u - (uv / vv) * v)};
-}
-
 auto key_of(PairKind kind, const std::array<int, 4>& vertices) {
   return std::tuple(kind == PairKind::edge_edge, vertices);
 }
@@ -69,7 +51,7 @@ const PairBristle* find_bristle(const std::vector<PairBristle>& bristles, PairKi
 }
 
 /// The deflection of the bristles of a touch were its vertices at `positions`, along its plane [m].
-Vector3<double> deflection(const LayerTouch& touch, const Points& start, const Points& positions) {
+Vector3<double> deflection(const LayerFriction& touch, const Points& start, const Points& positions) {
   Vector3<double> moved = touch.bristle;
   for (int k = 0; k < 4; ++k) {
     const int i = touch.vertices[k];
@@ -86,12 +68,10 @@ void add_row(Points& rows, int i, const Vector3<double>& v) {
 
 }  // namespace
 
-Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_step) {
-  const Symmetric3 normal = square(touch.normal);
-  Symmetric3 turns = identity3() - normal;
-  if (touch.slip > bristle_length(time_step)) turns = turns - square(touch.slip_direction);
-  return touch.stiffness * normal +
-         (friction * touch.normal_force / friction_length(touch.slip, time_step)) * turns;
+Symmetric3 stiffness_of(const LayerFriction& friction, double time_step) {
+  Symmetric3 turns = identity3() - square(friction.normal);
+  if (friction.slip > bristle_length(time_step)) turns = turns - square(friction.slip_direction);
+  return (friction.bound / friction_length(friction.slip, time_step)) * turns;
 }
 
 LayerStep::LayerStep(PairSurface& surface, const Environment& environment, double time_step)
@@ -134,8 +114,6 @@ void LayerStep::add_forces(const Points& positions, LayerContact& contact, Point
   contact.touches.clear();
   contact.energy = 0;
   contact.closest = far;
-  const double length = bristle_length(time_step_);
-  const Points& start = environment_.state.positions;
   for (const CandidatePair& pair : near_.pairs) {
     Vector3<double> x[4];
     gather(positions, pair.vertices, x);
@@ -145,29 +123,44 @@ void LayerStep::add_forces(const Points& positions, LayerContact& contact, Point
     const LayerResponse response = layer_response(pair.thickness, settings_.pressure, nearest.distance);
     if (response.force == 0) continue;
     const Crossing crossing = pair.kind == PairKind::edge_edge ? crossing_of(x) : Crossing{};
-    const double area = pair.area * crossing.factor;
-    LayerTouch touch{.kind = pair.kind,
-                     .vertices = pair.vertices,
-                     .normal_force = area * response.force,
-                     .stiffness = area * response.stiffness,
-                     .normal = nearest.normal};
-    std::copy(nearest.weights, nearest.weights + 4, touch.weights);
-    if (const PairBristle* bristle = find_bristle(environment_.state.pair_bristles, pair.kind, pair.vertices))
-      touch.bristle = length * vector3(bristle->share);
-    const Vector3<double> slip = deflection(touch, start, positions);
-    touch.slip = norm(slip);
-    touch.slip_direction = (1 / friction_length(touch.slip, time_step_)) * slip;
+    const double area = pair.area * crossing.factor, normal_force = area * response.force;
     contact.energy += area * response.energy;
-    const Vector3<double> needed =
-        settings_.friction * touch.normal_force * touch.slip_direction - touch.normal_force * touch.normal;
-    for (int k = 0; k < 4; ++k) add_row(force, pair.vertices[k], touch.weights[k] * needed);
+    for (int k = 0; k < 4; ++k)
+      add_row(force, pair.vertices[k], (-nearest.weights[k] * normal_force) * nearest.normal);
     if (crossing.factor < 1) {
       const double energy = pair.area * response.energy;
       for (int k = 0; k < 4; ++k)
         add_row(force, pair.vertices[k],
                 (k % 2 == 0 ? -energy : energy) * (k < 2 ? crossing.by_first : crossing.by_second));
     }
-    contact.touches.push_back(touch);
+    contact.touches.push_back(
+        {pair.kind, pair.vertices, nearest, pair.area, crossing.factor, response, normal_force});
+  }
+  frictions_of(contact.touches, contact.frictions);
+  const Points& start = environment_.state.positions;
+  for (LayerFriction& friction : contact.frictions) {
+    const Vector3<double> slip = deflection(friction, start, positions);
+    friction.slip = norm(slip);
+    friction.slip_direction = (1 / friction_length(friction.slip, time_step_)) * slip;
+    for (int k = 0; k < 4; ++k)
+      add_row(force, friction.vertices[k], (friction.weights[k] * friction.bound) * friction.slip_direction);
+  }
+}
+
+void LayerStep::frictions_of(const std::vector<LayerTouch>& touches,
+                             std::vector<LayerFriction>& frictions) const {
+  frictions.clear();
+  const double length = bristle_length(time_step_);
+  for (const LayerTouch& touch : touches) {
+    LayerFriction friction{.kind = touch.kind,
+                           .vertices = touch.vertices,
+                           .normal = touch.nearest.normal,
+                           .bound = settings_.friction * touch.normal_force};
+    std::copy(touch.nearest.weights, touch.nearest.weights + 4, friction.weights);
+    if (const PairBristle* bristle =
+            find_bristle(environment_.state.pair_bristles, touch.kind, touch.vertices))
+      friction.bristle = length * vector3(bristle->share);
+    frictions.push_back(friction);
   }
 }
 
@@ -180,17 +173,17 @@ double LayerStep::energy(const Points& positions) {
 
 double LayerStep::friction_potential(const LayerContact& contact, const Points& positions) const {
   double potential = 0;
-  for (const LayerTouch& touch : contact.touches)
+  for (const LayerFriction& friction : contact.frictions)
     potential +=
-        settings_.friction * touch.normal_force *
-        friction_energy(norm(deflection(touch, environment_.state.positions, positions)), time_step_);
+        friction.bound *
+        friction_energy(norm(deflection(friction, environment_.state.positions, positions)), time_step_);
   return potential;
 }
 
 double LayerStep::bristle_energy(const LayerContact& contact) const {
   double energy = 0;
-  for (const LayerTouch& touch : contact.touches)
-    energy += settings_.friction * touch.normal_force * friction_energy(norm(touch.bristle), time_step_);
+  for (const LayerFriction& friction : contact.frictions)
+    energy += friction.bound * friction_energy(norm(friction.bristle), time_step_);
   return energy;
 }
 
@@ -218,8 +211,9 @@ double LayerStep::free_share(const Points& from, const Points& to) {
 
 std::vector<PairBristle> LayerStep::bristles_at_end(const LayerContact& contact) const {
   std::vector<PairBristle> bristles;
-  for (const LayerTouch& touch : contact.touches)
-    bristles.push_back({touch.vertices, touch.kind == PairKind::edge_edge, vector3d(touch.slip_direction)});
+  for (const LayerFriction& friction : contact.frictions)
+    bristles.push_back(
+        {friction.vertices, friction.kind == PairKind::edge_edge, vector3d(friction.slip_direction)});
   std::sort(bristles.begin(), bristles.end(), [](const PairBristle& a, const PairBristle& b) {
     return std::tuple(a.edges, a.vertices) < std::tuple(b.edges, b.vertices);
   });

@@ -3,28 +3,40 @@
 #include <vector>
 
 #include "sim/law/feature_pair.h"
+#include "sim/law/layer_law.h"
 #include "sim/law/symmetric3.h"
 #include "sim/pairs/candidate_pairs.h"
 #include "sim/scene/environment.h"
 
 namespace flash::sim {
 
-/// Two features of the surface that feel each other at an iterate.
+/// Two features of the surface that press each other at an iterate.
 struct LayerTouch {
   PairKind kind = PairKind::vertex_face;
   std::array<int, 4> vertices{};
-  double weights[4] = {};   ///< of the vertices in what lies between the nearest points
+  NearestPoints nearest;
+  double area = 0;          ///< that the pair stands for [m^2]
+  double crossing = 1;      ///< what parallel edges leave of it
+  LayerResponse response;   ///< per area
   double normal_force = 0;  ///< lambda_n, of the second on the first along the normal [N]
-  double stiffness = 0;     ///< of the normal force [N/m]
-  double slip = 0;          ///< length of the deflection of the bristles and the slip over the step [m]
+};
+
+/// Friction between two features at the normal force, the nearest points and the normal of some iterate.
+struct LayerFriction {
+  PairKind kind = PairKind::vertex_face;
+  std::array<int, 4> vertices{};
+  double weights[4] = {};  ///< of the vertices in what lies between the nearest points
   Vector3<double> normal{};
+  double bound = 0;                  ///< mu lambda_n [N]
   Vector3<double> bristle{};         ///< deflection at the start of the step [m]
+  double slip = 0;                   ///< length of the bristles' deflection and the slip over the step [m]
   Vector3<double> slip_direction{};  ///< the slip over its friction_length
 };
 
 /// What the surface does to itself at an iterate.
 struct LayerContact {
   std::vector<LayerTouch> touches;
+  std::vector<LayerFriction> frictions;
   double energy = 0;   ///< of the pressure between layers [J]
   double closest = 0;  ///< distance of the nearest features that may touch [m]; 1e300: there are none
 };
@@ -84,6 +96,9 @@ class LayerStep {
   /// Fills in the pairs of all ways between two positions, and of a `margin` beside them.
   void search(const data::Points& from, const data::Points& to, double margin, Candidates& candidates);
 
+  /// Friction of touches at their own normal forces, without slips yet.
+  void frictions_of(const std::vector<LayerTouch>& touches, std::vector<LayerFriction>& frictions) const;
+
   PairSurface& surface_;
   const Environment& environment_;
   SelfContact settings_;
@@ -94,9 +109,7 @@ class LayerStep {
   LayerCounts counts_;
 };
 
-/// How the force of a touch changes with what lies between its nearest points: its pressure along the normal,
-/// friction across [N/m]. The Hessian is this matrix between the weighted vertices (Gauss-Newton): what the
-/// normal turns by is left out.
-Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_step);
+/// How friction changes with what lies between its nearest points [N/m].
+Symmetric3 stiffness_of(const LayerFriction& friction, double time_step);
 
 }  // namespace flash::sim

@@ -126,7 +126,10 @@ TEST(LayerContact, StiffnessIsTheDerivativeOfTheForce) {
       forces_at(step, x, contact);
       ASSERT_EQ(contact.touches.size(), 1u);
       ASSERT_EQ(contact.touches[0].kind == PairKind::edge_edge, by_edges);
-      const Eigen::Matrix3d expected = matrix3d(stiffness_of(contact.touches[0], friction, time_step));
+      const LayerTouch& touch = contact.touches[0];
+      const Eigen::Matrix3d expected =
+          matrix3d(touch.area * touch.response.stiffness * square(touch.nearest.normal) +
+                   stiffness_of(contact.frictions[0], time_step));
       constexpr double move = 1e-10;
       for (int axis = 0; axis < 3; ++axis) {
         const auto pushed = [&](double way) {
@@ -164,8 +167,8 @@ TEST(LayerContact, BristlesComeBackInTheNextStep) {
   ASSERT_EQ(again.touches.size(), contact.touches.size());
   for (std::size_t k = 0; k < contact.touches.size(); ++k) {
     ASSERT_EQ(again.touches[k].vertices, contact.touches[k].vertices);
-    EXPECT_NEAR(again.touches[k].slip, contact.touches[k].slip, 1e-12);
-    EXPECT_NEAR(norm(again.touches[k].slip_direction - contact.touches[k].slip_direction), 0, 1e-6);
+    EXPECT_NEAR(again.frictions[k].slip, contact.frictions[k].slip, 1e-12);
+    EXPECT_NEAR(norm(again.frictions[k].slip_direction - contact.frictions[k].slip_direction), 0, 1e-6);
   }
 }
 
