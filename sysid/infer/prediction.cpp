@@ -97,11 +97,12 @@ class ErrorDraws {
 /// where every row counts by its square and no bound is reached.
 class LinearFit {
  public:
-  LinearFit(const ObservedRows& rows, double noise) : columns_(rows.weights.size(), 0) {
+  /// `spread`: s of the likelihood [m].
+  LinearFit(const ObservedRows& rows, double spread) : columns_(rows.weights.size(), 0) {
     constexpr double kFree = 1e-6;  // precision of what may be anything within its bounds
     columns_.resize(rows.weights.size(), rows.free.cols() + rows.known.cols());
     columns_ << rows.free, rows.known;
-    weighed_ = (columns_.transpose() * rows.weights.asDiagonal()) / (noise * noise);
+    weighed_ = (columns_.transpose() * rows.weights.asDiagonal()) / (spread * spread);
     Eigen::MatrixXd normal = weighed_ * columns_;
     normal.diagonal().head(rows.free.cols()).array() += kFree;
     normal.diagonal().tail(rows.known.cols()).array() += 1;
@@ -189,6 +190,20 @@ double chance_of(const Eigen::MatrixXd& expected, const Eigen::VectorXd& observe
   return static_cast<double>(as_far) / static_cast<double>(expected.cols() - half);
 }
 
+/// How the motion changes from the estimate to some draws: by these the likelihood decides how much a row
+/// counts, and so how much of a misfit errors of known shape may take.
+std::vector<MotionChange> rates_by_draws(const Replay& replay, const std::vector<ReplayResult>& motions) {
+  constexpr std::size_t kDraws = 4;
+  const auto of = [&](const ReplayResult& motion) {
+    return std::make_shared<const Motions>(Motions{{replay}, {motion}});
+  };
+  std::vector<MotionChange> rates;
+  const std::shared_ptr<const Motions> estimate = of(motions.front());
+  for (std::size_t d = 1; d < motions.size() && d <= kDraws; ++d)
+    rates.push_back({{-1, estimate}, {1, of(motions[d])}});
+  return rates;
+}
+
 }  // namespace
 
 std::vector<KnownError> errors_of_prediction(const Replay& replay, const GridSettings& grid,
@@ -231,7 +246,8 @@ Prediction predict(const Replay& replay, const std::vector<ReplayResult>& motion
   prediction.fit = register_motions({registration_problem(replay, motions.front().motion)},
                                     settings.objective, settings.registration)
                        .front();
-  const MotionLikelihood likelihood({replay}, {motions.front()}, settings, {}, errors, {});
+  const MotionLikelihood likelihood({replay}, {motions.front()}, settings, {}, errors,
+                                    rates_by_draws(replay, motions));
   const MotionLikelihood::Linear& linear = likelihood.linear(0);
   Eigen::MatrixXd draws(linear.residuals.size(), static_cast<Eigen::Index>(motions.size()) - 1);
   for (std::size_t d = 1; d < motions.size(); ++d)
@@ -241,9 +257,9 @@ Prediction predict(const Replay& replay, const std::vector<ReplayResult>& motion
   const Eigen::VectorXd left = likelihood.of_recording(0).fit(linear.residuals).left;
   const std::vector<double> observed = distances_of(linear.rows, left, robust);
   const double noise = likelihood.of_recording(0).misfit().noise;
-  const Eigen::MatrixXd expected =
-      expected_distances(linear.rows, draws, misfits, LinearFit(linear.rows, noise),
-                         noise_of_keyframes(linear.rows, left, noise), robust, seed);
+  const LinearFit fit(linear.rows, likelihood.of_recording(0).spread());
+  const Eigen::MatrixXd expected = expected_distances(
+      linear.rows, draws, misfits, fit, noise_of_keyframes(linear.rows, left, noise), robust, seed);
   for (Eigen::Index k = 0; k < expected.rows(); ++k) {
     Eigen::VectorXd sorted = expected.row(k).transpose();
     std::sort(sorted.begin(), sorted.end());
