@@ -174,28 +174,25 @@ def fold(runs, data, asset, joint):
 
 
 def fold_models(runs, data):
-    """Navy at its best candidate, and the fold at the D of the lifts and a tenth of it: with and without self-contact, and with
-    bending that yields. The start yaw of the fold is searched for each."""
+    """The fold at the D of the lifts and a tenth of it: with and without self-contact, and with bending that yields. Its start yaw is
+    searched for each."""
     assets = {"plate": write_asset(runs.out), "hinge": write_asset(runs.out, "hinged", bending_model="hinge")}
-    navy = {"clip": "lift_navy", "model": "plate", "bending": 1e-5, "yields": None}
-    models = [navy | {"layers": layers} for layers in (False, True)]
-    models += [{"clip": "fold_paper", "model": model, "bending": bending, "yields": yields, "layers": layers}
+    models = [{"clip": "fold_paper", "model": model, "bending": bending, "yields": yields, "layers": layers}
                for bending in FOLD_BENDING for model, yields in (("plate", None), ("hinge", None), *(("hinge", k) for k in FOLD_YIELDS))
                for layers in (False, True)]
-    recordings = {"lift_navy": data / "lift" / "lift_navy", "fold_paper": import_fold(runs, data)}
-    return [model | best_yaw(runs, recordings[model["clip"]], assets[model["model"]], model) for model in models]
+    recording = import_fold(runs, data)
+    return [model | best_yaw(runs, recording, assets[model["model"]], model) for model in models]
 
 
 def best_yaw(runs, recording, asset, model):
     """The best of the start yaws, and in which keyframes that passes through itself away from the grasp."""
-    shape, yaws, grasp = {"lift_navy": ("pinch", [0.05], {"grasp_depth": 0.021}), "fold_paper": ("clamp", FOLD_YAWS, {})}[model["clip"]]
-    options = [word for word in GRASPS[shape] if word != "--hold" and "=" not in word]
-    options += ["--self-contact", "0.001"] if model["layers"] else []
+    options = [*GRASPS["clamp"], *(["--self-contact", "0.001"] if model["layers"] else [])]
     found = []
-    for yaw in yaws:
+    for yaw in FOLD_YAWS:
         name = "fold_models/" + "_".join(f"{value}" for value in [*model.values(), yaw])
         material = {"bending": model["bending"]} | ({"yield_curvature": model["yields"]} if model["yields"] else {})
-        replay = runs.replay(name, recording, material | grasp | {"start_yaw": yaw}, "--asset", asset, *window(model["clip"]), *options)
+        timed = [word if word != "1e-5" else "1e-3" for word in window(model["clip"])]  # layers in contact take long to 1e-5
+        replay = runs.replay(name, recording, material | {"start_yaw": yaw}, "--asset", asset, *timed, *options)
         found.append(replay | {"start_yaw": yaw, "folder": runs.out / name})
     best = min(found, key=lambda replay: replay["score"])
     pierced = surface.piercings_by_frame(best["folder"], range(10, 25))
