@@ -117,24 +117,38 @@ class LinearFit {
   Eigen::LDLT<Eigen::MatrixXd> solver_;
 };
 
-/// By how much neighbours differ in each keyframe, and the standard deviation of its logarithm: noise along
-/// the view differs with the slope of what is seen.
+/// Noise of each keyframe [m] and the standard deviation of its logarithm: noise along the view differs with
+/// the slope of what is seen.
 struct KeyframeNoise {
   Eigen::VectorXd sizes, spreads;
 };
 
+/// By what neighbours differ in, each keyframe drawn to the mean of all as far as it is not known better
+/// (empirical Bayes; Efron and Morris 1973).
 KeyframeNoise noise_of_keyframes(const ObservedRows& rows, const Eigen::VectorXd& residuals, double all) {
   const auto count = static_cast<Eigen::Index>(rows.times.size());
-  KeyframeNoise noise{Eigen::VectorXd::Constant(count, all), Eigen::VectorXd::Zero(count)};
+  Eigen::VectorXd logarithms(count), variances(count);
   for (Eigen::Index k = 0; k < count; ++k) {
     ObservedRows alone = rows;
     for (Eigen::Index i = 0; i < residuals.size(); ++i)
       if (alone.keyframe[static_cast<std::size_t>(i)] != k) alone.weights[i] = 0;
     const double between = noise_between_neighbours(alone, residuals);
-    if (!(between > 0)) continue;  // too few
-    noise.sizes[k] = between;
-    // Of squares of differences of neighbours (Rice 1984).
-    noise.spreads[k] = std::sqrt(0.75 / static_cast<double>((alone.weights.array() > 0).count()));
+    const auto seen = static_cast<double>(std::max<Eigen::Index>(1, (alone.weights.array() > 0).count()));
+    logarithms[k] = std::log(between > 0 ? between : all);
+    // A median of absolute values has 1.36 / n; a third of the differences is that of two which are each
+    // other's nearest and counts twice.
+    variances[k] = 2 / seen;
+  }
+  const double mean = logarithms.mean();
+  const double scatter =
+      count > 1 ? (logarithms.array() - mean).square().sum() / static_cast<double>(count - 1) : 0;
+  const double beyond = std::max(0.0, scatter - variances.mean());
+  KeyframeNoise noise{Eigen::VectorXd(count), Eigen::VectorXd(count)};
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double own = beyond / (beyond + variances[k]);
+    noise.sizes[k] = std::exp(mean + own * (logarithms[k] - mean));
+    noise.spreads[k] =
+        std::sqrt(own * variances[k] + (1 - own) * variances.mean() / static_cast<double>(count));
   }
   return noise;
 }

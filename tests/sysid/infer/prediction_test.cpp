@@ -87,8 +87,9 @@ TEST(Prediction, OfNoiseAloneIsTheMeanOfItsSize) {
   const double mean = 0.7168e-3, half = 1.96 * 0.553e-3 / 0.95 / std::sqrt(200);
   int held = 0;
   for (const PredictedKeyframe& keyframe : prediction.keyframes) {
-    EXPECT_NEAR(keyframe.band[0], mean - half, 0.3 * half);  // the noise itself is estimated, to 3 %
-    EXPECT_NEAR(keyframe.band[1], mean + half, 0.3 * half);
+    // The noise itself is estimated, by 2,000 differences of neighbours: to sqrt(2 / 2000). Three of these.
+    EXPECT_NEAR(keyframe.band[0], mean - half, 0.095 * mean);
+    EXPECT_NEAR(keyframe.band[1], mean + half, 0.095 * mean);
     held += keyframe.holds() ? 1 : 0;
   }
   EXPECT_GE(held, 8);  // less once in a hundred times
