@@ -6,7 +6,6 @@
 #include "data/text.h"
 #include "sysid/emulate/focused_axes.h"
 #include "sysid/infer/adaptive_design.h"
-#include "sysid/infer/agreement.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/verdict.h"
@@ -324,16 +323,6 @@ Fit fit_of(const Task& task, const Found& found, const Answer& answer) {
   return fit;
 }
 
-/// What the recordings say against each other, over the points of an emulator; empty where nothing.
-std::string contradiction_in(const Found& found, const GridSettings& grid,
-                             const std::vector<Replay>& replays) {
-  if (replays.size() < 2) return "";
-  std::vector<std::string> names;
-  for (const Replay& replay : replays) names.push_back(replay.recording.name);
-  return contradiction_text(agreement_of(found.emulator, found.axes, found.look.likelihood, grid), found.axes,
-                            names);
-}
-
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   const Sensitivity sensitivity = sensitivity_of(task, found);
   std::vector<SolverCheck> checks;
@@ -427,8 +416,6 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
     return answer;
   }
-  // Over all that was searched: about the answer, a recording that misses it by far hardly counts.
-  const std::string contradiction = contradiction_in(*found, usable, replays);
   Found about = simulate_about(task, *found, held);
   const Settled settled = settle(task, about, best, held);
   if (settled == Settled::elsewhere)
@@ -441,7 +428,6 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         "more values");
 
   warn_of_held(task, found->look.likelihood, found->errors, answer.warnings);
-  if (!contradiction.empty()) answer.warnings.push_back(contradiction);
 
   Posterior posterior = found->look.posterior;
   answer.values = posterior.values();

@@ -62,12 +62,6 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
   });
 }
 
-MotionLikelihood MotionLikelihood::only(std::size_t r) const {
-  MotionLikelihood likelihood;
-  likelihood.recordings_ = {recordings_[r]};
-  return likelihood;
-}
-
 void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
                                  const std::vector<SheetShifts>& rates, std::optional<double> repeatability,
                                  std::optional<double> limit) {

@@ -24,9 +24,6 @@ class MotionLikelihood {
 
   std::size_t recordings() const { return recordings_.size(); }
 
-  /// That of recording r alone.
-  MotionLikelihood only(std::size_t r) const;
-
   /// -2 log likelihood of motions, one a recording, up to a constant. NaN where the clock that fits one leads
   /// to steps that it lacks.
   double deviance(const std::vector<Motion>& motions) const;
@@ -63,8 +60,6 @@ class MotionLikelihood {
   Eigen::VectorXd away(std::size_t r, const Motion& reference, const Motion& motion) const;
 
  private:
-  MotionLikelihood() = default;
-
   using Registered = Eigen::Matrix<double, 5, 1>;
   struct Recording {
     Replay replay;
