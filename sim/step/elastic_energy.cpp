@@ -24,6 +24,11 @@ PaddedPoints padded_vertices(const Points& x) {
   return padded;
 }
 
+/// With the rest angles that hold: those of the plan where a law was made without a state.
+std::span<const Hinge> hinges_in(const SheetPlan& plan, const BodyLaw& law) {
+  return law.hinges.empty() ? hinges_of(law.place, plan.hinges) : law.hinges_now();
+}
+
 }  // namespace
 
 ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, const Points& positions,
@@ -39,8 +44,9 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, co
                                                         plan.triangle_groups.data() + place.first_group,
                                                         place.group_count, positions.data(), gradient.data());
   if (law.bends_at_hinges()) {
-    energy.bending = add_hinge_gradient(
-        law.hinges_now(), {law.material.bending_rigidity, law.material.yield_curvature}, positions, gradient);
+    energy.bending = add_hinge_gradient(hinges_in(plan, law),
+                                        {law.material.bending_rigidity, law.material.yield_curvature},
+                                        positions, gradient);
     return energy;
   }
   // Far from the origin positions would round the energy: its differences between them are all that counts.
@@ -60,7 +66,7 @@ void add_elastic_hessian(const SheetPlan& plan, const BodyLaw& law, const Points
       membrane.law, membrane.lame, plan.triangle_groups.data() + law.place.first_group, law.place.group_count,
       positions.data(), scale, curvature == Curvature::positive, values.data());
   if (law.bends_at_hinges())
-    add_hinge_hessian(plan, law.place, law.hinges_now(),
+    add_hinge_hessian(plan, law.place, hinges_in(plan, law),
                       {scale * law.material.bending_rigidity, law.material.yield_curvature}, positions,
                       values);
 }
