@@ -20,7 +20,7 @@ sysid = $(BUILD)/bin/flash-sysid
 sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
-.PHONY: help demo configure build test validate routes coverage other-simulators plan-promise answer-time size-study use-study
+.PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
 .PHONY: few-views-study knock-study locking drape self-contact reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
@@ -74,6 +74,10 @@ routes: configure-test  ## Say whether every route to an answer gives the same o
 coverage: configure-test  ## Say whether intervals hold the truth of RUNS twins from SEED on, of KIND lift, drape or bar_pull
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
 	$(PYTHON) tests/validation/coverage.py --sysid $(sysid) --out $(BUILD)/coverage_$(KIND) --kind $(KIND) --seed $(SEED) --runs $(RUNS)
+
+agreement: configure-test  ## Say whether searches of two recordings tell one cloth from two, RUNS materials from SEED on
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/agreement.py --sysid $(sysid) --out $(BUILD)/agreement --seed $(SEED) --runs $(RUNS)
 
 other-simulators: configure-test  ## Search the lifts that other simulators made, from $(DATA)/twin, and say what holds
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid

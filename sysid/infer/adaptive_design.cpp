@@ -287,7 +287,8 @@ Look narrow(const Emulator& emulator, const Extent& start, const std::vector<dou
   int looked = 0;
   for (int round = 0; round < kRounds; ++round) {
     MotionLikelihood likelihood(replays, motions_at(emulator, values, emulator.share), grid.score,
-                                repeatability, errors, rates_at(emulator, values, extent, axes));
+                                repeatability, errors, rates_at(emulator, values, extent, axes),
+                                emulator.first);
     const std::vector<Axis> here = axes_over(extent, axes);
     const Eigen::VectorXd deviance = deviance_over(emulator, here, likelihood, grid, told);
     looked += static_cast<int>(deviance.size());

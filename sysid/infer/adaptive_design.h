@@ -26,6 +26,7 @@ struct Look {
 struct Emulator {
   std::vector<ModelledReplay> models;  ///< one a recording
   double share = 0;                    ///< see TwoMeshMotions
+  std::size_t first = 0;               ///< recording of the search that the first is of
 };
 
 /// Modelled motions at values inside the range, one a recording; `share`: see TwoMeshMotions.

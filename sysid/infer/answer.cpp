@@ -8,6 +8,7 @@
 #include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/estimate_errors.h"
 #include "sysid/infer/held.h"
+#include "sysid/infer/recordings_alone.h"
 #include "sysid/infer/verdict.h"
 #include "sysid/infer/weight_scale.h"
 #include "sysid/observe/horizon.h"
@@ -323,6 +324,37 @@ Fit fit_of(const Task& task, const Found& found, const Answer& answer) {
   return fit;
 }
 
+/// The point of least score of each recording, of those at the values of `axes`.
+std::vector<std::vector<double>> best_of_each(const GridResults& results, const std::vector<Axis>& axes,
+                                              std::size_t recordings) {
+  std::vector<std::vector<double>> best(recordings);
+  std::vector<double> least(recordings, INFINITY);
+  for (const CandidateResult& candidate : results.candidates) {
+    bool among = candidate.recordings.size() == recordings;
+    for (std::size_t k = 0; among && k < axes.size(); ++k)
+      among = std::find(axes[k].values.begin(), axes[k].values.end(), candidate.values[k]) !=
+              axes[k].values.end();
+    for (std::size_t r = 0; among && r < recordings; ++r)
+      if (candidate.recordings[r].score < least[r]) {
+        least[r] = candidate.recordings[r].score;
+        best[r] = candidate.values;
+      }
+  }
+  return best;
+}
+
+/// Whether recordings ask for the parameters of the answer. `alone`: what each asks for by itself.
+Agreement agreement_about(const Task& task, const Found& found, const Answer& answer,
+                          const std::vector<Alone>& alone, std::vector<KnownError> held) {
+  std::vector<KnownError> errors = errors_about(found, std::move(held));
+  if (found.emulator.share != own_mesh)
+    errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, answer.motions})},
+                       {1, std::make_shared<const Motions>(Motions{answer.fit.replays, answer.fit.motions})}},
+                      true,
+                      true});
+  return agreement_of(task, alone, answer.motions, errors);
+}
+
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   const Sensitivity sensitivity = sensitivity_of(task, found);
   std::vector<SolverCheck> checks;
@@ -362,10 +394,11 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
-  std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) +
+  std::size_t motions = motions_at_estimate + 5 + most_held_motions(grid) +
                         kRounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
-  const int looks = 2 * (own > 0 ? 1 + kRounds : 1);
+  const int alone = recordings > 1 ? static_cast<int>(recordings) : 0,
+            looks = 2 * (own > 0 ? 1 + kRounds : 1) + alone;
   return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
 }
 
@@ -416,6 +449,10 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
     return answer;
   }
+  std::vector<Alone> alone;
+  if (replays.size() > 1)
+    alone = likeliest_alone(task, found->emulator, usable.axes,
+                            best_of_each(results, usable.axes, replays.size()), found->errors);
   Found about = simulate_about(task, *found, held);
   const Settled settled = settle(task, about, best, held);
   if (settled == Settled::elsewhere)
@@ -444,6 +481,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, *found);
+  if (!alone.empty()) answer.agreement = agreement_about(task, *found, answer, alone, held);
   return answer;
 }
 

@@ -5,6 +5,7 @@
 
 #include "sysid/emulate/grid_search.h"
 #include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/agreement.h"
 #include "sysid/infer/answer_work.h"
 #include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
@@ -34,10 +35,11 @@ struct Answer {
   std::vector<ReplayResult> motions;         ///< of the estimate there, one a recording
   Fit fit;                                   ///< on cells of no size where the answer is of these, else there
   std::vector<ParameterFinding> parameters;  ///< one an axis, in order
-  Eigen::MatrixXd covariance_log;   ///< of log(parameter) in order of the axes; empty where one may be zero
-  Eigen::MatrixXd samples;          ///< of the posterior, values of the axes, a draw a row
-  std::vector<Misfit> misfits;      ///< one a recording
-  std::vector<SolverCheck> checks;  ///< of the estimate; empty without them
+  Eigen::MatrixXd covariance_log;  ///< of log(parameter) in order of the axes; empty where one may be zero
+  Eigen::MatrixXd samples;         ///< of the posterior, values of the axes, a draw a row
+  std::vector<Misfit> misfits;     ///< one a recording
+  std::optional<Agreement> agreement;           ///< of several recordings
+  std::vector<SolverCheck> checks;              ///< of the estimate; empty without them
   std::vector<std::optional<double>> horizons;  ///< of each recording [s]
   std::vector<std::string> warnings;
 };

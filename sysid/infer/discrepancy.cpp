@@ -26,6 +26,7 @@ constexpr int kFew = 12;        // rows of one keyframe and channel that are too
 constexpr double kVague = 100;  // of what is not known, over the residuals
 // Chi-square with 3 degrees of freedom: a size and two reaches.
 constexpr double kOnceInTwenty = 7.815;
+constexpr std::size_t kDraws = 32;  // of size and reaches
 
 /// Row of (keyframe, channel) blocks, `modes` long each.
 Eigen::Index block(int keyframe, int channel, int channels, int modes) {
@@ -266,6 +267,7 @@ void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
     misfit_.size = misfit_.rms = noise_;
     misfit_.reach_time = fields_[longest].shape.reach_time;
     misfit_.reach_sheet = fields_[longest].shape.reach_sheet;
+    misfit_.draws = {{misfit_.size, misfit_.reach_time, misfit_.reach_sheet}};
     return;
   }
   std::vector<double> deviances;
@@ -284,10 +286,12 @@ void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
   misfit_.found = misfit_.gain > kOnceInTwenty;
   variances_.assign(fields_.size(), 0);
   double total = 0, squares = 0;
+  std::vector<double> weights;  // in order of fields, then sizes
   for (std::size_t f = 0, i = 0; f < fields_.size(); ++f)
     for (std::size_t s = 0; s < sizes_.size(); ++s, ++i) {
       const double weight = priors_[s] * std::exp(-0.5 * (deviances[i] - least)),
                    square = std::max(weight * sizes_[s] * sizes_[s], std::numeric_limits<double>::min());
+      weights.push_back(weight);
       total += weight;
       squares += square;
       variances_[f] += square;
@@ -300,6 +304,15 @@ void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
   misfit_.rms = std::sqrt(squares / total);
   misfit_.reach_time /= squares;
   misfit_.reach_sheet /= squares;
+  // Systematic resampling (Kitagawa 1996).
+  double below = 0;
+  std::size_t at = 0;
+  for (std::size_t draw = 0; draw < kDraws; ++draw) {
+    const double share = (static_cast<double>(draw) + 0.5) / kDraws * total;
+    while (at + 1 < weights.size() && below + weights[at] < share) below += weights[at++];
+    const Shape& shape = fields_[at / sizes_.size()].shape;
+    misfit_.draws.push_back({sizes_[at % sizes_.size()], shape.reach_time, shape.reach_sheet});
+  }
 }
 
 Eigen::MatrixXd DiscrepancyModel::covariance_of(const Eigen::MatrixXd& combinations, bool independent) const {

@@ -19,6 +19,13 @@ struct ObservedRows {
   Eigen::MatrixXd rates = {};  ///< by each parameter, a column each, over about what is likely of it [m]
 };
 
+/// A discrepancy that residuals make likely.
+struct DiscrepancyDraw {
+  double size = 0;         ///< tau [m]
+  double reach_time = 0;   ///< [s]
+  double reach_sheet = 0;  ///< [m]
+};
+
 /// What the residuals say of the error of the model itself.
 struct Misfit {
   double noise = 0;  ///< standard deviation by which neighbours differ [m]
@@ -32,6 +39,7 @@ struct Misfit {
   double explained = 0;    ///< discrepancy that the repeatability of trials accounts for [m]
   int keyframes = 0;
   double worth = 0;  ///< keyframes of independent discrepancies that would tell the parameters as well
+  std::vector<DiscrepancyDraw> draws = {};  ///< of the posterior, all alike likely
 };
 
 /// Covariance of residuals under a model that is wrong: noise, errors of known shape, and a discrepancy that

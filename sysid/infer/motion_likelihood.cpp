@@ -11,7 +11,7 @@ namespace flash::sysid {
 MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
                                    const std::vector<ReplayResult>& reference, const ScoreSettings& settings,
                                    std::optional<double> repeatability, const std::vector<KnownError>& errors,
-                                   const std::vector<MotionChange>& rates) {
+                                   const std::vector<MotionChange>& rates, std::size_t first) {
   constexpr int kPasses = 2;  // where the nuisance is linear: without known errors, then at those found
   const CandidateResult score = score_motions(replays, reference, settings);
   const Robust& robust = settings.objective.robust;
@@ -27,14 +27,14 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
     recording.nuisance.registration << fit.offset, fit.yaw, fit.time_offset;
     recording.nuisance.errors = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(errors.size()));
     for (const KnownError& error : errors) {
-      SheetShifts shifts = shifts_of(error.terms, r, replay, fit.time_offset);
+      SheetShifts shifts = shifts_of(error.terms, first + r, replay, fit.time_offset);
       if (error.corrects) add(recording.correction, 1, shifts);
       // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
       const double size = error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1;
       add(recording.errors.emplace_back(), size, shifts);
       recording.bends.emplace_back();
       if (!error.bend.empty())
-        add(recording.bends.back(), size * size, shifts_of(error.bend, r, replay, fit.time_offset));
+        add(recording.bends.back(), size * size, shifts_of(error.bend, first + r, replay, fit.time_offset));
     }
     std::vector<const SheetShifts*> shapes = {&recording.correction};
     for (const SheetShifts& error : recording.errors) shapes.push_back(&error);

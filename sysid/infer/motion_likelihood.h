@@ -17,10 +17,12 @@ namespace flash::sysid {
 class MotionLikelihood {
  public:
   /// `reference`: a motion a replay, near those to be asked about. `rates`: how motions change there with
-  /// each parameter, over about what is likely of it.
+  /// each parameter, over about what is likely of it. `first`: recording of `errors` that the first replay is
+  /// of.
   MotionLikelihood(const std::vector<Replay>& replays, const std::vector<ReplayResult>& reference,
                    const ScoreSettings& settings, std::optional<double> repeatability,
-                   const std::vector<KnownError>& errors, const std::vector<MotionChange>& rates);
+                   const std::vector<KnownError>& errors, const std::vector<MotionChange>& rates,
+                   std::size_t first = 0);
 
   std::size_t recordings() const { return recordings_.size(); }
 

@@ -43,13 +43,14 @@ std::vector<double> distances_of(const ObservedRows& rows, const Eigen::VectorXd
   return distances;
 }
 
-/// Draws errors of a misfit, of the rows. What is rough in the error of the model is neither smooth enough
-/// for the discrepancy nor noise that neighbours do not share: a field of the shortest reach along the sheet,
-/// anew in each keyframe.
+/// Draws errors of a misfit with one likely discrepancy, of the rows. What is rough in the error of the model
+/// is neither smooth enough for the discrepancy nor noise that neighbours do not share: a field of the
+/// shortest reach along the sheet, anew in each keyframe.
 class ErrorDraws {
  public:
-  ErrorDraws(const ObservedRows& rows, const SheetModes& modes, const Misfit& misfit)
-      : smooth_(field(modes, misfit.rms, misfit.reach_sheet)),
+  ErrorDraws(const ObservedRows& rows, const SheetModes& modes, const Misfit& misfit,
+             const DiscrepancyDraw& discrepancy)
+      : smooth_(field(modes, discrepancy.size, discrepancy.reach_sheet)),
         rough_(field(modes,
                      std::sqrt(std::max(0.0, misfit.rough * misfit.rough - misfit.noise * misfit.noise)),
                      kShortest * modes.length)),
@@ -60,7 +61,7 @@ class ErrorDraws {
       for (Eigen::Index l = 0; l < count; ++l)
         in_time(k, l) = correlation_in_time(
             std::abs(rows.times[static_cast<std::size_t>(k)] - rows.times[static_cast<std::size_t>(l)]) /
-            std::max(misfit.reach_time, 1e-9));
+            std::max(discrepancy.reach_time, 1e-9));
     constexpr double kRounding = 1e-9;  // keyframes that agree leave the matrix singular
     in_time.diagonal().array() += kRounding;
     in_time_ = in_time.llt().matrixL();
@@ -159,14 +160,17 @@ Eigen::MatrixXd expected_distances(const ObservedRows& rows, const Eigen::Matrix
                                    const std::vector<Misfit>& misfits, const LinearFit& fit,
                                    const KeyframeNoise& noise, const Robust& robust, unsigned seed) {
   const SheetModes modes = sheet_modes(rows.places);
-  std::vector<ErrorDraws> draws;
-  for (const Misfit& misfit : misfits) draws.emplace_back(rows, modes, misfit);
+  std::vector<std::vector<ErrorDraws>> draws(misfits.size());  // of each misfit
+  for (std::size_t m = 0; m < misfits.size(); ++m)
+    for (const DiscrepancyDraw& discrepancy : misfits[m].draws)
+      draws[m].emplace_back(rows, modes, misfits[m], discrepancy);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> gauss;
   const auto normal = [&] { return gauss(random); };
   Eigen::MatrixXd distances(static_cast<Eigen::Index>(rows.times.size()), kRecordings);
   for (Eigen::Index recording = 0; recording < kRecordings; ++recording) {
-    const auto m = static_cast<std::size_t>(random() % misfits.size());
+    const std::vector<ErrorDraws>& of_misfit = draws[random() % draws.size()];
+    const ErrorDraws& errors = of_misfit[random() % of_misfit.size()];
     Eigen::VectorXd residuals = rows.known * Eigen::VectorXd::NullaryExpr(rows.known.cols(), normal);
     if (motions.cols() > 0)
       residuals +=
@@ -174,7 +178,7 @@ Eigen::MatrixXd expected_distances(const ObservedRows& rows, const Eigen::Matrix
     const Eigen::VectorXd noises =
         noise.sizes.array() *
         (noise.spreads.array() * Eigen::VectorXd::NullaryExpr(noise.sizes.size(), normal).array()).exp();
-    draws[m].add(rows, noises, normal, residuals);
+    errors.add(rows, noises, normal, residuals);
     const std::vector<double> found = distances_of(rows, fit.left(residuals), robust);
     distances.col(recording) = Eigen::Map<const Eigen::VectorXd>(found.data(), distances.rows());
   }

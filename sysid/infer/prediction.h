@@ -43,12 +43,12 @@ std::vector<KnownError> errors_of_prediction(const Replay& replay, const GridSet
 /// posterior. `misfits`: of the recordings it used, all alike likely.
 ///
 /// An expected recording has the motion of one draw, the errors of known shape under their prior, a
-/// discrepancy of the size and the reaches of a misfit, as DiscrepancyModel has it, what is rough in that
-/// misfit, and noise as large as that between neighbours of the recording itself. Registration and errors of
-/// known shape are fitted to it, as to the observed one (MotionLikelihood). The distance of a keyframe is the
-/// mean over its terms of `settings.objective.robust`. All but the fit of what was observed is to first order
-/// about the estimate. How far a recording is from what is expected is Mahalanobis' distance of the
-/// logarithms.
+/// discrepancy of the size and the reaches that one misfit makes likely, as DiscrepancyModel has it, what is
+/// rough in that misfit, and noise as large as that between neighbours of the recording itself. Registration
+/// and errors of known shape are fitted to it, as to the observed one (MotionLikelihood). The distance of a
+/// keyframe is the mean over its terms of `settings.objective.robust`. All but the fit of what was observed
+/// is to first order about the estimate. How far a recording is from what is expected is Mahalanobis'
+/// distance of the logarithms.
 ///
 /// Throws data::InputError where no keyframe weighs.
 Prediction predict(const Replay& replay, const std::vector<ReplayResult>& motions,

@@ -162,8 +162,18 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
   return warnings;
 }
 
-// Empty where the answer can be used.
-std::string reason_unusable(const Summary& summary, const CandidateResult& best) {
+/// Empty where the recordings do not contradict each other.
+std::string contradiction_in(const Answer& answer, const std::vector<Replay>& replays,
+                             const std::vector<Axis>& ranges) {
+  if (!answer.agreement) return "";
+  std::vector<std::string> names;
+  for (const Replay& replay : replays) names.push_back(replay.recording.name);
+  return contradiction_text(*answer.agreement, in_own_coordinates(ranges), names);
+}
+
+// Empty where the answer can be used. `contradiction`: of the recordings.
+std::string reason_unusable(const Summary& summary, const CandidateResult& best,
+                            const std::string& contradiction) {
   if (best.status != CandidateStatus::ok)
     return "the estimate did not converge (residual " + data::format_short(best.residual_max) +
            "): raise --iterations or lower --time-step";
@@ -172,6 +182,7 @@ std::string reason_unusable(const Summary& summary, const CandidateResult& best)
       return recording.name +
              ": the model explains less than half of what was seen: " + miss_of(*recording.markers) +
              ". Are gravity, mesh, start and the markers' frame right?";
+  if (!contradiction.empty()) return contradiction;
   const auto is_searched_material = [](const ParameterFinding& finding) { return is_material(finding.name); };
   const auto is_known = [&](const ParameterFinding& finding) {
     return is_searched_material(finding) && finding.identifiable != Identifiable::no;
@@ -253,6 +264,17 @@ Eigen::MatrixXd some_samples(const Answer& answer) {
   return samples;
 }
 
+/// What recordings ask for by themselves, of the parameters that were searched.
+Agreement searched_alone(const Answer& answer) {
+  Agreement agreement = *answer.agreement;
+  for (std::vector<std::vector<double>>* const each : {&agreement.alone, &agreement.spreads})
+    for (std::vector<double>& numbers : *each)
+      for (std::size_t k = answer.parameters.size(); k-- > 0;)
+        if (answer.parameters[k].values.size() < 2)
+          numbers.erase(numbers.begin() + static_cast<std::ptrdiff_t>(k));
+  return agreement;
+}
+
 }  // namespace
 
 Summary summarize(const GridResults& results, const Answer& answer, const std::vector<Replay>& replays,
@@ -308,12 +330,15 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     summary.warnings.push_back(warning);
   summary.warnings.insert(summary.warnings.end(), answer.warnings.begin(), answer.warnings.end());
   summary.solver_check = answer.checks;
+  if (answer.agreement) summary.agreement = searched_alone(answer);
   if (!asked.solver_check)
     summary.warnings.emplace_back(
         "no finer solution was asked for: how far mesh, step and iterations move the answer is not known");
   summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
-  if (const std::string reason = reason_unusable(summary, estimate); !reason.empty()) {
+  const std::string contradiction =
+      contradiction_in(answer, replays, asked.ranges.empty() ? settings.axes : asked.ranges);
+  if (const std::string reason = reason_unusable(summary, estimate, contradiction); !reason.empty()) {
     summary.exit_code = 3;
     summary.warnings.insert(summary.warnings.begin(), reason);
   }

@@ -67,6 +67,9 @@ Json to_json(const SummaryRecording& recording) {
   json["misfit_reach_s"] = number(recording.misfit.reach_time);
   json["misfit_reach_m"] = number(recording.misfit.reach_sheet);
   json["misfit_gain"] = number(recording.misfit.gain);
+  json["misfit_draws"] = Json::array();
+  for (const DiscrepancyDraw& draw : recording.misfit.draws)
+    json["misfit_draws"].push_back({number(draw.size), number(draw.reach_time), number(draw.reach_sheet)});
   json["model_fits"] = model_fits(recording);
   json["keyframes"] = recording.misfit.keyframes;
   json["keyframes_worth"] = number(recording.misfit.worth);
@@ -148,10 +151,10 @@ ParameterFinding read_finding(const std::string& name, const data::JsonObject& j
 
 SummaryRecording read_recording(const data::JsonObject& json) {
   json.expect_fields(
-      {"name",           "sha256",         "offset",      "yaw",        "time_offset",  "nuisance",
-       "score",          "noise_m",        "rough_m",     "misfit_m",   "misfit_rms_m", "misfit_explained_m",
-       "misfit_reach_s", "misfit_reach_m", "misfit_gain", "model_fits", "keyframes",    "keyframes_worth",
-       "markers",        "horizon_s",      "frames"});
+      {"name",           "sha256",         "offset",      "yaw",         "time_offset",  "nuisance",
+       "score",          "noise_m",        "rough_m",     "misfit_m",    "misfit_rms_m", "misfit_explained_m",
+       "misfit_reach_s", "misfit_reach_m", "misfit_gain", "model_fits",  "keyframes",    "keyframes_worth",
+       "markers",        "horizon_s",      "frames",      "misfit_draws"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -170,6 +173,13 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   misfit.reach_time = score_of(json, "misfit_reach_s");
   misfit.reach_sheet = score_of(json, "misfit_reach_m");
   misfit.gain = score_of(json, "misfit_gain");
+  if (json.has("misfit_draws")) {
+    for (const auto& [size, reach_time, reach_sheet] :
+         typed<std::vector<std::array<double, 3>>>(json, "misfit_draws", "lists of three numbers"))
+      misfit.draws.push_back({size, reach_time, reach_sheet});
+  } else {  // earlier programs
+    misfit.draws = {{misfit.rms, misfit.reach_time, misfit.reach_sheet}};
+  }
   if (json.has("markers")) {
     const data::JsonObject markers = json.object("markers");
     markers.expect_fields({"sightings", "miss_m", "motion_m", "noise_m"});
@@ -396,6 +406,11 @@ std::string summary_text(const Summary& summary) {
   for (const SolverCheck& check : summary.solver_check)
     json["solver_check"].push_back(
         {{"what", check.what}, {"surface_change_m", number(check.surface_change_m)}, {"shift", check.shift}});
+  if (summary.agreement)
+    json["agreement"] = {{"excess", number(summary.agreement->excess)},
+                         {"chance", number(summary.agreement->chance)},
+                         {"alone", summary.agreement->alone},
+                         {"spreads", summary.agreement->spreads}};
   json["settings"] = summary.settings;
   json["asset"] = summary.asset;
   json["candidates"] = summary.candidates;
@@ -422,7 +437,7 @@ Summary load_summary(const std::string& path) {
                       "recordings",       "solver_check", "settings",       "asset",
                       "candidates",       "unconverged",  "device",         "wall_seconds",
                       "warnings",         "exit_code",    "results_digest", "digest",
-                      "next_experiments", "held"});
+                      "next_experiments", "held",         "agreement"});
   check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
@@ -460,6 +475,15 @@ Summary load_summary(const std::string& path) {
         {check.string("what"), score_of(check, "surface_change_m"),
          check.has("shift") ? typed<std::map<std::string, double>>(check, "shift", "numbers by name")
                             : std::map<std::string, double>{}});
+  if (json.has("agreement")) {
+    const data::JsonObject agreement = json.object("agreement");
+    agreement.expect_fields({"excess", "chance", "alone", "spreads"});
+    const auto lists = [&](const char* key) {
+      return typed<std::vector<std::vector<double>>>(agreement, key, "lists of numbers");
+    };
+    summary.agreement = {score_of(agreement, "excess"), score_of(agreement, "chance"), lists("alone"),
+                         lists("spreads")};
+  }
   summary.settings = typed<std::map<std::string, std::string>>(json, "settings", "texts by name");
   summary.asset = json.string("asset");
   summary.candidates = json.integer("candidates");

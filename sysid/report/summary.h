@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "sysid/infer/agreement.h"
 #include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
 #include "sysid/infer/marker_fit.h"
@@ -76,6 +77,7 @@ struct Summary {
   std::vector<NextExperiment> next_experiments;  ///< best first; empty: they were not ranked
   std::vector<SummaryRecording> recordings;
   std::vector<SolverCheck> solver_check;
+  std::optional<Agreement> agreement;  ///< of several recordings; values in the order of `parameters`
   std::map<std::string, std::string> settings;  ///< constitutive, bending_model, mesh, time_step_s, ...
   std::string asset;                            ///< path of the asset the search started from
   int candidates = 0;

@@ -18,9 +18,11 @@ inline data::SheetMaterial short_lift_material() {
 
 /// A strip lifted by its end within 0.4 s, recorded and loaded back from its files.
 inline Replay short_lift(const data::TemporaryFolder& folder,
-                         const std::string& mesh = "sheet:0.2x0.05:0.025") {
+                         const std::string& mesh = "sheet:0.2x0.05:0.025",
+                         const data::SheetMaterial& material = short_lift_material(), unsigned seed = 1) {
   SynthSettings settings;
   settings.name = "lift";
+  settings.seed = seed;
   settings.displacement = Eigen::Vector3d(-0.02, 0, 0.04);
   settings.duration = 0.4;
   settings.keyframe_rate = 50;
@@ -34,7 +36,7 @@ inline Replay short_lift(const data::TemporaryFolder& folder,
   camera.intrinsics.cy = 17.5;
   camera.base_from_camera = look_at({0.1, -0.3, 0.3}, {0.1, 0.025, 0.02}, Eigen::Vector3d::UnitZ());
   settings.cameras = {camera};
-  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, short_lift_material(), settings, {});
+  SynthRecording made = synthesize(data::parse_mesh_spec(mesh), mesh, material, settings, {});
   save_synthetic(made, folder / "lift");
   ReplaySettings replay;
   replay.clamp_slopes = true;

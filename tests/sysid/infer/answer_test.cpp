@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "tests/sysid/short_lift.h"
@@ -57,6 +58,35 @@ TEST(Answer, KeptMotionsGiveTheTruthBackBetweenTheValuesOfTheGrid) {
   EXPECT_EQ(answer.values.front(), *bending.estimate);
   EXPECT_EQ(bending.values.front(), grid.axes[0].values.front());
   EXPECT_EQ(bending.values.back(), grid.axes[0].values.back());
+}
+
+/// What two recordings of strips of these bending rigidities say together.
+Answer answer_of_two(double first, double second) {
+  const std::array<data::TemporaryFolder, 3> folders;
+  std::vector<Replay> replays;
+  for (const double bending : {first, second}) {
+    data::SheetMaterial material = short_lift_material();
+    material.bending_rigidity = bending;
+    const auto r = static_cast<unsigned>(replays.size());
+    replays.push_back(short_lift(folders[r], "sheet:0.2x0.05:0.0125", material, r + 1));
+  }
+  GridSettings grid = bending_grid();
+  grid.rollouts = folders[2] / "rollouts";
+  ResultsStore store(folders[2] / "run", grid.axes, {"first", "second"}, {}, Existing::refuse);
+  EXPECT_TRUE(grid_search(replays, grid, store));
+  GridResults results = store.results();
+  AnswerSettings settings = without_horizon();
+  settings.solver_check = false;
+  return find_answer(results, replays, grid, settings);
+}
+
+TEST(Answer, SaysThatTwoClothsAreNotOne) {
+  const Answer one = answer_of_two(2e-4, 2e-4), two = answer_of_two(1.5e-4, 3e-4);
+  ASSERT_TRUE(one.agreement && two.agreement);
+  EXPECT_GT(one.agreement->chance, 0.01);
+  EXPECT_LT(two.agreement->chance, 0.01);
+  EXPECT_NEAR(two.agreement->alone[0][0], 1.5e-4, 0.2 * 1.5e-4);
+  EXPECT_NEAR(two.agreement->alone[1][0], 3e-4, 0.2 * 3e-4);
 }
 
 }  // namespace

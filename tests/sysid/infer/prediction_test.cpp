@@ -74,6 +74,7 @@ Misfit misfit_of(double noise, double rms) {
   misfit.rms = misfit.size = rms;
   misfit.reach_time = 0.3;
   misfit.reach_sheet = 0.2;
+  misfit.draws = {{rms, misfit.reach_time, misfit.reach_sheet}};
   return misfit;
 }
 

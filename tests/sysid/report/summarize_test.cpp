@@ -70,6 +70,30 @@ TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
   EXPECT_TRUE(first().empty());
 }
 
+TEST(Summarize, RecordingsThatContradictEachOtherCannotBeUsed) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays(2, short_lift(folder));
+  GridSettings grid;
+  grid.base.material = short_lift_material();
+  grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
+  Answer answer;
+  answer.best = 0;
+  answer.values = {2e-4};
+  answer.estimate.status = CandidateStatus::ok;
+  answer.estimate.recordings.resize(2);
+  answer.fit.score = answer.estimate;
+  answer.agreement = Agreement{30, 1e-5, {{1.5e-4}, {3e-4}}, {{0.1}, {0.1}}};
+  const GridResults results{grid.axes, {"lift", "lift"}, {answer.estimate}};
+  Summary summary = summarize(results, answer, replays, grid);
+  EXPECT_EQ(summary.exit_code, 3);
+  ASSERT_FALSE(summary.warnings.empty());
+  EXPECT_NE(summary.warnings.front().find("lift asks for bending 0.00015, lift asks for bending 0.0003"),
+            std::string::npos)
+      << summary.warnings.front();
+  answer.agreement->chance = 0.02;
+  EXPECT_EQ(summarize(results, answer, replays, grid).exit_code, 0);
+}
+
 // Bending of cells of no size beside a score of coarse ones would say that a good fit is a bad one.
 TEST(Summarize, TheScoreIsThatOfTheMeshThatTheAnswerIsOf) {
   const data::TemporaryFolder folder;

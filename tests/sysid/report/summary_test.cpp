@@ -50,6 +50,21 @@ TEST(Summary, KeepsWhatToRecordNext) {
             std::string::npos);
 }
 
+TEST(Summary, KeepsWhatEachRecordingAsksForAndWhichMisfitsAreLikely) {
+  const data::TemporaryFolder folder;
+  Summary summary = example_summary();
+  summary.agreement = Agreement{12.5, 0.002, {{0.1, 1e-4}, {0.2, 3e-4}}, {{0.05, 0.2}, {0.06, 0.3}}};
+  summary.recordings[0].misfit.draws = {{1e-3, 0.2, 0.1}, {2e-3, 0.4, 0.05}};
+  save_summary(summary, folder / "summary.json");
+  const Summary loaded = load_summary(folder / "summary.json");
+  ASSERT_TRUE(loaded.agreement);
+  EXPECT_EQ(loaded.agreement->chance, 0.002);
+  EXPECT_EQ(loaded.agreement->alone[1][1], 3e-4);
+  EXPECT_EQ(loaded.agreement->spreads[0][0], 0.05);
+  ASSERT_EQ(loaded.recordings[0].misfit.draws.size(), 2u);
+  EXPECT_EQ(loaded.recordings[0].misfit.draws[1].reach_time, 0.4);
+}
+
 // The factor of a weight that was not measured is applied to what was simulated.
 TEST(Summary, AnIntervalMayReachBeyondWhatWasSimulatedByAnErrorOfTheWeightAlone) {
   const data::TemporaryFolder folder;
