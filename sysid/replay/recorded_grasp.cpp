@@ -52,6 +52,15 @@ data::GraspShape shape_of(const data::RecordedGrasp& grasp, const ReplaySettings
   return settings.grasp_shape.value_or(grasp.shape);
 }
 
+double held_extent(const Replay& replay, const data::RecordedGrasp& grasp) {
+  const data::Points& rest = replay.recording.mesh.vertices;
+  const std::vector<int> patch = patch_of(replay, grasp, {});
+  double extent = 0;
+  for (const int i : patch)
+    for (const int j : patch) extent = std::max(extent, (rest.row(i) - rest.row(j)).norm());
+  return extent;
+}
+
 const data::Trajectory& trajectory_of(const data::Recording& recording, const data::RecordedGrasp& grasp) {
   const auto found = recording.trajectories.find(grasp.gripper);
   if (found == recording.trajectories.end()) {

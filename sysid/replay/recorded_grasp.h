@@ -11,6 +11,9 @@ namespace flash::sysid {
 /// The shape of a grasp under the settings, which may replace the recording's.
 data::GraspShape shape_of(const data::RecordedGrasp& grasp, const ReplaySettings& settings);
 
+/// The largest distance between two vertices that a grasp of the recording takes, at rest [m].
+double held_extent(const Replay& replay, const data::RecordedGrasp& grasp);
+
 /// The trajectory of the gripper of a grasp. Throws data::InputError where the recording has none of that
 /// name.
 const data::Trajectory& trajectory_of(const data::Recording& recording, const data::RecordedGrasp& grasp);

@@ -12,6 +12,8 @@
 #include "sysid/emulate/candidate_lines.h"
 #include "sysid/infer/held.h"
 #include "sysid/observe/registration_parameter.h"
+#include "sysid/replay/half_cell.h"
+#include "sysid/replay/recorded_grasp.h"
 
 namespace flash::sysid {
 namespace {
@@ -110,6 +112,29 @@ std::string warning_of_misfit(const SummaryRecording& recording, const std::stri
          " it misses the " + object + " by " + mm(misfit.size) +
          (misfit.explained > 0 ? " where repeatability explains " + mm(misfit.explained) : "") + worth +
          ". The intervals allow for it, but are those of a model that does not fit";
+}
+
+/// What the search's mesh and that of half the cell hold of a sheet differs where a cell does not divide the
+/// grasped patch: then cells of no size hold what neither does.
+std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) {
+  constexpr double kSame = 0.01;  // of the smaller extent of the sheet
+  std::vector<std::string> warnings;
+  for (const Replay& replay : replays) {
+    if (replay.recording.is_solid()) continue;
+    const std::optional<Replay> finer = on_half_the_cell(replay);
+    if (!finer) continue;
+    const Eigen::RowVector3d sides = replay.recording.mesh.vertices.colwise().maxCoeff() -
+                                     replay.recording.mesh.vertices.colwise().minCoeff();
+    for (std::size_t g = 0; g < replay.recording.grasps.size(); ++g) {
+      const double here = held_extent(replay, replay.recording.grasps[g]),
+                   there = held_extent(*finer, finer->recording.grasps[g]);
+      if (std::abs(here - there) > kSame * sides.head<2>().minCoeff())
+        warnings.push_back(replay.recording.name + ": the gripper holds " + mm(here) +
+                           " of the sheet on the mesh of the search, and " + mm(there) +
+                           " on half its cells: choose cells that divide the patch (--mesh, --grasp-within)");
+    }
+  }
+  return warnings;
 }
 
 std::vector<std::string> warnings_of(const Summary& summary, const CandidateResult& best,
@@ -334,6 +359,8 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   if (!asked.solver_check)
     summary.warnings.emplace_back(
         "no finer solution was asked for: how far mesh, step and iterations move the answer is not known");
+  else
+    for (const std::string& warning : warnings_of_grasps(replays)) summary.warnings.push_back(warning);
   summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
   const std::string contradiction =

@@ -110,7 +110,7 @@ def one_bending_table(found):
     names = {"lifts": "both lifts", "fold": "the fold", "all": "lifts and fold"}
     rows = [[what, number(found[name]["best"]["parameters"]["bending"]), finding_text(found[name], "bending"),
              " / ".join(mm(recording["score"]) for recording in found[name]["recordings"]),
-             "-"]
+             "; ".join(warning.split(": the intervals")[0] for warning in found[name]["warnings"] if "contradict" in warning) or "-"]
             for name, what in names.items()]
     held, chance = band_of(found["band"])
     rows.append(["the fold, predicted from the lifts", "-", "-", mm(found["band"]["score_m"]),

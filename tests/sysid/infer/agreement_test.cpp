@@ -22,7 +22,8 @@ TEST(Agreement, NamesTheParameterThatIsFarthestApartForWhatIsKnownOfIt) {
   // Young is farther apart, and less known.
   const Agreement agreement{30, 3e-7, {{10, 1e-4}, {200, 3e-4}}, {{2.5, 0.1}, {2.5, 0.1}}};
   const std::string text = contradiction_text(agreement, bending_and_young(), {"lift", "fold"});
-  EXPECT_NE(text.find("lift asks for bending 0.0001, fold asks for bending 0.0003"), std::string::npos) << text;
+  EXPECT_NE(text.find("lift asks for bending 0.0001, fold asks for bending 0.0003"), std::string::npos)
+      << text;
   EXPECT_NE(text.find("once in 1e+06 times or less"), std::string::npos) << text;
 }
 

@@ -70,6 +70,34 @@ TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
   EXPECT_TRUE(first().empty());
 }
 
+// The patch reaches 51 mm: 33 mm of cells of 33 mm, 50 mm of cells of half the size.
+TEST(Summarize, SaysThatCellsDoNotDivideTheGraspedPatch) {
+  const auto warned = [](const std::string& mesh) {
+    const data::TemporaryFolder folder;
+    const std::vector<Replay> replays = {short_lift(folder, mesh)};
+    GridSettings grid;
+    grid.base.material = short_lift_material();
+    grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
+    Answer answer;
+    answer.best = 0;
+    answer.values = {2e-4};
+    answer.estimate.status = CandidateStatus::ok;
+    answer.estimate.recordings.resize(1);
+    answer.fit.score = answer.estimate;
+    const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
+    std::string all;
+    for (const std::string& warning : summarize(results, answer, replays, grid).warnings)
+      all += warning + "\n";
+    return all;
+  };
+  EXPECT_EQ(warned("sheet:0.2x0.05:0.025"), "");
+  EXPECT_NE(warned("sheet:0.2x0.05:0.03333333")
+                .find("lift: the gripper holds 60.09 mm of the sheet on the mesh of the search, and 70.71 mm "
+                      "on half its cells"),
+            std::string::npos)
+      << warned("sheet:0.2x0.05:0.03333333");
+}
+
 TEST(Summarize, RecordingsThatContradictEachOtherCannotBeUsed) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays(2, short_lift(folder));
