@@ -16,6 +16,7 @@
 #include "data/recording_digest.h"
 #include "data/text.h"
 #include "data/writable.h"
+#include "sysid/infer/held.h"
 #include "sysid/infer/prediction.h"
 #include "sysid/observe/registration_parameter.h"
 #include "sysid/replay/memory_estimate.h"
@@ -42,12 +43,13 @@ struct Found {
   sysid::Summary summary;
   sysid::GridSettings grid;
   std::vector<std::vector<double>> values;
+  std::vector<std::optional<double>> weights;  // of each, where it is another than that of the search
 };
 
 // `holds` differ from what the search found or held, as the start yaw of another trial may.
 Found take_search(const PredictOptions& options) {
   const sysid::SearchFolder search = sysid::load_search_folder(options.run);
-  Found found{search.summary, {}, {}};
+  Found found{search.summary, {}, {}, {}};
   const sysid::Summary& summary = found.summary;
   if (summary.samples.rows() < 2 || summary.recordings.empty())
     throw data::InputError(options.run + ": found no posterior, expected a search that came to an estimate");
@@ -68,7 +70,13 @@ Found take_search(const PredictOptions& options) {
     if (fixed.deviation) found.grid.deviations[name] = *fixed.deviation;
   }
   // A column of the samples for each axis that was searched.
-  for (Eigen::Index draw = -1; draw < std::min<Eigen::Index>(options.draws, summary.samples.rows()); ++draw) {
+  const Eigen::Index samples = summary.samples.rows(), draws = std::min<Eigen::Index>(options.draws, samples);
+  const bool weighed = summary.sample_weights.size() == 0 || held("areal_density") != holds.end() ||
+                       held("density") != holds.end();
+  for (Eigen::Index draw = -1; draw < draws; ++draw) {
+    const Eigen::Index sample = draw * samples / draws;
+    found.weights.emplace_back();
+    if (draw >= 0 && !weighed) found.weights.back() = summary.sample_weights[sample];
     std::vector<double>& values = found.values.emplace_back();
     Eigen::Index column = 0;
     for (const sysid::Axis& axis : found.grid.axes) {
@@ -78,11 +86,7 @@ Found take_search(const PredictOptions& options) {
       else if (!searched)
         values.push_back(axis.values.front());
       else
-        values.push_back(
-            draw < 0 ? summary.best.at(axis.name)
-                     : summary.samples(draw * summary.samples.rows() /
-                                           std::min<Eigen::Index>(options.draws, summary.samples.rows()),
-                                       column));
+        values.push_back(draw < 0 ? summary.best.at(axis.name) : summary.samples(sample, column));
       column += searched ? 1 : 0;
     }
   }
@@ -189,8 +193,14 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   for (const std::string& warning : found.summary.warnings) say(options.common, "the search: " + warning);
 
   std::vector<sysid::ReplayCandidate> candidates;
-  for (const std::vector<double>& values : found.values)
-    candidates.push_back(sysid::candidate_at(values, found.grid));
+  for (std::size_t i = 0; i < found.values.size(); ++i)
+    candidates.push_back(found.weights[i]
+                             ? sysid::candidate_with(found.values[i], found.grid,
+                                                     asset.element_type == data::ElementType::tetrahedron
+                                                         ? "density"
+                                                         : "areal_density",
+                                                     *found.weights[i])
+                             : sysid::candidate_at(found.values[i], found.grid));
   const sysid::MotionStore store((std::filesystem::path(options.run) / "motions").string());
   std::vector<sysid::ReplayResult> motions(candidates.size());
   store.run(replay, candidates,

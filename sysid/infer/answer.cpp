@@ -199,6 +199,14 @@ std::vector<std::size_t> stiffnesses_of(const std::vector<Axis>& axes) {
   return stiffnesses;
 }
 
+/// Areal density, or density of a solid, that a search holds.
+double weight_of(const GridSettings& grid) {
+  std::vector<double> first;
+  for (const Axis& axis : grid.axes) first.push_back(axis.values.front());
+  const ReplayCandidate candidate = candidate_at(first, grid);
+  return candidate.solid ? candidate.solid->density : candidate.material.areal_density;
+}
+
 enum class Settled { yes, at_points, elsewhere };
 
 /// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
@@ -469,7 +477,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   Posterior posterior = found->look.posterior;
   answer.values = posterior.values();
   if (const double spread = spread_of_scale(usable, replays); spread > 0)
-    scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges);
+    answer.weights =
+        weight_of(grid) * scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges).array();
   for (std::size_t r = 0; r < replays.size(); ++r) {
     answer.motions.push_back(store.run(replays[r], candidate_at(answer.values, grid)));
     answer.misfits.push_back(found->look.likelihood.of_recording(r).misfit());

@@ -36,8 +36,9 @@ struct Answer {
   Fit fit;                                   ///< on cells of no size where the answer is of these, else there
   std::vector<ParameterFinding> parameters;  ///< one an axis, in order
   Eigen::MatrixXd covariance_log;  ///< of log(parameter) in order of the axes; empty where one may be zero
-  Eigen::MatrixXd samples;         ///< of the posterior, values of the axes, a draw a row
-  std::vector<Misfit> misfits;     ///< one a recording
+  Eigen::VectorXd weights;      ///< of each sample, in the unit of the asset; empty where the weight is known
+  Eigen::MatrixXd samples;      ///< of the posterior, values of the axes, a draw a row
+  std::vector<Misfit> misfits;  ///< one a recording
   std::optional<Agreement> agreement;           ///< of several recordings
   std::vector<SolverCheck> checks;              ///< of the estimate; empty without them
   std::vector<std::optional<double>> horizons;  ///< of each recording [s]

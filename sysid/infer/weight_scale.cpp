@@ -22,14 +22,13 @@ double spread_of_scale(const GridSettings& grid, const std::vector<Replay>& repl
   return 0;
 }
 
-void scale_together(Posterior& posterior, const std::vector<std::size_t>& scaled, double spread,
-                    const std::vector<Axis>& ranges, unsigned seed) {
+Eigen::VectorXd scale_together(Posterior& posterior, const std::vector<std::size_t>& scaled, double spread,
+                               const std::vector<Axis>& ranges, unsigned seed) {
   constexpr double kFar = 4;  // standard deviations that an axis takes in
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
-  std::vector<double> factors;
-  for (Eigen::Index i = 0; i < posterior.samples.rows(); ++i)
-    factors.push_back(std::exp(spread * normal(random)));
+  const Eigen::VectorXd factors = Eigen::VectorXd::NullaryExpr(
+      posterior.samples.rows(), [&] { return std::exp(spread * normal(random)); });
   for (const std::size_t k : scaled) {
     Axis& axis = posterior.axes[k];
     const double first = ranges[k].values.front(), last = ranges[k].values.back();
@@ -38,9 +37,10 @@ void scale_together(Posterior& posterior, const std::vector<std::size_t>& scaled
     auto column = posterior.samples.col(static_cast<Eigen::Index>(k));
     for (Eigen::Index i = 0; i < column.size(); ++i) {
       const double value = axis.logarithmic ? std::exp(column[i]) : column[i];
-      column[i] = coordinate_of(axis, std::clamp(factors[static_cast<std::size_t>(i)] * value, first, last));
+      column[i] = coordinate_of(axis, std::clamp(factors[i] * value, first, last));
     }
   }
+  return factors;
 }
 
 }  // namespace flash::sysid

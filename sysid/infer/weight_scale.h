@@ -17,9 +17,10 @@ bool is_stiffness(const std::string& name);
 double spread_of_scale(const GridSettings& grid, const std::vector<Replay>& replays);
 
 /// Gives all of `scaled`, axes of the posterior, one factor in each draw, normal in its logarithm with
-/// standard deviation `spread`. Draws end with `ranges`, those of the search. `seed`: another than that of
-/// the posterior's draws, as factors from the same random numbers would go with them.
-void scale_together(Posterior& posterior, const std::vector<std::size_t>& scaled, double spread,
-                    const std::vector<Axis>& ranges, unsigned seed = 2);
+/// standard deviation `spread`: that of the weight, which is returned. Draws end with `ranges`, those of the
+/// search. `seed`: another than that of the posterior's draws, as factors from the same random numbers would
+/// go with them.
+Eigen::VectorXd scale_together(Posterior& posterior, const std::vector<std::size_t>& scaled, double spread,
+                               const std::vector<Axis>& ranges, unsigned seed = 2);
 
 }  // namespace flash::sysid

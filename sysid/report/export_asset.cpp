@@ -32,13 +32,17 @@ Json covariance(const Summary& summary) {
 }
 
 /// Draws of the posterior, to train on: parameters trade off along valleys that ranges do not show.
-Json samples(const Summary& summary) {
+/// `weight`: name of what they differ in where it is not known.
+Json samples(const Summary& summary, const char* weight) {
   if (summary.samples.rows() == 0) return nullptr;
   Json json = {{"parameters", Json::array()}, {"values", Json::array()}};
   for (const ParameterFinding& finding : summary.parameters) json["parameters"].push_back(finding.name);
+  const bool weighed = summary.sample_weights.size() == 0;
+  if (!weighed) json["parameters"].push_back(weight);
   for (Eigen::Index i = 0; i < summary.samples.rows(); ++i) {
     Json row = Json::array();
     for (Eigen::Index j = 0; j < summary.samples.cols(); ++j) row.push_back(number(summary.samples(i, j)));
+    if (!weighed) row.push_back(number(summary.sample_weights[i]));
     json["values"].push_back(row);
   }
   return json;
@@ -80,7 +84,8 @@ std::string identification(const data::Asset& base, const std::map<std::string, 
       json["fixed"][finding.name] = {{"value", base_values.at(finding.name)},
                                      {"source", source_of(base, finding.name)}};
   json["covariance_log"] = covariance(summary);
-  json["samples"] = samples(summary);
+  const bool solid = base.element_type == data::ElementType::tetrahedron;
+  json["samples"] = samples(summary, solid ? "density" : "areal_density");
   json["score_m"] = number(summary.score_on_mesh);
   json["horizon_s"] = horizon ? Json(*horizon) : Json(nullptr);
   json["solver"] = summary.settings;

@@ -277,16 +277,19 @@ std::optional<MarkerFit> markers_of(const Fit& fit, std::size_t r, double noise)
 }
 
 /// Every so many draws, of the parameters that were searched.
-Eigen::MatrixXd some_samples(const Answer& answer) {
+void add_samples(Summary& summary, const Answer& answer) {
   constexpr Eigen::Index kSamples = 64;
   std::vector<Eigen::Index> columns;
   for (std::size_t k = 0; k < answer.parameters.size(); ++k)
     if (answer.parameters[k].values.size() > 1) columns.push_back(static_cast<Eigen::Index>(k));
   const Eigen::Index count = std::min(kSamples, answer.samples.rows());
-  Eigen::MatrixXd samples(count, static_cast<Eigen::Index>(columns.size()));
-  for (Eigen::Index i = 0; i < count; ++i)
-    samples.row(i) = answer.samples.row(i * answer.samples.rows() / count)(columns);
-  return samples;
+  summary.samples.resize(count, static_cast<Eigen::Index>(columns.size()));
+  if (answer.weights.size() > 0) summary.sample_weights.resize(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index draw = i * answer.samples.rows() / count;
+    summary.samples.row(i) = answer.samples.row(draw)(columns);
+    if (answer.weights.size() > 0) summary.sample_weights[i] = answer.weights[draw];
+  }
 }
 
 /// What recordings ask for by themselves, of the parameters that were searched.
@@ -337,7 +340,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   for (const ParameterFinding& finding : answer.parameters)
     if (finding.values.size() > 1) summary.parameters.push_back(finding);
   if (summary.parameters.size() == answer.parameters.size()) summary.covariance_log = answer.covariance_log;
-  if (answer.samples.rows() > 0) summary.samples = some_samples(answer);
+  if (answer.samples.rows() > 0) add_samples(summary, answer);
   summary.fixed = fixed_of(summary, settings);
   for (const HeldParameter& held : held_parameters(settings, replays)) summary.held[held.name] = held.values;
   for (std::size_t r = 0; r < replays.size(); ++r) {

@@ -393,6 +393,9 @@ std::string summary_text(const Summary& summary) {
   for (const auto& [name, between] : summary.held) json["held"][name] = between;
   json["covariance_log"] = to_json(summary.covariance_log);
   json["samples"] = to_json(summary.samples);
+  if (summary.sample_weights.size() > 0)
+    json["sample_weights"] =
+        std::vector<double>(summary.sample_weights.begin(), summary.sample_weights.end());
   json["next_experiments"] = Json::array();
   for (const NextExperiment& next : summary.next_experiments)
     json["next_experiments"].push_back({{"experiment", next.name},
@@ -437,7 +440,7 @@ Summary load_summary(const std::string& path) {
                       "recordings",       "solver_check", "settings",       "asset",
                       "candidates",       "unconverged",  "device",         "wall_seconds",
                       "warnings",         "exit_code",    "results_digest", "digest",
-                      "next_experiments", "held",         "agreement"});
+                      "next_experiments", "held",         "agreement",      "sample_weights"});
   check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
@@ -459,6 +462,8 @@ Summary load_summary(const std::string& path) {
         typed<std::map<std::string, std::array<double, 2>>>(json, "held", "pairs of numbers by name");
   summary.covariance_log = read_matrix(json, "covariance_log");
   summary.samples = read_matrix(json, "samples", static_cast<Eigen::Index>(summary.parameters.size()));
+  if (json.has("sample_weights"))
+    summary.sample_weights = json.vector("sample_weights", static_cast<int>(summary.samples.rows()));
   if (json.has("next_experiments"))  // earlier programs ranked none
     for (const data::JsonObject& next : json.objects("next_experiments")) {
       next.expect_fields({"experiment", "bits", "spread_before", "spread"});

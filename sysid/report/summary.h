@@ -74,6 +74,9 @@ struct Summary {
   std::map<std::string, std::array<double, 2>> held;
   Eigen::MatrixXd covariance_log;  ///< of log(parameter) in the order of `parameters`; empty: not estimated
   Eigen::MatrixXd samples;         ///< of the posterior: a draw a row, in the order of `parameters`
+  /// Of each sample, areal density [kg/m^2] or density [kg/m^3]; empty where that is known. Motion tells
+  /// stiffnesses as ratios to it.
+  Eigen::VectorXd sample_weights;
   std::vector<NextExperiment> next_experiments;  ///< best first; empty: they were not ranked
   std::vector<SummaryRecording> recordings;
   std::vector<SolverCheck> solver_check;

@@ -39,7 +39,7 @@ TEST(WeightScale, OneFactorOfAllStiffnessesLeavesTheirRatioAlone) {
         std::pow(std::log(points[i][0] / 1e-4) / 0.1, 2) + std::pow(std::log(points[i][1] / 100) / 0.1, 2);
   const Posterior before = explore_posterior(axes, deviance);
   Posterior after = before;
-  scale_together(after, {0, 1}, 0.2, ranges);
+  const Eigen::VectorXd factors = scale_together(after, {0, 1}, 0.2, ranges);
   const auto spread = [](const Eigen::VectorXd& x) {
     return std::sqrt((x.array() - x.mean()).square().mean());
   };
@@ -47,6 +47,9 @@ TEST(WeightScale, OneFactorOfAllStiffnessesLeavesTheirRatioAlone) {
                 .cwiseAbs()
                 .maxCoeff(),
             1e-12);
+  EXPECT_LT(
+      (after.samples.col(0) - before.samples.col(0) - factors.array().log().matrix()).cwiseAbs().maxCoeff(),
+      1e-12);
   // The mean square of n sums of a draw b and a factor f scatters by sqrt((2 f^4 + 4 b^2 f^2) / n).
   const double f2 = 0.2 * 0.2, n = static_cast<double>(before.samples.rows());
   for (Eigen::Index k = 0; k < 2; ++k) {

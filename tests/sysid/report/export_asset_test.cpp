@@ -66,6 +66,16 @@ TEST(ExportAsset, TakesEstimatesWhereKnownAndTheAssetsValueElsewhere) {
   EXPECT_EQ(identification["samples"]["values"][1], (std::vector<double>{0.3, 1.2e-4}));
 }
 
+// Motion tells stiffnesses as ratios to a weight that nobody measured.
+TEST(ExportAsset, DrawsHaveTheWeightThatGoesWithTheirStiffnesses) {
+  Summary summary = example_summary();
+  summary.sample_weights = Eigen::VectorXd::LinSpaced(summary.samples.rows(), 0.18, 0.22);
+  const nlohmann::json samples =
+      nlohmann::json::parse(tuned_asset(towel(), summary).identification)["samples"];
+  EXPECT_EQ(samples["parameters"], (std::vector<std::string>{"poisson", "bending", "areal_density"}));
+  EXPECT_EQ(samples["values"][0][2], 0.18);
+}
+
 TEST(ExportAsset, YieldsWhereTheSearchTellsSoAndAsTheAssetDoesElsewhere) {
   Summary summary = example_summary();
   summary.best["yield_curvature"] = 30;
