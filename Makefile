@@ -159,7 +159,7 @@ check-includes:  ## Name the includes that go against the order of the folders
 	scripts/check_includes
 
 tidy: configure-test packages-check  ## Defects found by clang-tidy (.clang-tidy)
-	scripts/tidy $(BUILD)
+	scripts/tidy $(BUILD) $(TIDY_SECONDS)
 
 install: build  ## To $(PREFIX), for find_package(flash)
 	cmake --install $(BUILD) --prefix $(PREFIX)
