@@ -52,6 +52,8 @@ void take_search(const std::string& folder, sysid::PlanSettings& settings) {
   const sysid::Summary& summary = found.summary;
   if (summary.samples.rows() < 2 || summary.recordings.empty())
     throw data::InputError(folder + ": found no posterior, expected a search that came to an estimate");
+  if (summary.exit_code == exit_unusable)
+    warn(folder + " is a search that cannot be used: " + summary.warnings.front());
   settings.grid.axes = sysid::in_own_coordinates(found.results.axes);
   settings.at.clear();
   std::vector<sysid::Axis> searched;

@@ -9,6 +9,7 @@
 namespace flash::sysid {
 namespace {
 
+constexpr double kFar = 9;             // of a deviance: three standard deviations
 constexpr double kContradicts = 0.01;  // chance below which recordings contradict each other
 
 std::vector<std::size_t> searched(const std::vector<Axis>& axes) {
@@ -49,6 +50,15 @@ double chance_beyond(double x, int freedom) {
   return std::min(chance, 1.0);
 }
 
+std::string better_text(const Agreement& agreement, const std::vector<Axis>& axes) {
+  if (!(agreement.estimate_excess > kFar) || agreement.chance < kContradicts) return "";
+  std::string text = "the estimate is not the likeliest of what was simulated: ";
+  for (const std::size_t k : searched(axes))
+    text += (k == searched(axes).front() ? "" : ", ") + axes[k].name + " " +
+            data::format_short(agreement.likeliest[k]);
+  return text + " is likelier for the recordings together; search more values";
+}
+
 std::string contradiction_text(const Agreement& agreement, const std::vector<Axis>& axes,
                                const std::vector<std::string>& names) {
   if (agreement.chance >= kContradicts) return "";
@@ -63,9 +73,9 @@ std::string contradiction_text(const Agreement& agreement, const std::vector<Axi
   for (std::size_t r = 0; r < names.size(); ++r)
     text += (r > 0 ? ", " : "") + names[r] + " asks for " + axes[most].name + " " +
             asked(axes[most], agreement.alone[r][most]);
-  return text + ". Chance explains it once in " +
-         data::format_short(std::min(1e6, std::round(1 / std::max(agreement.chance, 1e-9)))) +
-         " times or less: the intervals are those of a compromise";
+  const double once_in = std::min(1e6, std::floor(1 / std::max(agreement.chance, 1e-9)));
+  return text + ". Chance explains it once in " + data::format_count(static_cast<std::size_t>(once_in)) +
+         " times or less. Search them one by one: what is said of all together serves one of them at best";
 }
 
 }  // namespace flash::sysid

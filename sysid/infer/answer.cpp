@@ -332,10 +332,10 @@ Fit fit_of(const Task& task, const Found& found, const Answer& answer) {
   return fit;
 }
 
-/// The point of least score of each recording, of those at the values of `axes`.
+/// The point of least score of each recording, of those at the values of `axes`; `of_all` where none has one.
 std::vector<std::vector<double>> best_of_each(const GridResults& results, const std::vector<Axis>& axes,
-                                              std::size_t recordings) {
-  std::vector<std::vector<double>> best(recordings);
+                                              std::size_t recordings, const std::vector<double>& of_all) {
+  std::vector<std::vector<double>> best(recordings, of_all);
   std::vector<double> least(recordings, INFINITY);
   for (const CandidateResult& candidate : results.candidates) {
     bool among = candidate.recordings.size() == recordings;
@@ -351,16 +351,33 @@ std::vector<std::vector<double>> best_of_each(const GridResults& results, const 
   return best;
 }
 
+/// What each recording makes likeliest by itself, over all that was ever searched; nothing of a single one.
+std::vector<Alone> alone_over_all(const Task& task, const Found& found, const GridResults& results) {
+  if (task.replays.size() < 2) return {};
+  const std::vector<Axis>& axes = task.grid.axes;
+  const std::vector<std::vector<double>> at =
+      best_of_each(results, axes, task.replays.size(), found.look.posterior.values());
+  if (reaches_beyond(extent_of(task.ranges), axes)) {
+    // A search that went on from another has its motions about one answer alone.
+    const std::vector<Axis> wide = lattice(extent_of(task.ranges), task.ranges, 3, kFew);
+    if (cartesian_product(wide).size() <= kMany)
+      if (const std::optional<Emulator> emulator = emulator_over(task, wide, {}, true))
+        return likeliest_alone(task, *emulator, wide, at, found.errors);
+  }
+  return likeliest_alone(task, found.emulator, axes, at, found.errors);
+}
+
 /// Whether recordings ask for the parameters of the answer. `alone`: what each asks for by itself.
 Agreement agreement_about(const Task& task, const Found& found, const Answer& answer,
-                          const std::vector<Alone>& alone, std::vector<KnownError> held) {
+                          std::vector<Alone> alone, std::vector<KnownError> held) {
   std::vector<KnownError> errors = errors_about(found, std::move(held));
   if (found.emulator.share != own_mesh)
     errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, answer.motions})},
                        {1, std::make_shared<const Motions>(Motions{answer.fit.replays, answer.fit.motions})}},
                       true,
                       true});
-  return agreement_of(task, alone, answer.motions, errors);
+  refine_alone(task, alone, errors, kFew);
+  return agreement_of(task, alone, answer.values, errors);
 }
 
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
@@ -402,10 +419,11 @@ std::vector<Axis> design_about(const std::vector<Replay>& replays, const GridSet
 
 AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solver_check) {
   const auto [own, finer] = most_motions(grid.axes);
-  std::size_t motions = motions_at_estimate + 5 + most_held_motions(grid) +
+  std::size_t motions = motions_at_estimate + 4 + most_held_motions(grid) +
+                        most_motions_alone(recordings, 2 * kMany) +
                         kRounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
-  const int alone = recordings > 1 ? static_cast<int>(recordings) : 0,
+  const int alone = recordings > 1 ? 2 * static_cast<int>(recordings) : 0,
             looks = 2 * (own > 0 ? 1 + kRounds : 1) + alone;
   return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
 }
@@ -457,10 +475,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.warnings.emplace_back("the estimate cannot be simulated: nothing is said of any parameter");
     return answer;
   }
-  std::vector<Alone> alone;
-  if (replays.size() > 1)
-    alone = likeliest_alone(task, found->emulator, usable.axes,
-                            best_of_each(results, usable.axes, replays.size()), found->errors);
+  const std::vector<Alone> alone = alone_over_all(task, *found, results);
   Found about = simulate_about(task, *found, held);
   const Settled settled = settle(task, about, best, held);
   if (settled == Settled::elsewhere)
@@ -490,7 +505,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
   if (settings.solver_check) answer.checks = checks_of(task, *found);
-  if (!alone.empty()) answer.agreement = agreement_about(task, *found, answer, alone, held);
+  if (!alone.empty()) {
+    answer.agreement = agreement_about(task, *found, answer, alone, held);
+    if (const std::string text = better_text(*answer.agreement, usable.axes); !text.empty())
+      answer.warnings.push_back(text);
+  }
   return answer;
 }
 

@@ -11,21 +11,30 @@ struct Alone {
   std::vector<double> values;
   std::vector<double> spreads;      ///< standard deviation of the coordinate of each
   std::vector<MotionChange> rates;  ///< of its motion there, with each searched parameter
+  Extent extent;                    ///< of what is likely
 };
 
-/// Of each recording, by an emulator of them all. `axes`: at whose values it is exact. `at`: of each
-/// recording, the point of `axes` with the least score, about which it is sought. `errors`: all that are
-/// known.
+/// Of each recording, by an emulator of them all, over the whole of `axes`, at whose values it is exact.
+/// `at`: values of each about which its likelihood is linear first. `errors`: all that are known.
 std::vector<Alone> likeliest_alone(const Task& task, const Emulator& emulator, const std::vector<Axis>& axes,
                                    const std::vector<std::vector<double>>& at,
                                    const std::vector<KnownError>& errors);
 
-/// By motions that are simulated at both, so that no error of an emulator counts. The misfit is that which a
+/// The same from motions that are simulated anew about what was found, on the search's own mesh, of up to
+/// `most` candidates a recording. A recording of which one diverges stays as it is.
+void refine_alone(const Task& task, std::vector<Alone>& alone, const std::vector<KnownError>& errors,
+                  std::size_t most);
+
+/// By motions that are simulated at each recording's own values and at some values for all: the estimate, the
+/// own values of each, and their mean. So no error of an emulator counts. The misfit is that which a
 /// recording has at its own values, and errors of known shape are free in each recording. Were the parameters
-/// the same, the excess would be chi-square with as many degrees of freedom as there are searched parameters,
-/// for each recording after the first (Wilks 1938). Own values that are not quite the likeliest make it
-/// smaller. `together`: the motion of the estimate, one a recording, on the search's own mesh.
-Agreement agreement_of(const Task& task, const std::vector<Alone>& alone,
-                       const std::vector<ReplayResult>& together, const std::vector<KnownError>& errors);
+/// the same, the excess of the best for all would be chi-square with as many degrees of freedom as there are
+/// searched parameters, for each recording after the first (Wilks 1938). Own values that are not quite the
+/// likeliest make it smaller.
+Agreement agreement_of(const Task& task, const std::vector<Alone>& alone, const std::vector<double>& estimate,
+                       const std::vector<KnownError>& errors);
+
+/// Motions that both simulate, a recording, at most.
+std::size_t most_motions_alone(std::size_t recordings, std::size_t most);
 
 }  // namespace flash::sysid

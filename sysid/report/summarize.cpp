@@ -317,8 +317,12 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   if (answer.best < 0) {
     summary.exit_code = 3;
     summary.best_score = INFINITY;
+    const bool diverged = std::any_of(
+        results.candidates.begin(), results.candidates.end(),
+        [](const CandidateResult& candidate) { return candidate.status == CandidateStatus::diverged; });
     summary.warnings = {summary.candidates == 0 ? "no candidate was simulated"
-                                                : "every candidate diverged: none has a score"};
+                        : diverged              ? "every candidate diverged: none has a score"
+                                   : "no candidate has a score: what was observed has too few points"};
     return summary;
   }
   const CandidateResult& estimate = answer.estimate;
@@ -368,7 +372,9 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
   const std::string contradiction =
       contradiction_in(answer, replays, asked.ranges.empty() ? settings.axes : asked.ranges);
-  if (const std::string reason = reason_unusable(summary, estimate, contradiction); !reason.empty()) {
+  const std::string reason = reason_unusable(summary, estimate, contradiction);
+  if (!contradiction.empty() && reason != contradiction) summary.warnings.push_back(contradiction);
+  if (!reason.empty()) {
     summary.exit_code = 3;
     summary.warnings.insert(summary.warnings.begin(), reason);
   }

@@ -177,9 +177,9 @@ SummaryRecording read_recording(const data::JsonObject& json) {
     for (const auto& [size, reach_time, reach_sheet] :
          typed<std::vector<std::array<double, 3>>>(json, "misfit_draws", "lists of three numbers"))
       misfit.draws.push_back({size, reach_time, reach_sheet});
-  } else {  // earlier programs
-    misfit.draws = {{misfit.rms, misfit.reach_time, misfit.reach_sheet}};
   }
+  if (misfit.draws.empty())  // earlier programs
+    misfit.draws = {{misfit.rms, misfit.reach_time, misfit.reach_sheet}};
   if (json.has("markers")) {
     const data::JsonObject markers = json.object("markers");
     markers.expect_fields({"sightings", "miss_m", "motion_m", "noise_m"});
@@ -295,7 +295,22 @@ void check_best(const Summary& summary, const std::string& path) {
     check("recordings." + recording.name + ".score", recording.score);
 }
 
+void check_agreement(const Summary& summary, const std::string& path) {
+  const Agreement& agreement = *summary.agreement;
+  check_within(path, "agreement.chance", agreement.chance, 0, 1);
+  check_score(path, "agreement.excess", agreement.excess);
+  for (const auto* const lists : {&agreement.alone, &agreement.spreads}) {
+    const std::string field = lists == &agreement.alone ? "agreement.alone" : "agreement.spreads";
+    if (lists->size() != summary.recordings.size())
+      throw data::input_error(path, field, "expected a list for each recording");
+    for (const std::vector<double>& numbers : *lists)
+      if (numbers.size() != summary.parameters.size())
+        throw data::input_error(path, field, "expected a number for each parameter");
+  }
+}
+
 void check_values(const Summary& summary, const std::string& path) {
+  if (summary.agreement) check_agreement(summary, path);
   check_best(summary, path);
   for (const auto& [name, value] : summary.best) check_value(path, "best.parameters", name, value);
   for (const auto& [name, fixed] : summary.fixed) check_value(path, "fixed", name, fixed.value);
@@ -331,6 +346,9 @@ void check_values(const Summary& summary, const std::string& path) {
     check_score(path, "recordings." + recording.name + ".score", recording.score);
     check_score(path, "recordings." + recording.name + ".noise_m", recording.misfit.noise);
     check_score(path, "recordings." + recording.name + ".misfit_m", recording.misfit.size);
+    for (const DiscrepancyDraw& draw : recording.misfit.draws)
+      for (const double number : {draw.size, draw.reach_time, draw.reach_sheet})
+        check_score(path, "recordings." + recording.name + ".misfit_draws", number);
     for (const SummaryFrame& frame : recording.frames) {
       check_score(path, "recordings." + recording.name + ".frames.score", frame.score);
       check_score(path, "recordings." + recording.name + ".frames.weight", frame.weight);

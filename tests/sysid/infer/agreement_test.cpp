@@ -24,7 +24,7 @@ TEST(Agreement, NamesTheParameterThatIsFarthestApartForWhatIsKnownOfIt) {
   const std::string text = contradiction_text(agreement, bending_and_young(), {"lift", "fold"});
   EXPECT_NE(text.find("lift asks for bending 0.0001, fold asks for bending 0.0003"), std::string::npos)
       << text;
-  EXPECT_NE(text.find("once in 1e+06 times or less"), std::string::npos) << text;
+  EXPECT_NE(text.find("once in 1,000,000 times or less"), std::string::npos) << text;
 }
 
 TEST(Agreement, ValuesAtAnEndAreBounds) {
@@ -33,6 +33,17 @@ TEST(Agreement, ValuesAtAnEndAreBounds) {
   EXPECT_NE(text.find("lift asks for bending at most 1e-05, fold asks for bending at least 0.001"),
             std::string::npos)
       << text;
+}
+
+TEST(Agreement, SaysThatTheEstimateIsNotTheLikeliest) {
+  Agreement agreement{1, 0.6, {{10, 1e-4}, {20, 1.2e-4}}, {{1, 0.1}, {1, 0.1}}, {15, 1.1e-4}, 9.5};
+  const std::string text = better_text(agreement, bending_and_young());
+  EXPECT_NE(text.find("young 15, bending 0.00011 is likelier"), std::string::npos) << text;
+  agreement.estimate_excess = 8.5;
+  EXPECT_EQ(better_text(agreement, bending_and_young()), "");
+  agreement.estimate_excess = 9.5;
+  agreement.chance = 1e-3;  // there is no such thing as one likeliest
+  EXPECT_EQ(better_text(agreement, bending_and_young()), "");
 }
 
 TEST(Agreement, IsNoContradictionWhereChanceExplainsIt) {

@@ -53,14 +53,18 @@ TEST(Summary, KeepsWhatToRecordNext) {
 TEST(Summary, KeepsWhatEachRecordingAsksForAndWhichMisfitsAreLikely) {
   const data::TemporaryFolder folder;
   Summary summary = example_summary();
-  summary.agreement = Agreement{12.5, 0.002, {{0.1, 1e-4}, {0.2, 3e-4}}, {{0.05, 0.2}, {0.06, 0.3}}};
+  summary.agreement = Agreement{12.5, 0.002, {}, {}};
+  for (std::size_t r = 0; r < summary.recordings.size(); ++r) {
+    summary.agreement->alone.push_back({0.1, 1e-4});
+    summary.agreement->spreads.push_back({0.05, 0.2});
+  }
   summary.sample_weights = Eigen::VectorXd::LinSpaced(summary.samples.rows(), 0.18, 0.22);
   summary.recordings[0].misfit.draws = {{1e-3, 0.2, 0.1}, {2e-3, 0.4, 0.05}};
   save_summary(summary, folder / "summary.json");
   const Summary loaded = load_summary(folder / "summary.json");
   ASSERT_TRUE(loaded.agreement);
   EXPECT_EQ(loaded.agreement->chance, 0.002);
-  EXPECT_EQ(loaded.agreement->alone[1][1], 3e-4);
+  EXPECT_EQ(loaded.agreement->alone[0][1], 1e-4);
   EXPECT_EQ(loaded.agreement->spreads[0][0], 0.05);
   EXPECT_EQ(loaded.sample_weights, summary.sample_weights);
   ASSERT_EQ(loaded.recordings[0].misfit.draws.size(), 2u);
