@@ -16,16 +16,18 @@ std::array<double, 2> range_of(const Axis& axis) {
   return {coordinate_of(axis, axis.values.front()), coordinate_of(axis, axis.values.back())};
 }
 
-/// Points an axis by how many are searched: some hundreds in all.
-int points_per_axis(const std::vector<Axis>& axes) {
+/// Points an axis by how many are searched: some hundreds in all, or some dozens.
+int points_per_axis(const std::vector<Axis>& axes, Points points) {
   const auto searched =
       std::count_if(axes.begin(), axes.end(), [](const Axis& axis) { return axis.values.size() > 1; });
-  constexpr std::array<int, 5> kPoints = {1, 17, 9, 7, 5};
-  return kPoints[static_cast<std::size_t>(std::min<std::ptrdiff_t>(searched, 4))];
+  constexpr std::array<int, 5> kHundreds = {1, 17, 9, 7, 5}, kDozens = {1, 9, 7, 4, 3};
+  return (points == Points::hundreds
+              ? kHundreds
+              : kDozens)[static_cast<std::size_t>(std::min<std::ptrdiff_t>(searched, 4))];
 }
 
-std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searched) {
-  const int points = points_per_axis(searched);
+std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searched, Points of_look) {
+  const int points = points_per_axis(searched, of_look);
   std::vector<Axis> axes = searched;
   for (std::size_t k = 0; k < axes.size(); ++k) {
     Axis& axis = axes[k];
@@ -66,7 +68,8 @@ Extent extent_of(const std::vector<Axis>& axes) {
   return extent;
 }
 
-Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes) {
+Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes,
+                   Points points) {
   constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most
   constexpr double kSmallest = 1e-4;      // half extent over the range
   Extent next = extent;
@@ -75,7 +78,7 @@ Extent next_extent(const Extent& extent, const Posterior& posterior, const std::
     if (axes[k].values.size() < 2) continue;
     const auto at = [&](double value) { return coordinate_of(axes[k], value); };
     const std::array<double, 2> range = range_of(axes[k]), now = {at(extent[k][0]), at(extent[k][1])};
-    const double width = now[1] - now[0], spacing = width / (points_per_axis(axes) - 1);
+    const double width = now[1] - now[0], spacing = width / (points_per_axis(axes, points) - 1);
     const double best = posterior.estimate[static_cast<Eigen::Index>(k)];
     double reach = 0;  // the larger half of the interval
     for (const std::size_t side : {0, 1}) {
@@ -278,7 +281,7 @@ std::vector<MotionChange> rates_at(const Emulator& emulator, const std::vector<d
 
 Look narrow(const Emulator& emulator, const Extent& start, const std::vector<double>& at,
             const std::vector<Axis>& axes, const GridSettings& grid, std::optional<double> repeatability,
-            const std::vector<KnownError>& errors, const TellWork& told) {
+            const std::vector<KnownError>& errors, const TellWork& told, Points points) {
   std::vector<Replay> replays;
   for (const ModelledReplay& model : emulator.models) replays.push_back(model.replay);
   Extent extent = start;
@@ -289,21 +292,21 @@ Look narrow(const Emulator& emulator, const Extent& start, const std::vector<dou
     MotionLikelihood likelihood(replays, motions_at(emulator, values, emulator.share), grid.score,
                                 repeatability, errors, rates_at(emulator, values, extent, axes),
                                 emulator.first);
-    const std::vector<Axis> here = axes_over(extent, axes);
+    const std::vector<Axis> here = axes_over(extent, axes, points);
     const Eigen::VectorXd deviance = deviance_over(emulator, here, likelihood, grid, told);
     looked += static_cast<int>(deviance.size());
     look.emplace(Look{std::move(likelihood), explore_posterior(here, deviance)});
     values = look->posterior.values();
-    const Extent next = next_extent(extent, look->posterior, axes);
+    const Extent next = next_extent(extent, look->posterior, axes, points);
     if (next == extent) break;
     extent = next;
   }
-  if (told) told({}, {0, most_scores(axes) - looked});
+  if (told) told({}, {0, most_scores(axes, points) - looked});
   return std::move(*look);
 }
 
-int most_scores(const std::vector<Axis>& axes) {
-  return kRounds * static_cast<int>(cartesian_product(axes_over(extent_of(axes), axes)).size());
+int most_scores(const std::vector<Axis>& axes, Points points) {
+  return kRounds * static_cast<int>(cartesian_product(axes_over(extent_of(axes), axes, points)).size());
 }
 
 std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,

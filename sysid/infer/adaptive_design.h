@@ -42,21 +42,26 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
                               const MotionLikelihood& likelihood, const GridSettings& grid,
                               const TellWork& told = {});
 
+/// At how many a look asks for the likelihood.
+enum class Points { hundreds, dozens };
+
 /// An extent about the estimate, of which the interval of every parameter takes a half or which ends with the
 /// range of `axes`; `extent`, on which the posterior stands, itself where it is not much too large and cuts
 /// nothing likely off.
-Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes);
+Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes,
+                   Points points = Points::hundreds);
 
-/// Posteriors over some hundred points, each about the estimate of the one before, until the interval of
+/// Posteriors over some points, each about the estimate of the one before, until the interval of
 /// every parameter takes a third to a half of the extent or ends with the range of `axes`. A point costs a
 /// look at the observations, no simulation. The likelihood is linear about the estimate before. `start`: the
 /// first extent; `at`: where it is linear first.
 Look narrow(const Emulator& emulator, const Extent& start, const std::vector<double>& at,
             const std::vector<Axis>& axes, const GridSettings& grid, std::optional<double> repeatability,
-            const std::vector<KnownError>& errors, const TellWork& told = {});
+            const std::vector<KnownError>& errors, const TellWork& told = {},
+            Points points = Points::hundreds);
 
 /// The most points that narrow looks at over such axes.
-int most_scores(const std::vector<Axis>& axes);
+int most_scores(const std::vector<Axis>& axes, Points points = Points::hundreds);
 
 /// Values at which motions are simulated anew about an answer, evenly over the extent of each axis: `count`
 /// where that is no wider than a cell of the search, else as many, to nine, as `at_most` points allow.

@@ -424,8 +424,9 @@ AnswerWork most_work(const GridSettings& grid, std::size_t recordings, bool solv
                         kRounds * (own + motions_at_estimate + (solver_check ? finer : 0));
   if (solver_check) motions += cartesian_product(thinned(most_focused(grid.axes))).size();
   const int alone = recordings > 1 ? 2 * static_cast<int>(recordings) : 0,
-            looks = 2 * (own > 0 ? 1 + kRounds : 1) + alone;
-  return {static_cast<int>(recordings * motions), looks * most_scores(grid.axes)};
+            looks = 2 * (own > 0 ? 1 + kRounds : 1);
+  return {static_cast<int>(recordings * motions),
+          looks * most_scores(grid.axes) + alone * most_scores(grid.axes, Points::dozens)};
 }
 
 Answer find_answer(GridResults& results, std::vector<Replay>& replays, const GridSettings& grid,

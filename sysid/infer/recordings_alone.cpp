@@ -8,12 +8,26 @@ namespace {
 
 Alone alone_by(const Task& task, const Emulator& own, const Extent& extent, const std::vector<double>& at,
                const std::vector<Axis>& axes, const std::vector<KnownError>& errors) {
-  const Look look = narrow(own, extent, at, axes, task.grid, task.settings.repeatability, errors, task.told);
+  const Look look = narrow(own, extent, at, axes, task.grid, task.settings.repeatability, errors, task.told,
+                           Points::dozens);
   Alone alone{look.posterior.values(), {}, {}, extent_of(look.posterior.axes)};
   for (const auto& draws : look.posterior.samples.colwise())
     alone.spreads.push_back(std::sqrt((draws.array() - draws.mean()).square().mean()));
   alone.rates = rates_at(own, alone.values, alone.extent, axes);
   return alone;
+}
+
+/// A value and the next ones of its axis.
+Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& axes) {
+  Extent extent;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const std::vector<double>& of_axis = axes[k].values;
+    const auto above = std::upper_bound(of_axis.begin(), of_axis.end(), values[k]);
+    const auto below = std::lower_bound(of_axis.begin(), of_axis.end(), values[k]);
+    extent.push_back({below == of_axis.begin() ? of_axis.front() : *(below - 1),
+                      above == of_axis.end() ? of_axis.back() : *above});
+  }
+  return extent;
 }
 
 /// Of what the recordings ask for, each by what it knows.
@@ -39,8 +53,8 @@ std::vector<Alone> likeliest_alone(const Task& task, const Emulator& emulator, c
                                    const std::vector<KnownError>& errors) {
   std::vector<Alone> all;
   for (std::size_t r = 0; r < emulator.models.size(); ++r)
-    all.push_back(alone_by(task, {{emulator.models[r]}, emulator.share, emulator.first + r}, extent_of(axes),
-                           at[r], axes, errors));
+    all.push_back(alone_by(task, {{emulator.models[r]}, emulator.share, emulator.first + r},
+                           cells_about(at[r], axes), at[r], axes, errors));
   return all;
 }
 
