@@ -44,6 +44,9 @@ class TwoMeshMotions {
   std::vector<Motion> at_points(const std::vector<std::vector<double>>& points, double share,
                                 int threads = 1) const;
 
+  /// Those of the search's mesh alone, on it.
+  TwoMeshMotions on_own_mesh() const { return TwoMeshMotions(coarse_); }
+
   /// A motion of the search's mesh on the mesh of the model.
   Motion on_its_mesh(const Motion& motion) const;
 

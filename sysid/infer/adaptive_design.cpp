@@ -45,6 +45,7 @@ std::vector<Axis> axes_over(const Extent& extent, const std::vector<Axis>& searc
 
 constexpr double kSame = 1e-9;   // of a width
 constexpr int kRounds = 12;      // of a look
+constexpr int kFewRounds = 4;    // where some dozens of points do
 constexpr double kUnlikely = 9;  // deviance over the least: three standard deviations
 
 double distance(const Axis& axis, double from, double to) {
@@ -288,7 +289,8 @@ Look narrow(const Emulator& emulator, const Extent& start, const std::vector<dou
   std::vector<double> values = at;
   std::optional<Look> look;
   int looked = 0;
-  for (int round = 0; round < kRounds; ++round) {
+  const int rounds = points == Points::hundreds ? kRounds : kFewRounds;
+  for (int round = 0; round < rounds; ++round) {
     MotionLikelihood likelihood(replays, motions_at(emulator, values, emulator.share), grid.score,
                                 repeatability, errors, rates_at(emulator, values, extent, axes),
                                 emulator.first);
@@ -306,7 +308,8 @@ Look narrow(const Emulator& emulator, const Extent& start, const std::vector<dou
 }
 
 int most_scores(const std::vector<Axis>& axes, Points points) {
-  return kRounds * static_cast<int>(cartesian_product(axes_over(extent_of(axes), axes, points)).size());
+  return (points == Points::hundreds ? kRounds : kFewRounds) *
+         static_cast<int>(cartesian_product(axes_over(extent_of(axes), axes, points)).size());
 }
 
 std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,

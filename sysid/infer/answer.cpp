@@ -351,20 +351,32 @@ std::vector<std::vector<double>> best_of_each(const GridResults& results, const 
   return best;
 }
 
+/// By which motions on the search's own mesh are corrected.
+KnownError to_no_cells(Motions own, Motions no_cells) {
+  return {{{-1, std::make_shared<const Motions>(std::move(own))},
+           {1, std::make_shared<const Motions>(std::move(no_cells))}},
+          true,
+          true};
+}
+
 /// What each recording makes likeliest by itself, over all that was ever searched; nothing of a single one.
 std::vector<Alone> alone_over_all(const Task& task, const Found& found, const GridResults& results) {
   if (task.replays.size() < 2) return {};
   const std::vector<Axis>& axes = task.grid.axes;
   const std::vector<std::vector<double>> at =
       best_of_each(results, axes, task.replays.size(), found.look.posterior.values());
+  std::vector<KnownError> errors = found.errors;
+  if (found.emulator.share != own_mesh)
+    errors.push_back(to_no_cells(Motions{task.replays, found.estimate.motions},
+                                 *found.estimate.errors.front().terms[1].motions));
   if (reaches_beyond(extent_of(task.ranges), axes)) {
     // A search that went on from another has its motions about one answer alone.
     const std::vector<Axis> wide = lattice(extent_of(task.ranges), task.ranges, 3, kFew);
     if (cartesian_product(wide).size() <= kMany)
       if (const std::optional<Emulator> emulator = emulator_over(task, wide, {}, true))
-        return likeliest_alone(task, *emulator, wide, at, found.errors);
+        return likeliest_alone(task, *emulator, wide, at, errors);
   }
-  return likeliest_alone(task, found.emulator, axes, at, found.errors);
+  return likeliest_alone(task, found.emulator, axes, at, errors);
 }
 
 /// Whether recordings ask for the parameters of the answer. `alone`: what each asks for by itself.
@@ -372,10 +384,8 @@ Agreement agreement_about(const Task& task, const Found& found, const Answer& an
                           std::vector<Alone> alone, std::vector<KnownError> held) {
   std::vector<KnownError> errors = errors_about(found, std::move(held));
   if (found.emulator.share != own_mesh)
-    errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, answer.motions})},
-                       {1, std::make_shared<const Motions>(Motions{answer.fit.replays, answer.fit.motions})}},
-                      true,
-                      true});
+    errors.push_back(
+        to_no_cells(Motions{task.replays, answer.motions}, Motions{answer.fit.replays, answer.fit.motions}));
   refine_alone(task, alone, errors, kFew);
   return agreement_of(task, alone, answer.values, errors);
 }

@@ -53,7 +53,7 @@ std::vector<Alone> likeliest_alone(const Task& task, const Emulator& emulator, c
                                    const std::vector<KnownError>& errors) {
   std::vector<Alone> all;
   for (std::size_t r = 0; r < emulator.models.size(); ++r)
-    all.push_back(alone_by(task, {{emulator.models[r]}, emulator.share, emulator.first + r},
+    all.push_back(alone_by(task, {{{task.replays[r], emulator.models[r].model.on_own_mesh()}}, own_mesh, r},
                            cells_about(at[r], axes), at[r], axes, errors));
   return all;
 }

@@ -14,8 +14,9 @@ struct Alone {
   Extent extent;                    ///< of what is likely
 };
 
-/// Of each recording, by an emulator of them all, over the whole of `axes`, at whose values it is exact.
-/// `at`: values of each about which its likelihood is linear first. `errors`: all that are known.
+/// Of each recording, by an emulator of them all on the search's own mesh, over the whole of `axes`, at whose
+/// values it is exact. `at`: values of each about which its likelihood is linear first. `errors`: all that
+/// are known.
 std::vector<Alone> likeliest_alone(const Task& task, const Emulator& emulator, const std::vector<Axis>& axes,
                                    const std::vector<std::vector<double>>& at,
                                    const std::vector<KnownError>& errors);
