@@ -20,12 +20,13 @@ struct LayerTouch {
   Vector3<double> normal{};
   Vector3<double> bristle{};         ///< deflection at the start of the step [m]
   Vector3<double> slip_direction{};  ///< the slip over its friction_length
+  Vector3<double> dual{};            ///< what the linear problems take for it, at most 1 long
 };
 
 /// What the surface does to itself at an iterate.
 struct LayerContact {
-  std::vector<LayerTouch> touches;
-  double energy = 0;   ///< of the pressure between layers [J]
+  std::vector<LayerTouch> touches;  ///< in the order of their kinds and vertices
+  double energy = 0;                ///< of the pressure between layers [J]
   double closest = 0;  ///< distance of the nearest features that may touch [m]; 1e300: there are none
 };
 
@@ -55,6 +56,18 @@ class LayerStep {
 
   /// Potential of friction at the forces and in the directions of `contact` [J].
   double friction_potential(const LayerContact& contact, const data::Points& positions) const;
+
+  /// Fills in the duals of an iterate from those of another, from which it is `length` directions of a linear
+  /// problem away. Friction is (mu N) z with the dual z, and m z = s with the slip s and its friction_length
+  /// m. The linear problem has both as unknowns:
+  ///
+  ///   z <- (s + ds - z (d . ds)) / m,   d = s / m where it slides, else 0
+  ///
+  /// With z = d that is Newton's method, whose matrix is zero along d: what has to stop slides past its
+  /// place and back again. With z = 0 it brakes what slides by (mu N) / |s|. Chan, Golub and Mulet 1999 ("A
+  /// nonlinear primal-dual method for total variation-based image restoration"), with the kink of
+  /// Hintermueller and Stadler 2006.
+  void carry_duals(const LayerContact& from, double length, LayerContact& to) const;
 
   /// Energy of bristles that bend at the end of the step [J].
   double bristle_energy(const LayerContact& contact) const;
@@ -95,8 +108,8 @@ class LayerStep {
 };
 
 /// How the force of a touch changes with what lies between its nearest points: its pressure along the normal,
-/// friction across [N/m]. The Hessian is this matrix between the weighted vertices (Gauss-Newton): what the
-/// normal turns by is left out.
+/// friction across [N/m]. It is positive semidefinite, and exact where the dual is the slip's direction. The
+/// Hessian is this matrix between the weighted vertices (Gauss-Newton): what the normal turns by is left out.
 Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_step);
 
 }  // namespace flash::sim

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <random>
 
+#include "sim/law/vertex_contact.h"
 #include "sim/step/moving_obstacles.h"
 #include "tests/sim/sheet_scene.h"
 
@@ -126,6 +128,7 @@ TEST(LayerContact, StiffnessIsTheDerivativeOfTheForce) {
       forces_at(step, x, contact);
       ASSERT_EQ(contact.touches.size(), 1u);
       ASSERT_EQ(contact.touches[0].kind == PairKind::edge_edge, by_edges);
+      contact.touches[0].dual = contact.touches[0].slip_direction;
       const Eigen::Matrix3d expected = matrix3d(stiffness_of(contact.touches[0], friction, time_step));
       constexpr double move = 1e-10;
       for (int axis = 0; axis < 3; ++axis) {
@@ -143,6 +146,44 @@ TEST(LayerContact, StiffnessIsTheDerivativeOfTheForce) {
       }
     }
   }
+}
+
+/// A mass on a spring that friction holds: m x + mu N z(x) = f with |f| < mu N. Newton's method on x goes
+/// from sliding to sliding; with the duals it ends within the bristles, from 10,000 times their length, in
+/// few steps.
+TEST(LayerContact, DualsLetWhatSlidesStop) {
+  TwoLayers layers(6e-4, 0.4);
+  PairSurface surface(layers.sheet);
+  const LayerStep step(surface, layers.environment, time_step);
+  const double length = bristle_length(time_step);
+  constexpr double spring = 1, bound = 1;  // [N/m], [N]
+  const Vector3<double> pull{0.3, -0.5, 0};
+  LayerContact now, next;
+  now.touches.resize(1);
+  now.touches[0].normal = {0, 0, 1};
+  now.touches[0].normal_force = bound;
+  Vector3<double> slip{1e4 * length, 3e3 * length, 0};
+  const auto place = [&](const Vector3<double>& at, LayerTouch& touch) {
+    touch.slip = norm(at);
+    touch.slip_direction = (1 / friction_length(touch.slip, time_step)) * at;
+  };
+  place(slip, now.touches[0]);
+  int iterations = 0;
+  const auto residual = [&] { return spring * slip + bound * now.touches[0].slip_direction - pull; };
+  for (; iterations < 60 && norm(residual()) > 1e-9; ++iterations) {
+    const Eigen::Matrix3d matrix =
+        spring * Eigen::Matrix3d::Identity() + matrix3d(stiffness_of(now.touches[0], 1.0, time_step));
+    EXPECT_GE(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(matrix).eigenvalues()[0], spring * (1 - 1e-9));
+    slip = slip - vector3(Vector3d(matrix.ldlt().solve(vector3d(residual()))));
+    next = now;
+    place(slip, next.touches[0]);
+    step.carry_duals(now, 1, next);
+    EXPECT_LE(norm(next.touches[0].dual), 1 + 1e-15);
+    now = next;
+  }
+  EXPECT_LE(iterations, 15);
+  // The bristles balance the pull, but for what the spring adds at their length.
+  EXPECT_LT(norm(slip - length * pull), 1e-3 * length);
 }
 
 TEST(LayerContact, BristlesComeBackInTheNextStep) {
