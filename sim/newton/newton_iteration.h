@@ -14,7 +14,7 @@ struct NewtonWorkspace {
   std::shared_ptr<const SheetPlan> plan;
   SolverSettings settings;
   NewtonMatrix matrix;
-  std::unique_ptr<PairSurface> surface;  ///< made where it first meets itself
+  std::unique_ptr<LayerMemory> layers;  ///< made where the surface first meets itself
   bool refactor = true;  ///< whether the next solve needs a new factor: none yet, or the sheet has moved on
   Iterate now;           ///< where the iteration stands; between steps the end of the last one
   // These members stay between steps to reuse their memory.

@@ -31,11 +31,12 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWo
   const Points& start = environment.state.positions;
   if (w.now.materials == environment.materials && w.now.solids == environment.solids &&
       w.now.rest_angles == environment.state.rest_angles && w.now.positions.rows() == start.rows() &&
-      w.now.positions == start)
+      w.now.positions == start && !(problem.layers && problem.layers->has_other_pairs()))
     return w.now.elastic;
   Points force = Points::Zero(start.rows(), 3);
   ElasticEnergy elastic;
   for (const BodyLaw& law : problem.laws) elastic += add_elastic_gradient(*w.plan, law, start, force);
+  if (problem.layers) elastic.layers = problem.layers->energy(start);
   return elastic;
 }
 
@@ -79,16 +80,13 @@ bool crushed(const Environment& environment, double layer_distance) {
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
 /// solved, or to all that rounding allows.
 bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
-  ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
+  const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
   bool free = start_search(problem, w);
   for (int portion = 0; !free && portion < most_portions; ++portion) {
     if (crushed(problem.contacts.environment, w.now.layers.closest)) break;
     iterate_to_balance(problem, portion_iterations, w, report);
     free = carry_on(problem, w, report);
   }
-  // Holds that close or open change which pairs there are.
-  if (problem.layers)
-    elastic_at_start.layers = problem.layers->energy(problem.contacts.environment.state.positions);
   iterate_to_balance(problem, w.settings.max_iterations, w, report);
 
   report.residual = problem.relative_residual(w.now);
@@ -103,8 +101,8 @@ bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& repo
 /// takes the first exit that does not tear it. Returns whether the step is solved.
 bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport& report) {
   const double exit_speed = w.settings.exit_speed;
-  PairSurface* surface = environment.self_contact ? w.surface.get() : nullptr;
-  const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed}, surface);
+  LayerMemory* layers = environment.self_contact ? w.layers.get() : nullptr;
+  const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed}, layers);
   bool solved = solve_step(problem, w, report);
   if (report.start_penetration.depth > 0) {
     const auto inside = vertices_inside(problem.contacts, w.now.contacts);
@@ -115,7 +113,7 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
       if (!solved && k > 1) k = exits.size() - 1;
       const StepReport given_up = std::exchange(report, {});
       w.refactor = true;
-      solved = solve_step(StepProblem(*w.plan, environment, h, exits[k], surface), w, report);
+      solved = solve_step(StepProblem(*w.plan, environment, h, exits[k], layers), w, report);
       add_work(given_up, report);
     }
   }
@@ -201,10 +199,10 @@ Solver::Solver(Solver&&) noexcept = default;
 
 StepReport Solver::step(Environment& environment) {
   NewtonWorkspace& w = *workspace_;
-  if (environment.self_contact && !w.surface) {
-    w.surface = std::make_unique<PairSurface>(w.plan->sheet);
-    check_thickness(w.plan->sheet, *w.surface, environment.self_contact->thickness);
-    check_start(w.plan->sheet, *w.surface, environment.state.positions);
+  if (environment.self_contact && !w.layers) {
+    w.layers = std::make_unique<LayerMemory>(w.plan->sheet);
+    check_thickness(w.plan->sheet, w.layers->surface, environment.self_contact->thickness);
+    check_start(w.plan->sheet, w.layers->surface, environment.state.positions);
   }
   const double h = w.settings.time_step;
   update_holds(environment, environment.state.time + h);

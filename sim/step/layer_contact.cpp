@@ -100,19 +100,20 @@ Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_st
          (friction * touch.normal_force / friction_length(touch.slip, time_step)) * turns;
 }
 
-LayerStep::LayerStep(PairSurface& surface, const Environment& environment, double time_step)
-    : surface_(surface),
+LayerStep::LayerStep(LayerMemory& memory, const Environment& environment, double time_step,
+                     const std::vector<bool>& carried)
+    : memory_(memory),
       environment_(environment),
       settings_(*environment.self_contact),
       time_step_(time_step),
-      carried_(static_cast<std::size_t>(environment.state.positions.rows()), false) {}
-
-void LayerStep::set_carried(const std::vector<bool>& carried) {
-  carried_ = carried;
-  near_.boxes.clear();
+      other_pairs_(memory.carried != carried || memory.thickness != settings_.thickness) {
+  if (!other_pairs_) return;
+  memory_.carried = carried;
+  memory_.thickness = settings_.thickness;
+  memory_.near.boxes.clear();
 }
 
-bool LayerStep::cover(const Candidates& candidates, const Points& from, const Points& to) {
+bool LayerStep::cover(const BoxedPairs& candidates, const Points& from, const Points& to) {
   const std::vector<Bounds>& boxes = candidates.boxes;
   const auto covers = [&](const Points& x, Eigen::Index i) {
     const Eigen::Array3d place = x.row(i).transpose().array();
@@ -123,21 +124,22 @@ bool LayerStep::cover(const Candidates& candidates, const Points& from, const Po
   return all;
 }
 
-void LayerStep::search(const Points& from, const Points& to, double margin, Candidates& candidates) {
+void LayerStep::search(const Points& from, const Points& to, double margin, BoxedPairs& candidates) {
   candidates.boxes.resize(static_cast<std::size_t>(from.rows()));
   for (Eigen::Index i = 0; i < from.rows(); ++i) {
     const Eigen::Array3d a = from.row(i).transpose().array(), b = to.row(i).transpose().array();
     candidates.boxes[i] = {a.min(b) - margin, a.max(b) + margin};
   }
-  find_candidates(surface_, candidates.boxes, settings_.thickness, carried_, candidates.pairs);
+  find_candidates(memory_.surface, candidates.boxes, settings_.thickness, memory_.carried, candidates.pairs);
   ++counts_.searches;
   counts_.pairs = std::max(counts_.pairs, static_cast<long>(candidates.pairs.size()));
 }
 
 void LayerStep::add_forces(const Points& positions, LayerContact& contact, Points& force) {
-  if (!cover(near_, positions, positions)) {
-    search(positions, positions, margin_share * settings_.thickness, near_);
-    std::sort(near_.pairs.begin(), near_.pairs.end(),
+  BoxedPairs& near = memory_.near;
+  if (!cover(near, positions, positions)) {
+    search(positions, positions, margin_share * settings_.thickness, near);
+    std::sort(near.pairs.begin(), near.pairs.end(),
               [](const CandidatePair& a, const CandidatePair& b) { return key_of(a) < key_of(b); });
   }
   contact.touches.clear();
@@ -146,7 +148,7 @@ void LayerStep::add_forces(const Points& positions, LayerContact& contact, Point
   const double length = bristle_length(time_step_);
   AscendingPlaces bristles(environment_.state.pair_bristles);
   const Points& start = environment_.state.positions;
-  for (const CandidatePair& pair : near_.pairs) {
+  for (const CandidatePair& pair : near.pairs) {
     Vector3<double> x[4];
     gather(positions, pair.vertices, x);
     if (!may_come_near(pair.kind, x, pair.thickness)) continue;
@@ -222,11 +224,11 @@ double LayerStep::bristle_energy(const LayerContact& contact) const {
 }
 
 double LayerStep::free_share(const Points& from, const Points& to) {
-  const bool is_near = cover(near_, from, to);
+  const bool is_near = cover(memory_.near, from, to);
   if (!is_near) search(from, to, 0, way_);
   const Eigen::VectorXd lengths = (to - from).rowwise().norm();
   double share = 1;
-  for (const CandidatePair& pair : (is_near ? near_ : way_).pairs) {
+  for (const CandidatePair& pair : (is_near ? memory_.near : way_).pairs) {
     const auto& v = pair.vertices;
     Vector3<double> x[4], move[4];
     gather(from, v, x);

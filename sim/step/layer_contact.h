@@ -30,6 +30,23 @@ struct LayerContact {
   double closest = 0;  ///< distance of the nearest features that may touch [m]; 1e300: there are none
 };
 
+/// Pairs that may touch while each vertex stays in its box.
+struct BoxedPairs {
+  std::vector<Bounds> boxes;
+  std::vector<CandidatePair> pairs;
+};
+
+/// What a surface that meets itself keeps between steps.
+struct LayerMemory {
+  explicit LayerMemory(const Sheet& sheet) : surface(sheet) {}
+
+  PairSurface surface;
+  BoxedPairs near;  ///< of an iterate; they serve as long as vertices stay in their boxes
+  // What these pairs are of: another thickness and other holds have others.
+  double thickness = 0;
+  std::vector<bool> carried;
+};
+
 /// How many pairs a step had to look at.
 struct LayerCounts {
   long pairs = 0;     ///< candidates, the most at a time
@@ -42,11 +59,13 @@ struct LayerCounts {
 /// a pair each. Ways are free where continuous detection says so.
 class LayerStep {
  public:
-  /// The arguments have to outlive the step. environment.self_contact has to be there.
-  LayerStep(PairSurface& surface, const Environment& environment, double time_step);
+  /// The first two have to outlive the step. environment.self_contact has to be there. `carried`: vertices
+  /// that holds carry whole; pairs of them alone do not count.
+  LayerStep(LayerMemory& memory, const Environment& environment, double time_step,
+            const std::vector<bool>& carried);
 
-  /// Vertices that holds carry whole: pairs of them alone do not count.
-  void set_carried(const std::vector<bool>& carried);
+  /// Whether there are other pairs than in the last step.
+  bool has_other_pairs() const { return other_pairs_; }
 
   /// Adds what each vertex needs from outside against pressure and friction at `positions` to `force` [N].
   void add_forces(const data::Points& positions, LayerContact& contact, data::Points& force);
@@ -85,25 +104,18 @@ class LayerStep {
   double time_step() const { return time_step_; }
 
  private:
-  /// Pairs that may touch while each vertex stays in its box.
-  struct Candidates {
-    std::vector<Bounds> boxes;
-    std::vector<CandidatePair> pairs;
-  };
-
   /// Whether the pairs of `candidates` are all that matter on the way between two positions.
-  static bool cover(const Candidates& candidates, const data::Points& from, const data::Points& to);
+  static bool cover(const BoxedPairs& candidates, const data::Points& from, const data::Points& to);
 
   /// Fills in the pairs of all ways between two positions, and of a `margin` beside them.
-  void search(const data::Points& from, const data::Points& to, double margin, Candidates& candidates);
+  void search(const data::Points& from, const data::Points& to, double margin, BoxedPairs& candidates);
 
-  PairSurface& surface_;
+  LayerMemory& memory_;
   const Environment& environment_;
   SelfContact settings_;
   double time_step_;
-  std::vector<bool> carried_;
-  Candidates near_;  ///< an iterate
-  Candidates way_;   ///< between iterates that are far apart
+  bool other_pairs_;
+  BoxedPairs way_;  ///< between iterates that are far apart
   LayerCounts counts_;
 };
 

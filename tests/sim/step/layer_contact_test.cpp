@@ -38,6 +38,10 @@ struct TwoLayers {
   }
 };
 
+std::vector<bool> none_carried(const Environment& environment) {
+  return std::vector<bool>(static_cast<std::size_t>(environment.state.positions.rows()), false);
+}
+
 Points forces_at(LayerStep& step, const Points& x, LayerContact& contact) {
   Points force = Points::Zero(x.rows(), 3);
   step.add_forces(x, contact, force);
@@ -46,8 +50,8 @@ Points forces_at(LayerStep& step, const Points& x, LayerContact& contact) {
 
 TEST(LayerContact, PressureIsTheDerivativeOfItsEnergyAndConservesMomentum) {
   TwoLayers layers(6e-4, 0);
-  PairSurface surface(layers.sheet);
-  LayerStep step(surface, layers.environment, time_step);
+  LayerMemory memory(layers.sheet);
+  LayerStep step(memory, layers.environment, time_step, none_carried(layers.environment));
   const Points& x = layers.environment.state.positions;
   LayerContact contact;
   const Points force = forces_at(step, x, contact);
@@ -72,10 +76,10 @@ TEST(LayerContact, PressureIsTheDerivativeOfItsEnergyAndConservesMomentum) {
 
 TEST(LayerContact, FrictionIsTheDerivativeOfItsPotentialAtTheForcesOfTheIterate) {
   TwoLayers layers(6e-4, 0.4);
-  PairSurface surface(layers.sheet);
-  LayerStep step(surface, layers.environment, time_step);
+  LayerMemory memory(layers.sheet);
+  LayerStep step(memory, layers.environment, time_step, none_carried(layers.environment));
   TwoLayers smooth(6e-4, 0);
-  LayerStep without(surface, smooth.environment, time_step);
+  LayerStep without(memory, smooth.environment, time_step, none_carried(smooth.environment));
   std::mt19937_64 engine(2);
   std::uniform_real_distribution<> even(-1, 1);
   for (const double slip : {3e-7, 1e-5}) {  // bristles bend over 1e-6 m
@@ -119,8 +123,8 @@ TEST(LayerContact, StiffnessIsTheDerivativeOfTheForce) {
     const Sheet sheet = joined(by_edges ? edges : corner);
     environment = environment_of(sheet);
     environment.self_contact = SelfContact{.thickness = 1e-3, .friction = friction, .pressure = 2500};
-    PairSurface surface(sheet);
-    LayerStep step(surface, environment, time_step);
+    LayerMemory memory(sheet);
+    LayerStep step(memory, environment, time_step, none_carried(environment));
     for (const double slip : {3e-7, 1e-5}) {  // the bristles bend, or slide
       Points x = environment.state.positions;
       x.bottomRows(3).rowwise() += Eigen::RowVector3d(slip, 0.5 * slip, 0);
@@ -153,8 +157,8 @@ TEST(LayerContact, StiffnessIsTheDerivativeOfTheForce) {
 /// few steps.
 TEST(LayerContact, DualsLetWhatSlidesStop) {
   TwoLayers layers(6e-4, 0.4);
-  PairSurface surface(layers.sheet);
-  const LayerStep step(surface, layers.environment, time_step);
+  LayerMemory memory(layers.sheet);
+  const LayerStep step(memory, layers.environment, time_step, none_carried(layers.environment));
   const double length = bristle_length(time_step);
   constexpr double spring = 1, bound = 1;  // [N/m], [N]
   const Vector3<double> pull{0.3, -0.5, 0};
@@ -188,18 +192,18 @@ TEST(LayerContact, DualsLetWhatSlidesStop) {
 
 TEST(LayerContact, BristlesComeBackInTheNextStep) {
   TwoLayers layers(6e-4, 0.4);
-  PairSurface surface(layers.sheet);
+  LayerMemory memory(layers.sheet);
   Points x = layers.environment.state.positions;
   rows_of(layers.sheet.bodies[1], x).col(0).array() += 5e-7;
   LayerContact contact;
   {
-    LayerStep step(surface, layers.environment, time_step);
+    LayerStep step(memory, layers.environment, time_step, none_carried(layers.environment));
     forces_at(step, x, contact);
     layers.environment.state.pair_bristles = step.bristles_at_end(contact);
   }
   ASSERT_EQ(layers.environment.state.pair_bristles.size(), contact.touches.size());
   layers.environment.state.positions = x;
-  LayerStep next(surface, layers.environment, time_step);
+  LayerStep next(memory, layers.environment, time_step, none_carried(layers.environment));
   LayerContact again;
   forces_at(next, x, again);
   ASSERT_EQ(again.touches.size(), contact.touches.size());
