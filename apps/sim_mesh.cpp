@@ -52,6 +52,26 @@ data::Geometry load(const MeshOptions& options, std::size_t& left_out) {
   return scan;
 }
 
+bool same_file(const std::string& a, const std::string& b) {
+  namespace fs = std::filesystem;
+  return fs::weakly_canonical(fs::absolute(a)) == fs::weakly_canonical(fs::absolute(b));
+}
+
+/// --force does not write over the scan.
+void check_spared(const MeshOptions& options, const std::string& path, const char* option) {
+  if (same_file(path, options.input))
+    throw data::InputError(std::string(option) + ": found the name of the scan, expected another file");
+}
+
+/// A sheet whose triangles lie on each other has no rest shape.
+void check_turned_over(const MeshOptions& options, const data::FlatShape& flat, Eigen::Index triangles) {
+  if (flat.inverted == 0 || options.force) return;
+  throw data::InputError(options.input + ": does not lie flat: found " +
+                         data::format_count(std::size_t(flat.inverted)) + " of " +
+                         data::format_count(std::size_t(triangles)) +
+                         " triangles turned over, expected none; --force writes the shape all the same");
+}
+
 std::vector<std::string> warnings_of(const data::ScannedSurface& sheet, std::size_t left_out) {
   std::vector<std::string> warnings;
   if (left_out > 0)
@@ -109,7 +129,8 @@ nlohmann::ordered_json json_of(const MeshOptions& options, const data::ScannedSu
                     {"width_m", flat->width},
                     {"height_m", flat->height},
                     {"strain_rms", flat->rms_strain},
-                    {"strain_max", flat->largest_strain}};
+                    {"strain_max", flat->largest_strain},
+                    {"turned_over", flat->inverted}};
   return json;
 }
 
@@ -126,9 +147,16 @@ int mesh_sheet(const MeshOptions& options) {
   int exit_code = exit_done;
   if (!options.flat.empty()) {
     flat = data::flattened(sheet.mesh, options.input);
+    check_turned_over(options, *flat, sheet.mesh.triangles.rows());
     files.push_back(
         {options.flat, data::format_triangle_mesh({flat->vertices, sheet.mesh.triangles}, options.flat)});
-    if (flat->rms_strain > most_rms_strain) {
+    if (flat->inverted > 0) {
+      warnings.insert(warnings.begin(),
+                      data::format_count(std::size_t(flat->inverted)) +
+                          " triangles of the flat shape are turned over; it is no rest shape");
+      exit_code = exit_unusable;
+    }
+    if (!(flat->rms_strain <= most_rms_strain)) {
       warnings.insert(warnings.begin(),
                       "the surface does not develop: laid flat, its edges are strained by " +
                           percent(flat->rms_strain) + " rms and " + percent(flat->largest_strain) +
@@ -184,14 +212,16 @@ int mesh(const MeshOptions& options) {
   if (options.frames.intrinsics.empty() && !(options.frames.poses + options.frames.extrinsics).empty())
     throw data::InputError("--poses and --extrinsics: are for depth frames, which need --intrinsics");
   data::check_file_free(options.out, options.force);
+  check_spared(options, options.out, "--out");
   if (options.tets) {
     data::format_tet_mesh({}, options.out);  // refuses the ending before the work
     return mesh_solid(options);
   }
   data::format_triangle_mesh({}, options.out);
   if (!options.flat.empty()) {
-    if (options.flat == options.out)
+    if (same_file(options.flat, options.out))
       throw data::InputError("--flat: found the name of --out, expected another file");
+    check_spared(options, options.flat, "--flat");
     data::check_file_free(options.flat, options.force);
     data::format_triangle_mesh({}, options.flat);
   }
@@ -208,6 +238,7 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       "--flat\n"
       "lays the sheet out: the rest shape of its asset. Exit code 3: it does not develop, more than 1 % "
       "rms.\n"
+      "Exit code 2: triangles of the flat shape are turned over; --force writes it.\n"
       "Examples:\n"
       "  flash-sim mesh scan.ply --edge 0.01 -o cloth.obj --flat cloth_flat.obj\n"
       "  flash-sim mesh depth --intrinsics camera_info.yaml --poses camera.tum -o cloth.obj\n"
@@ -247,8 +278,10 @@ void add_mesh_verb(CLI::App& app, Action& action) {
       ->excludes(flat)
       ->excludes(points);
   verb.add_flag("--json", options->json, "Print what was made as JSON on stdout");
-  verb.add_flag("--force", options->force,
-                "Write over what is there, and take a calibration that said it cannot be used");
+  verb.add_flag(
+      "--force", options->force,
+      "Write over what is there, and a flat shape with triangles turned over; take a calibration that "
+      "said it cannot be used");
   verb.callback([&action, options] {
     options->frames.folder = options->input;
     action = [options] { return mesh(*options); };

@@ -161,8 +161,9 @@ int run(const RunOptions& options) {
     std::cerr << "flash-sim: warning: " << summary.unconverged_steps << " of " << summary.steps
               << " steps did not converge; worst residual " << data::format_short(summary.residual_max)
               << ", worst complementarity " << data::format_short(summary.complementarity_max)
-              << " m; where both are small, energy came from nothing (accepted: 1 in 100, and 1; see "
-              << (fs::path(options.out) / "log.csv").string() << ")\n";
+              << " m; where both are small, energy came from nothing"
+              << (summary.self_contact ? ", or layers kept what a hold carries from its place" : "")
+              << " (accepted: 1 in 100, and 1; see " << (fs::path(options.out) / "log.csv").string() << ")\n";
   if (options.json) {
     print_json(summary, options.out, exit_code);
   } else if (!options.quiet) {

@@ -200,7 +200,10 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   if (!result.converged)
     warn("not converged in " + data::format_short(100 * motion.unconverged_share) +
          " % of the steps, residual up to " + data::format_short(result.residual_max) +
-         " (accepted: 1 %, and a residual of 1)");
+         " (accepted: 1 %, and a residual of 1)" +
+         (options.replay.self_contact > 0
+              ? "; where it is small, layers kept what a gripper holds from its place"
+              : ""));
   for (const sysid::RegistrationParameter& parameter : sysid::registration_parameters)
     if (sysid::is_at_bound(result.recordings.front().bounds_hit, parameter))
       warn(sysid::at_bound_text(parameter, recording.nuisance));

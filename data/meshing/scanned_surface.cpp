@@ -20,14 +20,14 @@ InputError unfit(const std::string& source, const std::string& what) {
 /// The scan has to be some edges wide, and its mesh no larger than anybody simulates.
 void check_size(const Points& points, double area, const ScanSettings& settings, const std::string& source) {
   const Eigen::RowVector3d span = points.colwise().maxCoeff() - points.colwise().minCoeff();
-  if (span.norm() < 4 * settings.edge)
+  if (!(span.norm() >= 4 * settings.edge))
     throw unfit(source, "spans " + format_short(span.norm()) + " m, expected four times --edge " +
                             format_short(settings.edge) + " at least");
   const double vertices = area * 2 / std::sqrt(3) / (settings.edge * settings.edge);
-  if (vertices > most_vertices)
+  if (!(vertices <= most_vertices))  // nor where the area overflows
     throw unfit(source, "spans " + format_short(span.norm()) + " m and would take " +
-                            format_count(std::size_t(std::min(vertices, 1e15))) + " vertices of --edge " +
-                            format_short(settings.edge) + ", expected at most " +
+                            format_count(std::size_t(vertices < 1e15 ? vertices : 1e15)) +
+                            " vertices of --edge " + format_short(settings.edge) + ", expected at most " +
                             format_count(std::size_t(most_vertices)));
 }
 

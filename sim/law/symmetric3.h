@@ -23,6 +23,12 @@ FLASH_HOST_DEVICE inline Symmetric3 square(const Vector3<double>& v) {
   return {v.x * v.x, v.x * v.y, v.x * v.z, v.y * v.y, v.y * v.z, v.z * v.z};
 }
 
+/// (a b^T + b a^T) / 2.
+FLASH_HOST_DEVICE inline Symmetric3 symmetric_product(const Vector3<double>& a, const Vector3<double>& b) {
+  return {a.x * b.x, 0.5 * (a.x * b.y + a.y * b.x), 0.5 * (a.x * b.z + a.z * b.x),
+          a.y * b.y, 0.5 * (a.y * b.z + a.z * b.y), a.z * b.z};
+}
+
 FLASH_HOST_DEVICE inline Symmetric3 operator+(const Symmetric3& a, const Symmetric3& b) {
   return {a.xx + b.xx, a.xy + b.xy, a.xz + b.xz, a.yy + b.yy, a.yz + b.yz, a.zz + b.zz};
 }

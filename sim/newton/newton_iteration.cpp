@@ -5,6 +5,7 @@
 
 #include "sim/newton/active_set.h"
 #include "sim/step/feasible_positions.h"
+#include "sim/step/moving_obstacles.h"
 
 namespace flash::sim {
 namespace {
@@ -27,8 +28,8 @@ constexpr double residual_growth = 10;  ///< of the residual by a lengthened ste
 /// Friction at the normal forces of the iterate converges where these change little. In the parts of a step
 /// that could not be solved as one it goes round in circles at times. Then both are solved at once, guided by
 /// the residual.
-bool couples_friction(const StepProblem& problem, const SolverSettings& settings, const StepReport& report) {
-  return problem.contacts.time_step < settings.time_step && report.iterations > coupled_after;
+bool couples_friction(const StepProblem& problem, const SolverSettings& settings, int iterations) {
+  return problem.contacts.time_step < settings.time_step && iterations > coupled_after;
 }
 
 /// The stiffness of all touches of layers at an iterate.
@@ -161,41 +162,44 @@ LinePoint line_search(const SearchLine& line, Iterate& trial) {
 }
 
 /// Goes on along the line, by secants, while the potential falls. A sheet about to buckle needs it: the
-/// matrix, made positive, is stiffer than the sheet, and steps are too short.
-void lengthen(const SearchLine& line, LinePoint point, Iterate& trial, Iterate& longer) {
+/// matrix, made positive, is stiffer than the sheet, and steps are too short. Returns where it ends.
+LinePoint lengthen(const SearchLine& line, LinePoint point, Iterate& trial, Iterate& longer) {
   while (point.length >= 1 && point.length < greatest_length) {
     const double end_slope = trial.residual.cwiseProduct(line.w.direction).sum();
-    if (end_slope > flat_slope * line.slope) return;
+    if (end_slope > flat_slope * line.slope) break;
     const double growth = std::clamp(line.slope / (line.slope - end_slope), least_growth, greatest_growth);
     const LinePoint further = move(line, point.length * growth, longer);
     if (further.potential >= point.potential ||
         !(longer.residual.norm() < residual_growth * line.w.now.residual.norm()))
-      return;
+      break;
     point = further;
     std::swap(trial, longer);
   }
+  return point;
 }
 
 }  // namespace
 
-void iterate_to_balance(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
+void iterate_to_balance(const StepProblem& problem, int most_iterations, NewtonWorkspace& w,
+                        StepReport& report) {
+  const int first = report.iterations;
   w.longer.contacts = w.trial.contacts = w.now.contacts;
   bool stuck = false;
   int forced_moves = 0;
   double tolerance = start_tolerance_share * w.settings.tolerance;
-  while (report.iterations < w.settings.max_iterations && !problem.balanced(w.now, tolerance)) {
+  while (report.iterations - first < most_iterations && !problem.balanced(w.now, tolerance)) {
     tolerance = w.settings.tolerance;
     ++report.iterations;
     if (w.refactor) {
       if (!factorize(problem, w)) return;
       ++report.factorizations;
     }
-    const bool coupled = !stuck && couples_friction(problem, w.settings, report);
+    const bool coupled = !stuck && couples_friction(problem, w.settings, report.iterations - first);
     linear_step(problem, stuck, coupled, w, report);
 
     const SearchLine line{problem, w, coupled, potential_at(problem, w.now, w.now),
                           w.now.residual.cwiseProduct(w.direction).sum()};
-    const LinePoint point = line_search(line, w.trial);
+    LinePoint point = line_search(line, w.trial);
     if (!acceptable(line, point, w.trial)) {
       if (problem.balanced(w.now, tolerance)) return;
       if (!stuck) {
@@ -207,9 +211,46 @@ void iterate_to_balance(const StepProblem& problem, NewtonWorkspace& w, StepRepo
       if (++forced_moves > most_forced_moves || !std::isfinite(point.potential)) return;
     }
     stuck = false;
-    if (!coupled) lengthen(line, point, w.trial, w.longer);
+    if (!coupled) point = lengthen(line, point, w.trial, w.longer);
+    if (problem.layers) problem.layers->carry_duals(w.now.layers, point.length, w.trial.layers);
     std::swap(w.now, w.trial);
   }
+}
+
+bool carry_on(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
+  constexpr int most_cuts = 20;
+  const auto set_corrections = [&](const data::Points* places) {
+    for (std::size_t k = 0; k < w.now.contacts.held; ++k) {
+      VertexConstraint& held = w.now.contacts.constraints[k];
+      const Eigen::Index i = held.vertex;
+      held.correction =
+          places == nullptr ? Vector3<double>{} : vector3(*places, i) - vector3(w.now.positions, i);
+    }
+  };
+  data::Points places = w.now.positions;
+  begin_step(problem.contacts, places);
+  ++report.iterations;
+  ++report.factorizations;
+  if (!factorize(problem, w)) return false;
+  set_corrections(&places);
+  linear_step(problem, true, false, w, report);
+  set_corrections(nullptr);
+  w.trial.contacts = w.now.contacts;
+  double length = 1;
+  for (int cut = 0; cut < most_cuts; ++cut) {
+    w.trial.positions = w.now.positions + length * w.direction;
+    if (length == 1) begin_step(problem.contacts, w.trial.positions);
+    project_to_feasible(problem.contacts, w.now.contacts, w.trial.positions);
+    const double share = problem.layers->free_share(w.now.positions, w.trial.positions);
+    if (share == 1) {
+      problem.evaluate(w.trial);
+      problem.layers->carry_duals(w.now.layers, length, w.trial.layers);
+      std::swap(w.now, w.trial);
+      return length == 1;
+    }
+    length *= share;
+  }
+  return false;
 }
 
 }  // namespace flash::sim

@@ -14,7 +14,7 @@ struct NewtonWorkspace {
   std::shared_ptr<const SheetPlan> plan;
   SolverSettings settings;
   NewtonMatrix matrix;
-  std::unique_ptr<PairSurface> surface;  ///< made where it first meets itself
+  std::unique_ptr<LayerMemory> layers;  ///< made where the surface first meets itself
   bool refactor = true;  ///< whether the next solve needs a new factor: none yet, or the sheet has moved on
   Iterate now;           ///< where the iteration stands; between steps the end of the last one
   // These members stay between steps to reuse their memory.
@@ -29,6 +29,11 @@ struct NewtonWorkspace {
 
 /// Semi-smooth Newton's method from w.now, which is feasible, to balance or until it cannot go on. Counts its
 /// work in `report`.
-void iterate_to_balance(const StepProblem& problem, NewtonWorkspace& w, StepReport& report);
+void iterate_to_balance(const StepProblem& problem, int most_iterations, NewtonWorkspace& w,
+                        StepReport& report);
+
+/// Takes what holds carry from where w.now has it to its places, or as far as layers are not in its way. The
+/// rest of the surface follows as the matrix says. Returns whether it arrives.
+bool carry_on(const StepProblem& problem, NewtonWorkspace& w, StepReport& report);
 
 }  // namespace flash::sim

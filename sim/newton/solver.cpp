@@ -22,6 +22,8 @@ namespace {
 
 constexpr double rounding_tolerance = 1e-6;  ///< relative residual below which a shorter step is no help
 constexpr double gap_tolerance = 1e-9;       ///< on gaps and complementarity [m]
+constexpr int most_portions = 20;            ///< in which holds arrive where layers are in their way
+constexpr int portion_iterations = 5;        ///< by which the surface makes way after each of them
 
 /// Elastic energy at the start of the step; as a rule the last step computed it.
 ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWorkspace& w) {
@@ -29,11 +31,12 @@ ElasticEnergy elastic_energy_at_start(const StepProblem& problem, const NewtonWo
   const Points& start = environment.state.positions;
   if (w.now.materials == environment.materials && w.now.solids == environment.solids &&
       w.now.rest_angles == environment.state.rest_angles && w.now.positions.rows() == start.rows() &&
-      w.now.positions == start)
+      w.now.positions == start && !(problem.layers && problem.layers->has_other_pairs()))
     return w.now.elastic;
   Points force = Points::Zero(start.rows(), 3);
   ElasticEnergy elastic;
   for (const BodyLaw& law : problem.laws) elastic += add_elastic_gradient(*w.plan, law, start, force);
+  if (problem.layers) elastic.layers = problem.layers->energy(start);
   return elastic;
 }
 
@@ -46,7 +49,8 @@ void advance_freely(const StepProblem& problem, double share, Iterate& to) {
 }
 
 /// Fills in w.now where the search for the end of the step starts: where speeds take the vertices, or as far
-/// as they do not take the surface through itself. Returns false where holds alone would.
+/// as they do not take the surface through itself. Where holds alone would, it is the start of the step, and
+/// false is returned.
 bool start_search(const StepProblem& problem, NewtonWorkspace& w) {
   constexpr int most_cuts = 8;
   const Points& start = problem.contacts.environment.state.positions;
@@ -61,21 +65,29 @@ bool start_search(const StepProblem& problem, NewtonWorkspace& w) {
       part *= share;
     }
     free = share == 1;
-    if (!free) w.now.positions = start + share * (w.now.positions - start);
+    if (!free) w.now.positions = start;
   }
   problem.evaluate(w.now);
   return free;
 }
 
+/// Whether holds have squeezed layers to a distance at which no force would keep them apart.
+bool crushed(const Environment& environment, double layer_distance) {
+  constexpr double least_share = 1e-6;  ///< of the thickness
+  return environment.self_contact && layer_distance < least_share * environment.self_contact->thickness;
+}
+
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
 /// solved, or to all that rounding allows.
 bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& report) {
-  ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
-  const bool free = start_search(problem, w);
-  // Holds that close or open change which pairs there are.
-  if (problem.layers)
-    elastic_at_start.layers = problem.layers->energy(problem.contacts.environment.state.positions);
-  iterate_to_balance(problem, w, report);
+  const ElasticEnergy elastic_at_start = elastic_energy_at_start(problem, w);
+  bool free = start_search(problem, w);
+  for (int portion = 0; !free && portion < most_portions; ++portion) {
+    if (crushed(problem.contacts.environment, w.now.layers.closest)) break;
+    iterate_to_balance(problem, portion_iterations, w, report);
+    free = carry_on(problem, w, report);
+  }
+  iterate_to_balance(problem, w.settings.max_iterations, w, report);
 
   report.residual = problem.relative_residual(w.now);
   report_contacts(problem, w.now, report);
@@ -89,8 +101,8 @@ bool solve_step(const StepProblem& problem, NewtonWorkspace& w, StepReport& repo
 /// takes the first exit that does not tear it. Returns whether the step is solved.
 bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport& report) {
   const double exit_speed = w.settings.exit_speed;
-  PairSurface* surface = environment.self_contact ? w.surface.get() : nullptr;
-  const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed}, surface);
+  LayerMemory* layers = environment.self_contact ? w.layers.get() : nullptr;
+  const StepProblem problem(*w.plan, environment, h, {.speed = exit_speed}, layers);
   bool solved = solve_step(problem, w, report);
   if (report.start_penetration.depth > 0) {
     const auto inside = vertices_inside(problem.contacts, w.now.contacts);
@@ -101,7 +113,7 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
       if (!solved && k > 1) k = exits.size() - 1;
       const StepReport given_up = std::exchange(report, {});
       w.refactor = true;
-      solved = solve_step(StepProblem(*w.plan, environment, h, exits[k], surface), w, report);
+      solved = solve_step(StepProblem(*w.plan, environment, h, exits[k], layers), w, report);
       add_work(given_up, report);
     }
   }
@@ -125,14 +137,15 @@ bool try_step(Environment& environment, double h, NewtonWorkspace& w, StepReport
 }
 
 /// One step of `h`, in halves where it cannot be solved as a whole, `halvings` times still. Once a half has
-/// failed the other is not divided any more: the step has not converged anyway.
+/// failed the other is not divided any more: the step has not converged anyway. Nor do shorter steps help
+/// layers that holds have crushed.
 StepReport advance(Environment& environment, double h, int halvings, NewtonWorkspace& w) {
   const State start = environment.state;
   StepReport report;
   if (try_step(environment, h, w, report)) return report;
   w.refactor = true;
   const bool stopped = w.settings.stop != nullptr && *w.settings.stop;
-  if (halvings <= 0 || stopped) return report;
+  if (halvings <= 0 || stopped || crushed(environment, report.layer_distance)) return report;
   const State whole = std::exchange(environment.state, start);
   const StepReport first = advance(environment, 0.5 * h, halvings - 1, w);
   StepReport parts = joined(first, advance(environment, 0.5 * h, first.converged ? halvings - 1 : 0, w));
@@ -186,10 +199,10 @@ Solver::Solver(Solver&&) noexcept = default;
 
 StepReport Solver::step(Environment& environment) {
   NewtonWorkspace& w = *workspace_;
-  if (environment.self_contact && !w.surface) {
-    w.surface = std::make_unique<PairSurface>(w.plan->sheet);
-    check_thickness(w.plan->sheet, *w.surface, environment.self_contact->thickness);
-    check_start(w.plan->sheet, *w.surface, environment.state.positions);
+  if (environment.self_contact && !w.layers) {
+    w.layers = std::make_unique<LayerMemory>(w.plan->sheet);
+    check_thickness(w.plan->sheet, w.layers->surface, environment.self_contact->thickness);
+    check_start(w.plan->sheet, w.layers->surface, environment.state.positions);
   }
   const double h = w.settings.time_step;
   update_holds(environment, environment.state.time + h);

@@ -20,17 +20,17 @@ std::vector<bool> carried_vertices(const ContactSet& contacts) {
 }  // namespace
 
 StepProblem::StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
-                         const WayOut<double>& way_out, PairSurface* surface)
+                         const WayOut<double>& way_out, LayerMemory* memory)
     : laws(body_laws(plan, environment)),
       potential(plan, laws, environment, time_step),
       contacts(plan.sheet, environment, time_step, way_out),
       gravity(environment.gravity.norm() > 0 ? environment.gravity.norm() : 9.81) {
   for (const BodyLaw& law : laws)
     force_scales.push_back(rows_of(law.place.body, potential.mass()).norm() * gravity);
-  if (surface == nullptr) return;
-  layers = std::make_unique<LayerStep>(*surface, environment, time_step);
+  if (memory == nullptr) return;
   data::Points positions = environment.state.positions;
-  layers->set_carried(carried_vertices(begin_step(contacts, positions)));
+  layers = std::make_unique<LayerStep>(*memory, environment, time_step,
+                                       carried_vertices(begin_step(contacts, positions)));
 }
 
 double StepProblem::relative_residual(const Iterate& iterate) const {

@@ -31,10 +31,10 @@ struct StepProblem {
   std::vector<double> force_scales;   ///< |M g| of each body [N]
   std::unique_ptr<LayerStep> layers;  ///< the contact of the surface with itself; none: it passes through
 
-  /// The arguments but `way_out` have to outlive the problem. `surface`: of the plan's sheet, where it meets
+  /// The arguments but `way_out` have to outlive the problem. `memory`: of the plan's sheet, where it meets
   /// itself; else null.
   StepProblem(const SheetPlan& plan, const Environment& environment, double time_step,
-              const WayOut<double>& way_out, PairSurface* surface = nullptr);
+              const WayOut<double>& way_out, LayerMemory* memory = nullptr);
   StepProblem(const StepProblem&) = delete;  // the potential refers to the laws
 
   /// Fills in an iterate from its positions.

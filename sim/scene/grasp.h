@@ -12,11 +12,12 @@ Eigen::Vector3d towards_middle(const data::Points& positions, const std::vector<
                                const Eigen::Vector3d& up);
 
 /// Where two fingers hold a patch that lay `flat` [m]: folded about the line through its centre along
-/// `ridge` and standing on the table. A vertex at (a, b) along and across the ridge is held at
-/// m + a ridge + (max|b| - |b|) up. The whole is then tilted by `pitch` [rad] about the axis across the ridge
-/// through m.
+/// `ridge` and standing on the table. A vertex at (a, b) along and across the ridge goes s = min(|b|, apart /
+/// 2) to its side, and is held at m + a ridge + sign(b) s across + (max(|b| - s) - (|b| - s)) up. The whole
+/// is then tilted by `pitch` [rad] about the axis across the ridge through m. `apart`: how far apart the
+/// sides of the fold are [m], 0 for layers that pass through each other.
 data::Points pinch_targets(const data::Points& flat, const Eigen::Vector3d& ridge, const Eigen::Vector3d& up,
-                           double pitch);
+                           double pitch, double apart = 0);
 
 /// Raises `targets` as a whole along `normal` until none lies below the plane through `point`: fingers do not
 /// push the sheet into the table.

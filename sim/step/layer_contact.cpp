@@ -54,19 +54,24 @@ Crossing crossing_of(const Vector3<double>* x) {
   return {q * (2 - q), slope * (v - (uv / uu) * u), slope * (u - (uv / vv) * v)};
 }
 
-auto key_of(PairKind kind, const std::array<int, 4>& vertices) {
-  return std::tuple(kind == PairKind::edge_edge, vertices);
-}
+/// What touches, candidates and bristles are in the order of.
+auto key_of(const auto& pair) { return std::tuple(pair.kind == PairKind::edge_edge, pair.vertices); }
+auto key_of(const PairBristle& bristle) { return std::tuple(bristle.edges, bristle.vertices); }
 
-const PairBristle* find_bristle(const std::vector<PairBristle>& bristles, PairKind kind,
-                                const std::array<int, 4>& vertices) {
-  const auto key = key_of(kind, vertices);
-  const auto at =
-      std::lower_bound(bristles.begin(), bristles.end(), key, [](const PairBristle& bristle, const auto& k) {
-        return std::tuple(bristle.edges, bristle.vertices) < k;
-      });
-  return at != bristles.end() && std::tuple(at->edges, at->vertices) == key ? &*at : nullptr;
-}
+/// The places of one list, whose keys ascend, at keys that ascend as well.
+template <typename Entry>
+class AscendingPlaces {
+ public:
+  explicit AscendingPlaces(const std::vector<Entry>& list) : next_(list.begin()), end_(list.end()) {}
+
+  const Entry* find(const auto& key) {
+    while (next_ != end_ && key_of(*next_) < key) ++next_;
+    return next_ != end_ && key_of(*next_) == key ? &*next_ : nullptr;
+  }
+
+ private:
+  typename std::vector<Entry>::const_iterator next_, end_;
+};
 
 /// The deflection of the bristles of a touch were its vertices at `positions`, along its plane [m].
 Vector3<double> deflection(const LayerTouch& touch, const Points& start, const Points& positions) {
@@ -89,24 +94,26 @@ void add_row(Points& rows, int i, const Vector3<double>& v) {
 Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_step) {
   const Symmetric3 normal = square(touch.normal);
   Symmetric3 turns = identity3() - normal;
-  if (touch.slip > bristle_length(time_step)) turns = turns - square(touch.slip_direction);
+  if (touch.slip > bristle_length(time_step))
+    turns = turns - symmetric_product(touch.dual, touch.slip_direction);
   return touch.stiffness * normal +
          (friction * touch.normal_force / friction_length(touch.slip, time_step)) * turns;
 }
 
-LayerStep::LayerStep(PairSurface& surface, const Environment& environment, double time_step)
-    : surface_(surface),
+LayerStep::LayerStep(LayerMemory& memory, const Environment& environment, double time_step,
+                     const std::vector<bool>& carried)
+    : memory_(memory),
       environment_(environment),
       settings_(*environment.self_contact),
       time_step_(time_step),
-      carried_(static_cast<std::size_t>(environment.state.positions.rows()), false) {}
-
-void LayerStep::set_carried(const std::vector<bool>& carried) {
-  carried_ = carried;
-  near_.boxes.clear();
+      other_pairs_(memory.carried != carried || memory.thickness != settings_.thickness) {
+  if (!other_pairs_) return;
+  memory_.carried = carried;
+  memory_.thickness = settings_.thickness;
+  memory_.near.boxes.clear();
 }
 
-bool LayerStep::cover(const Candidates& candidates, const Points& from, const Points& to) {
+bool LayerStep::cover(const BoxedPairs& candidates, const Points& from, const Points& to) {
   const std::vector<Bounds>& boxes = candidates.boxes;
   const auto covers = [&](const Points& x, Eigen::Index i) {
     const Eigen::Array3d place = x.row(i).transpose().array();
@@ -117,26 +124,31 @@ bool LayerStep::cover(const Candidates& candidates, const Points& from, const Po
   return all;
 }
 
-void LayerStep::search(const Points& from, const Points& to, double margin, Candidates& candidates) {
+void LayerStep::search(const Points& from, const Points& to, double margin, BoxedPairs& candidates) {
   candidates.boxes.resize(static_cast<std::size_t>(from.rows()));
   for (Eigen::Index i = 0; i < from.rows(); ++i) {
     const Eigen::Array3d a = from.row(i).transpose().array(), b = to.row(i).transpose().array();
     candidates.boxes[i] = {a.min(b) - margin, a.max(b) + margin};
   }
-  find_candidates(surface_, candidates.boxes, settings_.thickness, carried_, candidates.pairs);
+  find_candidates(memory_.surface, candidates.boxes, settings_.thickness, memory_.carried, candidates.pairs);
   ++counts_.searches;
   counts_.pairs = std::max(counts_.pairs, static_cast<long>(candidates.pairs.size()));
 }
 
 void LayerStep::add_forces(const Points& positions, LayerContact& contact, Points& force) {
-  if (!cover(near_, positions, positions))
-    search(positions, positions, margin_share * settings_.thickness, near_);
+  BoxedPairs& near = memory_.near;
+  if (!cover(near, positions, positions)) {
+    search(positions, positions, margin_share * settings_.thickness, near);
+    std::sort(near.pairs.begin(), near.pairs.end(),
+              [](const CandidatePair& a, const CandidatePair& b) { return key_of(a) < key_of(b); });
+  }
   contact.touches.clear();
   contact.energy = 0;
   contact.closest = far;
   const double length = bristle_length(time_step_);
+  AscendingPlaces bristles(environment_.state.pair_bristles);
   const Points& start = environment_.state.positions;
-  for (const CandidatePair& pair : near_.pairs) {
+  for (const CandidatePair& pair : near.pairs) {
     Vector3<double> x[4];
     gather(positions, pair.vertices, x);
     if (!may_come_near(pair.kind, x, pair.thickness)) continue;
@@ -152,8 +164,10 @@ void LayerStep::add_forces(const Points& positions, LayerContact& contact, Point
                      .stiffness = area * response.stiffness,
                      .normal = nearest.normal};
     std::copy(nearest.weights, nearest.weights + 4, touch.weights);
-    if (const PairBristle* bristle = find_bristle(environment_.state.pair_bristles, pair.kind, pair.vertices))
-      touch.bristle = length * vector3(bristle->share);
+    if (const PairBristle* bristle = bristles.find(key_of(pair))) {
+      touch.dual = vector3(bristle->share);
+      touch.bristle = length * touch.dual;
+    }
     const Vector3<double> slip = deflection(touch, start, positions);
     touch.slip = norm(slip);
     touch.slip_direction = (1 / friction_length(touch.slip, time_step_)) * slip;
@@ -187,6 +201,21 @@ double LayerStep::friction_potential(const LayerContact& contact, const Points& 
   return potential;
 }
 
+void LayerStep::carry_duals(const LayerContact& from, double length, LayerContact& to) const {
+  AscendingPlaces places(from.touches);
+  for (LayerTouch& touch : to.touches) {
+    const LayerTouch* before = places.find(key_of(touch));
+    if (before == nullptr) continue;
+    const double m = friction_length(before->slip, time_step_);
+    const Vector3<double>& d = before->slip_direction;
+    const Vector3<double> ds = friction_length(touch.slip, time_step_) * touch.slip_direction - m * d;
+    const double along = before->slip > bristle_length(time_step_) ? dot(d, ds) : 0;
+    const Vector3<double> dual = along_plane(
+        touch.normal, before->dual + length * (d - before->dual) + (1 / m) * (ds - along * before->dual));
+    touch.dual = (1 / larger_of(1.0, norm(dual))) * dual;
+  }
+}
+
 double LayerStep::bristle_energy(const LayerContact& contact) const {
   double energy = 0;
   for (const LayerTouch& touch : contact.touches)
@@ -195,11 +224,11 @@ double LayerStep::bristle_energy(const LayerContact& contact) const {
 }
 
 double LayerStep::free_share(const Points& from, const Points& to) {
-  const bool is_near = cover(near_, from, to);
+  const bool is_near = cover(memory_.near, from, to);
   if (!is_near) search(from, to, 0, way_);
   const Eigen::VectorXd lengths = (to - from).rowwise().norm();
   double share = 1;
-  for (const CandidatePair& pair : (is_near ? near_ : way_).pairs) {
+  for (const CandidatePair& pair : (is_near ? memory_.near : way_).pairs) {
     const auto& v = pair.vertices;
     Vector3<double> x[4], move[4];
     gather(from, v, x);
@@ -220,9 +249,6 @@ std::vector<PairBristle> LayerStep::bristles_at_end(const LayerContact& contact)
   std::vector<PairBristle> bristles;
   for (const LayerTouch& touch : contact.touches)
     bristles.push_back({touch.vertices, touch.kind == PairKind::edge_edge, vector3d(touch.slip_direction)});
-  std::sort(bristles.begin(), bristles.end(), [](const PairBristle& a, const PairBristle& b) {
-    return std::tuple(a.edges, a.vertices) < std::tuple(b.edges, b.vertices);
-  });
   return bristles;
 }
 

@@ -20,13 +20,31 @@ struct LayerTouch {
   Vector3<double> normal{};
   Vector3<double> bristle{};         ///< deflection at the start of the step [m]
   Vector3<double> slip_direction{};  ///< the slip over its friction_length
+  Vector3<double> dual{};            ///< what the linear problems take for it, at most 1 long
 };
 
 /// What the surface does to itself at an iterate.
 struct LayerContact {
-  std::vector<LayerTouch> touches;
-  double energy = 0;   ///< of the pressure between layers [J]
+  std::vector<LayerTouch> touches;  ///< in the order of their kinds and vertices
+  double energy = 0;                ///< of the pressure between layers [J]
   double closest = 0;  ///< distance of the nearest features that may touch [m]; 1e300: there are none
+};
+
+/// Pairs that may touch while each vertex stays in its box.
+struct BoxedPairs {
+  std::vector<Bounds> boxes;
+  std::vector<CandidatePair> pairs;
+};
+
+/// What a surface that meets itself keeps between steps.
+struct LayerMemory {
+  explicit LayerMemory(const Sheet& sheet) : surface(sheet) {}
+
+  PairSurface surface;
+  BoxedPairs near;  ///< of an iterate; they serve as long as vertices stay in their boxes
+  // What these pairs are of: another thickness and other holds have others.
+  double thickness = 0;
+  std::vector<bool> carried;
 };
 
 /// How many pairs a step had to look at.
@@ -41,11 +59,13 @@ struct LayerCounts {
 /// a pair each. Ways are free where continuous detection says so.
 class LayerStep {
  public:
-  /// The arguments have to outlive the step. environment.self_contact has to be there.
-  LayerStep(PairSurface& surface, const Environment& environment, double time_step);
+  /// The first two have to outlive the step. environment.self_contact has to be there. `carried`: vertices
+  /// that holds carry whole; pairs of them alone do not count.
+  LayerStep(LayerMemory& memory, const Environment& environment, double time_step,
+            const std::vector<bool>& carried);
 
-  /// Vertices that holds carry whole: pairs of them alone do not count.
-  void set_carried(const std::vector<bool>& carried);
+  /// Whether there are other pairs than in the last step.
+  bool has_other_pairs() const { return other_pairs_; }
 
   /// Adds what each vertex needs from outside against pressure and friction at `positions` to `force` [N].
   void add_forces(const data::Points& positions, LayerContact& contact, data::Points& force);
@@ -55,6 +75,18 @@ class LayerStep {
 
   /// Potential of friction at the forces and in the directions of `contact` [J].
   double friction_potential(const LayerContact& contact, const data::Points& positions) const;
+
+  /// Fills in the duals of an iterate from those of another, from which it is `length` directions of a linear
+  /// problem away. Friction is (mu N) z with the dual z, and m z = s with the slip s and its friction_length
+  /// m. The linear problem has both as unknowns:
+  ///
+  ///   z <- (s + ds - z (d . ds)) / m,   d = s / m where it slides, else 0
+  ///
+  /// With z = d that is Newton's method, whose matrix is zero along d: what has to stop slides past its
+  /// place and back again. With z = 0 it brakes what slides by (mu N) / |s|. Chan, Golub and Mulet 1999 ("A
+  /// nonlinear primal-dual method for total variation-based image restoration"), with the kink of
+  /// Hintermueller and Stadler 2006.
+  void carry_duals(const LayerContact& from, double length, LayerContact& to) const;
 
   /// Energy of bristles that bend at the end of the step [J].
   double bristle_energy(const LayerContact& contact) const;
@@ -72,31 +104,24 @@ class LayerStep {
   double time_step() const { return time_step_; }
 
  private:
-  /// Pairs that may touch while each vertex stays in its box.
-  struct Candidates {
-    std::vector<Bounds> boxes;
-    std::vector<CandidatePair> pairs;
-  };
-
   /// Whether the pairs of `candidates` are all that matter on the way between two positions.
-  static bool cover(const Candidates& candidates, const data::Points& from, const data::Points& to);
+  static bool cover(const BoxedPairs& candidates, const data::Points& from, const data::Points& to);
 
   /// Fills in the pairs of all ways between two positions, and of a `margin` beside them.
-  void search(const data::Points& from, const data::Points& to, double margin, Candidates& candidates);
+  void search(const data::Points& from, const data::Points& to, double margin, BoxedPairs& candidates);
 
-  PairSurface& surface_;
+  LayerMemory& memory_;
   const Environment& environment_;
   SelfContact settings_;
   double time_step_;
-  std::vector<bool> carried_;
-  Candidates near_;  ///< an iterate
-  Candidates way_;   ///< between iterates that are far apart
+  bool other_pairs_;
+  BoxedPairs way_;  ///< between iterates that are far apart
   LayerCounts counts_;
 };
 
 /// How the force of a touch changes with what lies between its nearest points: its pressure along the normal,
-/// friction across [N/m]. The Hessian is this matrix between the weighted vertices (Gauss-Newton): what the
-/// normal turns by is left out.
+/// friction across [N/m]. It is positive semidefinite, and exact where the dual is the slip's direction. The
+/// Hessian is this matrix between the weighted vertices (Gauss-Newton): what the normal turns by is left out.
 Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_step);
 
 }  // namespace flash::sim

@@ -124,8 +124,10 @@ sim::Hold make_hold(const Replay& replay, const data::RecordedGrasp& recorded, i
     const bool given = recorded.direction.norm() > 0 && !nuisance.grasp_direction;
     const Eigen::AngleAxisd turned(nuisance.grasp_direction.value_or(0.0), replay.up);
     const Eigen::Vector3d diagonal = turned * sim::towards_middle(flat, hold.vertices, replay.up);
-    targets = sim::pinch_targets(targets, given ? recorded.direction : diagonal, replay.up,
-                                 nuisance.grasp_pitch.value_or(recorded.pitch));
+    const auto& layers = replay.settings.self_contact;
+    targets =
+        sim::pinch_targets(targets, given ? recorded.direction : diagonal, replay.up,
+                           nuisance.grasp_pitch.value_or(recorded.pitch), layers ? layers->thickness : 0);
   }
   if (recording.has_table)
     sim::raise_above(recording.table_point + nuisance.table_height * replay.up, recording.table_normal,

@@ -114,6 +114,29 @@ TEST_F(ExampleScenes, ASoftGripperHoldsASoftCube) {
   EXPECT_NEAR(height(120) - height(60), lift, 0.05 * lift);
 }
 
+/// The first second, on a coarse mesh: the hand has lifted the cuff, and nothing passes through.
+TEST_F(ExampleScenes, ATShirtsSleeveIsLifted) {
+  take("tshirt_fold.json");
+  take("tshirt.json", {{":0.0138", ":0.0425"}});
+  constexpr int steps = 100;
+  constexpr double thickness = 1e-3;
+  const SceneSummary summary = run("tshirt_fold.json", steps, "out");
+  EXPECT_EQ(summary.unconverged_steps, 0);
+  EXPECT_GT(summary.layer_distance_min, 0.5 * thickness);
+  const data::Points start = frame("out", 0), end = frame("out", steps);
+  int cuff = 0;
+  Eigen::RowVector3d middle = Eigen::RowVector3d::Zero();
+  for (Eigen::Index i = 0; i < start.rows(); ++i) {
+    if (start(i, 0) > -0.409) continue;
+    ++cuff;
+    middle += end.row(i);
+  }
+  // Where the hand is at 1 s, within the thickness of both layers of the sleeve.
+  EXPECT_NEAR(middle[0] / cuff, -0.3774, 2 * thickness);
+  EXPECT_NEAR(middle[2] / cuff, 0.1000, 2 * thickness);
+  EXPECT_GT(cuff, 4);
+}
+
 /// The published method on two local-global and two contact iterations stays bounded, at ten times the speed.
 TEST_F(ExampleScenes, TwoPlusTwoIterationsStayBounded) {
   take("two_plus_two.json");

@@ -127,6 +127,21 @@ def check_cap(sim, folder):
     yield 0.75 < strain * 16 * math.sqrt(2) < 1.25, f"cap: strained by {strain} rms"
 
 
+def check_spike(sim, folder):
+    """A narrow hill has no room in the plane: its triangles turn over, and the flat shape is refused."""
+    side, cells = 0.2, 40
+    points = [(side * (k % (cells + 1)) / cells, side * (k // (cells + 1)) / cells) for k in range((cells + 1) ** 2)]
+    hill = [(x, y, 0.5 * math.exp(-((x - 0.1) ** 2 + (y - 0.1) ** 2) / 4e-4)) for x, y in points]
+    first = [k for k in range(len(points) - cells - 1) if k % (cells + 1) < cells]
+    (folder / "spike.obj").write_text(obj(hill, [t for k in first for t in ((k, k + 1, k + cells + 2),
+                                                                            (k, k + cells + 2, k + cells + 1))]))
+    words = ["mesh", "spike.obj", "-o", "out.obj", "--flat", "flat.obj"]
+    yield from refused(sim, folder, words, "spike.obj", "triangles turned over", "--force")
+    done = program.call(sim, *words, "--force", "--json", cwd=folder)
+    yield done.returncode == UNUSABLE and "turned over" in done.stderr, f"spike: {done.returncode}: {done.stderr}"
+    yield json.loads(done.stdout)["flat"]["turned_over"] > 0, f"spike: {done.stdout}"
+
+
 def check_tets(sim, folder):
     corners = [(100 * (i & 1), 100 * (i >> 1 & 1), 100 * (i >> 2)) for i in range(8)]
     (folder / "cube.obj").write_text(obj(corners, CUBE))
@@ -162,7 +177,12 @@ def check_bad(sim, folder):
     (folder / "sheet.ply").write_bytes(ply(sheet, False))
     for words, *expected in ((["sheet.ply", "-o", "out.stl"], "out.stl", "expected .ply, .obj or .vtk"),
                              (["sheet.ply", "-o", "a.obj", "--flat", "a.obj"], "--flat"),
+                             (["sheet.ply", "-o", "a.obj", "--flat", "./a.obj"], "--flat", "the name of --out"),
                              (["sheet.ply", "-o", "sheet.ply"], "sheet.ply", "exists already"),
+                             (["sheet.ply", "-o", "sheet.ply", "--force"], "--out", "the name of the scan"),
+                             (["sheet.ply", "-o", "a.obj", "--flat", "sheet.ply", "--force"], "--flat", "of the scan"),
+                             (["sheet.ply", "-o", "a.obj", "--scale", "1e300"], "sheet.ply", "--scale"),
+                             (["fin.obj", "-o", "a.obj", "--scale", "1e300"], "fin.obj", "--scale"),
                              (["sheet.ply", "-o", "a.obj", "--edge", "0"], "--edge"),
                              (["sheet.ply", "-o", "a.obj", "--poses", "p.tum"], "--intrinsics")):
         yield from refused(sim, folder, ["mesh", *words], *expected)
@@ -191,7 +211,7 @@ def main():
     parser.add_argument("--sim", required=True, type=pathlib.Path)
     sim = parser.parse_args().sim.resolve()
     failures = 0
-    for check in (check_drape, check_depth, check_cap, check_tets, check_bad):
+    for check in (check_drape, check_depth, check_cap, check_spike, check_tets, check_bad):
         with tempfile.TemporaryDirectory() as name:
             for held, statement in check(sim, pathlib.Path(name)):
                 if not held:

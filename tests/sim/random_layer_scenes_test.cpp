@@ -19,6 +19,16 @@ TEST(RandomLayerScenes, DoNotPass) {
   EXPECT_GE(touching, 4);
 }
 
+/// Newton's method alone, without duals, goes round in circles in these: what has to stop slides past its
+/// place.
+TEST(RandomLayerScenes, WhatSlidesComesToAStop) {
+  for (const unsigned long seed : {40002, 40011, 40014, 40028, 40034, 40047}) {
+    const LayerFindings found = observe(random_layer_scene(seed));
+    EXPECT_GT(found.touching, 0) << seed;
+    EXPECT_EQ(found.unconverged, 0) << seed;
+  }
+}
+
 TEST(RandomLayerScenes, TheSameSeedIsTheSameScene) {
   const RandomLayerScene first = random_layer_scene(7), again = random_layer_scene(7);
   EXPECT_EQ(first.environment.state.positions, again.environment.state.positions);

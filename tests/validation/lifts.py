@@ -33,6 +33,8 @@ CHECKED = ("lift_paper", "lift_paper2", "lift_navy")  # the best candidate is so
 FOLD_BENDING = (1.1e-3, 1e-4)  # of both paper lifts, and what the fold asks for [N m]
 FOLD_YIELDS = (5, 20)  # assumed: nobody measured where a paper towel yields [1/m]
 FOLD_YAWS = (-0.3, -0.2, -0.1, 0.0)
+NAVY_BENDING = 3.8e-6  # of its own fit [N m]
+NAVY_YAWS = (-0.05, 0.06, 0.15, 0.25)
 PAIRS = {"paper": ("lift_paper", "lift_paper2"), "navy": ("lift_navy", "lift_navy2")}
 
 
@@ -174,21 +176,25 @@ def fold(runs, data, asset, joint):
 
 
 def fold_models(runs, data):
-    """The fold at the D of the lifts and a tenth of it: with and without self-contact, and with bending that yields. Its start yaw is
-    searched for each."""
+    """The fold at the D of the lifts and a tenth of it: with and without self-contact, and with bending that yields. The start yaw
+    is searched for each. Then the limp lift, which passes through itself, at its own D."""
     assets = {"plate": write_asset(runs.out), "hinge": write_asset(runs.out, "hinged", bending_model="hinge")}
     models = [{"clip": "fold_paper", "model": model, "bending": bending, "yields": yields, "layers": layers}
                for bending in FOLD_BENDING for model, yields in (("plate", None), ("hinge", None), *(("hinge", k) for k in FOLD_YIELDS))
                for layers in (False, True)]
-    recording = import_fold(runs, data)
-    return [model | best_yaw(runs, recording, assets[model["model"]], model) for model in models]
+    models += [{"clip": "lift_navy", "model": "plate", "bending": NAVY_BENDING, "yields": None, "layers": layers}
+               for layers in (False, True)]
+    recordings = {"fold_paper": import_fold(runs, data), "lift_navy": data / "lift" / "lift_navy"}
+    return [model | best_yaw(runs, recordings[model["clip"]], assets[model["model"]], model) for model in models]
 
 
 def best_yaw(runs, recording, asset, model):
     """The best of the start yaws, and in which keyframes that passes through itself away from the grasp."""
-    options = [*GRASPS["clamp"], *(["--self-contact", "0.001"] if model["layers"] else [])]
+    grasp, yaws = (GRASPS["pinch"], NAVY_YAWS) if model["clip"] == "lift_navy" else (GRASPS["clamp"], FOLD_YAWS)
+    grasp = [word.removesuffix(":measured") for word in grasp]  # a replay has no intervals
+    options = [*grasp, *(["--self-contact", "0.001"] if model["layers"] else [])]
     found = []
-    for yaw in FOLD_YAWS:
+    for yaw in yaws:
         name = "fold_models/" + "_".join(f"{value}" for value in [*model.values(), yaw])
         material = {"bending": model["bending"]} | ({"yield_curvature": model["yields"]} if model["yields"] else {})
         timed = [word if word != "1e-5" else "1e-3" for word in window(model["clip"])]  # layers in contact take long to 1e-5
