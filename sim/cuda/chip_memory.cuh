@@ -22,13 +22,16 @@ __device__ inline CachePolicy leaves_first() {
   return policy;
 }
 
-/// Copies 16 bytes in the background, to be waited for with wait_for_copies.
-__device__ inline void copy_to_chip(unsigned to, const void* from, [[maybe_unused]] CachePolicy policy) {
+/// Copies 16 bytes in the background, to be waited for with wait_for_copies; zeros where `bytes` is 0, and
+/// not 16.
+__device__ inline void copy_to_chip(unsigned to, const void* from, int bytes,
+                                    [[maybe_unused]] CachePolicy policy) {
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
-  *static_cast<int4*>(__cvta_shared_to_generic(to)) = *static_cast<const int4*>(from);
+  *static_cast<int4*>(__cvta_shared_to_generic(to)) =
+      bytes > 0 ? *static_cast<const int4*>(from) : int4{0, 0, 0, 0};
 #else
-  asm volatile("cp.async.cg.shared.global.L2::cache_hint [%0], [%1], 16, %2;" ::"r"(to), "l"(from),
-               "l"(policy)
+  asm volatile("cp.async.cg.shared.global.L2::cache_hint [%0], [%1], 16, %2, %3;" ::"r"(to), "l"(from),
+               "r"(bytes), "l"(policy)
                : "memory");
 #endif
 }

@@ -81,14 +81,18 @@ class ChunkStream {
       const int4 what = what_[k];
       const unsigned slot = free_ + k * Slot::size, to = slot + 16 * lane();
       const char* upper = factor_ + static_cast<long>(what.x) * tile;
-      const char* lower = upper + static_cast<long>(what.y) * tile;
-      const bool two_rows = what.y != 0, two_columns = what.z & 1;
+      const char* lower = upper + static_cast<long>(next_row_of(what.y)) * tile;
+      const bool two_rows = next_row_of(what.y) != 0, two_columns = what.z & 1;
+      // Eight lanes have a square: 16 bytes of it or, in its place, zeros.
+      const int own_squares = squares_of(what.y) >> lane() / 8;
+      const auto bytes = [&](int k) { return 16 * (own_squares >> tile_squares * k & 1); };
 #pragma unroll
       for (int p = 0; p < parts; ++p) {
-        copy_to_chip(to + p * part, upper + p * part, policy_);
-        if (two_columns) copy_to_chip(to + tile + p * part, upper + tile + p * part, policy_);
-        if (two_rows) copy_to_chip(to + 2 * tile + p * part, lower + p * part, policy_);
-        if (two_rows && two_columns) copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, policy_);
+        copy_to_chip(to + p * part, upper + p * part, bytes(0), policy_);
+        if (two_columns) copy_to_chip(to + tile + p * part, upper + tile + p * part, bytes(1), policy_);
+        if (two_rows) copy_to_chip(to + 2 * tile + p * part, lower + p * part, bytes(2), policy_);
+        if (two_rows && two_columns)
+          copy_to_chip(to + 3 * tile + p * part, lower + tile + p * part, bytes(3), policy_);
       }
       copy_to_chip<8>(slot + Slot::input_table + 8 * lane(), gathers_ + what.w);
       if (what.z >= 0) copy_to_chip<8>(slot + Slot::result_table + 8 * lane(), gathers_ + (what.z >> 1));

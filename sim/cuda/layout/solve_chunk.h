@@ -25,7 +25,7 @@ struct alignas(16) SolveChunk {
 
   // To have it sent to the chip.
   int first_tile = 0;   ///< of the factor
-  int next_row = 0;     ///< from there to the tile below it; 0: none is read
+  int rows = 0;         ///< chunk_rows: from there to the tile below it, and what of the tiles is not zero
   int columns = 0;      ///< chunk_columns: how many tiles side by side, and where results go
   int input_table = 0;  ///< place of the first input in SolvePlan::gathers
   // To multiply by it.
@@ -38,6 +38,20 @@ struct alignas(16) SolveChunk {
   int passed_begin = 0, passed_end = 0;  ///< results that it does pass up
 };
 static_assert(sizeof(SolveChunk) == 48);
+
+/// Squares of eight rows and columns of a tile, as they lie behind each other (solve_tile.cuh).
+inline constexpr int tile_squares = 4;
+
+/// From the first tile of a chunk to that below it, 0 where none is read, and, a bit each, the squares that
+/// hold numbers: of the first tile, of that beside it, of that below it, and of the last. The others are zero
+/// and need not be read.
+constexpr int chunk_rows(int next_row, int squares) {
+  return next_row | static_cast<int>(static_cast<unsigned>(squares) << 16);
+}
+FLASH_HOST_DEVICE constexpr int next_row_of(int chunk_rows) { return chunk_rows & 0xffff; }
+FLASH_HOST_DEVICE constexpr int squares_of(int chunk_rows) {
+  return static_cast<int>(static_cast<unsigned>(chunk_rows) >> 16);
+}
 
 /// Whether there are two tiles side by side, and the place of the first result in SolvePlan::gathers, -1 for
 /// none.

@@ -16,13 +16,33 @@ struct Task {
   std::vector<SolveChunk> chunks;
 };
 
+/// The squares of a front's tile that hold numbers, a bit each: own rows up to the diagonal, and those below.
+int squares_of_tile(const FrontLayout& front, int row_tile, int column_tile) {
+  constexpr int width = solve_tile_width / 2;
+  const int own = 3 * front.column_count, end = front.below_at + 3 * front.row_count;
+  int squares = 0;
+  for (int square = 0; square < tile_squares; ++square) {
+    const int row = solve_tile_width * row_tile + width * (square % 2),
+              column = solve_tile_width * column_tile + width * (square / 2);
+    const bool in_own = row < own && row >= column, below = row + width > front.below_at && row < end;
+    if (column < own && (in_own || below)) squares |= 1 << square;
+  }
+  return squares;
+}
+
 /// The tiles of a front from `row` and `column` on, as many as `rows` and `columns` lie in.
 void take_tiles(const FrontLayout& front, int row, int rows, int column, int columns, int result_table,
                 SolveChunk& chunk) {
   const int r = row / solve_tile_width, c = column / solve_tile_width;
   chunk.first_tile = front.first_tile + r * front.column_tiles + c;
-  chunk.next_row = rows > solve_tile_width && r + 1 < front.row_tiles ? front.column_tiles : 0;
-  chunk.columns = chunk_columns(columns > solve_tile_width && c + 1 < front.column_tiles, result_table);
+  const bool two_rows = rows > solve_tile_width && r + 1 < front.row_tiles,
+             two_columns = columns > solve_tile_width && c + 1 < front.column_tiles;
+  int squares = 0;
+  for (int i = 0; i <= int{two_rows}; ++i)
+    for (int j = 0; j <= int{two_columns}; ++j)
+      squares |= squares_of_tile(front, r + i, c + j) << tile_squares * (2 * i + j);
+  chunk.rows = chunk_rows(two_rows ? front.column_tiles : 0, squares);
+  chunk.columns = chunk_columns(two_columns, result_table);
 }
 
 /// A front as a team solves with it.

@@ -149,8 +149,12 @@ class Team {
         for (int column = 0; column < 2; ++column) {
           const int input = backward ? row : column, result = backward ? column : row;
           if (input == 1 && chunk.inputs <= w) continue;
-          const bool read = (row == 0 || chunk.next_row > 0) && (column == 0 || chunk.columns % 2 != 0);
-          Eigen::MatrixXd left = read ? tiles_[chunk.first_tile + row * chunk.next_row + column] : anything;
+          const int next_row = next_row_of(chunk.rows);
+          const bool read = (row == 0 || next_row > 0) && (column == 0 || chunk.columns % 2 != 0);
+          Eigen::MatrixXd left = read ? tiles_[chunk.first_tile + row * next_row + column] : anything;
+          for (int square = 0; square < tile_squares && read; ++square)
+            if ((squares_of(chunk.rows) >> (tile_squares * (2 * row + column) + square) & 1) == 0)
+              left.block<w / 2, w / 2>(w / 2 * (square % 2), w / 2 * (square / 2)).setZero();
           if (backward) left.transposeInPlace();
           sum.segment<w>(result * w) += left * inputs.segment<w>(input * w);
         }
