@@ -21,7 +21,17 @@ struct LinearProblem {
   const float* gradient;
   Restrictions restrictions;
   float tolerance;
+  float first_norm = 0;  ///< residual with which the first problem of an iteration began [N]; 0: this is it
 };
+
+/// How a linear problem was solved.
+struct LinearEnd {
+  int solves;        ///< with the factor
+  float first_norm;  ///< as in LinearProblem, for the next one
+};
+
+/// Share of the first residual that is small enough, as on the CPU (sim/newton/krylov.h).
+inline constexpr float enough = 0.05f;
 
 /// Memory of a team, three numbers a vertex but where said.
 struct LinearVectors {
@@ -98,14 +108,14 @@ __device__ inline Numbers3 free_part(const Restrictions& restrictions, int verte
           free[2] * v.x + free[5] * v.y + free[8] * v.z};
 }
 
-/// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
-/// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
-/// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, a number a warp
-/// and solve_memory.
+/// `direction` = the solution over the free directions, `change` = matrix * direction. Goes on from
+/// `direction` but for the first problem of an iteration. Stops as the CPU does: at a share of the first
+/// residual, at the tolerance, where the matrix curves down, after `most` iterations. Returns the same to all
+/// threads. `partial`, `chip`: on chip, a number a warp and solve_memory.
 template <int parts>
-__device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
-                                   const LinearProblem& problem, const LinearVectors& v, float* direction,
-                                   float* change, float* partial, char* chip) {
+__device__ LinearEnd conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
+                                         const LinearProblem& problem, const LinearVectors& v,
+                                         float* direction, float* change, float* partial, char* chip) {
   constexpr int most = 20;
   const int size = sheet.size;
   float *residual = v.residual, *preconditioned = v.solved + 3 * size;
@@ -118,32 +128,6 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     v.search[i] = four;
     if (v.near != v.search) put_in_all(v.near + i, four);
   };
-  // The right-hand side, and where the restrictions have the solution start.
-  int moved = 0;
-  for_own_vertices(
-      size,
-      [&](int i) {
-        const int at = restrictions.count == 0 ? -1 : restrictions.of_place[i];
-        const float* correction = at < 0 ? nullptr : restrictions.list[at].correction;
-        const Numbers3 start = at < 0 ? Numbers3{} : Numbers3{correction[0], correction[1], correction[2]};
-        return NumbersPair{numbers_at(problem.gradient, i), start};
-      },
-      [&](int i, const NumbersPair& from) {
-        const auto& [gradient, start] = from;
-        moved |= start.x != 0 || start.y != 0 || start.z != 0;
-        put({-gradient.x, -gradient.y, -gradient.z}, residual, i);
-        put(start, direction, i);
-        put({}, change, i);
-        put_search(i, start);
-      });
-  const bool starts_elsewhere = any_of_team(moved != 0);
-  if (starts_elsewhere) {
-    multiply_search();
-    synchronize_team();
-    for_own_vertices(
-        size, [&](int i) { return numbers_at(v.image, i); },
-        [&](int i, const Numbers3& own) { put(own, change, i); });
-  }
   // The norm of the residual, of which `step` times the image is taken off. What the restrictions leave
   // becomes the next right-hand side of the factor.
   const auto take_residual = [&](float step) {
@@ -180,8 +164,41 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
           put(next.second, change, i);
         });
   };
-  float norm = take_residual(starts_elsewhere ? 1.0f : 0.0f), previous = 0;
-  const float target = fmaxf(0.1f * norm, problem.tolerance);
+  // The right-hand side, and where the solution starts: as the restrictions have it, and at the last
+  // direction where that is no worse than none.
+  float norm = 0, previous = 0;
+  for (bool at_last = problem.first_norm > 0;; at_last = false) {
+    int moved = 0;
+    for_own_vertices(
+        size,
+        [&](int i) {
+          const int at = restrictions.count == 0 ? -1 : restrictions.of_place[i];
+          const float* correction = at < 0 ? nullptr : restrictions.list[at].correction;
+          Numbers3 start = at_last ? free_part(restrictions, i, numbers_at(direction, i)) : Numbers3{};
+          if (at >= 0) start = {start.x + correction[0], start.y + correction[1], start.z + correction[2]};
+          return NumbersPair{numbers_at(problem.gradient, i), start};
+        },
+        [&](int i, const NumbersPair& from) {
+          const auto& [gradient, start] = from;
+          moved |= start.x != 0 || start.y != 0 || start.z != 0;
+          put({-gradient.x, -gradient.y, -gradient.z}, residual, i);
+          put(start, direction, i);
+          put({}, change, i);
+          put_search(i, start);
+        });
+    const bool starts_elsewhere = any_of_team(moved != 0);
+    if (starts_elsewhere) {
+      multiply_search();
+      synchronize_team();
+      for_own_vertices(
+          size, [&](int i) { return numbers_at(v.image, i); },
+          [&](int i, const Numbers3& own) { put(own, change, i); });
+    }
+    norm = take_residual(starts_elsewhere ? 1.0f : 0.0f);
+    if (!at_last || norm <= problem.first_norm) break;
+  }
+  const float first_norm = problem.first_norm > 0 ? problem.first_norm : norm;
+  const float target = fmaxf(enough * first_norm, problem.tolerance);
   int iteration = 0;
   while (norm > target && iteration < most) {
     ++iteration;
@@ -216,7 +233,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     norm = take_residual(step);
   }
   synchronize_team();
-  return iteration;
+  return {iteration, first_norm};
 }
 
 }  // namespace flash::sim::cuda

@@ -37,12 +37,12 @@ __device__ inline void solve_small(double* small, int count) {
 }
 
 /// The generalized minimal residual method for L A x = P b, as gmres of the CPU: `direction` = x over the
-/// free directions, `change` = A x. Returns the number of solves with the factor, to all threads.
+/// free directions, `change` = A x. It starts at zero. Returns the same to all threads.
 template <int parts>
-__device__ __noinline__ int generalized_residuals(const FrontTables& fronts, const SheetTables& sheet,
-                                                  const LinearProblem& problem, const LinearVectors& v,
-                                                  const CoupledMemory& memory, float* direction,
-                                                  float* change, float* partial, char* chip) {
+__device__ __noinline__ LinearEnd generalized_residuals(const FrontTables& fronts, const SheetTables& sheet,
+                                                        const LinearProblem& problem, const LinearVectors& v,
+                                                        const CoupledMemory& memory, float* direction,
+                                                        float* change, float* partial, char* chip) {
   const int size = 3 * sheet.size, first = team_rank(), step = team_size();
   // Each block fills its copy of a vector on chip.
   const int first_of_copy = static_cast<int>(threadIdx.x);
@@ -90,7 +90,7 @@ __device__ __noinline__ int generalized_residuals(const FrontTables& fronts, con
   multiply_search();
   apply_left(v.image);
   for (int i = first; i < size; i += step) v.residual[i] -= v.image[i];
-  const float norm = norm_of(v.residual), target = fmaxf(0.1f * norm, problem.tolerance);
+  const float norm = norm_of(v.residual), target = fmaxf(enough * norm, problem.tolerance);
   double* right = memory.small + most_directions * small_columns + 2 * most_directions;
   if (first == 0) right[0] = norm;
   for (int i = first; i < size; i += step) memory.basis[i] = v.residual[i] / norm;
@@ -142,7 +142,7 @@ __device__ __noinline__ int generalized_residuals(const FrontTables& fronts, con
   multiply_search();
   for (int i = first; i < size; i += step) change[i] = v.image[i];
   synchronize_team();
-  return count;
+  return {count, 0};
 }
 
 }  // namespace flash::sim::cuda

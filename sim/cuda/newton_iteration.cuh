@@ -107,8 +107,9 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
 /// On-chip bytes for sums over the team, before what a solve needs.
 inline constexpr int linear_partial_bytes = seats * static_cast<int>(sizeof(float));
 
-/// Solves the linear problem. Returns the number of solves with the factor.
-__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step, bool coupled) {
+/// Solves the linear problem. `first_norm`: as in LinearProblem.
+__device__ __noinline__ LinearEnd find_direction(const Work& w, const StepProblem& step, bool coupled,
+                                                 float first_norm) {
   constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
@@ -120,7 +121,8 @@ __device__ __noinline__ int find_direction(const Work& w, const StepProblem& ste
       m.gradient,
       step.restrictions,
       static_cast<float>(linear_tolerance *
-                         fmin(w.replay.tolerance * step.material->force_scale, w.now.residual))};
+                         fmin(w.replay.tolerance * step.material->force_scale, w.now.residual)),
+      first_norm};
   char* chip = shared_memory<char>();
   const auto on_chip = [&](int at, auto* otherwise) {
     return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
@@ -134,13 +136,13 @@ __device__ __noinline__ int find_direction(const Work& w, const StepProblem& ste
                                  {m.clocks}};
   float* partial = reinterpret_cast<float*>(chip);
   char* rest = chip + linear_partial_bytes;
-  const int solves = coupled
-                         ? generalized_residuals<half_parts>(w.replay.fronts, tables, problem, vectors,
-                                                             m.coupled, m.direction, m.change, partial, rest)
-                         : conjugate_gradients<half_parts>(w.replay.fronts, tables, problem, vectors,
-                                                           m.direction, m.change, partial, rest);
+  const LinearEnd end =
+      coupled ? generalized_residuals<half_parts>(w.replay.fronts, tables, problem, vectors, m.coupled,
+                                                  m.direction, m.change, partial, rest)
+              : conjugate_gradients<half_parts>(w.replay.fronts, tables, problem, vectors, m.direction,
+                                                m.change, partial, rest);
   count_phase(m, ReplayPhase::directions);
-  return solves;
+  return end;
 }
 
 /// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
@@ -156,12 +158,14 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   synchronize_team();
   w.refactor = false;
   count_phase(m, ReplayPhase::rest);
+  float first_norm = 0;
   for (int solved = 1;; ++solved) {
     restrict_by(w, w.linear, coupled, step);
     count_phase(m, ReplayPhase::contact);
-    const int solves = find_direction(w, step, coupled);
-    stats.solves += solves;
-    w.refactor = w.refactor || solves > w.replay.stale_factor_solves;
+    const LinearEnd end = find_direction(w, step, coupled, first_norm);
+    first_norm = end.first_norm;
+    stats.solves += end.solves;
+    w.refactor = w.refactor || end.solves > w.replay.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.
     if (!touches || solved == linear_problems) return;
     const bool changed =

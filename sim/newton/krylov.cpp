@@ -9,7 +9,6 @@
 namespace flash::sim {
 namespace {
 
-constexpr double enough = 0.1;       ///< share of the first residual: a direction needs a digit or two
 constexpr int most_directions = 40;  ///< of GMRES, which keeps all of them
 
 template <typename Scalar>
@@ -43,17 +42,34 @@ KrylovSolution<Scalar> conjugate_gradients(const RestrictedProblem<Scalar>& prob
   using Vector = OrderedVector<Scalar>;
   const LinearKernels<Scalar>& kernels = linear<Scalar>(all_kernels);
   const long size = problem.right.size();
-  Vector residual = problem.right, preconditioned(size), search(size), image(size);
+  Vector residual(size), preconditioned(size), search(size), image(size);
   OrderedVector<float> single(size);
-  KrylovSolution<Scalar> solution{problem.start, Vector::Zero(size)};
-  if (!problem.start.isZero(0)) {
-    problem.matrix.multiply(solution.x.data(), solution.image.data());
-    residual -= solution.image;
-  }
-  apply(problem.free, residual);
+  KrylovSolution<Scalar> solution;
   const auto norm_of = [&](const Vector& v) { return std::sqrt(kernels.dot(size, v.data(), v.data())); };
-  Scalar norm = norm_of(residual), previous = 0;
-  const Scalar target = std::max(Scalar(enough) * norm, static_cast<Scalar>(problem.tolerance));
+  const auto begin_at = [&](const Vector& x) {
+    solution.x = x;
+    solution.image = Vector::Zero(size);
+    residual = problem.right;
+    if (!x.isZero(0)) {
+      problem.matrix.multiply(solution.x.data(), solution.image.data());
+      residual -= solution.image;
+    }
+    apply(problem.free, residual);
+    return norm_of(residual);
+  };
+  // At the last solution, where that is no worse than none.
+  Scalar norm = 0, previous = 0;
+  bool goes_on = problem.first_norm > 0;
+  if (goes_on) {
+    Vector last = problem.last;
+    apply(problem.free, last);
+    norm = begin_at(last + problem.start);
+    goes_on = norm <= static_cast<Scalar>(problem.first_norm);
+  }
+  if (!goes_on) norm = begin_at(problem.start);
+  solution.first_norm = problem.first_norm > 0 ? problem.first_norm : norm;
+  const Scalar target =
+      static_cast<Scalar>(std::max(problem.enough * solution.first_norm, problem.tolerance));
   while (norm > target && solution.solves < problem.most_solves) {
     const bool first = solution.solves++ == 0;
     precondition(problem.preconditioner, residual, single, preconditioned);
@@ -94,7 +110,8 @@ KrylovSolution<Scalar> gmres(const RestrictedProblem<Scalar>& problem,
     residual -= image;
   }
   const Scalar norm = residual.norm();
-  const Scalar target = std::max(Scalar(enough) * norm, static_cast<Scalar>(problem.tolerance));
+  const Scalar target =
+      std::max(static_cast<Scalar>(problem.enough) * norm, static_cast<Scalar>(problem.tolerance));
   if (norm > target) {
     Eigen::Matrix<Scalar, Eigen::Dynamic, Eigen::Dynamic> basis(size, most_directions + 1),
         directions(size, most_directions);

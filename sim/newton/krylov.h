@@ -22,6 +22,10 @@ struct VertexMatrix {
   }
 };
 
+/// Share of the first residual of a linear problem that is small enough. Twice of it takes as many solves a
+/// step and more Newton iterations (docs/performance.md).
+inline constexpr double enough_of_first = 0.05;
+
 /// P A x = P b over the free directions, P their projector. In the others x is given.
 template <typename Scalar>
 struct RestrictedProblem {
@@ -30,14 +34,19 @@ struct RestrictedProblem {
   std::vector<VertexMatrix<Scalar>> free;  ///< P
   OrderedVector<Scalar> right;             ///< b
   OrderedVector<Scalar> start;             ///< x, zero in the free directions
-  double tolerance;                        ///< residual that is small enough; so is a tenth of the first
+  double tolerance;                        ///< residual that is small enough
   int most_solves = 20;                    ///< iterations of conjugate gradients
+  double enough = enough_of_first;         ///< share of the first residual that is small enough too
+  // The solution and the first residual of a problem like this one, from which conjugate gradients go on.
+  OrderedVector<Scalar> last = {};
+  double first_norm = 0;  ///< 0: there is none
 };
 
 template <typename Scalar>
 struct KrylovSolution {
   OrderedVector<Scalar> x, image;  ///< x and A x
   int solves = 0;                  ///< with the preconditioner
+  double first_norm = 0;           ///< residual that the problem, or the one before it, began with
 };
 
 /// Conjugate gradients for a symmetric A; they stop where it curves down (Steihaug 1983).

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double sheet_neighbours = 6, solid_neighbours = 14;  ///< of a vertex, in a regular linear mesh
 constexpr int most_solves = 20, most_layered_solves = 100;     ///< of a linear problem
+/// As enough_of_first where layers touch, which the preconditioner does not know: solves are dear there.
+constexpr double enough_of_layered = 0.1;
 constexpr double little = 0.01;  ///< share of the least eigenvalue that rounding may change
 
 /// The matrices on the vertices of the constraints: what each leaves free, and its coupling where there is
@@ -74,6 +76,7 @@ void NewtonMatrix::assign(const BlockValues<double>& blocks, bool sparse,
     for (int c = 0; c < 3; ++c) largest = std::max(largest, std::abs(blocks[9 * k + 4 * c]));
   for (const TouchStiffness& layer : layers) largest = std::max(largest, norm(layer.stiffness));
   layered_ = !layers.empty();
+  first_norm_ = 0;
   const double mean = 2.0 * static_cast<double>(plan_->edge_count) / plan_->pattern.size;
   const double neighbours = has_solids(plan_->sheet) ? std::max(solid_neighbours, mean) : sheet_neighbours;
   single_ = std::numeric_limits<float>::epsilon() * neighbours * largest < little * least_eigenvalue;
@@ -96,7 +99,8 @@ RestrictedProblem<Scalar> NewtonMatrix::restricted(SheetProduct<Scalar>& product
                                     Vector::Zero(size),
                                     Vector::Zero(size),
                                     tolerance,
-                                    layered_ ? most_layered_solves : most_solves};
+                                    layered_ ? most_layered_solves : most_solves,
+                                    layered_ ? enough_of_layered : enough_of_first};
   for (int i = 0; i < gradient.rows(); ++i)
     problem.right.template segment<3>(4L * position[i]) = -gradient.row(i).transpose().cast<Scalar>();
   for (const VertexConstraint& constraint : contacts.constraints)
@@ -120,8 +124,17 @@ int NewtonMatrix::take(const KrylovSolution<Scalar>& solution, Points& direction
 int NewtonMatrix::solve(const ContactSet& contacts, const Points& gradient, double tolerance,
                         Points& direction, Points& force) {
   return with_product([&](auto& product) {
-    const auto problem = restricted(product, contacts, gradient, tolerance);
-    return take(conjugate_gradients(problem, *plan_->kernels), direction, force);
+    auto problem = restricted(product, contacts, gradient, tolerance);
+    if (first_norm_ > 0) {
+      problem.first_norm = first_norm_;
+      problem.last = decltype(problem.last)::Zero(problem.start.size());
+      for (int i = 0; i < direction.rows(); ++i)
+        problem.last.template segment<3>(4L * plan_->symbolic->position[i]) =
+            direction.row(i).transpose().template cast<typename decltype(problem.last)::Scalar>();
+    }
+    const auto solution = conjugate_gradients(problem, *plan_->kernels);
+    first_norm_ = solution.first_norm;
+    return take(solution, direction, force);
   });
 }
 

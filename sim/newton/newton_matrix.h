@@ -39,8 +39,9 @@ class NewtonMatrix {
               double least_eigenvalue, const std::vector<TouchStiffness>& layers = {});
 
   /// Sets `direction` to the solution of matrix * direction = -gradient over the free directions, and to the
-  /// constraints' corrections in the others. It is solved to a residual of `tolerance` [N] or a tenth of the
-  /// first. Adds to `force` what the direction changes. Returns the number of solves with the factor.
+  /// constraints' corrections in the others. It is solved to a residual of `tolerance` [N] or to a share of
+  /// the first with this matrix, after which it goes on from `direction`. Adds to `force` what the direction
+  /// changes. Returns the number of solves with the factor.
   int solve(const ContactSet& contacts, const data::Points& gradient, double tolerance,
             data::Points& direction, data::Points& force);
 
@@ -66,8 +67,9 @@ class NewtonMatrix {
 
   std::shared_ptr<const SheetPlan> plan_;
   BlockCholesky<float> factor_;
-  bool single_ = true;    ///< whether single precision does
-  bool layered_ = false;  ///< whether layers touch, whose pairs the preconditioner does not know
+  bool single_ = true;     ///< whether single precision does
+  bool layered_ = false;   ///< whether layers touch, whose pairs the preconditioner does not know
+  double first_norm_ = 0;  ///< residual that the first problem with the matrix began with [N]; 0: none yet
   SheetProduct<float> single_product_;
   SheetProduct<double> double_product_;
 };
