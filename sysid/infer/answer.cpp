@@ -332,39 +332,12 @@ Fit fit_of(const Task& task, const Found& found, const Answer& answer) {
   return fit;
 }
 
-/// The point of least score of each recording, of those at the values of `axes`; `of_all` where none has one.
-std::vector<std::vector<double>> best_of_each(const GridResults& results, const std::vector<Axis>& axes,
-                                              std::size_t recordings, const std::vector<double>& of_all) {
-  std::vector<std::vector<double>> best(recordings, of_all);
-  std::vector<double> least(recordings, INFINITY);
-  for (const CandidateResult& candidate : results.candidates) {
-    bool among = candidate.recordings.size() == recordings;
-    for (std::size_t k = 0; among && k < axes.size(); ++k)
-      among = std::find(axes[k].values.begin(), axes[k].values.end(), candidate.values[k]) !=
-              axes[k].values.end();
-    for (std::size_t r = 0; among && r < recordings; ++r)
-      if (candidate.recordings[r].score < least[r]) {
-        least[r] = candidate.recordings[r].score;
-        best[r] = candidate.values;
-      }
-  }
-  return best;
-}
-
-/// By which motions on the search's own mesh are corrected.
-KnownError to_no_cells(Motions own, Motions no_cells) {
-  return {{{-1, std::make_shared<const Motions>(std::move(own))},
-           {1, std::make_shared<const Motions>(std::move(no_cells))}},
-          true,
-          true};
-}
-
 /// What each recording makes likeliest by itself, over all that was ever searched; nothing of a single one.
 std::vector<Alone> alone_over_all(const Task& task, const Found& found, const GridResults& results) {
   if (task.replays.size() < 2) return {};
   const std::vector<Axis>& axes = task.grid.axes;
   const std::vector<std::vector<double>> at =
-      best_of_each(results, axes, task.replays.size(), found.look.posterior.values());
+      best_alone(results, axes, task.replays.size(), found.look.posterior.values());
   std::vector<KnownError> errors = found.errors;
   if (found.emulator.share != own_mesh)
     errors.push_back(to_no_cells(Motions{task.replays, found.estimate.motions},

@@ -48,6 +48,31 @@ std::vector<double> mean_of(const std::vector<Alone>& alone, const std::vector<A
 
 }  // namespace
 
+std::vector<std::vector<double>> best_alone(const GridResults& results, const std::vector<Axis>& axes,
+                                            std::size_t recordings, const std::vector<double>& of_all) {
+  std::vector<std::vector<double>> best(recordings, of_all);
+  std::vector<double> least(recordings, INFINITY);
+  for (const CandidateResult& candidate : results.candidates) {
+    bool among = candidate.recordings.size() == recordings;
+    for (std::size_t k = 0; among && k < axes.size(); ++k)
+      among = std::find(axes[k].values.begin(), axes[k].values.end(), candidate.values[k]) !=
+              axes[k].values.end();
+    for (std::size_t r = 0; among && r < recordings; ++r)
+      if (candidate.recordings[r].score < least[r]) {
+        least[r] = candidate.recordings[r].score;
+        best[r] = candidate.values;
+      }
+  }
+  return best;
+}
+
+KnownError to_no_cells(Motions own, Motions there) {
+  return {{{-1, std::make_shared<const Motions>(std::move(own))},
+           {1, std::make_shared<const Motions>(std::move(there))}},
+          true,
+          true};
+}
+
 std::vector<Alone> likeliest_alone(const Task& task, const Emulator& emulator, const std::vector<Axis>& axes,
                                    const std::vector<std::vector<double>>& at,
                                    const std::vector<KnownError>& errors) {

@@ -14,6 +14,13 @@ struct Alone {
   Extent extent;                    ///< of what is likely
 };
 
+/// The point of least score of each recording, of those at the values of `axes`; `of_all` where none has one.
+std::vector<std::vector<double>> best_alone(const GridResults& results, const std::vector<Axis>& axes,
+                                            std::size_t recordings, const std::vector<double>& of_all);
+
+/// By which motions on the search's own mesh are corrected. `there`: the same on cells of no size.
+KnownError to_no_cells(Motions own, Motions there);
+
 /// Of each recording, by an emulator of them all on the search's own mesh, over the whole of `axes`, at whose
 /// values it is exact. `at`: values of each about which its likelihood is linear first. `errors`: all that
 /// are known.

@@ -7,6 +7,27 @@
 namespace flash::sysid {
 namespace {
 
+/// A search for bending that came to 2e-4 N m.
+struct BendingSearch {
+  GridSettings grid;
+  Answer answer;
+
+  explicit BendingSearch(std::size_t recordings = 1) {
+    grid.base.material = short_lift_material();
+    grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
+    answer.best = 0;
+    answer.values = {2e-4};
+    answer.estimate.score = 0.005;
+    answer.estimate.status = CandidateStatus::ok;
+    answer.estimate.recordings.resize(recordings);
+    answer.fit.score = answer.estimate;
+  }
+  Summary summary(const std::vector<Replay>& replays) const {
+    const GridResults results{grid.axes, std::vector<std::string>(replays.size(), "lift"), {answer.estimate}};
+    return summarize(results, answer, replays, grid);
+  }
+};
+
 // Without weight a sheet shows its bending by its inertia alone: most likely the file is wrong.
 TEST(Summarize, ABendingFoundWithoutGravityIsDoubted) {
   const data::TemporaryFolder folder;
@@ -43,19 +64,10 @@ TEST(Summarize, ABendingFoundWithoutGravityIsDoubted) {
 TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays = {short_lift(folder)};
-  GridSettings grid;
-  grid.base.material = short_lift_material();
-  grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
-  Answer answer;
-  answer.best = 0;
-  answer.values = {2e-4};
-  answer.estimate.score = 0.005;
-  answer.estimate.status = CandidateStatus::ok;
-  answer.estimate.recordings.resize(1);
-  answer.fit.score = answer.estimate;
+  BendingSearch search;
+  Answer& answer = search.answer;
   answer.misfits = {{0.001, 0.001, 0.0052, 0.0052, 0.3, 0.1, 90, true, 0.0028, 80, 9}};
-  const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
-  const auto first = [&] { return summarize(results, answer, replays, grid).warnings; };
+  const auto first = [&] { return search.summary(replays).warnings; };
   ASSERT_FALSE(first().empty());
   EXPECT_EQ(
       first().front(),
@@ -74,19 +86,8 @@ TEST(Summarize, SaysThatAModelDoesNotFitAndWhatItsKeyframesAreWorth) {
 TEST(Summarize, SaysThatCellsDoNotDivideTheGraspedPatch) {
   const auto warned = [](const std::string& mesh) {
     const data::TemporaryFolder folder;
-    const std::vector<Replay> replays = {short_lift(folder, mesh)};
-    GridSettings grid;
-    grid.base.material = short_lift_material();
-    grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
-    Answer answer;
-    answer.best = 0;
-    answer.values = {2e-4};
-    answer.estimate.status = CandidateStatus::ok;
-    answer.estimate.recordings.resize(1);
-    answer.fit.score = answer.estimate;
-    const GridResults results{grid.axes, {"lift"}, {answer.estimate}};
     std::string all;
-    for (const std::string& warning : summarize(results, answer, replays, grid).warnings)
+    for (const std::string& warning : BendingSearch().summary({short_lift(folder, mesh)}).warnings)
       all += warning + "\n";
     return all;
   };
@@ -101,25 +102,16 @@ TEST(Summarize, SaysThatCellsDoNotDivideTheGraspedPatch) {
 TEST(Summarize, RecordingsThatContradictEachOtherCannotBeUsed) {
   const data::TemporaryFolder folder;
   const std::vector<Replay> replays(2, short_lift(folder));
-  GridSettings grid;
-  grid.base.material = short_lift_material();
-  grid.axes = {parse_axis("bending", "1e-4,2e-4,4e-4")};
-  Answer answer;
-  answer.best = 0;
-  answer.values = {2e-4};
-  answer.estimate.status = CandidateStatus::ok;
-  answer.estimate.recordings.resize(2);
-  answer.fit.score = answer.estimate;
-  answer.agreement = Agreement{30, 1e-5, {{1.5e-4}, {3e-4}}, {{0.1}, {0.1}}};
-  const GridResults results{grid.axes, {"lift", "lift"}, {answer.estimate}};
-  Summary summary = summarize(results, answer, replays, grid);
+  BendingSearch search(2);
+  search.answer.agreement = Agreement{30, 1e-5, {{1.5e-4}, {3e-4}}, {{0.1}, {0.1}}};
+  const Summary summary = search.summary(replays);
   EXPECT_EQ(summary.exit_code, 3);
   ASSERT_FALSE(summary.warnings.empty());
   EXPECT_NE(summary.warnings.front().find("lift asks for bending 0.00015, lift asks for bending 0.0003"),
             std::string::npos)
       << summary.warnings.front();
-  answer.agreement->chance = 0.02;
-  EXPECT_EQ(summarize(results, answer, replays, grid).exit_code, 0);
+  search.answer.agreement->chance = 0.02;
+  EXPECT_EQ(search.summary(replays).exit_code, 0);
 }
 
 // Bending of cells of no size beside a score of coarse ones would say that a good fit is a bad one.
