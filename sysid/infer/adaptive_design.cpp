@@ -223,8 +223,11 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
       if (k == axes.size()) {
         if (stop != nullptr && *stop) throw data::Stopped();
         motions.take(slices);
+        FittedNearby::Fitted fitted = nearby.guess();
         deviance[static_cast<Eigen::Index>(first)] = likelihood.deviance(
-            [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); });
+            [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); },
+            fitted);
+        nearby.add(std::move(fitted));
         if (told) told({0, 1}, {});
         return;
       }
