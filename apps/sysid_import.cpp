@@ -110,8 +110,7 @@ int run_import(const CLI::App& verb, ImportVerbOptions options) {
   settings.overwrite = settings.accept_unusable = options.common.force;
   if (!options.offset.empty()) settings.nuisance.offset = parse_bounds(options.offset);
   settings.tool_at_patch = options.tool_at == "patch";
-  if (options.shape == "point") settings.shape = data::GraspShape::point;
-  if (options.shape == "pinch") settings.shape = data::GraspShape::pinch;
+  settings.shape = data::parse_grasp_shape(options.shape).value_or(settings.shape);
   if (verb.count("--grasp-within") > 0) options.texts.within = options.within;
   if (verb.count("--table-z") > 0) settings.table_height = options.table_height;
   if (verb.count("--heading") > 0) settings.heading = options.heading_degrees * M_PI / 180;

@@ -183,9 +183,7 @@ sysid::ReplaySettings replay_settings(const CLI::App& verb, const ReplayOptions&
     settings.self_contact =
         sim::SelfContact{.thickness = options.self_contact, .friction = options.layer_friction};
   if (options.grasp_within > 0) settings.grasp_within = options.grasp_within;
-  if (options.grasp_shape == "clamp") settings.grasp_shape = data::GraspShape::clamp;
-  if (options.grasp_shape == "point") settings.grasp_shape = data::GraspShape::point;
-  if (options.grasp_shape == "pinch") settings.grasp_shape = data::GraspShape::pinch;
+  settings.grasp_shape = data::parse_grasp_shape(options.grasp_shape);  // empty: as recorded
   settings.solver.stop = &stop_on_signals();
   if (verb.count("--from") > 0) settings.score_from = options.from;
   if (verb.count("--to") > 0) settings.score_to = options.to;

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "apps/command_line.h"
+#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/message_line.h"
 #include "data/text.h"
@@ -17,6 +18,7 @@
 #include "sysid/report/parameter_label.h"
 #include "sysid/report/recording_names.h"
 #include "sysid/report/report.h"
+#include "sysid/report/residuals_file.h"
 #include "sysid/report/summarize.h"
 
 namespace flash {
@@ -163,6 +165,14 @@ int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptio
   summary.device = search.device == sim::Device::cuda ? "cuda" : "cpu";
   summary.wall_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - search.begin).count();
+  const fs::path residuals = fs::path(search.out) / "residuals.csv";
+  if (!answer.residuals.empty()) {
+    const std::string text = sysid::residuals_text(answer.residuals);
+    summary.residuals_digest = sysid::residuals_digest(text);
+    data::write_atomically(residuals.string(), text);
+  } else {
+    fs::remove(residuals);
+  }
   sysid::save_summary(summary, (fs::path(search.out) / "summary.json").string());
   sysid::ReportSettings report;
   for (std::size_t k = 0; k < search.map.size() && k < 2; ++k) report.map_axes[k] = search.map[k];

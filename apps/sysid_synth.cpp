@@ -36,6 +36,7 @@ struct SynthOptions {
   std::vector<std::string> holds;
   std::vector<std::string> cameras;
   std::string resolution = "160x120";
+  std::string grasp_shape = "clamp";
   double field_of_view = 60;
   std::vector<double> displacement, offset;
   bool no_gripper = false;
@@ -169,6 +170,7 @@ int run_synth(SynthOptions options) {
   settings.cameras = make_cameras(options, mesh);
   if (!options.displacement.empty()) settings.displacement = vector_of(options.displacement);
   if (!options.offset.empty()) settings.cloud_offset = vector_of(options.offset);
+  settings.grasp_shape = data::parse_grasp_shape(options.grasp_shape).value_or(settings.grasp_shape);
   if (options.no_gripper) settings.gripper_half_extents.setZero();
 
   const data::SheetMaterial material = sysid::make_candidate(base, axes, values).material;
@@ -243,6 +245,9 @@ void add_synth_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--grasp-within", synth.grasp_within, "Size of the grasped patch [m]")
       ->check(positive_number())
+      ->capture_default_str();
+  verb->add_option("--grasp-shape", options->grasp_shape, "How the patch sits in the fingers")
+      ->check(CLI::IsMember({"clamp", "point"}))
       ->capture_default_str();
   verb->add_option("--camera", options->cameras,
                    "Position x,y,z of a camera [m], aimed at the sheet; repeat for more")

@@ -16,6 +16,7 @@ void add_replay_verb(CLI::App& app, Action& action);
 void add_fit_verb(CLI::App& app, Action& action);
 void add_plan_verb(CLI::App& app, Action& action);
 void add_predict_verb(CLI::App& app, Action& action);
+void add_compare_verb(CLI::App& app, Action& action);
 void add_repeatability_verb(CLI::App& app, Action& action);
 void add_synth_verb(CLI::App& app, Action& action);
 void add_import_verb(CLI::App& app, Action& action);

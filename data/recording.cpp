@@ -115,10 +115,9 @@ void read_trajectories(const JsonObject& file, Recording& recording) {
 }
 
 GraspShape read_shape(const JsonObject& grasp) {
-  const std::string shape = grasp.string("shape", "clamp");
-  for (const GraspShape candidate : {GraspShape::clamp, GraspShape::point, GraspShape::pinch})
-    if (shape == to_string(candidate)) return candidate;
-  throw grasp.error("shape", "clamp, point or pinch");
+  const std::optional<GraspShape> shape = parse_grasp_shape(grasp.string("shape", "clamp"));
+  if (!shape) throw grasp.error("shape", "clamp, point or pinch");
+  return *shape;
 }
 
 void read_grasps(const JsonObject& file, Recording& recording) {
@@ -363,6 +362,12 @@ void load_object_mesh(const std::string& mesh, const std::string& source, const 
   }
   recording.tetrahedra.resize(0, 4);
   recording.mesh = is_mesh_spec(mesh) ? parse_mesh_spec(mesh, source, field) : load_triangle_mesh(mesh);
+}
+
+std::optional<GraspShape> parse_grasp_shape(const std::string& text) {
+  for (const GraspShape shape : {GraspShape::clamp, GraspShape::point, GraspShape::pinch})
+    if (text == to_string(shape)) return shape;
+  return std::nullopt;
 }
 
 const char* to_string(GraspShape shape) {

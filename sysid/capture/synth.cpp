@@ -148,6 +148,7 @@ data::Recording recording_of(const data::TriangleMesh& mesh, const std::string& 
     data::RecordedGrasp grasp;
     grasp.gripper = hand.name;
     grasp.select = hand.select;
+    grasp.shape = settings.grasp_shape;
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
     const std::vector<int> held = data::select_vertices(recording, grasp);
     for (int vertex : held)

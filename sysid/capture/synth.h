@@ -28,6 +28,7 @@ struct SynthSettings {
   double rest = 0.0;                            ///< recorded after it [s]
   double keyframe_rate = 10.0;                  ///< [1/s]
   double grasp_within = 0.0201;                 ///< of the corner, along each axis [m]
+  data::GraspShape grasp_shape = data::GraspShape::clamp;  ///< or point: a pinch needs time to close
   std::vector<SynthCamera> cameras;
   double depth_noise = 0.001;  ///< along the ray [m]
   double dropped = 0.0;        ///< share of keyframes lost

@@ -485,6 +485,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   answer.estimate = score_motions(replays, answer.motions, grid.score);
   answer.estimate.values = answer.values;
   answer.fit = fit_of(task, *found, answer);
+  answer.residuals = left_residuals(
+      likelihood_about(task, *found, answer.fit.replays, answer.values, answer.fit.motions, held));
   answer.parameters = findings_of(results, ranges, posterior);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);

@@ -9,6 +9,7 @@
 #include "sysid/infer/answer_work.h"
 #include "sysid/infer/discrepancy.h"
 #include "sysid/infer/finding.h"
+#include "sysid/infer/model_comparison.h"
 #include "sysid/infer/solver_check.h"
 
 namespace flash::sysid {
@@ -39,6 +40,7 @@ struct Answer {
   Eigen::VectorXd weights;      ///< of each sample, in the unit of the asset; empty where the weight is known
   Eigen::MatrixXd samples;      ///< of the posterior, values of the axes, a draw a row
   std::vector<Misfit> misfits;  ///< one a recording
+  std::vector<LeftResiduals> residuals;         ///< of `fit`, one a recording
   std::optional<Agreement> agreement;           ///< of several recordings
   std::vector<SolverCheck> checks;              ///< of the estimate; empty without them
   std::vector<std::optional<double>> horizons;  ///< of each recording [s]

@@ -234,6 +234,22 @@ std::string observed_terms(const std::vector<Replay>& replays, const Objective& 
   return terms;
 }
 
+std::string sigmas_of(const Objective& objective) {
+  return "cloud " + mm(objective.cloud_sigma) + ", contour " + mm(objective.contour_sigma) + ", markers " +
+         mm(objective.marker_sigma) + ", force " + data::format_short(objective.force_sigma) + " N";
+}
+
+/// Of the grasps as they were simulated, each once: "clamp".
+std::string grasp_shapes(const std::vector<Replay>& replays) {
+  std::string shapes;
+  for (const Replay& replay : replays)
+    for (const data::RecordedGrasp& grasp : replay.recording.grasps) {
+      const std::string shape = data::to_string(shape_of(grasp, replay.settings));
+      if (shapes.find(shape) == std::string::npos) shapes += (shapes.empty() ? "" : ", ") + shape;
+    }
+  return shapes;
+}
+
 void add_settings(Summary& summary, const std::vector<Replay>& replays, const GridSettings& settings) {
   const Replay& replay = replays.front();
   auto& texts = summary.settings;
@@ -266,6 +282,8 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
       : robust.kind == RobustKind::huber ? "Huber, " + data::format_short(1000 * robust.huber_delta) + " mm"
                                          : "mean";
   texts["observed"] = observed_terms(replays, settings.score.objective);
+  texts["sigmas"] = sigmas_of(settings.score.objective);
+  if (const std::string shapes = grasp_shapes(replays); !shapes.empty()) texts["grasp_shape"] = shapes;
 }
 
 std::optional<MarkerFit> markers_of(const Fit& fit, std::size_t r, double noise) {
@@ -352,6 +370,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     summary.recordings.push_back(
         summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
     summary.recordings.back().markers = markers_of(answer.fit, r, settings.score.objective.marker_sigma);
+    if (r < answer.residuals.size()) summary.recordings.back().error_cost = answer.residuals[r].error_cost;
     if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
   }
   const std::string object = settings.base.solid ? "object" : "cloth";
@@ -369,6 +388,8 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   else
     for (const std::string& warning : warnings_of_grasps(replays)) summary.warnings.push_back(warning);
   summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
+  if (asked.repeatability)
+    summary.settings["repeatability_m"] = data::format_number(*asked.repeatability);
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
   const std::string contradiction =
       contradiction_in(answer, replays, asked.ranges.empty() ? settings.axes : asked.ranges);

@@ -58,6 +58,7 @@ Json to_json(const SummaryRecording& recording) {
   json["time_offset"] = recording.time_offset;
   json["nuisance"] = recording.nuisance;
   json["score"] = number(recording.score);
+  json["error_cost"] = number(recording.error_cost);
   json["noise_m"] = number(recording.misfit.noise);
   json["rough_m"] = number(recording.misfit.rough);
   json["misfit_m"] = number(recording.misfit.size);
@@ -153,7 +154,8 @@ SummaryRecording read_recording(const data::JsonObject& json) {
       {"name",           "sha256",         "offset",      "yaw",         "time_offset",  "nuisance",
        "score",          "noise_m",        "rough_m",     "misfit_m",    "misfit_rms_m", "misfit_explained_m",
        "misfit_reach_s", "misfit_reach_m", "misfit_gain", "model_fits",  "keyframes",    "keyframes_worth",
-       "markers",        "horizon_s",      "frames",      "misfit_draws"});
+       "markers",        "horizon_s",      "frames",      "misfit_draws",
+       "error_cost"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -162,6 +164,7 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   recording.time_offset = json.number("time_offset");
   recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
   recording.score = score_of(json, "score");
+  recording.error_cost = json.optional_number("error_cost").value_or(0);  // earlier programs kept none
   Misfit& misfit = recording.misfit;
   misfit.noise = score_of(json, "noise_m");
   misfit.size = score_of(json, "misfit_m");
@@ -303,6 +306,7 @@ std::string summary_text(const Summary& summary) {
   json["warnings"] = summary.warnings;
   json["exit_code"] = summary.exit_code;
   json["results_digest"] = summary.results_digest;
+  if (!summary.residuals_digest.empty()) json["residuals_digest"] = summary.residuals_digest;
   json["digest"] = digest_of(nlohmann::json::parse(data::format_json(json)));  // of numbers as they are read
   return data::format_json(json);
 }
@@ -320,7 +324,8 @@ Summary load_summary(const std::string& path) {
                       "recordings",       "solver_check", "settings",       "asset",
                       "candidates",       "unconverged",  "device",         "wall_seconds",
                       "warnings",         "exit_code",    "results_digest", "digest",
-                      "next_experiments", "held",         "agreement",      "sample_weights"});
+                      "next_experiments", "held",         "agreement",      "sample_weights",
+                      "residuals_digest"});
   check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
@@ -378,6 +383,7 @@ Summary load_summary(const std::string& path) {
   summary.warnings = typed<std::vector<std::string>>(json, "warnings", "a list of texts");
   summary.exit_code = json.integer("exit_code");
   summary.results_digest = json.string("results_digest", "");
+  summary.residuals_digest = json.string("residuals_digest", "");
   check_values(summary, path);
   if (const std::string digest = digest_of(file); json.string("digest", "") != digest)
     throw json.error(

@@ -36,6 +36,7 @@ struct SummaryRecording {
   double time_offset = 0;                            ///< [s]
   std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
   double score = 0;                                  ///< [m]
+  double error_cost = 0;                             ///< of errors that are fitted, see LeftResiduals
   Misfit misfit;                                     ///< error of the model itself
   std::optional<MarkerFit> markers;                  ///< of what was tracked
   std::optional<double> horizon_s;                   ///< predictable until here [s]
@@ -89,6 +90,7 @@ struct Summary {
   double wall_seconds = 0;
   std::string tool_version;
   std::string results_digest;  ///< of the tables it was made from (candidate_lines.h)
+  std::string residuals_digest;  ///< of residuals.csv; empty: none
   std::vector<std::string> warnings;
   int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used
 };

@@ -1,0 +1,122 @@
+#include "sysid/infer/model_comparison.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <random>
+
+namespace flash::sysid {
+namespace {
+
+constexpr double kNoise = 1e-3;  // [m]
+
+/// A strip of 20 cm seen at `keyframes` times within 0.8 s, `points` at each.
+ObservedRows strip_rows(int keyframes, int points) {
+  ObservedRows rows;
+  const int count = keyframes * points;
+  rows.places.resize(count, 2);
+  rows.weights = Eigen::VectorXd::Ones(count);
+  for (int k = 0; k < keyframes; ++k) rows.times.push_back(0.8 * k / (keyframes - 1));
+  for (int i = 0; i < count; ++i) {
+    rows.keyframe.push_back(i / points);
+    rows.channel.push_back(0);
+    rows.places.row(i) << 0.2 * (i % points + 0.5) / points, 0.025 * ((7 * i) % points) / (points - 1);
+  }
+  return rows;
+}
+
+Eigen::VectorXd normal(std::mt19937& random, Eigen::Index count) {
+  std::normal_distribution<double> draw;
+  return Eigen::VectorXd::NullaryExpr(count, [&](Eigen::Index) { return draw(random); });
+}
+
+/// By what two models differ, of unit root mean square.
+Eigen::VectorXd difference(const ObservedRows& rows) {
+  const Eigen::VectorXd wave = Eigen::VectorXd::NullaryExpr(rows.weights.size(), [&](Eigen::Index i) {
+    const double t = rows.times[static_cast<std::size_t>(rows.keyframe[static_cast<std::size_t>(i)])] / 0.8;
+    return std::sin(M_PI * rows.places(i, 0) / 0.2) * t;
+  });
+  return wave / std::sqrt(wave.squaredNorm() / static_cast<double>(wave.size()));
+}
+
+double excess(const ObservedRows& rows, const Eigen::VectorXd& reference, const Eigen::VectorXd& other) {
+  return excess_deviance({{rows, reference, 0}}, {{rows, other, 0}});
+}
+
+TEST(ModelComparison, WithoutADiscrepancyTheExcessIsThatOfTheNoise) {
+  const ObservedRows rows = strip_rows(9, 40);
+  const Eigen::VectorXd apart = 0.5 * kNoise * difference(rows);
+  const double expected = apart.squaredNorm() / (kNoise * kNoise);  // 90
+  std::mt19937 random(1);
+  double mean = 0;
+  constexpr int kDraws = 40;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd y = kNoise * normal(random, rows.weights.size());
+    mean += excess(rows, y, y + apart) / kDraws;
+    EXPECT_EQ(excess(rows, y, y), 0);
+  }
+  // Huber's function takes 5 %; a discrepancy that is never quite ruled out takes more, never all.
+  EXPECT_LT(mean, expected);
+  EXPECT_GT(mean, 0.3 * expected);
+}
+
+// A discrepancy ten times the noise hides what the noise alone would tell.
+TEST(ModelComparison, WhatADiscrepancyMakesIsNotTold) {
+  const ObservedRows rows = strip_rows(9, 40);
+  const Eigen::Index count = rows.weights.size();
+  std::mt19937 random(2);
+  const DiscrepancyModel any(rows, kNoise * normal(random, count));
+  const std::size_t shape = 10;
+  const Eigen::MatrixXd root =
+      Eigen::MatrixXd(any.covariance(shape) + 1e-9 * Eigen::MatrixXd::Identity(count, count)).llt().matrixL();
+  const Eigen::VectorXd apart = kNoise * difference(rows);
+  constexpr int kDraws = 60;
+  int wrong = 0, told = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd y =
+        kNoise * normal(random, count) + 10 * kNoise * (root * normal(random, count));
+    // The truth's residuals are y; the other model's are farther off or, as the discrepancy falls, nearer.
+    const Eigen::VectorXd other = y + apart;
+    const bool truth_is_nearer = y.cwiseAbs().mean() < other.cwiseAbs().mean();
+    const double over = truth_is_nearer ? excess(rows, y, other) : excess(rows, other, y);
+    told += over > 4;
+    wrong += !truth_is_nearer && over > 4;
+  }
+  EXPECT_LE(wrong, 6);  // 5 % at two standard deviations; 3 expected of 60, 1.8 sd
+  EXPECT_LT(told, kDraws / 2);
+}
+
+TEST(ModelComparison, ErrorsThatWereFittedCost) {
+  const ObservedRows rows = strip_rows(5, 20);
+  std::mt19937 random(3);
+  const Eigen::VectorXd y = kNoise * normal(random, rows.weights.size());
+  EXPECT_NEAR(excess_deviance({{rows, y, 1}}, {{rows, y, 4}}), 3, 1e-12);
+}
+
+TEST(ModelComparison, RecordingsAddUp) {
+  const ObservedRows rows = strip_rows(5, 20);
+  std::mt19937 random(4);
+  const Eigen::VectorXd first = kNoise * normal(random, 100), second = kNoise * normal(random, 100),
+                        apart = kNoise * difference(rows);
+  EXPECT_NEAR(excess_deviance({{rows, first, 0}, {rows, second, 0}},
+                              {{rows, first + apart, 0}, {rows, second + apart, 0}}),
+              excess(rows, first, first + apart) + excess(rows, second, second + apart), 1e-9);
+}
+
+TEST(ModelComparison, OccupiedShareIsThatOfNormalDraws) {
+  std::mt19937 random(5);
+  Eigen::MatrixXd draws(20000, 2);
+  draws.col(0) = 0.01 * normal(random, 20000);
+  draws.col(1) = 0.3 * normal(random, 20000) + draws.col(0);  // one along, one across
+  const double expected = std::log(2 * M_PI * 0.01 * 0.3 / (2.0 * 30.0));
+  EXPECT_NEAR(log_occupied(draws, Eigen::Vector2d(2, 30)), expected, 0.03);  // sd 1 / sqrt(2 n) each
+  // A parameter of which nothing is known costs nothing, and draws that are all alike not all.
+  const Eigen::VectorXd even = Eigen::VectorXd::LinSpaced(1001, 0, 1);
+  EXPECT_NEAR(log_occupied(even, Eigen::VectorXd::Ones(1)), 0.5 * std::log(2 * M_PI / 12), 2e-3);
+  EXPECT_TRUE(std::isfinite(log_occupied(Eigen::MatrixXd::Ones(10, 1), Eigen::VectorXd::Ones(1))));
+  EXPECT_EQ(log_occupied(Eigen::MatrixXd(10, 0), {}), 0);
+}
+
+}  // namespace
+}  // namespace flash::sysid
