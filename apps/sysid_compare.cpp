@@ -87,7 +87,8 @@ void add_compare_verb(CLI::App& app, Action& action) {
   verb->add_option("-o,--out", options->out, "File for the comparison, as comparison.json");
   add_common_options(*verb, options->common);
   verb->footer(
-      "excess: -2 log likelihood over that of the search of least distance, with the model's own error in it. A "
+      "excess: -2 log likelihood over that of the search of least distance, with the model's own error in "
+      "it. A "
       "model of more parameters pays for them.\n"
       "Example:\n"
       "  flash-sysid grid lift --asset cloth.json --bending 1e-5:1e-3:9:log --grasp-shape clamp -o clamp\n"

@@ -79,7 +79,7 @@ void keep_lines_of(const std::string& path, const std::string& header, const std
 }
 
 /// Beside grid.json and the tables.
-constexpr const char* kAnswers[] = {"summary.json", "report.html", "best"};
+constexpr const char* kAnswers[] = {"summary.json", "residuals.csv", "report.html", "best"};
 
 /// Throws where the folder holds what a search would write over. A table without lines does not count: a
 /// search that was killed before its grid.json was written leaves it.

@@ -69,6 +69,18 @@ Extent extent_of(const std::vector<Axis>& axes) {
   return extent;
 }
 
+Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& axes) {
+  Extent extent;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const std::vector<double>& of_axis = axes[k].values;
+    const auto above = std::upper_bound(of_axis.begin(), of_axis.end(), values[k]);
+    const auto below = std::lower_bound(of_axis.begin(), of_axis.end(), values[k]);
+    extent.push_back({below == of_axis.begin() ? of_axis.front() : *(below - 1),
+                      above == of_axis.end() ? of_axis.back() : *above});
+  }
+  return extent;
+}
+
 Extent next_extent(const Extent& extent, const Posterior& posterior, const std::vector<Axis>& axes,
                    Points points) {
   constexpr double kRoom = 2, kMost = 3;  // of an extent over the interval: aimed at, at most

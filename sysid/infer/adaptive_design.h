@@ -16,6 +16,9 @@ using Extent = std::vector<std::array<double, 2>>;
 /// From the first to the last value of each axis.
 Extent extent_of(const std::vector<Axis>& axes);
 
+/// From the value of an axis below each value to the one above.
+Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& axes);
+
 /// A posterior over one extent, and the likelihood that it is of.
 struct Look {
   MotionLikelihood likelihood;

@@ -60,18 +60,6 @@ std::vector<Axis> axes_without_diverged(const GridResults& results, const std::v
   }
 }
 
-/// The cells of the grid around a candidate.
-Extent cells_around(const std::vector<double>& candidate, const std::vector<Axis>& axes) {
-  Extent extent;
-  for (std::size_t k = 0; k < axes.size(); ++k) {
-    const std::vector<double>& values = axes[k].values;
-    const auto at =
-        static_cast<std::size_t>(std::find(values.begin(), values.end(), candidate[k]) - values.begin());
-    extent.push_back({values[at > 0 ? at - 1 : 0], values[std::min(at + 1, values.size() - 1)]});
-  }
-  return extent;
-}
-
 std::vector<Replay> finer_replays(const std::vector<Replay>& replays, const AnswerSettings& settings) {
   return settings.solver_check ? on_half_the_cell(replays) : std::vector<Replay>();
 }
@@ -363,6 +351,51 @@ Agreement agreement_about(const Task& task, const Found& found, const Answer& an
   return agreement_of(task, alone, answer.values, errors);
 }
 
+/// What a search says once motions were simulated about its answer.
+struct Concluded {
+  Found found;
+  Answer answer;  ///< values, motions, estimate, fit, agreement, warnings
+};
+
+/// `best`: the candidate from which to go on; `alone`: what each recording asks for, if there are several.
+Concluded conclude(const Task& task, Found found, const std::vector<double>& best,
+                   std::vector<KnownError>& held, const std::vector<Alone>& alone) {
+  Found about = simulate_about(task, found, held);
+  const Settled settled = settle(task, about, best, held);
+  if (settled == Settled::elsewhere)
+    keep_to_simulated(task, found, best, held);
+  else
+    found = std::move(about);
+  Concluded concluded{std::move(found), {}};
+  Answer& answer = concluded.answer;
+  if (settled != Settled::yes)
+    answer.warnings.emplace_back(
+        "the motion changes too abruptly between the values searched: the answer is by these alone; search "
+        "more values");
+  answer.values = concluded.found.look.posterior.values();
+  for (const Replay& replay : task.replays)
+    answer.motions.push_back(task.store.run(replay, candidate_at(answer.values, task.grid)));
+  answer.estimate = score_motions(task.replays, answer.motions, task.grid.score);
+  answer.estimate.values = answer.values;
+  answer.fit = fit_of(task, concluded.found, answer);
+  if (!alone.empty()) answer.agreement = agreement_about(task, concluded.found, answer, alone, held);
+  return concluded;
+}
+
+/// Once more about what is likelier for all recordings together, where there is such a thing and that helps.
+void go_on_elsewhere(const Task& task, Concluded& concluded, std::vector<KnownError>& held,
+                     const std::vector<Alone>& alone) {
+  if (!concluded.answer.agreement || !is_better_elsewhere(*concluded.answer.agreement)) return;
+  const std::vector<double> there = concluded.answer.agreement->likeliest;
+  std::optional<Found> found =
+      look_about(task, cells_about(there, task.ranges), there, concluded.found.emulator.share != own_mesh,
+                 concluded.found.errors, held);
+  if (!found) return;
+  Concluded again = conclude(task, std::move(*found), there, held, alone);
+  if (again.answer.agreement->estimate_excess < concluded.answer.agreement->estimate_excess)
+    concluded = std::move(again);
+}
+
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   const Sensitivity sensitivity = sensitivity_of(task, found);
   std::vector<SolverCheck> checks;
@@ -446,8 +479,8 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   std::optional<Found> found;
   std::vector<KnownError> held;
   if (emulator) {
-    const Extent around = cells_around(best, usable.axes);
-    found = look_with(task, std::move(*emulator), usable.axes, around, best, {}, held);
+    found =
+        look_with(task, std::move(*emulator), usable.axes, cells_about(best, usable.axes), best, {}, held);
   }
   if (!found) {
     answer.values = best;
@@ -460,42 +493,31 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     return answer;
   }
   const std::vector<Alone> alone = alone_over_all(task, *found, results);
-  Found about = simulate_about(task, *found, held);
-  const Settled settled = settle(task, about, best, held);
-  if (settled == Settled::elsewhere)
-    keep_to_simulated(task, *found, best, held);
-  else
-    found = std::move(about);
-  if (settled != Settled::yes)
-    answer.warnings.emplace_back(
-        "the motion changes too abruptly between the values searched: the answer is by these alone; search "
-        "more values");
+  Concluded concluded = conclude(task, std::move(*found), best, held, alone);
+  go_on_elsewhere(task, concluded, held, alone);
+  const Found& there = concluded.found;
+  concluded.answer.best = answer.best;
+  concluded.answer.horizons = std::move(answer.horizons);
+  concluded.answer.warnings.insert(concluded.answer.warnings.begin(), answer.warnings.begin(),
+                                   answer.warnings.end());
+  answer = std::move(concluded.answer);
+  warn_of_held(task, there.look.likelihood, there.errors, answer.warnings);
 
-  warn_of_held(task, found->look.likelihood, found->errors, answer.warnings);
-
-  Posterior posterior = found->look.posterior;
-  answer.values = posterior.values();
+  Posterior posterior = there.look.posterior;
   if (const double spread = spread_of_scale(usable, replays); spread > 0)
     answer.weights =
         weight_of(grid) * scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges).array();
-  for (std::size_t r = 0; r < replays.size(); ++r) {
-    answer.motions.push_back(store.run(replays[r], candidate_at(answer.values, grid)));
-    answer.misfits.push_back(found->look.likelihood.of_recording(r).misfit());
-  }
-  answer.estimate = score_motions(replays, answer.motions, grid.score);
-  answer.estimate.values = answer.values;
-  answer.fit = fit_of(task, *found, answer);
+  for (std::size_t r = 0; r < replays.size(); ++r)
+    answer.misfits.push_back(there.look.likelihood.of_recording(r).misfit());
   answer.residuals = left_residuals(
-      likelihood_about(task, *found, answer.fit.replays, answer.values, answer.fit.motions, held));
+      likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held));
   answer.parameters = findings_of(results, ranges, posterior);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);
-  if (settings.solver_check) answer.checks = checks_of(task, *found);
-  if (!alone.empty()) {
-    answer.agreement = agreement_about(task, *found, answer, alone, held);
+  if (settings.solver_check) answer.checks = checks_of(task, there);
+  if (answer.agreement)
     if (const std::string text = better_text(*answer.agreement, usable.axes); !text.empty())
       answer.warnings.push_back(text);
-  }
   return answer;
 }
 

@@ -17,19 +17,6 @@ Alone alone_by(const Task& task, const Emulator& own, const Extent& extent, cons
   return alone;
 }
 
-/// A value and the next ones of its axis.
-Extent cells_about(const std::vector<double>& values, const std::vector<Axis>& axes) {
-  Extent extent;
-  for (std::size_t k = 0; k < axes.size(); ++k) {
-    const std::vector<double>& of_axis = axes[k].values;
-    const auto above = std::upper_bound(of_axis.begin(), of_axis.end(), values[k]);
-    const auto below = std::lower_bound(of_axis.begin(), of_axis.end(), values[k]);
-    extent.push_back({below == of_axis.begin() ? of_axis.front() : *(below - 1),
-                      above == of_axis.end() ? of_axis.back() : *above});
-  }
-  return extent;
-}
-
 /// Of what the recordings ask for, each by what it knows.
 std::vector<double> mean_of(const std::vector<Alone>& alone, const std::vector<Axis>& axes) {
   constexpr double kLeast = 1e-9;  // of a spread

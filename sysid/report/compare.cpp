@@ -31,11 +31,9 @@ bool same_rows(const LeftResiduals& a, const LeftResiduals& b) {
 }
 
 void check_comparable(const FinishedSearch& first, const FinishedSearch& other) {
-  const std::vector<SummaryRecording>&ours = first.summary.recordings,
-        &theirs = other.summary.recordings;
-  if (!std::equal(
-          ours.begin(), ours.end(), theirs.begin(), theirs.end(),
-          [](const SummaryRecording& a, const SummaryRecording& b) { return a.sha256 == b.sha256; }))
+  const std::vector<SummaryRecording>&ours = first.summary.recordings, &theirs = other.summary.recordings;
+  if (!std::equal(ours.begin(), ours.end(), theirs.begin(), theirs.end(),
+                  [](const SummaryRecording& a, const SummaryRecording& b) { return a.sha256 == b.sha256; }))
     throw data::InputError(other.name + ": found other recordings than in " + first.name +
                            ", expected the same in the same order");
   for (const char* each : {"distance", "observed", "sigmas", "repeatability_m"})

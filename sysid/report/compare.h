@@ -27,11 +27,11 @@ struct ComparedSearch {
 /// search is of an earlier program, which kept no residuals, or came to no estimate.
 FinishedSearch load_finished_search(const std::string& folder);
 
-/// How likely searches of the same observations are beside each other, by their generalized marginal likelihood
-/// (Bissiri, Holmes and Walker 2016): exp(-excess / 2) times what of its ranges each leaves likely, so that a
-/// model of more parameters pays for them. The reference is the search of least mean distance. Throws
-/// data::InputError where what was observed is not the same in all: recordings, keyframes that count,
-/// observations, and how they count.
+/// How likely searches of the same observations are beside each other, by their generalized marginal
+/// likelihood (Bissiri, Holmes and Walker 2016): exp(-excess / 2) times what of its ranges each leaves
+/// likely, so that a model of more parameters pays for them. The reference is the search of least mean
+/// distance. Throws data::InputError where what was observed is not the same in all: recordings, keyframes
+/// that count, observations, and how they count.
 std::vector<ComparedSearch> compare(const std::vector<FinishedSearch>& searches);
 
 }  // namespace flash::sysid

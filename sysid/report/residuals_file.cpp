@@ -48,8 +48,7 @@ std::vector<LeftResiduals> load_residuals(const std::string& path, const std::st
   for (Table table(path, kColumns, CutLine::refuse); table.row() != nullptr; table.next()) {
     const Row& row = *table.row();
     const auto r = static_cast<std::size_t>(row.index("recording"));
-    if (r >= recordings.size())
-      throw row.error("recording", "below " + std::to_string(recordings.size()));
+    if (r >= recordings.size()) throw row.error("recording", "below " + std::to_string(recordings.size()));
     ObservedRows& rows = recordings[r].rows;
     const double time = row.finite("t");
     if (rows.times.empty() || rows.times.back() < time) rows.times.push_back(time);

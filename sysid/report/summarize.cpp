@@ -388,8 +388,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   else
     for (const std::string& warning : warnings_of_grasps(replays)) summary.warnings.push_back(warning);
   summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
-  if (asked.repeatability)
-    summary.settings["repeatability_m"] = data::format_number(*asked.repeatability);
+  if (asked.repeatability) summary.settings["repeatability_m"] = data::format_number(*asked.repeatability);
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
   const std::string contradiction =
       contradiction_in(answer, replays, asked.ranges.empty() ? settings.axes : asked.ranges);

@@ -150,12 +150,12 @@ ParameterFinding read_finding(const std::string& name, const data::JsonObject& j
 }
 
 SummaryRecording read_recording(const data::JsonObject& json) {
-  json.expect_fields(
-      {"name",           "sha256",         "offset",      "yaw",         "time_offset",  "nuisance",
-       "score",          "noise_m",        "rough_m",     "misfit_m",    "misfit_rms_m", "misfit_explained_m",
-       "misfit_reach_s", "misfit_reach_m", "misfit_gain", "model_fits",  "keyframes",    "keyframes_worth",
-       "markers",        "horizon_s",      "frames",      "misfit_draws",
-       "error_cost"});
+  json.expect_fields({"name",           "sha256",          "offset",       "yaw",
+                      "time_offset",    "nuisance",        "score",        "noise_m",
+                      "rough_m",        "misfit_m",        "misfit_rms_m", "misfit_explained_m",
+                      "misfit_reach_s", "misfit_reach_m",  "misfit_gain",  "model_fits",
+                      "keyframes",      "keyframes_worth", "markers",      "horizon_s",
+                      "frames",         "misfit_draws",    "error_cost"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");

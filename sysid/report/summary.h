@@ -89,7 +89,7 @@ struct Summary {
   std::string device = "cpu";
   double wall_seconds = 0;
   std::string tool_version;
-  std::string results_digest;  ///< of the tables it was made from (candidate_lines.h)
+  std::string results_digest;    ///< of the tables it was made from (candidate_lines.h)
   std::string residuals_digest;  ///< of residuals.csv; empty: none
   std::vector<std::string> warnings;
   int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used

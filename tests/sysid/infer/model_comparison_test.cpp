@@ -74,8 +74,7 @@ TEST(ModelComparison, WhatADiscrepancyMakesIsNotTold) {
   constexpr int kDraws = 60;
   int wrong = 0, told = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
-    const Eigen::VectorXd y =
-        kNoise * normal(random, count) + 10 * kNoise * (root * normal(random, count));
+    const Eigen::VectorXd y = kNoise * normal(random, count) + 10 * kNoise * (root * normal(random, count));
     // The truth's residuals are y; the other model's are farther off or, as the discrepancy falls, nearer.
     const Eigen::VectorXd other = y + apart;
     const bool truth_is_nearer = y.cwiseAbs().mean() < other.cwiseAbs().mean();

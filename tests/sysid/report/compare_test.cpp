@@ -73,17 +73,24 @@ TEST(Compare, RefusesOtherObservationsByName) {
   const FinishedSearch first = search("a", "clamp", 0);
   FinishedSearch other = search("b", "pinch", 0);
   other.summary.recordings[0].sha256 = "4567";
-  EXPECT_EQ(data::input_error_of([&] { compare({first, other}); }),
+  EXPECT_EQ(data::input_error_of([&] {
+              compare({first, other});
+            }),
             "b: found other recordings than in a, expected the same in the same order");
   other = search("b", "pinch", 0);
   other.summary.settings["distance"] = "Huber, 20 mm";
-  EXPECT_EQ(data::input_error_of([&] { compare({first, other}); }),
+  EXPECT_EQ(data::input_error_of([&] {
+              compare({first, other});
+            }),
             "b: settings.distance: found \"Huber, 20 mm\", expected \"mean\" as in a");
   other = search("b", "pinch", 0);
   other.residuals[0].rows.times.back() = 1.75;
-  EXPECT_EQ(data::input_error_of([&] { compare({first, other}); }),
-            "b: lift: found 60 observations from 1 to 1.75 s, expected 60 observations from 1 to 2 s as in a: "
-            "search all with --no-horizon, or with one --from and --to");
+  EXPECT_EQ(
+      data::input_error_of([&] {
+        compare({first, other});
+      }),
+      "b: lift: found 60 observations from 1 to 1.75 s, expected 60 observations from 1 to 2 s as in a: "
+      "search all with --no-horizon, or with one --from and --to");
 }
 
 TEST(ResidualsFile, ComesBackAsItWas) {
