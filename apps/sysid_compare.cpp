@@ -1,14 +1,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/command_line.h"
 #include "apps/sysid_options.h"
 #include "apps/sysid_verbs.h"
 #include "data/atomic_file.h"
+#include "data/error.h"
 #include "data/json_reader.h"
 #include "data/text.h"
 #include "data/writable.h"
@@ -52,6 +55,10 @@ void print_comparison(const std::vector<sysid::FinishedSearch>& searches,
 
 int run_compare(const CompareOptions& options) {
   std::vector<sysid::FinishedSearch> searches;
+  std::set<std::filesystem::path> folders;
+  for (const std::string& run : options.runs)
+    if (!folders.insert(std::filesystem::weakly_canonical(run)).second)
+      throw data::InputError(run + ": named twice, expected searches that differ");
   for (const std::string& run : options.runs) searches.push_back(sysid::load_finished_search(run));
   const std::vector<sysid::ComparedSearch> compared = sysid::compare(searches);
   if (!options.out.empty()) data::check_file_free(options.out, options.common.force);
@@ -91,8 +98,10 @@ void add_compare_verb(CLI::App& app, Action& action) {
       "it. A "
       "model of more parameters pays for them.\n"
       "Example:\n"
-      "  flash-sysid grid lift --asset cloth.json --bending 1e-5:1e-3:9:log --grasp-shape clamp -o clamp\n"
-      "  flash-sysid grid lift --asset cloth.json --bending 1e-5:1e-3:9:log --grasp-shape pinch -o pinch\n"
+      "  flash-sysid grid lift --asset cloth.json --bending 1e-5:1e-3:9:log --grasp-shape clamp --no-horizon "
+      "-o clamp\n"
+      "  flash-sysid grid lift --asset cloth.json --bending 1e-5:1e-3:9:log --grasp-shape pinch --no-horizon "
+      "-o pinch\n"
       "  flash-sysid compare clamp pinch");
   verb->callback([options, &action] { action = [options] { return run_compare(*options); }; });
 }

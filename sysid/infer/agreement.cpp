@@ -50,12 +50,8 @@ double chance_beyond(double x, int freedom) {
   return std::min(chance, 1.0);
 }
 
-bool is_better_elsewhere(const Agreement& agreement) {
-  return agreement.estimate_excess > kFar && agreement.chance >= kContradicts;
-}
-
 std::string better_text(const Agreement& agreement, const std::vector<Axis>& axes) {
-  if (!is_better_elsewhere(agreement)) return "";
+  if (!(agreement.estimate_excess > kFar) || agreement.chance < kContradicts) return "";
   std::string text = "the estimate is not the likeliest of what was simulated: ";
   for (const std::size_t k : searched(axes))
     text += (k == searched(axes).front() ? "" : ", ") + axes[k].name + " " +

@@ -19,10 +19,6 @@ struct Agreement {
 /// Chance that chi-square of so many degrees of freedom is larger than x.
 double chance_beyond(double x, int freedom);
 
-/// Whether other values than the estimate are likelier by far, by 9 of deviance, for recordings that do not
-/// contradict each other.
-bool is_better_elsewhere(const Agreement& agreement);
-
 /// "the estimate is not the likeliest ...", where other values are likelier by far for recordings that do not
 /// contradict each other.
 std::string better_text(const Agreement& agreement, const std::vector<Axis>& axes);

@@ -382,20 +382,6 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
   return concluded;
 }
 
-/// Once more about what is likelier for all recordings together, where there is such a thing and that helps.
-void go_on_elsewhere(const Task& task, Concluded& concluded, std::vector<KnownError>& held,
-                     const std::vector<Alone>& alone) {
-  if (!concluded.answer.agreement || !is_better_elsewhere(*concluded.answer.agreement)) return;
-  const std::vector<double> there = concluded.answer.agreement->likeliest;
-  std::optional<Found> found =
-      look_about(task, cells_about(there, task.ranges), there, concluded.found.emulator.share != own_mesh,
-                 concluded.found.errors, held);
-  if (!found) return;
-  Concluded again = conclude(task, std::move(*found), there, held, alone);
-  if (again.answer.agreement->estimate_excess < concluded.answer.agreement->estimate_excess)
-    concluded = std::move(again);
-}
-
 std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
   const Sensitivity sensitivity = sensitivity_of(task, found);
   std::vector<SolverCheck> checks;
@@ -494,7 +480,6 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   }
   const std::vector<Alone> alone = alone_over_all(task, *found, results);
   Concluded concluded = conclude(task, std::move(*found), best, held, alone);
-  go_on_elsewhere(task, concluded, held, alone);
   const Found& there = concluded.found;
   concluded.answer.best = answer.best;
   concluded.answer.horizons = std::move(answer.horizons);
@@ -509,8 +494,11 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
         weight_of(grid) * scale_together(posterior, stiffnesses_of(posterior.axes), spread, ranges).array();
   for (std::size_t r = 0; r < replays.size(); ++r)
     answer.misfits.push_back(there.look.likelihood.of_recording(r).misfit());
-  answer.residuals = left_residuals(
-      likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held));
+  const MotionLikelihood at_fit =
+      likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held);
+  answer.residuals = left_residuals(at_fit);
+  answer.open_information =
+      open_information(at_fit, spreads_over(ranges, extent_of(there.look.posterior.axes)));
   answer.parameters = findings_of(results, ranges, posterior);
   answer.covariance_log = covariance_of_logarithms(posterior);
   answer.samples = samples_of(posterior);

@@ -1,7 +1,6 @@
 #include "sysid/infer/model_comparison.h"
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <cmath>
 
 #include "sysid/infer/residual_likelihood.h"
@@ -18,6 +17,7 @@ std::vector<LeftResiduals> left_residuals(const MotionLikelihood& likelihood) {
                  linear.rows.weights};
     each.left = fit.left;
     each.error_cost = fit.known.squaredNorm();
+    each.spread = likelihood.of_recording(r).spread();
   }
   return all;
 }
@@ -37,18 +37,45 @@ double excess_deviance(const std::vector<LeftResiduals>& reference, const std::v
   return excess;
 }
 
-double log_occupied(const Eigen::MatrixXd& draws, const Eigen::VectorXd& widths) {
-  if (draws.cols() == 0) return 0;
-  // In units of the ranges, where a standard deviation is 1 / sqrt(2 pi) at most and, of draws that are all
-  // alike, a thousandth.
-  const Eigen::MatrixXd scaled = draws * widths.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd centred = scaled.rowwise() - scaled.colwise().mean();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(centred.transpose() * centred /
-                                                             static_cast<double>(draws.rows()));
-  double log = 0;
-  for (const double variance : eigen.eigenvalues())
-    log += 0.5 * std::log(2 * M_PI * std::clamp(variance, 1e-6, 1 / (2 * M_PI)));
-  return log;
+Eigen::VectorXd open_information(const MotionLikelihood& likelihood, const std::vector<double>& spreads) {
+  const auto parameters = static_cast<Eigen::Index>(spreads.size());
+  Eigen::Index size = parameters;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r)
+    size += likelihood.linear(r).rows.free.cols() + likelihood.linear(r).rows.known.cols();
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(size, size);
+  Eigen::Index own = parameters;  // first of a recording
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    const ObservedRows& rows = likelihood.linear(r).rows;
+    const Eigen::Index errors = rows.free.cols() + rows.known.cols();
+    Eigen::MatrixXd columns(rows.weights.size(), parameters + errors);
+    // What is even from -1 to 1 has a standard deviation of 1 / sqrt(3).
+    columns << rows.rates * Eigen::Map<const Eigen::VectorXd>(spreads.data(), parameters).asDiagonal(),
+        rows.free / std::sqrt(3.0), rows.known;
+    const Eigen::MatrixXd here = columns.transpose() * rows.weights.asDiagonal() * columns;
+    information.topLeftCorner(parameters, parameters) += here.topLeftCorner(parameters, parameters);
+    information.block(own, 0, errors, parameters) = here.bottomLeftCorner(errors, parameters);
+    information.block(0, own, parameters, errors) = here.topRightCorner(parameters, errors);
+    information.block(own, own, errors, errors) = here.bottomRightCorner(errors, errors);
+    own += errors;
+  }
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(information).eigenvalues().cwiseMax(0.0);
+}
+
+double log_occupied(const Eigen::VectorXd& open_information, double spread) {
+  return -0.5 * (1 + open_information.array() / (spread * spread)).log().sum();
+}
+
+std::vector<double> spreads_over(const std::vector<Axis>& axes, const Extent& extent) {
+  std::vector<double> spreads;
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    if (axes[k].values.size() < 2) continue;
+    const auto width = [&](double low, double high) {
+      return coordinate_of(axes[k], high) - coordinate_of(axes[k], low);
+    };
+    spreads.push_back(width(axes[k].values.front(), axes[k].values.back()) / std::sqrt(12.0) /
+                      width(extent[k][0], extent[k][1]));
+  }
+  return spreads;
 }
 
 }  // namespace flash::sysid

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "sysid/infer/motion_likelihood.h"
+#include "sysid/infer/adaptive_design.h"
 
 namespace flash::sysid {
 
@@ -13,6 +13,7 @@ struct LeftResiduals {
   ObservedRows rows;      ///< without columns of errors or parameters
   Eigen::VectorXd left;   ///< once registration and errors of known shape are fitted [m]
   double error_cost = 0;  ///< -2 log prior of these errors, up to a constant
+  double spread = 0;      ///< s of the search's likelihood [m]
 };
 
 /// Of each recording, at the reference of a likelihood.
@@ -26,9 +27,18 @@ std::vector<LeftResiduals> left_residuals(const MotionLikelihood& likelihood);
 double excess_deviance(const std::vector<LeftResiduals>& reference, const std::vector<LeftResiduals>& other,
                        std::optional<double> repeatability = {});
 
-/// Share of the prior that is likely, by Laplace: log of sqrt(det(2 pi C)) over the volume of the ranges, not
-/// above zero for any parameter alone. `draws`: of the posterior, a draw a row; `widths`: of the ranges that
-/// were alike likely before.
-double log_occupied(const Eigen::MatrixXd& draws, const Eigen::VectorXd& widths);
+/// What the observations tell of all that a search left open, about the reference of a likelihood:
+/// eigenvalues of the information of its parameters, registration and known errors, each in units of its
+/// prior's standard deviation, were the residuals' a metre [m^2]. `spreads`: of the searched parameters'
+/// priors, in units of their rates. Recordings have their parameters in common.
+Eigen::VectorXd open_information(const MotionLikelihood& likelihood, const std::vector<double>& spreads);
+
+/// Share of its prior that residuals of standard deviation `spread` [m] leave likely, by Laplace, as a
+/// logarithm.
+double log_occupied(const Eigen::VectorXd& open_information, double spread);
+
+/// Prior standard deviations of values that are anywhere in the ranges of the searched `axes` alike, in units
+/// of rates over `extent`.
+std::vector<double> spreads_over(const std::vector<Axis>& axes, const Extent& extent);
 
 }  // namespace flash::sysid

@@ -18,6 +18,14 @@ std::string setting(const Summary& search, const std::string& name) {
   return found == search.settings.end() ? "none" : found->second;
 }
 
+/// Its settings, and what it held: "0.3, measured".
+std::map<std::string, std::string> described(const Summary& search) {
+  std::map<std::string, std::string> texts = search.settings;
+  for (const auto& [name, fixed] : search.fixed)
+    texts[name] = data::format_short(fixed.value) + ", " + fixed.source;
+  return texts;
+}
+
 /// "1500 observations from 1.0 to 2.4 s".
 std::string observed_in(const LeftResiduals& recording) {
   return std::to_string(recording.left.size()) + " observations from " +
@@ -31,45 +39,48 @@ bool same_rows(const LeftResiduals& a, const LeftResiduals& b) {
 }
 
 void check_comparable(const FinishedSearch& first, const FinishedSearch& other) {
-  const std::vector<SummaryRecording>&ours = first.summary.recordings, &theirs = other.summary.recordings;
-  if (!std::equal(ours.begin(), ours.end(), theirs.begin(), theirs.end(),
-                  [](const SummaryRecording& a, const SummaryRecording& b) { return a.sha256 == b.sha256; }))
-    throw data::InputError(other.name + ": found other recordings than in " + first.name +
-                           ", expected the same in the same order");
   for (const char* each : {"distance", "observed", "sigmas", "repeatability_m"})
     if (setting(first.summary, each) != setting(other.summary, each))
       throw data::input_error(other.name, "settings." + std::string(each),
                               "found \"" + setting(other.summary, each) + "\", expected \"" +
                                   setting(first.summary, each) + "\" as in " + first.name);
-  for (std::size_t r = 0; r < ours.size(); ++r)
+  for (std::size_t r = 0; r < first.residuals.size(); ++r)
     if (!same_rows(first.residuals[r], other.residuals[r]))
-      throw data::input_error(other.name, ours[r].name,
+      throw data::input_error(other.name, first.summary.recordings[r].name,
                               "found " + observed_in(other.residuals[r]) + ", expected " +
                                   observed_in(first.residuals[r]) + " as in " + first.name +
                                   ": search all with --no-horizon, or with one --from and --to");
 }
 
-/// The posterior's draws in the coordinates of its parameters, and the width of each range.
-double occupied_by(const Summary& search) {
-  Eigen::MatrixXd draws = search.samples;
-  Eigen::VectorXd widths(draws.cols());
-  for (Eigen::Index k = 0; k < draws.cols(); ++k) {
-    const ParameterFinding& finding = search.parameters[static_cast<std::size_t>(k)];
-    const bool logarithmic = finding.values.front() > 0 && finding.logarithmic;
-    if (logarithmic) draws.col(k) = draws.col(k).array().log();
-    widths[k] = logarithmic ? std::log(finding.values.back() / finding.values.front())
-                            : finding.values.back() - finding.values.front();
-  }
-  return log_occupied(draws, widths);
+/// Of each search what is not alike in all; "-" where there is none.
+std::vector<std::map<std::string, std::string>> differences(const std::vector<FinishedSearch>& searches) {
+  std::vector<std::map<std::string, std::string>> texts;
+  std::map<std::string, std::set<std::string>> seen;
+  for (const FinishedSearch& search : searches) texts.push_back(described(search.summary));
+  for (const auto& each : texts)
+    for (const auto& [name, text] : each) seen[name];
+  for (auto& [name, values] : seen)
+    for (auto& each : texts) values.insert(each.emplace(name, "-").first->second);
+  for (auto& each : texts)
+    std::erase_if(each, [&](const auto& setting) { return seen[setting.first].size() == 1; });
+  return texts;
 }
 
-std::set<std::string> settings_that_differ(const std::vector<FinishedSearch>& searches) {
-  std::set<std::string> differing;
-  for (const FinishedSearch& search : searches)
-    for (const auto& [key, text] : search.summary.settings)
-      for (const FinishedSearch& other : searches)
-        if (setting(other.summary, key) != text) differing.insert(key);
-  return differing;
+/// A search with its recordings in the order of another. Throws data::InputError where they are others.
+FinishedSearch in_order_of(const FinishedSearch& first, const FinishedSearch& search) {
+  FinishedSearch ordered{search.name, search.summary, {}};
+  ordered.summary.recordings.clear();
+  for (const SummaryRecording& wanted : first.summary.recordings)
+    for (std::size_t r = 0; r < search.summary.recordings.size(); ++r)
+      if (search.summary.recordings[r].sha256 == wanted.sha256) {
+        ordered.summary.recordings.push_back(search.summary.recordings[r]);
+        ordered.residuals.push_back(search.residuals[r]);
+      }
+  const std::size_t count = first.summary.recordings.size();
+  if (search.summary.recordings.size() != count || ordered.residuals.size() != count)
+    throw data::InputError(search.name + ": found other recordings than in " + first.name +
+                           ", expected searches of the same");
+  return ordered;
 }
 
 }  // namespace
@@ -81,6 +92,15 @@ FinishedSearch load_finished_search(const std::string& folder) {
     throw data::input_error(path, "residuals_digest",
                             "found none, expected a search by this version that came to an estimate; grid "
                             "--resume writes it anew");
+  for (const SummaryRecording& recording : search.summary.recordings)
+    if (!(recording.spread > 0) || !(recording.error_cost >= 0) || !std::isfinite(recording.error_cost))
+      throw data::input_error(path, recording.name,
+                              "found a spread_m of " + data::format_short(recording.spread) +
+                                  " and an error_cost of " + data::format_short(recording.error_cost) +
+                                  ", expected above 0, and 0 or above");
+  for (const double each : search.summary.open_information)
+    if (!(each >= 0) || !std::isfinite(each))
+      throw data::input_error(path, "open_information", "found a number below 0, or none");
   std::vector<double> costs;
   for (const SummaryRecording& recording : search.summary.recordings) costs.push_back(recording.error_cost);
   search.residuals = load_residuals((std::filesystem::path(folder) / "residuals.csv").string(),
@@ -88,24 +108,34 @@ FinishedSearch load_finished_search(const std::string& folder) {
   return search;
 }
 
-std::vector<ComparedSearch> compare(const std::vector<FinishedSearch>& searches) {
-  for (const FinishedSearch& search : searches) check_comparable(searches.front(), search);
+std::vector<ComparedSearch> compare(const std::vector<FinishedSearch>& found) {
+  std::vector<FinishedSearch> searches;
+  for (const FinishedSearch& search : found) {
+    searches.push_back(in_order_of(found.front(), search));
+    check_comparable(searches.front(), searches.back());
+  }
   const auto reference = std::min_element(searches.begin(), searches.end(), [](const auto& a, const auto& b) {
     return a.summary.best_score < b.summary.best_score;
   });
   const std::optional<double> repeatability =
       data::parse_number(setting(reference->summary, "repeatability_m"));
-  const std::set<std::string> differing = settings_that_differ(searches);
+  // One for all searches: a model that misses more is not freer for that.
+  double spread = 0;
+  for (const SummaryRecording& recording : reference->summary.recordings)
+    spread += recording.spread / static_cast<double>(reference->summary.recordings.size());
+  std::vector<std::map<std::string, std::string>> differs = differences(searches);
   std::vector<ComparedSearch> compared;
   double most = -INFINITY, sum = 0;
-  for (const FinishedSearch& search : searches) {
+  for (std::size_t i = 0; i < searches.size(); ++i) {
     ComparedSearch& each = compared.emplace_back();
-    if (&search != &*reference)
-      each.excess = excess_deviance(reference->residuals, search.residuals, repeatability);
-    each.occupied = occupied_by(search.summary);
+    if (&searches[i] != &*reference)
+      each.excess = excess_deviance(reference->residuals, searches[i].residuals, repeatability);
+    const std::vector<double>& open = searches[i].summary.open_information;
+    each.occupied = log_occupied(
+        Eigen::Map<const Eigen::VectorXd>(open.data(), static_cast<Eigen::Index>(open.size())), spread);
     each.probability = each.occupied - 0.5 * each.excess;
     most = std::max(most, each.probability);
-    for (const std::string& key : differing) each.differs[key] = setting(search.summary, key);
+    each.differs = std::move(differs[i]);
   }
   for (ComparedSearch& each : compared) sum += each.probability = std::exp(each.probability - most);
   for (ComparedSearch& each : compared) each.probability /= sum;

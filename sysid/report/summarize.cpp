@@ -239,6 +239,16 @@ std::string sigmas_of(const Objective& objective) {
          mm(objective.marker_sigma) + ", force " + data::format_short(objective.force_sigma) + " N";
 }
 
+/// "bending 5e-05 to 0.002, friction 0.15 to 0.6".
+std::string searched_text(const std::vector<Axis>& axes) {
+  std::string text;
+  for (const Axis& axis : axes)
+    if (axis.values.size() > 1)
+      text += (text.empty() ? "" : ", ") + axis.name + " " + data::format_short(axis.values.front()) +
+              " to " + data::format_short(axis.values.back());
+  return text;
+}
+
 /// Of the grasps as they were simulated, each once: "clamp".
 std::string grasp_shapes(const std::vector<Replay>& replays) {
   std::string shapes;
@@ -283,7 +293,11 @@ void add_settings(Summary& summary, const std::vector<Replay>& replays, const Gr
                                          : "mean";
   texts["observed"] = observed_terms(replays, settings.score.objective);
   texts["sigmas"] = sigmas_of(settings.score.objective);
-  if (const std::string shapes = grasp_shapes(replays); !shapes.empty()) texts["grasp_shape"] = shapes;
+  if (const std::string shapes = grasp_shapes(replays); !shapes.empty()) {
+    texts["grasp_shape"] = shapes;
+    texts["grasp_within"] = replay.settings.grasp_within ? mm(*replay.settings.grasp_within) : "as recorded";
+    texts["clamp_slopes"] = replay.settings.clamp_slopes ? "yes" : "no";
+  }
 }
 
 std::optional<MarkerFit> markers_of(const Fit& fit, std::size_t r, double noise) {
@@ -370,7 +384,10 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     summary.recordings.push_back(
         summarize_recording(replays[r], answer.fit.score.recordings[r], misfit, nuisance));
     summary.recordings.back().markers = markers_of(answer.fit, r, settings.score.objective.marker_sigma);
-    if (r < answer.residuals.size()) summary.recordings.back().error_cost = answer.residuals[r].error_cost;
+    if (r < answer.residuals.size()) {
+      summary.recordings.back().error_cost = answer.residuals[r].error_cost;
+      summary.recordings.back().spread = answer.residuals[r].spread;
+    }
     if (r < answer.horizons.size()) summary.recordings.back().horizon_s = answer.horizons[r];
   }
   const std::string object = settings.base.solid ? "object" : "cloth";
@@ -381,6 +398,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     summary.warnings.push_back(warning);
   summary.warnings.insert(summary.warnings.end(), answer.warnings.begin(), answer.warnings.end());
   summary.solver_check = answer.checks;
+  summary.open_information = {answer.open_information.begin(), answer.open_information.end()};
   if (answer.agreement) summary.agreement = searched_alone(answer);
   if (!asked.solver_check)
     summary.warnings.emplace_back(
@@ -389,6 +407,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
     for (const std::string& warning : warnings_of_grasps(replays)) summary.warnings.push_back(warning);
   summary.settings["solver_check"] = asked.solver_check ? "yes" : "no";
   if (asked.repeatability) summary.settings["repeatability_m"] = data::format_number(*asked.repeatability);
+  summary.settings["searched"] = searched_text(asked.ranges.empty() ? settings.axes : asked.ranges);
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
   const std::string contradiction =
       contradiction_in(answer, replays, asked.ranges.empty() ? settings.axes : asked.ranges);

@@ -59,6 +59,7 @@ Json to_json(const SummaryRecording& recording) {
   json["nuisance"] = recording.nuisance;
   json["score"] = number(recording.score);
   json["error_cost"] = number(recording.error_cost);
+  json["spread_m"] = number(recording.spread);
   json["noise_m"] = number(recording.misfit.noise);
   json["rough_m"] = number(recording.misfit.rough);
   json["misfit_m"] = number(recording.misfit.size);
@@ -155,7 +156,7 @@ SummaryRecording read_recording(const data::JsonObject& json) {
                       "rough_m",        "misfit_m",        "misfit_rms_m", "misfit_explained_m",
                       "misfit_reach_s", "misfit_reach_m",  "misfit_gain",  "model_fits",
                       "keyframes",      "keyframes_worth", "markers",      "horizon_s",
-                      "frames",         "misfit_draws",    "error_cost"});
+                      "frames",         "misfit_draws",    "error_cost",   "spread_m"});
   SummaryRecording recording;
   recording.name = json.string("name");
   recording.sha256 = json.string("sha256");
@@ -164,7 +165,9 @@ SummaryRecording read_recording(const data::JsonObject& json) {
   recording.time_offset = json.number("time_offset");
   recording.nuisance = typed<std::map<std::string, double>>(json, "nuisance", "numbers by name");
   recording.score = score_of(json, "score");
-  recording.error_cost = json.optional_number("error_cost").value_or(0);  // earlier programs kept none
+  // Earlier programs kept neither.
+  recording.error_cost = json.optional_number("error_cost").value_or(0);
+  recording.spread = json.optional_number("spread_m").value_or(0);
   Misfit& misfit = recording.misfit;
   misfit.noise = score_of(json, "noise_m");
   misfit.size = score_of(json, "misfit_m");
@@ -306,7 +309,10 @@ std::string summary_text(const Summary& summary) {
   json["warnings"] = summary.warnings;
   json["exit_code"] = summary.exit_code;
   json["results_digest"] = summary.results_digest;
-  if (!summary.residuals_digest.empty()) json["residuals_digest"] = summary.residuals_digest;
+  if (!summary.residuals_digest.empty()) {
+    json["residuals_digest"] = summary.residuals_digest;
+    json["open_information"] = numbers(summary.open_information);
+  }
   json["digest"] = digest_of(nlohmann::json::parse(data::format_json(json)));  // of numbers as they are read
   return data::format_json(json);
 }
@@ -319,13 +325,32 @@ Summary load_summary(const std::string& path) {
   const nlohmann::json file = data::load_json(path);
   const data::JsonObject json(file, path);
   if (json.string("schema") != schema) throw json.error("schema", schema);
-  json.expect_fields({"schema",           "tool_version", "best",           "axes",
-                      "parameters",       "fixed",        "samples",        "covariance_log",
-                      "recordings",       "solver_check", "settings",       "asset",
-                      "candidates",       "unconverged",  "device",         "wall_seconds",
-                      "warnings",         "exit_code",    "results_digest", "digest",
-                      "next_experiments", "held",         "agreement",      "sample_weights",
-                      "residuals_digest"});
+  json.expect_fields({"schema",
+                      "tool_version",
+                      "best",
+                      "axes",
+                      "parameters",
+                      "fixed",
+                      "samples",
+                      "covariance_log",
+                      "recordings",
+                      "solver_check",
+                      "settings",
+                      "asset",
+                      "candidates",
+                      "unconverged",
+                      "device",
+                      "wall_seconds",
+                      "warnings",
+                      "exit_code",
+                      "results_digest",
+                      "digest",
+                      "next_experiments",
+                      "held",
+                      "agreement",
+                      "sample_weights",
+                      "residuals_digest",
+                      "open_information"});
   check_version(json);
   Summary summary;
   summary.tool_version = json.string("tool_version");
@@ -384,6 +409,7 @@ Summary load_summary(const std::string& path) {
   summary.exit_code = json.integer("exit_code");
   summary.results_digest = json.string("results_digest", "");
   summary.residuals_digest = json.string("residuals_digest", "");
+  if (!summary.residuals_digest.empty()) summary.open_information = list_of(json, "open_information");
   check_values(summary, path);
   if (const std::string digest = digest_of(file); json.string("digest", "") != digest)
     throw json.error(

@@ -37,6 +37,7 @@ struct SummaryRecording {
   std::map<std::string, double> nuisance;            ///< the others found: table_height_m, start_yaw_rad, ...
   double score = 0;                                  ///< [m]
   double error_cost = 0;                             ///< of errors that are fitted, see LeftResiduals
+  double spread = 0;                                 ///< s of the likelihood, see LeftResiduals [m]
   Misfit misfit;                                     ///< error of the model itself
   std::optional<MarkerFit> markers;                  ///< of what was tracked
   std::optional<double> horizon_s;                   ///< predictable until here [s]
@@ -89,8 +90,9 @@ struct Summary {
   std::string device = "cpu";
   double wall_seconds = 0;
   std::string tool_version;
-  std::string results_digest;    ///< of the tables it was made from (candidate_lines.h)
-  std::string residuals_digest;  ///< of residuals.csv; empty: none
+  std::string results_digest;            ///< of the tables it was made from (candidate_lines.h)
+  std::vector<double> open_information;  ///< see model_comparison.h [m^2]
+  std::string residuals_digest;          ///< of residuals.csv; empty: none
   std::vector<std::string> warnings;
   int exit_code = 0;  ///< 0 usable; 3 finished, but the answer cannot be used
 };

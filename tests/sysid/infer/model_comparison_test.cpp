@@ -41,7 +41,7 @@ Eigen::VectorXd difference(const ObservedRows& rows) {
 }
 
 double excess(const ObservedRows& rows, const Eigen::VectorXd& reference, const Eigen::VectorXd& other) {
-  return excess_deviance({{rows, reference, 0}}, {{rows, other, 0}});
+  return excess_deviance({{rows, reference}}, {{rows, other}});
 }
 
 TEST(ModelComparison, WithoutADiscrepancyTheExcessIsThatOfTheNoise) {
@@ -98,23 +98,26 @@ TEST(ModelComparison, RecordingsAddUp) {
   std::mt19937 random(4);
   const Eigen::VectorXd first = kNoise * normal(random, 100), second = kNoise * normal(random, 100),
                         apart = kNoise * difference(rows);
-  EXPECT_NEAR(excess_deviance({{rows, first, 0}, {rows, second, 0}},
-                              {{rows, first + apart, 0}, {rows, second + apart, 0}}),
-              excess(rows, first, first + apart) + excess(rows, second, second + apart), 1e-9);
+  EXPECT_NEAR(
+      excess_deviance({{rows, first}, {rows, second}}, {{rows, first + apart}, {rows, second + apart}}),
+      excess(rows, first, first + apart) + excess(rows, second, second + apart), 1e-9);
 }
 
-TEST(ModelComparison, OccupiedShareIsThatOfNormalDraws) {
-  std::mt19937 random(5);
-  Eigen::MatrixXd draws(20000, 2);
-  draws.col(0) = 0.01 * normal(random, 20000);
-  draws.col(1) = 0.3 * normal(random, 20000) + draws.col(0);  // one along, one across
-  const double expected = std::log(2 * M_PI * 0.01 * 0.3 / (2.0 * 30.0));
-  EXPECT_NEAR(log_occupied(draws, Eigen::Vector2d(2, 30)), expected, 0.03);  // sd 1 / sqrt(2 n) each
-  // A parameter of which nothing is known costs nothing, and draws that are all alike not all.
-  const Eigen::VectorXd even = Eigen::VectorXd::LinSpaced(1001, 0, 1);
-  EXPECT_NEAR(log_occupied(even, Eigen::VectorXd::Ones(1)), 0.5 * std::log(2 * M_PI / 12), 2e-3);
-  EXPECT_TRUE(std::isfinite(log_occupied(Eigen::MatrixXd::Ones(10, 1), Eigen::VectorXd::Ones(1))));
-  EXPECT_EQ(log_occupied(Eigen::MatrixXd(10, 0), {}), 0);
+TEST(ModelComparison, OccupiedShareIsThatOfTheLinearModel) {
+  // One direction told to 1 % of its prior's deviation, one not at all.
+  const double spread = 2e-3;
+  const Eigen::Vector2d information(std::pow(spread / 0.01, 2), 0);
+  EXPECT_NEAR(log_occupied(information, spread), std::log(0.01), 1e-4);
+  EXPECT_EQ(log_occupied({}, spread), 0);
+}
+
+TEST(ModelComparison, PriorsAreThoseOfTheRanges) {
+  std::vector<Axis> axes = {
+      {"bending", {1e-5, 1e-4, 1e-3}, true}, {"poisson", {0.3}, false}, {"table_height", {-1, 2}, false}};
+  const std::vector<double> spreads = spreads_over(axes, {{1e-4, 2e-4}, {0.3, 0.3}, {0, 1.5}});
+  ASSERT_EQ(spreads.size(), 2u);
+  EXPECT_NEAR(spreads[0], std::log(100) / std::log(2) / std::sqrt(12), 1e-12);
+  EXPECT_NEAR(spreads[1], 2 / std::sqrt(12), 1e-12);
 }
 
 }  // namespace

@@ -36,12 +36,8 @@ FinishedSearch search(const std::string& name, const std::string& shape, double 
   finished.summary.recordings.resize(1);
   finished.summary.recordings[0].name = "lift";
   finished.summary.recordings[0].sha256 = "0123";
-  ParameterFinding bending;
-  bending.name = "bending";
-  bending.values = {1e-5, 1e-3};
-  bending.logarithmic = true;
-  finished.summary.parameters = {bending};
-  finished.summary.samples = Eigen::VectorXd::LinSpaced(64, 1e-4, 1.2e-4);
+  finished.summary.recordings[0].spread = 1e-3;
+  finished.summary.open_information = {1e-2};
   return finished;
 }
 
@@ -62,11 +58,30 @@ TEST(Compare, ModelsThatLeaveTheSameAreAsLikely) {
 
 TEST(Compare, AParameterThatTellsNothingMoreMakesAModelNoLikelier) {
   FinishedSearch more = search("b", "clamp", 0);
-  more.summary.parameters.push_back(more.summary.parameters[0]);
-  more.summary.samples.conservativeResize(64, 2);
-  more.summary.samples.col(1) = more.summary.samples.col(0).reverse();
+  more.summary.open_information.push_back(1e-2);
   const std::vector<ComparedSearch> compared = compare({search("a", "clamp", 0), more});
-  EXPECT_LT(compared[1].probability, 0.1);
+  EXPECT_NEAR(compared[1].occupied - compared[0].occupied, -0.5 * std::log(1 + 1e4), 1e-9);
+  EXPECT_LT(compared[1].probability, 0.05);
+}
+
+TEST(Compare, RecordingsMayBeNamedInAnotherOrder) {
+  FinishedSearch both = search("a", "clamp", 0);
+  both.summary.recordings.push_back(both.summary.recordings[0]);
+  both.summary.recordings[1].sha256 = "4567";
+  both.residuals.push_back(residuals(2e-3));
+  FinishedSearch turned = both;
+  turned.name = "b";
+  std::swap(turned.summary.recordings[0], turned.summary.recordings[1]);
+  std::swap(turned.residuals[0], turned.residuals[1]);
+  EXPECT_DOUBLE_EQ(compare({both, turned})[1].probability, 0.5);
+}
+
+TEST(Compare, NamesWhatWasHeld) {
+  FinishedSearch held = search("b", "clamp", 0);
+  held.summary.fixed["friction"] = {0.3, "measured"};
+  const std::vector<ComparedSearch> compared = compare({search("a", "clamp", 0), held});
+  EXPECT_EQ(compared[1].differs, (std::map<std::string, std::string>{{"friction", "0.3, measured"}}));
+  EXPECT_EQ(compared[0].differs, (std::map<std::string, std::string>{{"friction", "-"}}));
 }
 
 TEST(Compare, RefusesOtherObservationsByName) {
@@ -76,7 +91,7 @@ TEST(Compare, RefusesOtherObservationsByName) {
   EXPECT_EQ(data::input_error_of([&] {
               compare({first, other});
             }),
-            "b: found other recordings than in a, expected the same in the same order");
+            "b: found other recordings than in a, expected searches of the same");
   other = search("b", "pinch", 0);
   other.summary.settings["distance"] = "Huber, 20 mm";
   EXPECT_EQ(data::input_error_of([&] {
