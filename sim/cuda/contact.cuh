@@ -108,7 +108,7 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
   for_obstacles_of(
       step, [&](auto most) { gather_contacts<most>(tables, step, contacts, list, of_place, left, count); });
   synchronize_team();
-  step.restrictions.count = *count;
+  if (threadIdx.x == 0) step.restrictions.count = *count;
   synchronize_team();
 }
 

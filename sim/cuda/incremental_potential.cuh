@@ -10,7 +10,7 @@ namespace flash::sim::cuda {
 
 // What one implicit Euler step minimizes, as sim/step/incremental_potential.h, with what holds vertices.
 
-/// One step of an environment as a problem.
+/// One step of an environment as a problem. The threads of a block have it in common.
 struct StepProblem {
   const ReplayMaterial* material;
   double h;                                    ///< [s]
@@ -45,7 +45,7 @@ struct StepProblem {
   }
 };
 
-/// A point on the way to the end of a step.
+/// A point on the way to the end of a step. The threads of a block have it in common.
 struct Iterate {
   Point* positions;
   double* force;
@@ -215,9 +215,10 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
   double* force = at.force;
   const Point* positions = at.positions;
   synchronize_team();
-  at.elastic = elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, positions, force,
-                                                {triangle_shares, memory.hinge_gradients}, partial);
-  double damping = at.elastic.damping;
+  const ElasticEnergies elastic =
+      elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, positions, force,
+                                       {triangle_shares, memory.hinge_gradients}, partial);
+  double damping = elastic.damping;
   if (step.damped_since.metrics != nullptr && tables.bundle_count > 0)
     damping += add_turned_damping(tables, step, memory, positions, force, partial);
   const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
@@ -254,12 +255,15 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
     worst = worse_of(worst, (sqrt(squared) - rounding) / mass);
   });
   worst = worst_over_team(worst, partial);
-  at.potential = sums[0] + damping + at.elastic.membrane + at.elastic.bending;
-  at.residual = sqrt(sums[1]);
-  at.friction = sums[2];
-  at.line_friction = sums[3];
-  at.rounding = sqrt(sums[4]);
-  at.worst = worst / step.material->weight_factor;
+  if (threadIdx.x == 0) {
+    at.elastic = elastic;
+    at.potential = sums[0] + damping + elastic.membrane + elastic.bending;
+    at.residual = sqrt(sums[1]);
+    at.friction = sums[2];
+    at.line_friction = sums[3];
+    at.rounding = sqrt(sums[4]);
+    at.worst = worst / step.material->weight_factor;
+  }
   synchronize_team();
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include "sim/cuda/common_value.cuh"
 #include "sim/cuda/conjugate_gradients.cuh"
 #include "sim/cuda/contact.cuh"
 #include "sim/cuda/front_factor.cuh"
@@ -10,7 +11,7 @@ namespace flash::sim::cuda {
 
 // Newton's method of sim/newton/newton_iteration.h for one environment. All threads of a team decide alike.
 
-/// A team at work on an environment.
+/// A team at work on an environment. The threads of a block have it in common.
 struct Work {
   const ReplayNumbers& replay;
   const TeamMemory& memory;
@@ -154,21 +155,22 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
     m.gradient[i] = static_cast<float>(w.now.residuals[i]);
   if (touches) copy_contacts(tables, step, w.now.contacts, w.linear);
   synchronize_team();
-  w.refactor = false;
   count_phase(m, ReplayPhase::rest);
+  bool refactor = false;
   for (int solved = 1;; ++solved) {
     restrict_by(w, w.linear, coupled, step);
     count_phase(m, ReplayPhase::contact);
     const int solves = find_direction(w, step, coupled);
     stats.solves += solves;
-    w.refactor = w.refactor || solves > w.replay.stale_factor_solves;
+    refactor = refactor || solves > w.replay.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.
-    if (!touches || solved == linear_problems) return;
+    if (!touches || solved == linear_problems) break;
     const bool changed =
         exchange_contacts(tables, step, w.now, m.direction, m.change, stuck, w.linear, m.gradient);
     count_phase(m, ReplayPhase::contact);
-    if (!changed) return;
+    if (!changed) break;
   }
+  change_common([&] { w.refactor = refactor; });
 }
 
 /// The slope of the potential along the direction, at an iterate [J].
@@ -198,9 +200,11 @@ __device__ inline void move(const Work& w, const StepProblem& step, double lengt
 __device__ inline double potential_on_line(const Iterate& at) { return at.potential + at.line_friction; }
 
 __device__ inline void swap_iterates(Iterate& a, Iterate& b) {
-  const Iterate c = a;
-  a = b;
-  b = c;
+  change_common([&] {
+    const Iterate c = a;
+    a = b;
+    b = c;
+  });
 }
 
 /// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
@@ -273,7 +277,8 @@ __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stat
       if (balanced(step, w.now, tolerance)) return;
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
-        stuck = w.refactor = true;
+        stuck = true;
+        change_common([&] { w.refactor = true; });
         continue;
       }
       // A small step all the same lets the contacts decide anew.
