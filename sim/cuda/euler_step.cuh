@@ -168,11 +168,10 @@ __device__ inline void begin_damping(const Work& w, StepProblem& step) {
 __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const StepMotion& motion,
                                        double begin, double end) {
   if (motion.obstacle_count == 0) return;
-  place_obstacles(motion.obstacles, motion.obstacle_count, motion.poses, w.replay.frames, begin, end,
-                  w.memory.obstacles);
+  place_obstacles(static_cast<int>(threadIdx.x), motion.obstacles, motion.obstacle_count, motion.poses,
+                  w.replay.frames, begin, end, w.obstacles);
   change_common([&] {
-    step.obstacles = {
-        w.memory.obstacles, motion.obstacle_count, motion.several, step.h, {w.replay.exit_speed, {}}};
+    step.obstacles = {w.obstacles, motion.obstacle_count, motion.several, step.h, {w.replay.exit_speed, {}}};
     step.numbers.own_blocks = w.memory.own_blocks;
   });
 }

@@ -174,9 +174,9 @@ __device__ inline void write_contact(const VertexContact& contact, const VertexT
 
 /// Decides what the obstacles do to vertex i, which needs `force`.
 template <int most>
-__device__ __noinline__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
-                                                       const ContactSet* line, int i, const Triple& point,
-                                                       const Triple& force) {
+__device__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
+                                          const ContactSet* line, int i, const Triple& point,
+                                          const Triple& force) {
   constexpr double epsilon = 2.220446049250313e-16;
   const ObstacleStep<double> obstacles = obstacles_of<most>(step);
   const Triple start = triple(step.start[i]);
@@ -205,6 +205,58 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   return response;
 }
 
+/// What the vertices of an iterate add up to.
+struct VertexSums {
+  double potential;                ///< but for that of elasticity and its damping [J]
+  double friction, line_friction;  ///< as in Iterate [J]
+  double residual, rounding;       ///< as in Iterate, squared [N^2]
+  double worst;                    ///< as in Iterate, times the weight of a unit of mass [N/kg]
+};
+
+/// Completes the forces of the vertices, in which those of elasticity stand, and decides their contacts with
+/// `most` obstacles.
+template <int most>
+__device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, const StepProblem& step,
+                                                    const ContactSet* line, const Iterate& at,
+                                                    double* partial) {
+  double* force = at.force;
+  const Point* positions = at.positions;
+  const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
+  enum { potential, residual, friction, line_friction, rounding, count };
+  double sums[count], worst = 0;
+  sum_over_team(tables.size, sums, partial, [&](int i, double(&added)[count]) {
+    const double mass = step.mass(tables, i);
+    const Triple point = triple(positions[i]), moved = point - triple(step.start[i]),
+                 inertial = step.inertial(i, moved), load = step.load(i);
+    const Triple own = force_at(force, i) + mass * (per_step * inertial + drag * moved) - load;
+    added[potential] +=
+        0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
+    force[3 * i] = own.x;
+    force[3 * i + 1] = own.y;
+    force[3 * i + 2] = own.z;
+    Triple reaction = step.held_part(i, own);
+    double uncertain = 0;
+    if constexpr (most > 0)
+      if (step.held_axes[i] == 0) {
+        const ContactResponse contact = update_contact<most>(step, at.contacts, line, i, point, own);
+        reaction = contact.reaction;
+        uncertain = contact.rounding;
+        added[friction] += contact.friction;
+        added[line_friction] += contact.line_friction;
+      }
+    const Triple left = own - reaction;
+    at.residuals[3 * i] = left.x;
+    at.residuals[3 * i + 1] = left.y;
+    at.residuals[3 * i + 2] = left.z;
+    const double squared = dot(left, left);
+    added[residual] += squared;
+    added[rounding] += uncertain * uncertain;
+    worst = worse_of(worst, (sqrt(squared) - uncertain) / mass);
+  });
+  worst = worst_over_team(worst, partial);
+  return {sums[potential], sums[friction], sums[line_friction], sums[residual], sums[rounding], worst};
+}
+
 /// Fills in an iterate from its positions. `line`: contacts of the iterate from which a line leads here, null
 /// without. `triangle_shares`: for what triangles give to the gradient.
 template <bool places_on_chip>
@@ -212,57 +264,26 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
                                       const TeamMemory& memory, double* triangle_shares,
                                       const ContactSet* line, Iterate& at) {
   double* partial = shared_memory<double>();
-  double* force = at.force;
-  const Point* positions = at.positions;
   synchronize_team();
   const ElasticEnergies elastic =
-      elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, positions, force,
+      elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, at.positions, at.force,
                                        {triangle_shares, memory.hinge_gradients}, partial);
   double damping = elastic.damping;
   if (step.damped_since.metrics != nullptr && tables.bundle_count > 0)
-    damping += add_turned_damping(tables, step, memory, positions, force, partial);
-  const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
-  // Potential, squared residuals, friction, friction along the line, squared rounding.
-  double sums[5], worst = 0;
-  sum_over_team(tables.size, sums, partial, [&](int i, double(&added)[5]) {
-    const double mass = step.mass(tables, i);
-    const Triple moved = triple(positions[i]) - triple(step.start[i]), inertial = step.inertial(i, moved),
-                 load = step.load(i);
-    const Triple own = force_at(force, i) + mass * (per_step * inertial + drag * moved) - load;
-    added[0] +=
-        0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
-    force[3 * i] = own.x;
-    force[3 * i + 1] = own.y;
-    force[3 * i + 2] = own.z;
-    Triple reaction = step.held_part(i, own);
-    double rounding = 0;
-    if (step.obstacles.count > 0 && step.held_axes[i] == 0) {
-      const ContactResponse contact = for_obstacles_of(step, [&](auto most) {
-        return update_contact<most>(step, at.contacts, line, i, triple(positions[i]), own);
-      });
-      reaction = contact.reaction;
-      rounding = contact.rounding;
-      added[2] += contact.friction;
-      added[3] += contact.line_friction;
-    }
-    const Triple residual = own - reaction;
-    at.residuals[3 * i] = residual.x;
-    at.residuals[3 * i + 1] = residual.y;
-    at.residuals[3 * i + 2] = residual.z;
-    const double squared = dot(residual, residual);
-    added[1] += squared;
-    added[4] += rounding * rounding;
-    worst = worse_of(worst, (sqrt(squared) - rounding) / mass);
-  });
-  worst = worst_over_team(worst, partial);
+    damping += add_turned_damping(tables, step, memory, at.positions, at.force, partial);
+  const VertexSums sums = step.obstacles.count == 0
+                              ? balance_vertices<0>(tables, step, line, at, partial)
+                              : for_obstacles_of(step, [&](auto most) {
+                                  return balance_vertices<most>(tables, step, line, at, partial);
+                                });
   if (threadIdx.x == 0) {
     at.elastic = elastic;
-    at.potential = sums[0] + damping + elastic.membrane + elastic.bending;
-    at.residual = sqrt(sums[1]);
-    at.friction = sums[2];
-    at.line_friction = sums[3];
-    at.rounding = sqrt(sums[4]);
-    at.worst = worst / step.material->weight_factor;
+    at.potential = sums.potential + damping + elastic.membrane + elastic.bending;
+    at.residual = sqrt(sums.residual);
+    at.friction = sums.friction;
+    at.line_friction = sums.line_friction;
+    at.rounding = sqrt(sums.rounding);
+    at.worst = sums.worst / step.material->weight_factor;
   }
   synchronize_team();
 }

@@ -15,7 +15,8 @@ namespace flash::sim::cuda {
 struct Work {
   const ReplayNumbers& replay;
   const TeamMemory& memory;
-  bool refactor;  ///< whether the next solve needs a new factor
+  MovingObstacle<double>* obstacles;  ///< room on chip for those of a step
+  bool refactor;                      ///< whether the next solve needs a new factor
   Iterate now, trial, longer;
   ContactSet linear;  ///< of the linear problem, to which the direction is the solution
 };
@@ -108,40 +109,49 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
 /// On-chip bytes for sums over the team, before what a solve needs.
 inline constexpr int linear_partial_bytes = seats * static_cast<int>(sizeof(float));
 
-/// Solves the linear problem. Returns the number of solves with the factor.
-__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step, bool coupled) {
+/// A linear problem and what a team solves it with.
+struct LinearWork {
+  LinearProblem problem;
+  LinearVectors vectors;
+  float* partial;  ///< on chip
+  char* chip;      ///< behind that
+};
+
+__device__ inline LinearWork linear_work(const Work& w, const StepProblem& step) {
   constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
-  const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
-  const LinearProblem problem = {
-      m.block_rows,
-      static_cast<float>(step.numbers.effective_rigidity()),
-      hinges_of(w),
-      m.factor,
-      m.gradient,
-      step.restrictions,
-      static_cast<float>(linear_tolerance *
-                         fmin(w.replay.tolerance * step.material->force_scale, w.now.residual))};
   char* chip = shared_memory<char>();
   const auto on_chip = [&](int at, auto* otherwise) {
     return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
   };
-  const LinearVectors vectors = {m.residual,
-                                 m.image,
-                                 m.search,
-                                 on_chip(w.replay.search_at, m.search),
-                                 on_chip(w.replay.solved_at, m.solved),
-                                 w.replay.solved_at >= 0,
-                                 {m.clocks}};
-  float* partial = reinterpret_cast<float*>(chip);
-  char* rest = chip + linear_partial_bytes;
-  const int solves = coupled
-                         ? generalized_residuals<half_parts>(w.replay.fronts, tables, problem, vectors,
-                                                             m.coupled, m.direction, m.change, partial, rest)
-                         : conjugate_gradients<half_parts>(w.replay.fronts, tables, problem, vectors,
-                                                           m.direction, m.change, partial, rest);
-  count_phase(m, ReplayPhase::directions);
-  return solves;
+  return {{m.block_rows, static_cast<float>(step.numbers.effective_rigidity()), hinges_of(w), m.factor,
+           m.gradient, step.restrictions,
+           static_cast<float>(linear_tolerance *
+                              fmin(w.replay.tolerance * step.material->force_scale, w.now.residual))},
+          {m.residual,
+           m.image,
+           m.search,
+           on_chip(w.replay.search_at, m.search),
+           on_chip(w.replay.solved_at, m.solved),
+           w.replay.solved_at >= 0,
+           {m.clocks}},
+          reinterpret_cast<float*>(chip),
+          chip + linear_partial_bytes};
+}
+
+/// Solves the linear problem. Returns the number of solves with the factor.
+__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step) {
+  const LinearWork own = linear_work(w, step);
+  return conjugate_gradients<half_parts>(w.replay.fronts, w.replay.sheet, own.problem, own.vectors,
+                                         w.memory.direction, w.memory.change, own.partial, own.chip);
+}
+
+/// The same where friction follows the normal forces.
+__device__ __noinline__ int find_coupled_direction(const Work& w, const StepProblem& step) {
+  const LinearWork own = linear_work(w, step);
+  return generalized_residuals<half_parts>(w.replay.fronts, w.replay.sheet, own.problem, own.vectors,
+                                           w.memory.coupled, w.memory.direction, w.memory.change, own.partial,
+                                           own.chip);
 }
 
 /// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
@@ -160,7 +170,8 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   for (int solved = 1;; ++solved) {
     restrict_by(w, w.linear, coupled, step);
     count_phase(m, ReplayPhase::contact);
-    const int solves = find_direction(w, step, coupled);
+    const int solves = coupled ? find_coupled_direction(w, step) : find_direction(w, step);
+    count_phase(m, ReplayPhase::directions);
     stats.solves += solves;
     refactor = refactor || solves > w.replay.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.

@@ -21,6 +21,11 @@ __device__ void keep(const ReplayNumbers& replay, const Point* positions, double
   }
 }
 
+/// Room for the obstacles of a step.
+struct StepObstacles {
+  MovingObstacle<double> of[most_obstacles];
+};
+
 /// What the threads of a block have in common.
 struct CommonState {
   CommonValue<ReplayNumbers> replay;
@@ -28,6 +33,7 @@ struct CommonState {
   CommonValue<ReplayMaterial> material;
   CommonValue<Work> work;
   CommonValue<StepProblem> step;
+  CommonValue<StepObstacles> obstacles;
 };
 
 /// What a team works on an environment with.
@@ -43,7 +49,8 @@ __device__ Work& begin_work(CommonState& common) {
     return at;
   };
   return common.work.write([&](Work& work) {
-    new (&work) Work{replay, memory, true, iterate(0), iterate(1), iterate(2), memory.contacts[3]};
+    new (&work) Work{replay,     memory,     common.obstacles.get().of, true, iterate(0),
+                     iterate(1), iterate(2), memory.contacts[3]};
   });
 }
 

@@ -58,12 +58,12 @@ FLASH_HOST_DEVICE inline Vector3<Real> slid_place(const ObstacleStep<Real>& step
   return end;
 }
 
-/// How a vertex that comes from `start` stands against an obstacle, were it at `point` at the end of the
-/// step.
+/// gap_in_step of an obstacle that is no plane. By value: what a kernel hands out the address of it keeps in
+/// memory.
 template <typename Real>
-FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_in_step(const ObstacleStep<Real>& step, int obstacle,
-                                                      const Vector3<Real>& start,
-                                                      const Vector3<Real>& point) {
+FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_of_solid_in_step(ObstacleStep<Real> step, int obstacle,
+                                                                    Vector3<Real> start,
+                                                                    Vector3<Real> point) {
   const MovingObstacle<Real>& own = step.obstacles[obstacle];
   const OtherObstacles<Real> none;
   if (!step.several || own.shape != ObstacleShape::box)
@@ -74,6 +74,18 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_in_step(const ObstacleStep<Real>& 
     return gap_after(own, none, start, point, point, step.time_step, step.way_out);
   return gap_after(own, step.others(obstacle), start, point, slid_place(step, obstacle, start, point),
                    step.time_step, step.way_out);
+}
+
+/// How a vertex that comes from `start` stands against an obstacle, were it at `point` at the end of the
+/// step.
+template <typename Real>
+FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_in_step(const ObstacleStep<Real>& step, int obstacle,
+                                                      const Vector3<Real>& start,
+                                                      const Vector3<Real>& point) {
+  const MovingObstacle<Real>& own = step.obstacles[obstacle];
+  if (own.shape == ObstacleShape::plane)
+    return gap_after_plane(own, start, point, step.time_step, step.way_out);
+  return gap_of_solid_in_step(step, obstacle, start, point);
 }
 
 /// The distance of gap_in_step alone, fast where the obstacle is a plane.
