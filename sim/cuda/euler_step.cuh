@@ -171,7 +171,11 @@ __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const S
   place_obstacles(static_cast<int>(threadIdx.x), motion.obstacles, motion.obstacle_count, motion.poses,
                   w.replay.frames, begin, end, w.obstacles);
   change_common([&] {
-    step.obstacles = {w.obstacles, motion.obstacle_count, motion.several, step.h, {w.replay.exit_speed, {}}};
+    bool planes = true;
+    for (int k = 0; k < motion.obstacle_count; ++k)
+      planes = planes && w.obstacles[k].shape == ObstacleShape::plane;
+    step.obstacles = {w.obstacles, motion.obstacle_count,     motion.several,
+                      step.h,      {w.replay.exit_speed, {}}, planes};
     step.numbers.own_blocks = w.memory.own_blocks;
   });
 }

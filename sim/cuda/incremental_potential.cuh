@@ -134,22 +134,67 @@ struct ContactResponse {
   double rounding;                 ///< of the reaction, by that of positions where friction turns [N]
 };
 
-/// The obstacles of a step that has at most so many of them; for one the compiler has no loops to make.
-template <int most>
+// Kinds of obstacles that code is made for. For one the compiler has no loops to make. Where all are planes
+// nothing is called, and what a vertex is worked on with stays in registers: else it is kept in memory over
+// calls, and that is more than the first-level cache has room for.
+
+struct NoObstacles {
+  static constexpr int most = 0;
+};
+struct OnePlane {
+  static constexpr int most = 1;
+  static constexpr bool planes = true;
+};
+struct OneObstacle {
+  static constexpr int most = 1;
+  static constexpr bool planes = false;
+};
+struct AnyObstacles {
+  static constexpr int most = most_obstacles;
+  static constexpr bool planes = false;
+};
+
+/// The obstacles of a step, which are of this kind.
+template <typename Kind>
 __device__ ObstacleStep<double> obstacles_of(const StepProblem& step) {
   ObstacleStep<double> obstacles = step.obstacles;
-  if constexpr (most == 1) {
+  obstacles.planes = Kind::planes;
+  if constexpr (Kind::most == 1) {
     obstacles.count = 1;
     obstacles.several = false;
   }
   return obstacles;
 }
 
-/// act(std::integral_constant<int, most>) for the fewest obstacles that code is made for: one, or any number.
+/// act(the kind of obstacles of a step that has some).
 template <typename Act>
 __device__ auto for_obstacles_of(const StepProblem& step, const Act& act) {
-  if (step.obstacles.count == 1) return act(std::integral_constant<int, 1>{});
-  return act(std::integral_constant<int, most_obstacles>{});
+  if (step.obstacles.count > 1) return act(AnyObstacles{});
+  return step.obstacles.planes ? act(OnePlane{}) : act(OneObstacle{});
+}
+
+/// What is kept of the contact of a vertex, and of its touches.
+template <int most>
+struct KeptContact {
+  ContactRecord contact;
+  TouchRecord touches[most];
+};
+
+/// Reads nothing of a vertex that is not `listed`.
+template <int most>
+__device__ KeptContact<most> read_kept(const ContactSet* contacts, int i, int count, bool listed) {
+  KeptContact<most> kept;
+  if (listed) {
+    kept.contact = read(contacts->contacts, i);
+    for (int k = 0; k < count; ++k) kept.touches[k] = read(contacts->touches, i, k);
+  }
+  return kept;
+}
+
+/// The touches of a vertex that is listed.
+template <int most>
+__device__ void take_touches(const KeptContact<most>& kept, int count, VertexTouch* touches) {
+  for (int k = 0; k < count; ++k) touches[k] = touch_of(kept.touches[k]);
 }
 
 __device__ inline void read_touches(const ContactSet& contacts, int i, int count, VertexTouch* touches) {
@@ -173,14 +218,14 @@ __device__ inline void write_contact(const VertexContact& contact, const VertexT
 }
 
 /// Decides what the obstacles do to vertex i, which needs `force`.
-template <int most>
+template <typename Kind>
 __device__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
                                           const ContactSet* line, int i, const Triple& point,
                                           const Triple& force) {
   constexpr double epsilon = 2.220446049250313e-16;
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
   const Triple start = triple(step.start[i]);
-  VertexTouch touches[most];
+  VertexTouch touches[Kind::most];
   ContactResponse response = {};
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
@@ -194,7 +239,7 @@ __device__ ContactResponse update_contact(const StepProblem& step, const Contact
   if (clearance > touching_gap) return response;
   find_touches(obstacles, start, point, touches);
   carry_bristles(obstacles, step, i, touches);
-  SurfaceRoom<most> room;
+  SurfaceRoom<Kind::most> room;
   const VertexContact contact = decide_contact(obstacles, start, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
   write_contact(contact, touches, obstacles.count, contacts, i);
@@ -213,9 +258,8 @@ struct VertexSums {
   double worst;                    ///< as in Iterate, times the weight of a unit of mass [N/kg]
 };
 
-/// Completes the forces of the vertices, in which those of elasticity stand, and decides their contacts with
-/// `most` obstacles.
-template <int most>
+/// Completes the forces of the vertices, in which those of elasticity stand, and decides their contacts.
+template <typename Kind>
 __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, const StepProblem& step,
                                                     const ContactSet* line, const Iterate& at,
                                                     double* partial) {
@@ -236,9 +280,9 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
     force[3 * i + 2] = own.z;
     Triple reaction = step.held_part(i, own);
     double uncertain = 0;
-    if constexpr (most > 0)
+    if constexpr (Kind::most > 0)
       if (step.held_axes[i] == 0) {
-        const ContactResponse contact = update_contact<most>(step, at.contacts, line, i, point, own);
+        const ContactResponse contact = update_contact<Kind>(step, at.contacts, line, i, point, own);
         reaction = contact.reaction;
         uncertain = contact.rounding;
         added[friction] += contact.friction;
@@ -271,11 +315,11 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
   double damping = elastic.damping;
   if (step.damped_since.metrics != nullptr && tables.bundle_count > 0)
     damping += add_turned_damping(tables, step, memory, at.positions, at.force, partial);
-  const VertexSums sums = step.obstacles.count == 0
-                              ? balance_vertices<0>(tables, step, line, at, partial)
-                              : for_obstacles_of(step, [&](auto most) {
-                                  return balance_vertices<most>(tables, step, line, at, partial);
-                                });
+  const auto balance = [&](auto kind) {
+    return balance_vertices<decltype(kind)>(tables, step, line, at, partial);
+  };
+  const VertexSums sums =
+      step.obstacles.count == 0 ? balance(NoObstacles{}) : for_obstacles_of(step, balance);
   if (threadIdx.x == 0) {
     at.elastic = elastic;
     at.potential = sums.potential + damping + elastic.membrane + elastic.bending;

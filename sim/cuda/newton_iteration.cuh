@@ -161,8 +161,11 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
   const bool touches = step.obstacles.count > 0;
-  for (int i = team_rank(); i < 3 * tables.size; i += team_size())
-    m.gradient[i] = static_cast<float>(w.now.residuals[i]);
+  for_own_vertices(
+      tables.size, [&](int i) { return force_at(w.now.residuals, i); },
+      [&](int i, const Triple& own) {
+        put({static_cast<float>(own.x), static_cast<float>(own.y), static_cast<float>(own.z)}, m.gradient, i);
+      });
   if (touches) copy_contacts(tables, step, w.now.contacts, w.linear);
   synchronize_team();
   count_phase(m, ReplayPhase::rest);
@@ -186,21 +189,26 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
 
 /// The slope of the potential along the direction, at an iterate [J].
 __device__ inline double slope_at(const Work& w, const Iterate& at) {
-  double slope[1];
-  sum_over_team(w.replay.sheet.size, slope, shared_memory<double>(), [&](int i, double(&sums)[1]) {
-    sums[0] += dot(force_at(at.residuals, i), way_at(w.memory.direction, i));
-  });
+  double* partial = shared_memory<double>();
+  const int size = w.replay.sheet.size;
   synchronize_team();
-  return slope[0];
+  add_up<1, 2>(
+      size, partial, [&](int i) { return dot(force_at(at.residuals, i), way_at(w.memory.direction, i)); },
+      [&](int, double own, double(&sums)[1]) { sums[0] += own; });
+  synchronize_team();
+  const double slope = total(size, partial);
+  synchronize_team();
+  return slope;
 }
 
 /// Evaluates the feasible iterate nearest to the point `length` directions from the iterate.
 __device__ inline void move(const Work& w, const StepProblem& step, double length, Iterate& to) {
-  for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
-    const Point from = w.now.positions[i];
-    const float* way = w.memory.direction + 3 * i;
-    to.positions[i] = {from.x + length * way[0], from.y + length * way[1], from.z + length * way[2], 0};
-  }
+  for_own_vertices(
+      w.replay.sheet.size,
+      [&](int i) { return triple(w.now.positions[i]) + length * way_at(w.memory.direction, i); },
+      [&](int i, const Triple& place) {
+        to.positions[i] = {place.x, place.y, place.z, 0};
+      });
   count_phase(w.memory, ReplayPhase::rest);
   project_to_feasible(w.replay.sheet, step, &w.linear, to.positions);
   count_phase(w.memory, ReplayPhase::contact);

@@ -60,7 +60,7 @@ FLASH_HOST_DEVICE inline Vector3<double> project_in_rounds(const ObstacleStep<do
       }
       outside = outside && depth <= 0;
       // What is nearest of a box or a mesh that the way misses may be its far side.
-      const ObstacleShape shape = step.obstacles[k].shape;
+      const ObstacleShape shape = step.planes ? ObstacleShape::plane : step.obstacles[k].shape;
       if ((shape == ObstacleShape::box || shape == ObstacleShape::mesh) && depth < -touching_gap) continue;
       room.normals[count] = gap.normal;
       room.right[count++] = depth;
@@ -73,6 +73,7 @@ FLASH_HOST_DEVICE inline Vector3<double> project_in_rounds(const ObstacleStep<do
   return point;
 }
 
+/// The same, called on a device: several surfaces take much code.
 template <typename Room>
 FLASH_CALLED_ON_DEVICE inline Vector3<double> project_by_call(const ObstacleStep<double>& step,
                                                               const Vector3<double>& start,
