@@ -112,7 +112,9 @@ __device__ __noinline__ void gather_contacts(const SheetTables& tables, const St
           take_touches(kept, obstacles.count, touches);
           contact = contact_of(obstacles, kept.contact, touches);
         }
-        if (contact.freedom == Freedom::free) {
+        const bool held = contact.freedom != Freedom::free;
+        step.restrictions.set_projector(i, held ? contact.free : identity3());
+        if (!held) {
           of_place[i] = -1;
           return;
         }

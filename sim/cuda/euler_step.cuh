@@ -19,12 +19,16 @@ struct StepMotion {
 };
 
 /// Notes what is held and where it is now; forget_restrictions takes it back.
-__device__ inline void begin_holds(const Work& w, const StepMotion& motion, const Point* positions) {
+__device__ inline void begin_holds(const Work& w, const StepProblem& step, const StepMotion& motion,
+                                   const Point* positions) {
   for (int k = team_rank(); k < motion.held_count; k += team_size()) {
     const HeldPlace& held = motion.held[k];
     VertexRestriction restriction = {held.place, {}, {}};
     for (int axis = 0; axis < 3; ++axis) restriction.free[4 * axis] = held.axes >> axis & 1 ? 0.0f : 1.0f;
     w.memory.restrictions[k] = restriction;
+    if (step.restrictions.projectors != nullptr)
+      step.restrictions.set_projector(
+          held.place, Symmetric3{restriction.free[0], 0, 0, restriction.free[4], 0, restriction.free[8]});
     w.memory.restriction_of[held.place] = k;
     w.memory.held_axes[held.place] = held.axes;
     const Point from = positions[held.place];
@@ -259,7 +263,7 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion
                                     const SheetState& state) {
   constexpr int most_halvings = 16;
   ReplayStats stats = {};
-  begin_holds(w, motion, state.positions);
+  begin_holds(w, step, motion, state.positions);
   // Of each part of a part, from the whole step on: halves that it may be divided into still.
   int halvings[most_halvings + 1], level = 0;
   unsigned second = 0, first_converged = 0;  // a bit a level

@@ -35,6 +35,7 @@ struct CommonState {
   CommonValue<StepProblem> step;
   CommonValue<StepObstacles> obstacles;
 };
+static_assert(sizeof(CommonState) <= common_memory);
 
 /// What a team works on an environment with.
 __device__ Work& begin_work(CommonState& common) {
@@ -73,7 +74,8 @@ __device__ void advance(CommonState& common, int e, int first, int end) {
            state.bristles,
            size,
            replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
-           {memory.restrictions, 0, memory.restriction_of},
+           {memory.restrictions, 0, memory.restriction_of,
+            material.obstacle_count > 0 ? memory.projectors : nullptr, size},
            memory.held_axes,
            0,
            {},

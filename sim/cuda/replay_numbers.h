@@ -102,6 +102,7 @@ struct TeamMemory {
   double* damped;
   VertexRestriction* restrictions;
   int* restriction_of;  ///< by place, -1 for none
+  float* projectors;    ///< six a vertex (Restrictions); null without obstacles
   double* hold_starts;  ///< where held vertices were when the step began
   long long* clocks;    ///< ticks of the processor spent in each phase
 };
