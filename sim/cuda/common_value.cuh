@@ -3,6 +3,15 @@
 
 namespace flash::sim::cuda {
 
+/// change() by one thread of a block, of what its threads have in common: behind all that they read before,
+/// and before all that they read next.
+template <typename Change>
+__device__ void change_common(const Change& change) {
+  __syncthreads();
+  if (threadIdx.x == 0) change();
+  __syncthreads();
+}
+
 /// A value that the threads of a block have in common, on chip. What a function takes by reference would else
 /// be a copy for each thread, in memory: half a megabyte for a block, beside a first-level cache of 28 KB.
 template <typename Value>
@@ -13,9 +22,7 @@ struct CommonValue {
   /// change(value) by one thread, which the others see.
   template <typename Change>
   __device__ Value& write(const Change& change) {
-    __syncthreads();
-    if (threadIdx.x == 0) change(get());
-    __syncthreads();
+    change_common([&] { change(get()); });
     return get();
   }
 };

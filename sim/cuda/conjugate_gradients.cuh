@@ -91,6 +91,13 @@ __device__ inline float product(const Numbers3& a, const Numbers3& b) {
 
 /// What of a vertex may move freely.
 __device__ inline Numbers3 free_part(const Restrictions& restrictions, int vertex, const Numbers3& v) {
+  if (restrictions.projectors != nullptr) {
+    const float* own = restrictions.projectors + vertex;
+    const long step = restrictions.size;
+    const float xx = own[0], xy = own[step], xz = own[2 * step], yy = own[3 * step], yz = own[4 * step],
+                zz = own[5 * step];
+    return {xx * v.x + xy * v.y + xz * v.z, xy * v.x + yy * v.y + yz * v.z, xz * v.x + yz * v.y + zz * v.z};
+  }
   const int at = restrictions.count == 0 ? -1 : restrictions.of_place[vertex];
   if (at < 0) return v;
   const float* free = restrictions.list[at].free;

@@ -1,6 +1,7 @@
 #pragma once
 #include "sim/cuda/environment_numbers.h"
 #include "sim/cuda/incremental_potential.cuh"
+#include "sim/cuda/own_vertices.cuh"
 #include "sim/cuda/team_sum.cuh"
 #include "sim/law/contact_exchange.h"
 #include "sim/law/feasible_place.h"
@@ -15,27 +16,44 @@ __device__ inline Triple way_at(const float* direction, int i) {
   return {direction[3 * i], direction[3 * i + 1], direction[3 * i + 2]};
 }
 
-template <int most>
+/// Vertices of a thread whose contacts are on their way to it at the same time: as many as registers hold.
+template <typename Kind>
+inline constexpr int contacts_together = Kind::most == 1 ? 2 : 1;
+
+template <typename Kind>
 __device__ __noinline__ void project_vertices(const SheetTables& tables, const StepProblem& step,
                                               const ContactSet* contacts, Point* positions) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  SurfaceRoom<most> room;
-  VertexTouch touches[most];
+  struct Vertex {
+    bool free, listed;
+    Triple start, point;
+  };
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
+  SurfaceRoom<Kind::most> room;
+  VertexTouch touches[Kind::most];
   synchronize_team();
-  for (int i = team_rank(); i < tables.size; i += team_size()) {
-    if (step.held_axes[i] != 0) continue;
-    const Triple start = triple(step.start[i]), point = triple(positions[i]);
-    Triple place = point;
-    if (contacts != nullptr && contacts->listed[i] != 0) {
-      read_touches(*contacts, i, obstacles.count, touches);
-      carry_bristles(obstacles, step, i, touches);
-      place = feasible_place(obstacles, start, read_contact(*contacts, i, obstacles, touches), touches, point,
-                             room);
-    } else if (!(clearance_of(obstacles, start, point) >= 0)) {
-      place = projected_out(obstacles, start, nullptr, point, room);
-    }
-    positions[i] = {place.x, place.y, place.z, 0};
-  }
+  for_own_vertices<contacts_together<Kind>>(
+      tables.size,
+      [&](int i) {
+        const bool free = step.held_axes[i] == 0, listed = contacts != nullptr && contacts->listed[i] != 0;
+        return Vertex{free, free && listed, triple(step.start[i]), triple(positions[i])};
+      },
+      [&](int i, const Vertex& vertex) {
+        return read_kept<Kind::most>(contacts, i, obstacles.count, vertex.listed);
+      },
+      [&](int i, const Vertex& vertex, const KeptContact<Kind::most>& kept) {
+        const auto& [free, listed, start, point] = vertex;
+        if (!free) return;
+        Triple place = point;
+        if (listed) {
+          take_touches(kept, obstacles.count, touches);
+          carry_bristles(obstacles, step, i, touches);
+          place = feasible_place(obstacles, start, contact_of(obstacles, kept.contact, touches), touches,
+                                 point, room);
+        } else if (!(clearance_of(obstacles, start, point) >= 0)) {
+          place = projected_out(obstacles, start, nullptr, point, room);
+        }
+        positions[i] = {place.x, place.y, place.z, 0};
+      });
 }
 
 /// Moves a trial iterate out of the obstacles, held vertices onto their surface. `contacts`: of the linear
@@ -43,53 +61,78 @@ __device__ __noinline__ void project_vertices(const SheetTables& tables, const S
 __device__ inline void project_to_feasible(const SheetTables& tables, const StepProblem& step,
                                            const ContactSet* contacts, Point* positions) {
   if (step.obstacles.count == 0) return;
-  for_obstacles_of(step, [&](auto most) { project_vertices<most>(tables, step, contacts, positions); });
+  for_obstacles_of(step,
+                   [&](auto kind) { project_vertices<decltype(kind)>(tables, step, contacts, positions); });
+}
+
+template <typename Kind>
+__device__ __noinline__ void copy_records(const SheetTables& tables, int count, const ContactSet& from,
+                                          const ContactSet& to) {
+  for_own_vertices<contacts_together<Kind>>(
+      tables.size, [&](int i) { return from.listed[i]; },
+      [&](int i, int listed) { return read_kept<Kind::most>(&from, i, count, listed != 0); },
+      [&](int i, int listed, const KeptContact<Kind::most>& kept) {
+        to.listed[i] = listed;
+        if (listed == 0) return;
+        write(kept.contact, to.contacts, i);
+        for (int k = 0; k < count; ++k) write(kept.touches[k], to.touches, i, k);
+      });
 }
 
 /// Copies what holds the vertices at an iterate.
 __device__ inline void copy_contacts(const SheetTables& tables, const StepProblem& step,
                                      const ContactSet& from, const ContactSet& to) {
-  for (int i = team_rank(); i < tables.size; i += team_size()) {
-    const int listed = from.listed[i];
-    to.listed[i] = listed;
-    if (listed == 0) continue;
-    write(read(from.contacts, i), to.contacts, i);
-    for (int k = 0; k < step.obstacles.count; ++k) write(read(from.touches, i, k), to.touches, i, k);
-  }
+  for_obstacles_of(step, [&](auto kind) {
+    copy_records<decltype(kind)>(tables, decltype(kind)::most == 1 ? 1 : step.obstacles.count, from, to);
+  });
 }
 
-template <int most>
-__device__ void gather_contacts(const SheetTables& tables, const StepProblem& step,
-                                const ContactSet& contacts, VertexRestriction* list, int* of_place,
-                                float* left, int* count) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  VertexTouch touches[most];
-  for (int i = team_rank(); i < tables.size; i += team_size()) {
-    if (step.held_axes[i] != 0) continue;
-    VertexContact contact;
-    if (contacts.listed[i] != 0) {
-      read_touches(contacts, i, obstacles.count, touches);
-      contact = read_contact(contacts, i, obstacles, touches);
-    }
-    if (contact.freedom == Freedom::free) {
-      of_place[i] = -1;
-      continue;
-    }
-    VertexRestriction restriction = {i, {}, {}};
-    for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 3; ++r) restriction.free[3 * c + r] = static_cast<float>(contact.free.at(r, c));
-      restriction.correction[c] = static_cast<float>(contact.correction[c]);
-    }
-    const int at = atomicAdd(count, 1);
-    list[at] = restriction;
-    of_place[i] = at;
-    if (left == nullptr) continue;
-    for (int c = 0; c < 3; ++c) {
-      const Triple coupling = friction_coupling(obstacles, contact, touches, c);
-      for (int r = 0; r < 3; ++r)
-        left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
-    }
-  }
+template <typename Kind>
+__device__ __noinline__ void gather_contacts(const SheetTables& tables, const StepProblem& step,
+                                             const ContactSet& contacts, VertexRestriction* list,
+                                             int* of_place, float* left, int* count) {
+  struct Vertex {
+    bool free, listed;
+  };
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
+  VertexTouch touches[Kind::most];
+  for_own_vertices<contacts_together<Kind>>(
+      tables.size,
+      [&](int i) {
+        const bool free = step.held_axes[i] == 0, listed = contacts.listed[i] != 0;
+        return Vertex{free, free && listed};
+      },
+      [&](int i, const Vertex& vertex) {
+        return read_kept<Kind::most>(&contacts, i, obstacles.count, vertex.listed);
+      },
+      [&](int i, const Vertex& vertex, const KeptContact<Kind::most>& kept) {
+        if (!vertex.free) return;
+        VertexContact contact;
+        if (vertex.listed) {
+          take_touches(kept, obstacles.count, touches);
+          contact = contact_of(obstacles, kept.contact, touches);
+        }
+        const bool held = contact.freedom != Freedom::free;
+        step.restrictions.set_projector(i, held ? contact.free : identity3());
+        if (!held) {
+          of_place[i] = -1;
+          return;
+        }
+        VertexRestriction restriction = {i, {}, {}};
+        for (int c = 0; c < 3; ++c) {
+          for (int r = 0; r < 3; ++r) restriction.free[3 * c + r] = static_cast<float>(contact.free.at(r, c));
+          restriction.correction[c] = static_cast<float>(contact.correction[c]);
+        }
+        const int at = atomicAdd(count, 1);
+        list[at] = restriction;
+        of_place[i] = at;
+        if (left == nullptr) return;
+        for (int c = 0; c < 3; ++c) {
+          const Triple coupling = friction_coupling(obstacles, contact, touches, c);
+          for (int r = 0; r < 3; ++r)
+            left[9 * at + 3 * c + r] = static_cast<float>(contact.free.at(r, c) + coupling[r]);
+        }
+      });
 }
 
 /// Fills in what may not move freely: held vertices, and those that `contacts` hold. Their order does not
@@ -105,10 +148,11 @@ __device__ inline void gather_restrictions(const SheetTables& tables, StepProble
   for (int k = team_rank(); k < step.held_count && left != nullptr; k += team_size())
     for (int e = 0; e < 9; ++e) left[9 * k + e] = list[k].free[e];
   synchronize_team();
-  for_obstacles_of(
-      step, [&](auto most) { gather_contacts<most>(tables, step, contacts, list, of_place, left, count); });
+  for_obstacles_of(step, [&](auto kind) {
+    gather_contacts<decltype(kind)>(tables, step, contacts, list, of_place, left, count);
+  });
   synchronize_team();
-  step.restrictions.count = *count;
+  if (threadIdx.x == 0) step.restrictions.count = *count;
   synchronize_team();
 }
 
@@ -125,11 +169,11 @@ __device__ inline Symmetric3 curvature_at(const ObstacleStep<double>& obstacles,
   return curvature_of(touch);
 }
 
-template <int most>
+template <typename Kind>
 __device__ __noinline__ void write_blocks_of_contacts(const SheetTables& tables, const StepProblem& step,
                                                       const Iterate& now, bool curved, float* blocks) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  VertexTouch touches[most];
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
+  VertexTouch touches[Kind::most];
   for (int i = team_rank(); i < tables.size; i += team_size()) {
     Symmetric3 sum;
     if (step.held_axes[i] == 0 && now.contacts.listed[i] != 0) {
@@ -148,47 +192,60 @@ __device__ __noinline__ void write_blocks_of_contacts(const SheetTables& tables,
 /// `curved` that of round surfaces, on which the normal force turns.
 __device__ inline void write_own_blocks(const SheetTables& tables, const StepProblem& step,
                                         const Iterate& now, bool curved, float* blocks) {
-  for_obstacles_of(step,
-                   [&](auto most) { write_blocks_of_contacts<most>(tables, step, now, curved, blocks); });
+  for_obstacles_of(
+      step, [&](auto kind) { write_blocks_of_contacts<decltype(kind)>(tables, step, now, curved, blocks); });
 }
 
-template <int most>
+template <typename Kind>
 __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const StepProblem& step,
                                                const Iterate& now, const float* direction,
                                                const float* change, bool stuck, const ContactSet& contacts,
                                                float* gradient) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  struct Vertex {
+    bool free, listed;
+    Triple way;
+    double clearance;  ///< of one that is not listed
+  };
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
   const double reach = stuck ? touching_gap : no_such_side;
-  SurfaceRoom<most> room;
-  VertexTouch touches[most];
+  SurfaceRoom<Kind::most> room;
+  VertexTouch touches[Kind::most];
   bool any = false;
-  for (int i = team_rank(); i < tables.size; i += team_size()) {
-    if (step.held_axes[i] != 0) continue;
-    const Triple way = way_at(direction, i);
-    VertexContact contact;
-    if (contacts.listed[i] != 0) {
-      read_touches(contacts, i, obstacles.count, touches);
-      contact = read_contact(contacts, i, obstacles, touches);
-      const Triple force = force_at(now.force, i);
-      if (!stuck && contact.freedom != Freedom::free &&
-          release(obstacles, force + way_at(change, i), contact, touches, room)) {
-        const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
-        for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
-      } else if (!hold(obstacles, way, reach, contact, touches)) {
-        // Of several surfaces the forces change all the same.
-        if (most > 1) write_contact(contact, touches, obstacles.count, contacts, i);
-        continue;
-      }
-    } else {
-      const double clearance = now.contacts.clearance[i];
-      if (clearance > reach || clearance > norm(way)) continue;
-      find_touches(obstacles, triple(step.start[i]), triple(now.positions[i]), touches);
-      if (!hold(obstacles, way, reach, contact, touches)) continue;
-      contacts.listed[i] = 1;
-    }
-    write_contact(contact, touches, obstacles.count, contacts, i);
-    any = true;
-  }
+  for_own_vertices<contacts_together<Kind>>(
+      tables.size,
+      [&](int i) {
+        return Vertex{step.held_axes[i] == 0, contacts.listed[i] != 0, way_at(direction, i),
+                      now.contacts.clearance[i]};
+      },
+      [&](int i, const Vertex& vertex) {
+        return read_kept<Kind::most>(&contacts, i, obstacles.count, vertex.free && vertex.listed);
+      },
+      [&](int i, const Vertex& vertex, const KeptContact<Kind::most>& kept) {
+        const auto& [free, listed, way, clearance] = vertex;
+        if (!free) return;
+        VertexContact contact;
+        if (listed) {
+          take_touches(kept, obstacles.count, touches);
+          contact = contact_of(obstacles, kept.contact, touches);
+          const Triple force = force_at(now.force, i);
+          if (!stuck && contact.freedom != Freedom::free &&
+              release(obstacles, force + way_at(change, i), contact, touches, room)) {
+            const Triple row = contact.freedom == Freedom::free ? force : force_at(now.residuals, i);
+            for (int c = 0; c < 3; ++c) gradient[3 * i + c] = static_cast<float>(row[c]);
+          } else if (!hold(obstacles, way, reach, contact, touches)) {
+            // Of several surfaces the forces change all the same.
+            if (Kind::most > 1) write_contact(contact, touches, obstacles.count, contacts, i);
+            return;
+          }
+        } else {
+          if (clearance > reach || clearance > norm(way)) return;
+          find_touches(obstacles, triple(step.start[i]), triple(now.positions[i]), touches);
+          if (!hold(obstacles, way, reach, contact, touches)) return;
+          contacts.listed[i] = 1;
+        }
+        write_contact(contact, touches, obstacles.count, contacts, i);
+        any = true;
+      });
   return any_of_team(any);
 }
 
@@ -198,16 +255,16 @@ __device__ __noinline__ bool exchange_vertices(const SheetTables& tables, const 
 __device__ inline bool exchange_contacts(const SheetTables& tables, const StepProblem& step,
                                          const Iterate& now, const float* direction, const float* change,
                                          bool stuck, const ContactSet& contacts, float* gradient) {
-  return for_obstacles_of(step, [&](auto most) {
-    return exchange_vertices<most>(tables, step, now, direction, change, stuck, contacts, gradient);
+  return for_obstacles_of(step, [&](auto kind) {
+    return exchange_vertices<decltype(kind)>(tables, step, now, direction, change, stuck, contacts, gradient);
   });
 }
 
-template <int most>
+template <typename Kind>
 __device__ __noinline__ void write_bristles_of_contacts(const SheetTables& tables, const StepProblem& step,
                                                         const ContactSet& contacts, Point* bristles) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  VertexTouch touches[most];
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
+  VertexTouch touches[Kind::most];
   for (int i = team_rank(); i < tables.size; i += team_size()) {
     const bool touched = step.held_axes[i] == 0 && contacts.listed[i] != 0;
     if (touched) read_touches(contacts, i, obstacles.count, touches);
@@ -222,8 +279,8 @@ __device__ __noinline__ void write_bristles_of_contacts(const SheetTables& table
 __device__ inline void write_bristles(const SheetTables& tables, const StepProblem& step,
                                       const ContactSet& contacts, Point* bristles) {
   if (step.obstacles.count == 0) return;
-  for_obstacles_of(step,
-                   [&](auto most) { write_bristles_of_contacts<most>(tables, step, contacts, bristles); });
+  for_obstacles_of(
+      step, [&](auto kind) { write_bristles_of_contacts<decltype(kind)>(tables, step, contacts, bristles); });
 }
 
 /// What a step says of its contacts.
@@ -235,11 +292,11 @@ struct ContactEnd {
   double bristles;         ///< energy that those of friction started with [J]
 };
 
-template <int most>
+template <typename Kind>
 __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, const StepProblem& step,
                                                   const Iterate& end, double* partial) {
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
-  VertexTouch touches[most];
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
+  VertexTouch touches[Kind::most];
   double complementarity = 0, penetration = 0, start_depth = 0, sums[2];
   sum_over_team(tables.size, sums, partial, [&](int i, double(&own)[2]) {
     double &work = own[0], &bristles = own[1];
@@ -282,7 +339,8 @@ __device__ __noinline__ ContactEnd judge_vertices(const SheetTables& tables, con
 __device__ inline ContactEnd judge_contacts(const SheetTables& tables, const StepProblem& step,
                                             const Iterate& end, double* partial) {
   if (step.obstacles.count == 0) return {};
-  return for_obstacles_of(step, [&](auto most) { return judge_vertices<most>(tables, step, end, partial); });
+  return for_obstacles_of(
+      step, [&](auto kind) { return judge_vertices<decltype(kind)>(tables, step, end, partial); });
 }
 
 }  // namespace flash::sim::cuda

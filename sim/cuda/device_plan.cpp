@@ -7,9 +7,9 @@
 namespace flash::sim::cuda {
 
 FrontSettings fitting_fronts(FrontSettings settings) {
-  constexpr int tile = 1024, rest = block_warps * tile + 64;  // numbers
-  settings.panel_capacity =
-      std::min(settings.panel_capacity, most_memory() / static_cast<int>(sizeof(float)) - rest);
+  constexpr int tile = 1024, number = sizeof(float),
+                rest = block_warps * tile + common_memory / number + 64;  // numbers
+  settings.panel_capacity = std::min(settings.panel_capacity, most_memory() / number - rest);
   return settings;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 #include "sim/law/host_device.h"
 #include "sim/law/membrane_law.h"
+#include "sim/law/symmetric3.h"
 
 namespace flash::sim::cuda {
 
@@ -40,6 +41,22 @@ struct Restrictions {
   const VertexRestriction* list = nullptr;
   int count = 0;
   const int* of_place = nullptr;  ///< by place, -1 for none; null where there are none
+  /// The projectors of all vertices, so that a warp reads whole lines and looks nothing up: by place, their
+  /// xx, xy, xz, yy, yz and zz, `size` apart. Null: they are those of the list.
+  float* projectors = nullptr;
+  int size = 0;
+
+  /// Sets the projector of a place.
+  FLASH_HOST_DEVICE void set_projector(int place, const Symmetric3& free) const {
+    float* own = projectors + place;
+    const long step = size;
+    own[0] = static_cast<float>(free.xx);
+    own[step] = static_cast<float>(free.xy);
+    own[2 * step] = static_cast<float>(free.xz);
+    own[3 * step] = static_cast<float>(free.yy);
+    own[4 * step] = static_cast<float>(free.yz);
+    own[5 * step] = static_cast<float>(free.zz);
+  }
 };
 
 struct ElasticEnergies {

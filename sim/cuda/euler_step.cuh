@@ -19,12 +19,16 @@ struct StepMotion {
 };
 
 /// Notes what is held and where it is now; forget_restrictions takes it back.
-__device__ inline void begin_holds(const Work& w, const StepMotion& motion, const Point* positions) {
+__device__ inline void begin_holds(const Work& w, const StepProblem& step, const StepMotion& motion,
+                                   const Point* positions) {
   for (int k = team_rank(); k < motion.held_count; k += team_size()) {
     const HeldPlace& held = motion.held[k];
     VertexRestriction restriction = {held.place, {}, {}};
     for (int axis = 0; axis < 3; ++axis) restriction.free[4 * axis] = held.axes >> axis & 1 ? 0.0f : 1.0f;
     w.memory.restrictions[k] = restriction;
+    if (step.restrictions.projectors != nullptr)
+      step.restrictions.set_projector(
+          held.place, Symmetric3{restriction.free[0], 0, 0, restriction.free[4], 0, restriction.free[8]});
     w.memory.restriction_of[held.place] = k;
     w.memory.held_axes[held.place] = held.axes;
     const Point from = positions[held.place];
@@ -145,18 +149,22 @@ __device__ inline StepEnd judge_end(const Work& w, const StepProblem& step) {
 /// What damping measures from, at the start of a step of h.
 __device__ inline void begin_damping(const Work& w, StepProblem& step) {
   const ReplayMaterial& material = *step.material;
-  EnvironmentNumbers& numbers = step.numbers;
-  numbers = {material.law, material.lame, material.rigidity,
-             material.areal_density * (1 / (step.h * step.h) + material.air_drag / step.h)};
-  step.damped_since = {};
-  if (material.stiffness_damping == 0) return;
-  const double share = material.stiffness_damping / step.h;
-  numbers.damping = {share * material.damping.mu, share * material.damping.lambda};
-  numbers.damping_share = share;
+  const bool damped = material.stiffness_damping != 0;
+  change_common([&] {
+    EnvironmentNumbers& numbers = step.numbers;
+    numbers = {material.law, material.lame, material.rigidity,
+               material.areal_density * (1 / (step.h * step.h) + material.air_drag / step.h)};
+    step.damped_since = {};
+    if (!damped) return;
+    const double share = material.stiffness_damping / step.h;
+    numbers.damping = {share * material.damping.mu, share * material.damping.lambda};
+    numbers.damping_share = share;
+    step.damped_since = {w.memory.start_metrics, w.memory.start_angles};
+  });
+  if (!damped) return;
   const auto place = [&](int vertex) { return triple(step.start[vertex]); };
   write_metrics(w.replay.sheet, place, w.memory.start_metrics);
   if (w.replay.sheet.hinge_count > 0) write_angles(w.replay.sheet, place, w.memory.start_angles);
-  step.damped_since = {w.memory.start_metrics, w.memory.start_angles};
   synchronize_team();
 }
 
@@ -164,11 +172,16 @@ __device__ inline void begin_damping(const Work& w, StepProblem& step) {
 __device__ inline void begin_obstacles(const Work& w, StepProblem& step, const StepMotion& motion,
                                        double begin, double end) {
   if (motion.obstacle_count == 0) return;
-  place_obstacles(motion.obstacles, motion.obstacle_count, motion.poses, w.replay.frames, begin, end,
-                  w.memory.obstacles);
-  step.obstacles = {
-      w.memory.obstacles, motion.obstacle_count, motion.several, step.h, {w.replay.exit_speed, {}}};
-  step.numbers.own_blocks = w.memory.own_blocks;
+  place_obstacles(static_cast<int>(threadIdx.x), motion.obstacles, motion.obstacle_count, motion.poses,
+                  w.replay.frames, begin, end, w.obstacles);
+  change_common([&] {
+    bool planes = true;
+    for (int k = 0; k < motion.obstacle_count; ++k)
+      planes = planes && w.obstacles[k].shape == ObstacleShape::plane;
+    step.obstacles = {w.obstacles, motion.obstacle_count,     motion.several,
+                      step.h,      {w.replay.exit_speed, {}}, planes};
+    step.numbers.own_blocks = w.memory.own_blocks;
+  });
 }
 
 struct PartEnd {
@@ -203,8 +216,10 @@ __device__ __noinline__ PartEnd leave_obstacles(Work& w, StepProblem& step, cons
     // A slower exit does not help an unsolved step, which costs the most: only staying is tried.
     if (!part.solved && k > 1) k = last;
     const double own_speed = k == last ? 0 : k < ways ? speed : slow_exit_share * speed;
-    step.obstacles.way_out = {own_speed, k < last && k % ways == 1 ? direction : Triple{}};
-    w.refactor = true;
+    change_common([&] {
+      step.obstacles.way_out = {own_speed, k < last && k % ways == 1 ? direction : Triple{}};
+      w.refactor = true;
+    });
     part = solve_part(w, step, motion, share, stats);
   }
   return part;
@@ -220,7 +235,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
   if (part.end.start_depth > 0) part = leave_obstacles(w, step, motion, end, stats, part);
   const bool solved = part.solved;
   const StepEnd& judged = part.end;
-  if (!solved) w.refactor = true;
+  if (!solved) change_common([&] { w.refactor = true; });
   if (!solved && !last_try) return false;
   // A sheet that is not finite stands still instead.
   const double residual = judged.finite ? w.now.residual / step.material->force_scale : INFINITY;
@@ -237,7 +252,7 @@ __device__ bool try_step(Work& w, StepProblem& step, const StepMotion& motion, d
     if (judged.finite) state.positions[i] = w.now.positions[i];
   }
   if (judged.finite) write_bristles(w.replay.sheet, step, w.now.contacts, state.bristles);
-  if (judged.finite) step.at_start = w.now.elastic;
+  if (judged.finite && threadIdx.x == 0) step.at_start = w.now.elastic;
   synchronize_team();
   return solved;
 }
@@ -248,7 +263,7 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion
                                     const SheetState& state) {
   constexpr int most_halvings = 16;
   ReplayStats stats = {};
-  begin_holds(w, motion, state.positions);
+  begin_holds(w, step, motion, state.positions);
   // Of each part of a part, from the whole step on: halves that it may be divided into still.
   int halvings[most_halvings + 1], level = 0;
   unsigned second = 0, first_converged = 0;  // a bit a level
@@ -256,7 +271,7 @@ __device__ ReplayStats advance_step(Work& w, StepProblem& step, const StepMotion
   halvings[0] = w.replay.halvings;
   while (true) {
     const double length = 1.0 / (1 << level);
-    step.h = length * w.replay.time_step;
+    change_common([&] { step.h = length * w.replay.time_step; });
     const bool last_try = halvings[level] == 0;
     const bool solved = try_step(w, step, motion, begin, begin + length, state, stats, last_try);
     if (!solved && !last_try) {

@@ -39,10 +39,10 @@ __device__ inline void solve_small(double* small, int count) {
 /// The generalized minimal residual method for L A x = P b, as gmres of the CPU: `direction` = x over the
 /// free directions, `change` = A x. Returns the number of solves with the factor, to all threads.
 template <int parts>
-__device__ __noinline__ int generalized_residuals(const FrontTables& fronts, const SheetTables& sheet,
-                                                  const LinearProblem& problem, const LinearVectors& v,
-                                                  const CoupledMemory& memory, float* direction,
-                                                  float* change, float* partial, char* chip) {
+__device__ int generalized_residuals(const FrontTables& fronts, const SheetTables& sheet,
+                                     const LinearProblem& problem, const LinearVectors& v,
+                                     const CoupledMemory& memory, float* direction, float* change,
+                                     float* partial, char* chip) {
   const int size = 3 * sheet.size, first = team_rank(), step = team_size();
   // Each block fills its copy of a vector on chip.
   const int first_of_copy = static_cast<int>(threadIdx.x);

@@ -10,7 +10,7 @@ namespace flash::sim::cuda {
 
 // What one implicit Euler step minimizes, as sim/step/incremental_potential.h, with what holds vertices.
 
-/// One step of an environment as a problem.
+/// One step of an environment as a problem. The threads of a block have it in common.
 struct StepProblem {
   const ReplayMaterial* material;
   double h;                                    ///< [s]
@@ -45,7 +45,7 @@ struct StepProblem {
   }
 };
 
-/// A point on the way to the end of a step.
+/// A point on the way to the end of a step. The threads of a block have it in common.
 struct Iterate {
   Point* positions;
   double* force;
@@ -134,22 +134,67 @@ struct ContactResponse {
   double rounding;                 ///< of the reaction, by that of positions where friction turns [N]
 };
 
-/// The obstacles of a step that has at most so many of them; for one the compiler has no loops to make.
-template <int most>
+// Kinds of obstacles that code is made for. For one the compiler has no loops to make. Where all are planes
+// nothing is called, and what a vertex is worked on with stays in registers: else it is kept in memory over
+// calls, and that is more than the first-level cache has room for.
+
+struct NoObstacles {
+  static constexpr int most = 0;
+};
+struct OnePlane {
+  static constexpr int most = 1;
+  static constexpr bool planes = true;
+};
+struct OneObstacle {
+  static constexpr int most = 1;
+  static constexpr bool planes = false;
+};
+struct AnyObstacles {
+  static constexpr int most = most_obstacles;
+  static constexpr bool planes = false;
+};
+
+/// The obstacles of a step, which are of this kind.
+template <typename Kind>
 __device__ ObstacleStep<double> obstacles_of(const StepProblem& step) {
   ObstacleStep<double> obstacles = step.obstacles;
-  if constexpr (most == 1) {
+  obstacles.planes = Kind::planes;
+  if constexpr (Kind::most == 1) {
     obstacles.count = 1;
     obstacles.several = false;
   }
   return obstacles;
 }
 
-/// act(std::integral_constant<int, most>) for the fewest obstacles that code is made for: one, or any number.
+/// act(the kind of obstacles of a step that has some).
 template <typename Act>
 __device__ auto for_obstacles_of(const StepProblem& step, const Act& act) {
-  if (step.obstacles.count == 1) return act(std::integral_constant<int, 1>{});
-  return act(std::integral_constant<int, most_obstacles>{});
+  if (step.obstacles.count > 1) return act(AnyObstacles{});
+  return step.obstacles.planes ? act(OnePlane{}) : act(OneObstacle{});
+}
+
+/// What is kept of the contact of a vertex, and of its touches.
+template <int most>
+struct KeptContact {
+  ContactRecord contact;
+  TouchRecord touches[most];
+};
+
+/// Reads nothing of a vertex that is not `listed`.
+template <int most>
+__device__ KeptContact<most> read_kept(const ContactSet* contacts, int i, int count, bool listed) {
+  KeptContact<most> kept;
+  if (listed) {
+    kept.contact = read(contacts->contacts, i);
+    for (int k = 0; k < count; ++k) kept.touches[k] = read(contacts->touches, i, k);
+  }
+  return kept;
+}
+
+/// The touches of a vertex that is listed.
+template <int most>
+__device__ void take_touches(const KeptContact<most>& kept, int count, VertexTouch* touches) {
+  for (int k = 0; k < count; ++k) touches[k] = touch_of(kept.touches[k]);
 }
 
 __device__ inline void read_touches(const ContactSet& contacts, int i, int count, VertexTouch* touches) {
@@ -173,14 +218,14 @@ __device__ inline void write_contact(const VertexContact& contact, const VertexT
 }
 
 /// Decides what the obstacles do to vertex i, which needs `force`.
-template <int most>
-__device__ __noinline__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
-                                                       const ContactSet* line, int i, const Triple& point,
-                                                       const Triple& force) {
+template <typename Kind>
+__device__ ContactResponse update_contact(const StepProblem& step, const ContactSet& contacts,
+                                          const ContactSet* line, int i, const Triple& point,
+                                          const Triple& force) {
   constexpr double epsilon = 2.220446049250313e-16;
-  const ObstacleStep<double> obstacles = obstacles_of<most>(step);
+  const ObstacleStep<double> obstacles = obstacles_of<Kind>(step);
   const Triple start = triple(step.start[i]);
-  VertexTouch touches[most];
+  VertexTouch touches[Kind::most];
   ContactResponse response = {};
   if (line != nullptr && line->listed[i] != 0) {
     read_touches(*line, i, obstacles.count, touches);
@@ -194,7 +239,7 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   if (clearance > touching_gap) return response;
   find_touches(obstacles, start, point, touches);
   carry_bristles(obstacles, step, i, touches);
-  SurfaceRoom<most> room;
+  SurfaceRoom<Kind::most> room;
   const VertexContact contact = decide_contact(obstacles, start, point, force, touches, room);
   if (contact.freedom == Freedom::free) return response;
   write_contact(contact, touches, obstacles.count, contacts, i);
@@ -205,6 +250,57 @@ __device__ __noinline__ ContactResponse update_contact(const StepProblem& step, 
   return response;
 }
 
+/// What the vertices of an iterate add up to.
+struct VertexSums {
+  double potential;                ///< but for that of elasticity and its damping [J]
+  double friction, line_friction;  ///< as in Iterate [J]
+  double residual, rounding;       ///< as in Iterate, squared [N^2]
+  double worst;                    ///< as in Iterate, times the weight of a unit of mass [N/kg]
+};
+
+/// Completes the forces of the vertices, in which those of elasticity stand, and decides their contacts.
+template <typename Kind>
+__device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, const StepProblem& step,
+                                                    const ContactSet* line, const Iterate& at,
+                                                    double* partial) {
+  double* force = at.force;
+  const Point* positions = at.positions;
+  const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
+  enum { potential, residual, friction, line_friction, rounding, count };
+  double sums[count], worst = 0;
+  sum_over_team(tables.size, sums, partial, [&](int i, double(&added)[count]) {
+    const double mass = step.mass(tables, i);
+    const Triple point = triple(positions[i]), moved = point - triple(step.start[i]),
+                 inertial = step.inertial(i, moved), load = step.load(i);
+    const Triple own = force_at(force, i) + mass * (per_step * inertial + drag * moved) - load;
+    added[potential] +=
+        0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
+    force[3 * i] = own.x;
+    force[3 * i + 1] = own.y;
+    force[3 * i + 2] = own.z;
+    Triple reaction = step.held_part(i, own);
+    double uncertain = 0;
+    if constexpr (Kind::most > 0)
+      if (step.held_axes[i] == 0) {
+        const ContactResponse contact = update_contact<Kind>(step, at.contacts, line, i, point, own);
+        reaction = contact.reaction;
+        uncertain = contact.rounding;
+        added[friction] += contact.friction;
+        added[line_friction] += contact.line_friction;
+      }
+    const Triple left = own - reaction;
+    at.residuals[3 * i] = left.x;
+    at.residuals[3 * i + 1] = left.y;
+    at.residuals[3 * i + 2] = left.z;
+    const double squared = dot(left, left);
+    added[residual] += squared;
+    added[rounding] += uncertain * uncertain;
+    worst = worse_of(worst, (sqrt(squared) - uncertain) / mass);
+  });
+  worst = worst_over_team(worst, partial);
+  return {sums[potential], sums[friction], sums[line_friction], sums[residual], sums[rounding], worst};
+}
+
 /// Fills in an iterate from its positions. `line`: contacts of the iterate from which a line leads here, null
 /// without. `triangle_shares`: for what triangles give to the gradient.
 template <bool places_on_chip>
@@ -212,54 +308,27 @@ __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProbl
                                       const TeamMemory& memory, double* triangle_shares,
                                       const ContactSet* line, Iterate& at) {
   double* partial = shared_memory<double>();
-  double* force = at.force;
-  const Point* positions = at.positions;
   synchronize_team();
-  at.elastic = elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, positions, force,
-                                                {triangle_shares, memory.hinge_gradients}, partial);
-  double damping = at.elastic.damping;
+  const ElasticEnergies elastic =
+      elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, at.positions, at.force,
+                                       {triangle_shares, memory.hinge_gradients}, partial);
+  double damping = elastic.damping;
   if (step.damped_since.metrics != nullptr && tables.bundle_count > 0)
-    damping += add_turned_damping(tables, step, memory, positions, force, partial);
-  const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
-  // Potential, squared residuals, friction, friction along the line, squared rounding.
-  double sums[5], worst = 0;
-  sum_over_team(tables.size, sums, partial, [&](int i, double(&added)[5]) {
-    const double mass = step.mass(tables, i);
-    const Triple moved = triple(positions[i]) - triple(step.start[i]), inertial = step.inertial(i, moved),
-                 load = step.load(i);
-    const Triple own = force_at(force, i) + mass * (per_step * inertial + drag * moved) - load;
-    added[0] +=
-        0.5 * mass * (per_step * dot(inertial, inertial) + drag * dot(moved, moved)) - dot(load, moved);
-    force[3 * i] = own.x;
-    force[3 * i + 1] = own.y;
-    force[3 * i + 2] = own.z;
-    Triple reaction = step.held_part(i, own);
-    double rounding = 0;
-    if (step.obstacles.count > 0 && step.held_axes[i] == 0) {
-      const ContactResponse contact = for_obstacles_of(step, [&](auto most) {
-        return update_contact<most>(step, at.contacts, line, i, triple(positions[i]), own);
-      });
-      reaction = contact.reaction;
-      rounding = contact.rounding;
-      added[2] += contact.friction;
-      added[3] += contact.line_friction;
-    }
-    const Triple residual = own - reaction;
-    at.residuals[3 * i] = residual.x;
-    at.residuals[3 * i + 1] = residual.y;
-    at.residuals[3 * i + 2] = residual.z;
-    const double squared = dot(residual, residual);
-    added[1] += squared;
-    added[4] += rounding * rounding;
-    worst = worse_of(worst, (sqrt(squared) - rounding) / mass);
-  });
-  worst = worst_over_team(worst, partial);
-  at.potential = sums[0] + damping + at.elastic.membrane + at.elastic.bending;
-  at.residual = sqrt(sums[1]);
-  at.friction = sums[2];
-  at.line_friction = sums[3];
-  at.rounding = sqrt(sums[4]);
-  at.worst = worst / step.material->weight_factor;
+    damping += add_turned_damping(tables, step, memory, at.positions, at.force, partial);
+  const auto balance = [&](auto kind) {
+    return balance_vertices<decltype(kind)>(tables, step, line, at, partial);
+  };
+  const VertexSums sums =
+      step.obstacles.count == 0 ? balance(NoObstacles{}) : for_obstacles_of(step, balance);
+  if (threadIdx.x == 0) {
+    at.elastic = elastic;
+    at.potential = sums.potential + damping + elastic.membrane + elastic.bending;
+    at.residual = sqrt(sums.residual);
+    at.friction = sums.friction;
+    at.line_friction = sums.line_friction;
+    at.rounding = sqrt(sums.rounding);
+    at.worst = sums.worst / step.material->weight_factor;
+  }
   synchronize_team();
 }
 

@@ -1,4 +1,5 @@
 #pragma once
+#include "sim/cuda/common_value.cuh"
 #include "sim/cuda/conjugate_gradients.cuh"
 #include "sim/cuda/contact.cuh"
 #include "sim/cuda/front_factor.cuh"
@@ -10,11 +11,12 @@ namespace flash::sim::cuda {
 
 // Newton's method of sim/newton/newton_iteration.h for one environment. All threads of a team decide alike.
 
-/// A team at work on an environment.
+/// A team at work on an environment. The threads of a block have it in common.
 struct Work {
   const ReplayNumbers& replay;
   const TeamMemory& memory;
-  bool refactor;  ///< whether the next solve needs a new factor
+  MovingObstacle<double>* obstacles;  ///< room on chip for those of a step
+  bool refactor;                      ///< whether the next solve needs a new factor
   Iterate now, trial, longer;
   ContactSet linear;  ///< of the linear problem, to which the direction is the solution
 };
@@ -107,40 +109,49 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
 /// On-chip bytes for sums over the team, before what a solve needs.
 inline constexpr int linear_partial_bytes = seats * static_cast<int>(sizeof(float));
 
-/// Solves the linear problem. Returns the number of solves with the factor.
-__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step, bool coupled) {
+/// A linear problem and what a team solves it with.
+struct LinearWork {
+  LinearProblem problem;
+  LinearVectors vectors;
+  float* partial;  ///< on chip
+  char* chip;      ///< behind that
+};
+
+__device__ inline LinearWork linear_work(const Work& w, const StepProblem& step) {
   constexpr double linear_tolerance = 0.3;  // of a linear problem, as a share of the step's
-  const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
-  const LinearProblem problem = {
-      m.block_rows,
-      static_cast<float>(step.numbers.effective_rigidity()),
-      hinges_of(w),
-      m.factor,
-      m.gradient,
-      step.restrictions,
-      static_cast<float>(linear_tolerance *
-                         fmin(w.replay.tolerance * step.material->force_scale, w.now.residual))};
   char* chip = shared_memory<char>();
   const auto on_chip = [&](int at, auto* otherwise) {
     return at < 0 ? otherwise : reinterpret_cast<decltype(otherwise)>(chip + at);
   };
-  const LinearVectors vectors = {m.residual,
-                                 m.image,
-                                 m.search,
-                                 on_chip(w.replay.search_at, m.search),
-                                 on_chip(w.replay.solved_at, m.solved),
-                                 w.replay.solved_at >= 0,
-                                 {m.clocks}};
-  float* partial = reinterpret_cast<float*>(chip);
-  char* rest = chip + linear_partial_bytes;
-  const int solves = coupled
-                         ? generalized_residuals<half_parts>(w.replay.fronts, tables, problem, vectors,
-                                                             m.coupled, m.direction, m.change, partial, rest)
-                         : conjugate_gradients<half_parts>(w.replay.fronts, tables, problem, vectors,
-                                                           m.direction, m.change, partial, rest);
-  count_phase(m, ReplayPhase::directions);
-  return solves;
+  return {{m.block_rows, static_cast<float>(step.numbers.effective_rigidity()), hinges_of(w), m.factor,
+           m.gradient, step.restrictions,
+           static_cast<float>(linear_tolerance *
+                              fmin(w.replay.tolerance * step.material->force_scale, w.now.residual))},
+          {m.residual,
+           m.image,
+           m.search,
+           on_chip(w.replay.search_at, m.search),
+           on_chip(w.replay.solved_at, m.solved),
+           w.replay.solved_at >= 0,
+           {m.clocks}},
+          reinterpret_cast<float*>(chip),
+          chip + linear_partial_bytes};
+}
+
+/// Solves the linear problem. Returns the number of solves with the factor.
+__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step) {
+  const LinearWork own = linear_work(w, step);
+  return conjugate_gradients<half_parts>(w.replay.fronts, w.replay.sheet, own.problem, own.vectors,
+                                         w.memory.direction, w.memory.change, own.partial, own.chip);
+}
+
+/// The same where friction follows the normal forces.
+__device__ __noinline__ int find_coupled_direction(const Work& w, const StepProblem& step) {
+  const LinearWork own = linear_work(w, step);
+  return generalized_residuals<half_parts>(w.replay.fronts, w.replay.sheet, own.problem, own.vectors,
+                                           w.memory.coupled, w.memory.direction, w.memory.change, own.partial,
+                                           own.chip);
 }
 
 /// Finds the direction and the contacts that go with it, those of the linear problem: solves it and exchanges
@@ -150,44 +161,54 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   const SheetTables& tables = w.replay.sheet;
   const TeamMemory& m = w.memory;
   const bool touches = step.obstacles.count > 0;
-  for (int i = team_rank(); i < 3 * tables.size; i += team_size())
-    m.gradient[i] = static_cast<float>(w.now.residuals[i]);
+  for_own_vertices(
+      tables.size, [&](int i) { return force_at(w.now.residuals, i); },
+      [&](int i, const Triple& own) {
+        put({static_cast<float>(own.x), static_cast<float>(own.y), static_cast<float>(own.z)}, m.gradient, i);
+      });
   if (touches) copy_contacts(tables, step, w.now.contacts, w.linear);
   synchronize_team();
-  w.refactor = false;
   count_phase(m, ReplayPhase::rest);
+  bool refactor = false;
   for (int solved = 1;; ++solved) {
     restrict_by(w, w.linear, coupled, step);
     count_phase(m, ReplayPhase::contact);
-    const int solves = find_direction(w, step, coupled);
+    const int solves = coupled ? find_coupled_direction(w, step) : find_direction(w, step);
+    count_phase(m, ReplayPhase::directions);
     stats.solves += solves;
-    w.refactor = w.refactor || solves > w.replay.stale_factor_solves;
+    refactor = refactor || solves > w.replay.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.
-    if (!touches || solved == linear_problems) return;
+    if (!touches || solved == linear_problems) break;
     const bool changed =
         exchange_contacts(tables, step, w.now, m.direction, m.change, stuck, w.linear, m.gradient);
     count_phase(m, ReplayPhase::contact);
-    if (!changed) return;
+    if (!changed) break;
   }
+  change_common([&] { w.refactor = refactor; });
 }
 
 /// The slope of the potential along the direction, at an iterate [J].
 __device__ inline double slope_at(const Work& w, const Iterate& at) {
-  double slope[1];
-  sum_over_team(w.replay.sheet.size, slope, shared_memory<double>(), [&](int i, double(&sums)[1]) {
-    sums[0] += dot(force_at(at.residuals, i), way_at(w.memory.direction, i));
-  });
+  double* partial = shared_memory<double>();
+  const int size = w.replay.sheet.size;
   synchronize_team();
-  return slope[0];
+  add_up<1, 2>(
+      size, partial, [&](int i) { return dot(force_at(at.residuals, i), way_at(w.memory.direction, i)); },
+      [&](int, double own, double(&sums)[1]) { sums[0] += own; });
+  synchronize_team();
+  const double slope = total(size, partial);
+  synchronize_team();
+  return slope;
 }
 
 /// Evaluates the feasible iterate nearest to the point `length` directions from the iterate.
 __device__ inline void move(const Work& w, const StepProblem& step, double length, Iterate& to) {
-  for (int i = team_rank(); i < w.replay.sheet.size; i += team_size()) {
-    const Point from = w.now.positions[i];
-    const float* way = w.memory.direction + 3 * i;
-    to.positions[i] = {from.x + length * way[0], from.y + length * way[1], from.z + length * way[2], 0};
-  }
+  for_own_vertices(
+      w.replay.sheet.size,
+      [&](int i) { return triple(w.now.positions[i]) + length * way_at(w.memory.direction, i); },
+      [&](int i, const Triple& place) {
+        to.positions[i] = {place.x, place.y, place.z, 0};
+      });
   count_phase(w.memory, ReplayPhase::rest);
   project_to_feasible(w.replay.sheet, step, &w.linear, to.positions);
   count_phase(w.memory, ReplayPhase::contact);
@@ -198,9 +219,11 @@ __device__ inline void move(const Work& w, const StepProblem& step, double lengt
 __device__ inline double potential_on_line(const Iterate& at) { return at.potential + at.line_friction; }
 
 __device__ inline void swap_iterates(Iterate& a, Iterate& b) {
-  const Iterate c = a;
-  a = b;
-  b = c;
+  change_common([&] {
+    const Iterate c = a;
+    a = b;
+    b = c;
+  });
 }
 
 /// The potential guides the step. It is not exact where the surface is curved or the normal forces change.
@@ -273,7 +296,8 @@ __device__ void iterate_to_balance(Work& w, StepProblem& step, ReplayStats& stat
       if (balanced(step, w.now, tolerance)) return;
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
-        stuck = w.refactor = true;
+        stuck = true;
+        change_common([&] { w.refactor = true; });
         continue;
       }
       // A small step all the same lets the contacts decide anew.

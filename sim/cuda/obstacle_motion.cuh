@@ -29,12 +29,11 @@ __device__ inline Frame<double> carried(const Frame<double>& by, const Frame<dou
           place_from(by, place.origin)};
 }
 
-/// Writes the obstacles between two shares of a step, a thread each. `poses`: of the frames at the start of
-/// the step; those at its end follow after `frames` of them.
-__device__ inline void place_obstacles(const PlacedObstacle* placed, int count, const FramePose* poses,
+/// Writes the obstacles between two shares of a step, thread k of them the k-th. `poses`: of the frames at
+/// the start of the step; those at its end follow after `frames` of them.
+__device__ inline void place_obstacles(int k, const PlacedObstacle* placed, int count, const FramePose* poses,
                                        int frames, double begin, double end,
                                        MovingObstacle<double>* obstacles) {
-  const int k = team_rank();
   if (k < count) {
     const PlacedObstacle& own = placed[k];
     MovingObstacle<double> moving = own.obstacle;

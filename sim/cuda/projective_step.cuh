@@ -174,8 +174,8 @@ __device__ __noinline__ void begin_step(const ProjectiveWork& w, StepProblem& st
     for (int c = 0; c < 3; ++c) m.reaction[3 * i + c] = 0;
   }
   if (motion.obstacle_count > 0)
-    place_obstacles(motion.obstacles, motion.obstacle_count, motion.poses, w.numbers.replay.frames, 0, 1,
-                    m.obstacles);
+    place_obstacles(team_rank(), motion.obstacles, motion.obstacle_count, motion.poses,
+                    w.numbers.replay.frames, 0, 1, m.obstacles);
   const VertexContacts contacts = {m, step.size, motion.obstacle_count};
   for (int i = team_rank(); i < step.size; i += team_size())
     for (int k = 0; k < motion.obstacle_count; ++k) {

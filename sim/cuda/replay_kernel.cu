@@ -1,6 +1,7 @@
 #include "sim/cuda/replay_kernel.h"
 
 #include <algorithm>
+#include <new>
 
 #include "sim/cuda/euler_step.cuh"
 #include "sim/cuda/launch.h"
@@ -20,11 +21,26 @@ __device__ void keep(const ReplayNumbers& replay, const Point* positions, double
   }
 }
 
-/// Takes an environment from its step `first` up to `end`.
-__device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, int e, int first, int end) {
-  const int size = replay.sheet.size;
-  const SheetState state = replay.states.of(e, size, replay.most_obstacles_each);
-  const ReplayMaterial& material = replay.materials[e];
+/// Room for the obstacles of a step.
+struct StepObstacles {
+  MovingObstacle<double> of[most_obstacles];
+};
+
+/// What the threads of a block have in common.
+struct CommonState {
+  CommonValue<ReplayNumbers> replay;
+  CommonValue<TeamMemory> memory;
+  CommonValue<ReplayMaterial> material;
+  CommonValue<Work> work;
+  CommonValue<StepProblem> step;
+  CommonValue<StepObstacles> obstacles;
+};
+static_assert(sizeof(CommonState) <= common_memory);
+
+/// What a team works on an environment with.
+__device__ Work& begin_work(CommonState& common) {
+  const ReplayNumbers& replay = common.replay.get();
+  const TeamMemory& memory = common.memory.get();
   const auto iterate = [&](int k) {
     Iterate at = {};
     at.positions = memory.positions[k];
@@ -33,30 +49,44 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
     at.contacts = memory.contacts[k];
     return at;
   };
+  return common.work.write([&](Work& work) {
+    new (&work) Work{replay,     memory,     common.obstacles.get().of, true, iterate(0),
+                     iterate(1), iterate(2), memory.contacts[3]};
+  });
+}
+
+/// Takes an environment from its step `first` up to `end`.
+__device__ void advance(CommonState& common, int e, int first, int end) {
+  Work& w = begin_work(common);
+  const ReplayNumbers& replay = w.replay;
+  const TeamMemory& memory = w.memory;
+  const int size = replay.sheet.size;
+  const SheetState state = replay.states.of(e, size, replay.most_obstacles_each);
+  const ReplayMaterial& material =
+      common.material.write([&](ReplayMaterial& own) { own = replay.materials[e]; });
   PhaseClock{memory.clocks}.start();
-  Work w = {replay, memory, true, iterate(0), iterate(1), iterate(2), memory.contacts[3]};
-  StepProblem step = {&material,
-                      replay.time_step,
-                      {},
-                      state.positions,
-                      state.velocities,
-                      state.bristles,
-                      size,
-                      replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
-                      {memory.restrictions, 0, memory.restriction_of},
-                      memory.held_axes,
-                      0,
-                      {},
-                      {},
-                      {}};
+  StepProblem& step = common.step.write([&](StepProblem& own) {
+    own = {&material,
+           replay.time_step,
+           {material.law, material.lame, material.rigidity, 0},
+           state.positions,
+           state.velocities,
+           state.bristles,
+           size,
+           replay.loads == nullptr ? nullptr : replay.loads + static_cast<long>(size) * e,
+           {memory.restrictions, 0, memory.restriction_of,
+            material.obstacle_count > 0 ? memory.projectors : nullptr, size},
+           memory.held_axes,
+           0,
+           {},
+           {},
+           {}};
+  });
   // The energy that it starts with.
   Iterate& now = w.now;
   for (int i = team_rank(); i < size; i += team_size()) now.positions[i] = state.positions[i];
-  step.numbers = {material.law, material.lame, material.rigidity, 0};
   evaluate(w, step, nullptr, now);
-  step.at_start = now.elastic;
   for (int at = first; at < end; ++at) {
-    if (at % replay.restart_interval == 0) w.refactor = true;
     const long row = static_cast<long>(material.motion) * replay.motion_steps + (at - replay.stats_begin);
     const int* starts = replay.hold_starts + row;
     const StepMotion motion = {
@@ -68,7 +98,11 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
         material.obstacle_count,
         material.several,
         replay.poses + row * replay.frames};
-    step.restrictions.count = step.held_count = motion.held_count;
+    change_common([&] {
+      if (at == first) step.at_start = now.elastic;
+      if (at % replay.restart_interval == 0) w.refactor = true;
+      step.restrictions.count = step.held_count = motion.held_count;
+    });
     const ReplayStats stats = advance_step(w, step, motion, state);
     const long place = at - replay.stats_begin;
     if (team_rank() == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
@@ -83,8 +117,10 @@ __device__ void advance(const ReplayNumbers& replay, const TeamMemory& memory, i
 /// and then takes the one that is furthest behind. So none waits for another, and all end at nearly the same
 /// time.
 __global__ void __launch_bounds__(block_threads, resident_blocks_each)
-    replay_kernel(const __grid_constant__ ReplayNumbers replay) {
-  const TeamMemory& memory = replay.teams[team_index()];
+    replay_kernel(const __grid_constant__ ReplayNumbers given) {
+  __shared__ CommonState common;
+  const ReplayNumbers& replay = common.replay.write([&](ReplayNumbers& own) { own = given; });
+  const TeamMemory& memory = common.memory.write([&](TeamMemory& own) { own = given.teams[team_index()]; });
   while (true) {
     synchronize_team();
     int first = 0;
@@ -92,7 +128,7 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
     if (e < 0) return;
     const int interval = replay.restart_interval,
               end = min(replay.end_step, (first / interval + 1) * interval);
-    advance(replay, memory, e, first, end);
+    advance(common, e, first, end);
     count_phase(memory, ReplayPhase::rest);
     synchronize_team();
     if (team_rank() == 0 && end < replay.end_step) add(replay.waiting, e, end);
@@ -103,7 +139,9 @@ int linear_bytes_of(int solve_depth) { return linear_partial_bytes + solve_memor
 
 /// What a team needs in any case, and as much as leaves room for as many teams as there are registers for.
 int bytes_of(const FrontTables& fronts) {
-  constexpr int number = sizeof(float), reserved = 1024;  // by the device, for each team
+  constexpr int number = sizeof(float);
+  // What the device and the kernel have on chip besides, for each team.
+  constexpr int reserved = 1024 + (static_cast<int>(sizeof(CommonState)) + 127) / 128 * 128;
   return std::max({gradient_memory(fronts.size, false), hessian_memory * number,
                    number * factor_memory(fronts.shared_panel), linear_bytes_of(fronts.solve_depth),
                    most_memory() / resident_blocks_each - reserved});

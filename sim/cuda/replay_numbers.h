@@ -86,10 +86,9 @@ struct TeamMemory {
   double* forces[3];       ///< what each vertex needs from outside [N]
   double* residuals[3];    ///< what the constraints leave of it [N]
   ContactSet contacts[4];  ///< of the iterates and of the linear problem; null without obstacles
-  MovingObstacle<double>* obstacles;
-  float* own_blocks;      ///< what contact adds to the diagonal of the matrix, nine numbers a vertex
-  int* held_axes;         ///< by place: bits 1, 2 and 4 for x, y and z
-  CoupledMemory coupled;  ///< null without obstacles
+  float* own_blocks;       ///< what contact adds to the diagonal of the matrix, nine numbers a vertex
+  int* held_axes;          ///< by place: bits 1, 2 and 4 for x, y and z
+  CoupledMemory coupled;   ///< null without obstacles
   float *gradient, *direction, *change;
   float *residual, *image;
   float* solved;  ///< FrontTables::vector_size
@@ -103,6 +102,7 @@ struct TeamMemory {
   double* damped;
   VertexRestriction* restrictions;
   int* restriction_of;  ///< by place, -1 for none
+  float* projectors;    ///< six a vertex (Restrictions); null without obstacles
   double* hold_starts;  ///< where held vertices were when the step began
   long long* clocks;    ///< ticks of the processor spent in each phase
 };

@@ -1,4 +1,6 @@
 #pragma once
+#include <type_traits>
+
 #include "sim/cuda/four.h"
 #include "sim/cuda/hinges.cuh"
 #include "sim/cuda/layout/edge_sources.h"
@@ -17,6 +19,23 @@ __device__ inline Four<double> step_values_at(const double* values, int step) {
   return {first.x, first.y, second.x, second.y};
 }
 
+/// What a lane has of a few steps that follow each other.
+template <typename Number>
+struct StepNumbers {
+  /// As many of either precision as leave room for those of the next steps in registers.
+  static constexpr int together = std::is_same_v<Number, float> ? steps_together : steps_together / 2;
+
+  Four<Number> rows[together];
+  int columns[together];
+
+  __device__ StepNumbers(const SheetTables& tables, const Number* values, int first) {
+#pragma unroll
+    for (int k = 0; k < together; ++k) rows[k] = step_values_at(values, first + k);
+#pragma unroll
+    for (int k = 0; k < together; ++k) columns[k] = tables.step_columns[32 * (first + k) + lane()];
+  }
+};
+
 /// S x over the vertices: x(vertex) has x, y and z, and write(row, c, number) takes coordinate c of a row. S,
 /// shared by all environments, comes from the second-level cache; four lanes share the columns of a group of
 /// four rows.
@@ -29,23 +48,15 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
   for (int bundle = team_warp(); bundle < tables.bundle_count; bundle += team_warps()) {
     const int start = tables.bundle_starts[bundle], end = tables.bundle_starts[bundle + 1];
     Number sums[4][3] = {};
-    int columns[steps_together];
+    StepNumbers<Number> now(tables, values, start);
+    for (int step = start; step < end; step += now.together) {
+      // Those of the next steps are on their way meanwhile; behind the last ones they are not used.
+      const StepNumbers<Number> next(tables, values, min(step + now.together, end - now.together));
 #pragma unroll
-    for (int k = 0; k < steps_together; ++k) columns[k] = tables.step_columns[32 * (start + k) + lane()];
-    for (int step = start; step < end; step += steps_together) {
-      Four<Number> own[steps_together];
-      int next[steps_together];
-#pragma unroll
-      for (int k = 0; k < steps_together; ++k) own[k] = step_values_at(values, step + k);
-      // Those of the last steps are not used.
-      const int after = min(step + steps_together, end - steps_together);
-#pragma unroll
-      for (int k = 0; k < steps_together; ++k) next[k] = tables.step_columns[32 * (after + k) + lane()];
-#pragma unroll
-      for (int k = 0; k < steps_together; ++k) {
-        const auto vertex = x(columns[k]);
-        columns[k] = next[k];
-        const Number rows[4] = {own[k].x, own[k].y, own[k].z, own[k].w};
+      for (int k = 0; k < now.together; ++k) {
+        const auto vertex = x(now.columns[k]);
+        const Four<Number> own = now.rows[k];
+        const Number rows[4] = {own.x, own.y, own.z, own.w};
 #pragma unroll
         for (int row = 0; row < 4; ++row) {
           sums[row][0] += rows[row] * vertex.x;
@@ -53,6 +64,7 @@ __device__ void multiply_scalar_rows(const SheetTables& tables, const Number* va
           sums[row][2] += rows[row] * vertex.z;
         }
       }
+      now = next;
     }
     Number own[3] = {};
 #pragma unroll

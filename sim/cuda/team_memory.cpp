@@ -44,8 +44,8 @@ TeamMemory lay_out_team(const TeamSizes& sizes, DeviceArena& arena) {
     for (ContactSet& contacts : m.contacts)
       contacts = {arena.take<int>(size), records.operator()<ContactRecord>(1),
                   records.operator()<TouchRecord>(obstacles), arena.take<double>(size)};
-    m.obstacles = arena.take<MovingObstacle<double>>(obstacles);
     m.own_blocks = arena.take<float>(9 * size);
+    m.projectors = arena.take<float>(6 * size);
     m.coupled = {arena.take<float>(9 * size), arena.take<float>(3 * size * (most_directions + 1)),
                  arena.take<float>(3 * size * most_directions), arena.take<double>(small_numbers)};
   }

@@ -29,6 +29,23 @@ FLASH_HOST_DEVICE inline bool solve(const FewEquations<Real>& equations, Real le
   return true;
 }
 
+/// Sine squared of 0.06 degrees, the angle between two faces below which they count as parallel.
+inline constexpr double parallel_faces = 1e-6;
+
+/// solve_lcp for one face: b / (n . c) where that is positive, else zero.
+template <typename Real>
+FLASH_HOST_DEVICE inline Real solve_lcp_of_one(const Vector3<Real>& normal, const Vector3<Real>& direction,
+                                               const Real& b) {
+  const Real across = dot(normal, direction);
+  if (magnitude(across) < Real(parallel_faces)) return Real(0);
+  const Real x = b / across;
+  if (x < 0) return Real(0);
+  const Real violation = larger_of(b - dot(normal, x * direction), Real(0)),
+             rounding = Real(1e-12) * larger_of(magnitude(b), Real(0)),
+             without = larger_of(b, Real(0)) - rounding;
+  return violation >= without ? Real(0) : x;
+}
+
 /// Solves a linear complementarity problem: the x >= 0 with y = N^T C x - b >= 0 and x . y = 0. The unit
 /// `normals` are the columns of N, the `directions` those of C; all have `count` entries. At most three of x
 /// are positive, of independent columns. Where there is none (faces that press against each other), x becomes
@@ -37,7 +54,10 @@ FLASH_HOST_DEVICE inline bool solve(const FewEquations<Real>& equations, Real le
 template <typename Real>
 FLASH_HOST_DEVICE inline void solve_lcp(int count, const Vector3<Real>* normals,
                                         const Vector3<Real>* directions, const Real* b, Real* x) {
-  constexpr Real parallel = 1e-6;  // sin^2 of 0.06 degrees, the angle between two faces
+  if (count == 1) {
+    x[0] = solve_lcp_of_one(normals[0], directions[0], b[0]);
+    return;
+  }
   Real largest{}, best_violation{};
   for (int k = 0; k < count; ++k) {
     x[k] = 0;
@@ -56,7 +76,7 @@ FLASH_HOST_DEVICE inline void solve_lcp(int count, const Vector3<Real>* normals,
     }
     Real trial[3];
     // Faces that are parallel give no unique force.
-    if (!solve(equations, parallel, trial)) return;
+    if (!solve(equations, Real(parallel_faces), trial)) return;
     Vector3<Real> sum{};
     for (int r = 0; r < size; ++r) {
       if (trial[r] < 0) return;

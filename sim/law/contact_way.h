@@ -257,7 +257,17 @@ FLASH_HOST_DEVICE inline bool ends_behind_its_entry(const MovingObstacle<Real>& 
           passage.entry_sign * way.to[passage.entry_axis] < -box.half_extents[passage.entry_axis]);
 }
 
-/// The parts of gap_after for each shape.
+// The parts of gap_after for each shape.
+
+template <typename Real>
+FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after_plane(const MovingObstacle<Real>& plane,
+                                                          const Vector3<Real>& start,
+                                                          const Vector3<Real>& point, Real time_step,
+                                                          const WayOut<Real>& way_out) {
+  const SurfaceGap<Real> gap = gap_to_plane(plane, point);
+  return let_out(gap, -dot(plane.start.z, start - plane.start.origin), time_step, way_out);
+}
+
 /// The share of a way after which it first comes within `radius` of the origin: 0 where it starts there,
 /// no_such_side where it never does. `from`, `way`: across the axis for a cylinder.
 template <typename Real>
@@ -402,8 +412,7 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_after(const MovingObstacle<Real>& 
                                                     const Vector3<Real>& slid, Real time_step,
                                                     const WayOut<Real>& way_out) {
   if (obstacle.shape == ObstacleShape::plane)
-    return let_out(gap_to(obstacle, point), -dot(obstacle.start.z, start - obstacle.start.origin), time_step,
-                   way_out);
+    return gap_after_plane(obstacle, start, point, time_step, way_out);
   if (obstacle.shape == ObstacleShape::cylinder)
     return gap_after_cylinder(obstacle, start, point, time_step, way_out);
   if (obstacle.shape == ObstacleShape::capsule)

@@ -126,16 +126,21 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_to_face(const MovingObstacle<Real>
   return gap;
 }
 
+template <typename Real>
+FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_to_plane(const MovingObstacle<Real>& plane,
+                                                       const Vector3<Real>& point) {
+  return {.distance = dot(plane.end.z, point - plane.end.origin),
+          .normal = plane.end.z,
+          .surface_moved = material_motion(plane, point)};
+}
+
 /// Signed distance of `point` [m] to the obstacle where it stands at the end of the step. Exact outside;
 /// inside a box the nearest face decides.
 template <typename Real>
 FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_to(const MovingObstacle<Real>& obstacle,
                                                  const Vector3<Real>& point) {
   const Frame<Real>& frame = obstacle.end;
-  if (obstacle.shape == ObstacleShape::plane)
-    return {.distance = dot(frame.z, point - frame.origin),
-            .normal = frame.z,
-            .surface_moved = material_motion(obstacle, point)};
+  if (obstacle.shape == ObstacleShape::plane) return gap_to_plane(obstacle, point);
   SurfaceGap<Real> gap;
   if constexpr (meets_meshes<Real>)
     if (obstacle.shape == ObstacleShape::mesh) {

@@ -12,6 +12,7 @@ struct ObstacleStep {
   bool several = false;  ///< whether a box stands beside another obstacle, so that one may continue the other
   Real time_step{};      ///< [s]
   WayOut<Real> way_out{};
+  bool planes = false;  ///< whether all obstacles are planes, where the caller looked
 
   FLASH_HOST_DEVICE OtherObstacles<Real> others(int own) const { return {obstacles, count, own}; }
 };
@@ -58,12 +59,12 @@ FLASH_HOST_DEVICE inline Vector3<Real> slid_place(const ObstacleStep<Real>& step
   return end;
 }
 
-/// How a vertex that comes from `start` stands against an obstacle, were it at `point` at the end of the
-/// step.
+/// gap_in_step of an obstacle that is no plane. It takes values: what a kernel gives away the address of
+/// stays in memory.
 template <typename Real>
-FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_in_step(const ObstacleStep<Real>& step, int obstacle,
-                                                      const Vector3<Real>& start,
-                                                      const Vector3<Real>& point) {
+FLASH_CALLED_ON_DEVICE inline SurfaceGap<Real> gap_of_solid_in_step(ObstacleStep<Real> step, int obstacle,
+                                                                    Vector3<Real> start,
+                                                                    Vector3<Real> point) {
   const MovingObstacle<Real>& own = step.obstacles[obstacle];
   const OtherObstacles<Real> none;
   if (!step.several || own.shape != ObstacleShape::box)
@@ -76,12 +77,25 @@ FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_in_step(const ObstacleStep<Real>& 
                    step.time_step, step.way_out);
 }
 
+/// How a vertex that comes from `start` stands against an obstacle, were it at `point` at the end of the
+/// step.
+template <typename Real>
+FLASH_HOST_DEVICE inline SurfaceGap<Real> gap_in_step(const ObstacleStep<Real>& step, int obstacle,
+                                                      const Vector3<Real>& start,
+                                                      const Vector3<Real>& point) {
+  const MovingObstacle<Real>& own = step.obstacles[obstacle];
+  if (step.planes || own.shape == ObstacleShape::plane)
+    return gap_after_plane(own, start, point, step.time_step, step.way_out);
+  return gap_of_solid_in_step(step, obstacle, start, point);
+}
+
 /// The distance of gap_in_step alone, fast where the obstacle is a plane.
 template <typename Real>
 FLASH_HOST_DEVICE inline Real distance_in_step(const ObstacleStep<Real>& step, int obstacle,
                                                const Vector3<Real>& start, const Vector3<Real>& point) {
   const MovingObstacle<Real>& own = step.obstacles[obstacle];
-  if (own.shape != ObstacleShape::plane) return gap_in_step(step, obstacle, start, point).distance;
+  if (!step.planes && own.shape != ObstacleShape::plane)
+    return gap_in_step(step, obstacle, start, point).distance;
   const Real depth = -dot(own.start.z, start - own.start.origin);
   return dot(own.end.z, point - own.end.origin) + sunk_of(depth, step.time_step, step.way_out);
 }

@@ -40,6 +40,12 @@ struct SurfaceRoom {
   int those[most];
 };
 
+/// Whether a room is for one surface, so that a kernel can keep all of its problem in registers.
+template <typename Room>
+inline constexpr bool for_one_surface = false;
+template <>
+inline constexpr bool for_one_surface<SurfaceRoom<1>> = true;
+
 /// The smallest gap of a vertex [m].
 FLASH_HOST_DEVICE inline double clearance_of(const ObstacleStep<double>& step, const Vector3<double>& start,
                                              const Vector3<double>& point) {

@@ -16,6 +16,9 @@ inline constexpr int most_team_blocks = 8;
 /// Blocks that a processor of the device has registers for, at least.
 inline constexpr int resident_blocks_each = 1;
 
+/// On-chip memory of a block for what its threads have in common, at most [bytes].
+inline constexpr int common_memory = 5 * 1024;
+
 /// Columns of a block on the diagonal of a front, inverted by a warp at a time.
 inline constexpr int panel_width = 8;
 

@@ -33,6 +33,17 @@ TEST(ContactLaw, FewEquationsAreSolvedAsByAFactorization) {
   }
 }
 
+TEST(ContactLaw, AFaceAlonePushesAsMuchAsIsNeededAndNeverPulls) {
+  const Vector3<double> normal{0, 0.6, 0.8}, rubbing{0.3, 0.6, 0.8}, along{0, 0.8, -0.6};
+  EXPECT_EQ(solve_lcp_of_one(normal, normal, 3.0), 3 / dot(normal, normal));
+  // Its friction is across the normal, so that it changes nothing.
+  EXPECT_EQ(solve_lcp_of_one(normal, rubbing, 3.0), 3 / dot(normal, normal));
+  EXPECT_EQ(solve_lcp_of_one(normal, normal, -3.0), 0);
+  EXPECT_EQ(solve_lcp_of_one(normal, normal, 0.0), 0);
+  EXPECT_EQ(solve_lcp_of_one(normal, along, 3.0), 0);
+  EXPECT_EQ(solve_lcp_of_one(normal, normal, std::nan("")), 0);
+}
+
 TEST(ContactLaw, RubbingSurfacesMeetTheConditionsOfComplementarity) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> number(-1, 1);

@@ -67,7 +67,7 @@ TEST(SolidMesh, WhatHoldsBothEndsOfAnEdgeHoldsItsMiddle) {
     if (i < mesh_vertices(box)) corners.push_back(i);
   }
   EXPECT_EQ(with_midsides(box, corners), face);
-  EXPECT_EQ(with_midsides(box, {corners[0]}), std::vector<int>{corners[0]});
+  EXPECT_EQ(with_midsides(box, std::vector<int>{corners[0]}), std::vector<int>{corners[0]});
   const data::Points moved = 2 * box.rest.vertices;
   EXPECT_EQ(with_midsides(box, moved.topRows(mesh_vertices(box))), moved);
 }
