@@ -42,9 +42,9 @@ void add_weighted(const WeightedPart<Scalar>& part, const Scalar* x, Scalar* y) 
   for (int k = 0; k < 4; ++k)
     for (int c = 0; c < 3; ++c) between[c] += part.weights[k] * x[4L * part.positions[k] + c];
   const Scalar* b = part.block;
-  const Scalar image[3] = {b[0] * between[0] + b[1] * between[1] + b[2] * between[2],
-                           b[1] * between[0] + b[3] * between[1] + b[4] * between[2],
-                           b[2] * between[0] + b[4] * between[1] + b[5] * between[2]};
+  Scalar image[3];
+  for (int c = 0; c < 3; ++c)
+    image[c] = b[3 * c] * between[0] + b[3 * c + 1] * between[1] + b[3 * c + 2] * between[2];
   for (int k = 0; k < 4; ++k)
     for (int c = 0; c < 3; ++c) y[4L * part.positions[k] + c] += part.weights[k] * image[c];
 }

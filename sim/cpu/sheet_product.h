@@ -31,7 +31,7 @@ template <typename Scalar>
 struct WeightedPart {
   int positions[4];  ///< of the vertices in the elimination
   Scalar weights[4];
-  Scalar block[6];  ///< B, symmetric: xx, xy, xz, yy, yz, zz
+  Scalar block[9];  ///< B, row by row
 };
 
 /// y = (B + sum s S + sum w w^T C) x over the vertices of a sheet in elimination order, four numbers a

@@ -10,7 +10,8 @@
 namespace flash::sim {
 namespace {
 
-constexpr int coupled_after = 20;   ///< iterations of a part after which friction follows the normal forces
+constexpr int coupled_after = 20;  ///< iterations of a part after which friction follows the normal forces
+constexpr int layers_coupled_after = 3;  ///< iterations after which friction of layers may do so
 constexpr int linear_problems = 6;  ///< an iteration, each with the contacts that the one before asks for
 constexpr double linear_tolerance = 0.3;  ///< of a linear problem, as a share of the step's
 /// Of the tolerance, for the place where a step starts to be taken for its end as it is. With the whole
@@ -25,29 +26,44 @@ constexpr double flat_slope = 0.2;      ///< share of the first slope from which
 constexpr double least_growth = 1.5, greatest_growth = 3.0;  ///< of a length at a time
 constexpr double residual_growth = 10;  ///< of the residual by a lengthened step, at most
 
+/// Whether layers rub on each other.
+bool layers_rub(const StepProblem& problem) { return problem.layers && problem.layers->friction() > 0; }
+
 /// Friction at the normal forces of the iterate converges where these change little. In the parts of a step
 /// that could not be solved as one it goes round in circles at times. Then both are solved at once, guided by
-/// the residual.
-bool couples_friction(const StepProblem& problem, const SolverSettings& settings, int iterations) {
+/// the residual. Normal forces of layers change with every motion, so they are coupled in any step. But far
+/// from its end the potential is the better guide: only where the last iteration went its whole way.
+bool couples_friction(const StepProblem& problem, const SolverSettings& settings, int iterations,
+                      bool went_whole) {
+  if (layers_rub(problem)) return iterations > layers_coupled_after && went_whole;
   return problem.contacts.time_step < settings.time_step && iterations > coupled_after;
 }
 
-/// The stiffness of all touches of layers at an iterate.
-std::vector<TouchStiffness> layer_stiffness(const StepProblem& problem, const Iterate& iterate) {
+/// The stiffness of all touches of layers at an iterate; `coupled`: with friction that grows with the normal
+/// forces.
+std::vector<TouchStiffness> layer_stiffness(const StepProblem& problem, const Iterate& iterate,
+                                            bool coupled = false) {
   std::vector<TouchStiffness> all;
   if (!problem.layers) return all;
+  const double friction = problem.layers->friction();
+  all.reserve(iterate.layers.touches.size());
   for (const LayerTouch& touch : iterate.layers.touches)
-    all.push_back({touch, stiffness_of(touch, problem.layers->friction(), problem.layers->time_step())});
+    all.push_back({touch, stiffness_of(touch, friction, problem.layers->time_step()),
+                   coupled ? friction_coupling_of(touch, friction) : Vector3<double>{}});
   return all;
 }
 
 /// Adds what layers that touch add to the blocks of their vertices. Those between them are not in the
 /// pattern.
 void add_layer_diagonal(const std::vector<TouchStiffness>& layers, BlockValues<double>& values) {
-  for (const auto& [touch, stiffness] : layers)
-    for (int k = 0; k < 4; ++k)
-      Eigen::Map<Eigen::Matrix3d>(values.data() + 9L * touch.vertices[k]) +=
-          touch.weights[k] * touch.weights[k] * matrix3d(stiffness);
+  for (const TouchStiffness& layer : layers) {
+    const Eigen::Matrix3d stiffness = matrix3d(layer.stiffness);
+    for (int k = 0; k < 4; ++k) {
+      const double weight = layer.touch.weights[k];
+      Eigen::Map<Eigen::Matrix3d>(values.data() + 9L * layer.touch.vertices[k]) +=
+          weight * weight * stiffness;
+    }
+  }
 }
 
 /// Factorizes the positive Hessian at w.now. Returns false where it is not positive definite after all.
@@ -61,8 +77,9 @@ bool factorize(const StepProblem& problem, NewtonWorkspace& w) {
   return w.matrix.factorize(w.values);
 }
 
-/// Assembles the Hessian at w.now as the matrix of the linear problem: exact, or `positive`.
-void assemble_matrix(const StepProblem& problem, bool positive, NewtonWorkspace& w) {
+/// Assembles the Hessian at w.now as the matrix of the linear problem: exact, or `positive`. `coupled`: with
+/// friction of layers that grows with their normal forces, so that it is not symmetric.
+void assemble_matrix(const StepProblem& problem, bool positive, bool coupled, NewtonWorkspace& w) {
   const double h = problem.contacts.time_step;
   bool sparse = true;
   std::vector<ScaledBending> bending;
@@ -76,14 +93,14 @@ void assemble_matrix(const StepProblem& problem, bool positive, NewtonWorkspace&
   add_slip_stiffness(w.now.contacts, w.values);
   if (!positive) add_surface_curvature(w.now.contacts, w.values);
   w.matrix.assign(w.values, sparse, bending, problem.potential.mass().minCoeff() / (h * h),
-                  layer_stiffness(problem, w.now));
+                  layer_stiffness(problem, w.now, coupled));
 }
 
 /// Finds w.direction and the contacts that go with it, w.linear: solves the linear problem and exchanges its
 /// contacts in turn. `stuck`: with the positive Hessian, whose direction leads down.
 void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWorkspace& w,
                  StepReport& report) {
-  assemble_matrix(problem, stuck, w);
+  assemble_matrix(problem, stuck, coupled, w);
   const Linearization iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
   const double lightest = *std::min_element(problem.force_scales.begin(), problem.force_scales.end());
   const double enough = linear_tolerance * std::min(w.settings.tolerance * lightest, w.now.residual.norm());
@@ -184,7 +201,7 @@ void iterate_to_balance(const StepProblem& problem, int most_iterations, NewtonW
                         StepReport& report) {
   const int first = report.iterations;
   w.longer.contacts = w.trial.contacts = w.now.contacts;
-  bool stuck = false;
+  bool stuck = false, went_whole = true;
   int forced_moves = 0;
   double tolerance = start_tolerance_share * w.settings.tolerance;
   while (report.iterations - first < most_iterations && !problem.balanced(w.now, tolerance)) {
@@ -194,14 +211,17 @@ void iterate_to_balance(const StepProblem& problem, int most_iterations, NewtonW
       if (!factorize(problem, w)) return;
       ++report.factorizations;
     }
-    const bool coupled = !stuck && couples_friction(problem, w.settings, report.iterations - first);
+    const bool coupled =
+        !stuck && couples_friction(problem, w.settings, report.iterations - first, went_whole);
     linear_step(problem, stuck, coupled, w, report);
 
     const SearchLine line{problem, w, coupled, potential_at(problem, w.now, w.now),
                           w.now.residual.cwiseProduct(w.direction).sum()};
     LinePoint point = line_search(line, w.trial);
+    went_whole = point.length == 1;
     if (!acceptable(line, point, w.trial)) {
       if (problem.balanced(w.now, tolerance)) return;
+      if (coupled && layers_rub(problem)) continue;
       if (!stuck) {
         // The iteration is repeated with a fresh factor and a positive matrix, whose direction leads down.
         stuck = w.refactor = true;

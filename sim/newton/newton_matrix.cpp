@@ -40,13 +40,15 @@ std::vector<WeightedPart<Scalar>> weighted_parts(const std::vector<TouchStiffnes
                                                  const std::vector<int>& position) {
   std::vector<WeightedPart<Scalar>> parts(layers.size());
   for (size_t p = 0; p < layers.size(); ++p) {
-    const auto& [touch, b] = layers[p];
+    const LayerTouch& touch = layers[p].touch;
     for (size_t k = 0; k < 4; ++k) {
       parts[p].positions[k] = position[touch.vertices[k]];
       parts[p].weights[k] = static_cast<Scalar>(touch.weights[k]);
     }
-    const double block[6] = {b.xx, b.xy, b.xz, b.yy, b.yz, b.zz};
-    for (int c = 0; c < 6; ++c) parts[p].block[c] = static_cast<Scalar>(block[c]);
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 3; ++column)
+        parts[p].block[3 * row + column] = static_cast<Scalar>(
+            layers[p].stiffness.at(row, column) - layers[p].coupling[row] * touch.normal[column]);
   }
   return parts;
 }

@@ -15,10 +15,11 @@ struct ScaledBending {
   double rigidity;
 };
 
-/// The stiffness between four vertices that touch, as stiffness_of says [N/m].
+/// The stiffness between four vertices that touch [N/m]: as stiffness_of says, less `coupling` n^T.
 struct TouchStiffness {
   const LayerTouch& touch;
   Symmetric3 stiffness;
+  Vector3<double> coupling{};  ///< as friction_coupling_of says, or zero
 };
 
 /// The matrix of a Newton iteration, its preconditioner and the solution of its linear problem.

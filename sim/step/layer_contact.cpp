@@ -100,6 +100,10 @@ Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_st
          (friction * touch.normal_force / friction_length(touch.slip, time_step)) * turns;
 }
 
+Vector3<double> friction_coupling_of(const LayerTouch& touch, double friction) {
+  return (friction * touch.stiffness) * touch.slip_direction;
+}
+
 LayerStep::LayerStep(LayerMemory& memory, const Environment& environment, double time_step,
                      const std::vector<bool>& carried)
     : memory_(memory),

@@ -124,4 +124,8 @@ class LayerStep {
 /// Hessian is this matrix between the weighted vertices (Gauss-Newton): what the normal turns by is left out.
 Symmetric3 stiffness_of(const LayerTouch& touch, double friction, double time_step);
 
+/// Friction grows with the normal force, which falls by touch.stiffness as the points part: by the way u
+/// between them the force that is needed changes by this, times -n . u. It is not symmetric [N/m].
+Vector3<double> friction_coupling_of(const LayerTouch& touch, double friction);
+
 }  // namespace flash::sim
