@@ -162,7 +162,7 @@ std::vector<int> select_vertices(const Recording& recording, const Selection& se
 /// Writes recording.json with paths relative to it. The files it names must stand already.
 void save_recording(const Recording& recording, const std::string& path);
 
-const char* to_string(GraspShape shape);  ///< "clamp", "point", "pinch"
+const char* to_string(GraspShape shape);                               ///< "clamp", "point", "pinch"
 std::optional<GraspShape> parse_grasp_shape(const std::string& text);  ///< of such a text
 
 }  // namespace flash::data
