@@ -236,9 +236,10 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
         if (stop != nullptr && *stop) throw data::Stopped();
         motions.take(slices);
         FittedNearby::Fitted fitted = nearby.guess();
-        deviance[static_cast<Eigen::Index>(first)] = likelihood.deviance(
+        const double here = likelihood.deviance(
             [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); },
             fitted);
+        deviance[static_cast<Eigen::Index>(first)] = std::isnan(here) ? INFINITY : here;
         nearby.add(std::move(fitted));
         if (told) told({0, 1}, {});
         return;

@@ -43,6 +43,10 @@ Eigen::VectorXd open_information(const MotionLikelihood& likelihood, const std::
   for (std::size_t r = 0; r < likelihood.recordings(); ++r)
     size += likelihood.linear(r).rows.free.cols() + likelihood.linear(r).rows.known.cols();
   Eigen::MatrixXd information = Eigen::MatrixXd::Zero(size, size);
+  double precision = 0;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r)
+    precision +=
+        std::pow(likelihood.of_recording(r).spread(), -2) / static_cast<double>(likelihood.recordings());
   Eigen::Index own = parameters;  // first of a recording
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     const ObservedRows& rows = likelihood.linear(r).rows;
@@ -51,7 +55,8 @@ Eigen::VectorXd open_information(const MotionLikelihood& likelihood, const std::
     // What is even from -1 to 1 has a standard deviation of 1 / sqrt(3).
     columns << rows.rates * Eigen::Map<const Eigen::VectorXd>(spreads.data(), parameters).asDiagonal(),
         rows.free / std::sqrt(3.0), rows.known;
-    const Eigen::MatrixXd here = columns.transpose() * rows.weights.asDiagonal() * columns;
+    const double share = std::pow(likelihood.of_recording(r).spread(), -2) / precision;
+    const Eigen::MatrixXd here = share * (columns.transpose() * rows.weights.asDiagonal() * columns);
     information.topLeftCorner(parameters, parameters) += here.topLeftCorner(parameters, parameters);
     information.block(own, 0, errors, parameters) = here.bottomLeftCorner(errors, parameters);
     information.block(0, own, parameters, errors) = here.topRightCorner(parameters, errors);
@@ -68,7 +73,7 @@ double log_occupied(const Eigen::VectorXd& open_information, double spread) {
 std::vector<double> spreads_over(const std::vector<Axis>& axes, const Extent& extent) {
   std::vector<double> spreads;
   for (std::size_t k = 0; k < axes.size(); ++k) {
-    if (axes[k].values.size() < 2) continue;
+    if (axes[k].values.size() < 2 || !(extent[k][0] < extent[k][1])) continue;
     const auto width = [&](double low, double high) {
       return coordinate_of(axes[k], high) - coordinate_of(axes[k], low);
     };

@@ -30,7 +30,8 @@ double excess_deviance(const std::vector<LeftResiduals>& reference, const std::v
 /// What the observations tell of all that a search left open, about the reference of a likelihood:
 /// eigenvalues of the information of its parameters, registration and known errors, each in units of its
 /// prior's standard deviation, were the residuals' a metre [m^2]. `spreads`: of the searched parameters'
-/// priors, in units of their rates. Recordings have their parameters in common.
+/// priors, in units of their rates. Recordings have their parameters in common, and each counts by 1 / s^2
+/// over the mean of that.
 Eigen::VectorXd open_information(const MotionLikelihood& likelihood, const std::vector<double>& spreads);
 
 /// Share of its prior that residuals of standard deviation `spread` [m] leave likely, by Laplace, as a

@@ -151,7 +151,10 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     return moved.norm() <
            kSame * recording.likelihood->misfit().noise * std::sqrt(static_cast<double>(moved.size()));
   };
-  Nuisance at = start, next = start;
+  // Beyond its bounds a registration costs nothing, and no step back within them would fall.
+  Nuisance at = start;
+  at.registration = at.registration.cwiseMax(-recording.bounds).cwiseMin(recording.bounds).eval();
+  Nuisance next = at;
   double here = INFINITY;  // at `at`
   SheetDistance sheet = sheet_of(recording.replay);
   std::vector<int> triangles;
@@ -165,7 +168,7 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     // Errors that bend, and surfaces that are left for another, make a step too long.
     const double there = recording.likelihood->deviance_of(
         residuals, next.registration.cwiseQuotient(recording.bounds.cwiseMax(1e-300)), next.errors);
-    if (there > here) {
+    if (!(there <= here)) {
       if (is_same(at, next)) return {at, here};
       next.registration = 0.5 * (at.registration + next.registration);
       next.errors = 0.5 * (at.errors + next.errors);

@@ -120,9 +120,10 @@ std::vector<ComparedSearch> compare(const std::vector<FinishedSearch>& found) {
   const std::optional<double> repeatability =
       data::parse_number(setting(reference->summary, "repeatability_m"));
   // One for all searches: a model that misses more is not freer for that.
-  double spread = 0;
+  double precision = 0;  // mean of the recordings'
   for (const SummaryRecording& recording : reference->summary.recordings)
-    spread += recording.spread / static_cast<double>(reference->summary.recordings.size());
+    precision += std::pow(recording.spread, -2) / static_cast<double>(reference->summary.recordings.size());
+  const double spread = 1 / std::sqrt(precision);
   std::vector<std::map<std::string, std::string>> differs = differences(searches);
   std::vector<ComparedSearch> compared;
   double most = -INFINITY, sum = 0;

@@ -125,6 +125,29 @@ TEST(MotionLikelihood, WhatIsFittedIsFoundFromWhereAStepIsFarTooLong) {
   }
 }
 
+TEST(MotionLikelihood, ARegistrationEndsWithinItsBoundsWhereverItBegins) {
+  Cloth cloth(12);
+  Motion risen = cloth.bulged(0.03);
+  for (data::Points& positions : risen.positions) positions.col(2).array() += 0.004;
+  cloth.see(risen);
+  cloth.replay.recording.nuisance.offset << 0, 0, 0.002;
+  ScoreSettings settings;
+  settings.objective.robust.kind = RobustKind::plain;
+  const Motion motion = cloth.bulged(0.03);
+  const MotionLikelihood likelihood({cloth.replay}, result_of(motion), settings, {}, {}, {});
+  double within = 0;
+  for (const double start : {0.0, 0.004, 0.02}) {
+    std::vector<MotionLikelihood::Nuisance> fitted(1);
+    fitted[0].registration << 0, 0, start, 0, 0;
+    fitted[0].errors.resize(0);
+    const double deviance =
+        likelihood.deviance([&](std::size_t, double) -> const Motion& { return motion; }, fitted);
+    EXPECT_LE(std::abs(fitted[0].registration[2]), 0.002 * (1 + 1e-12)) << start;
+    if (start == 0) within = deviance;
+    EXPECT_NEAR(deviance, within, 1e-3 * within) << start;
+  }
+}
+
 TEST(MotionLikelihood, WhatIsCorrectedIsTakenForGranted) {
   Cloth cloth(12);
   cloth.see(cloth.bulged(0.02));
