@@ -8,27 +8,10 @@
 
 #include "sysid/infer/local_noise.h"
 #include "sysid/infer/residual_likelihood.h"
+#include "tests/sysid/infer/strip_rows.h"
 
 namespace flash::sysid {
 namespace {
-
-constexpr double kNoise = 1e-3;  // [m]
-
-/// A strip of 20 cm seen at `keyframes` times within 0.8 s, `points` at each.
-ObservedRows strip_rows(int keyframes, int points) {
-  ObservedRows rows;
-  const int count = keyframes * points;
-  rows.places.resize(count, 2);
-  rows.weights = Eigen::VectorXd::Ones(count);
-  for (int k = 0; k < keyframes; ++k) rows.times.push_back(0.8 * k / (keyframes - 1));
-  for (int i = 0; i < count; ++i) {
-    rows.keyframe.push_back(i / points);
-    rows.channel.push_back(0);
-    const double along = (i % points + 0.5) / points;
-    rows.places.row(i) << 0.2 * along, 0.025 * ((7 * i) % points) / (points - 1);
-  }
-  return rows;
-}
 
 /// How the rows of a strip would move with a parameter: later and farther out, more.
 Eigen::VectorXd lifted(const ObservedRows& rows) {
@@ -38,11 +21,6 @@ Eigen::VectorXd lifted(const ObservedRows& rows) {
     rate[i] = 0.05 * t * t * std::pow(rows.places(i, 0) / 0.2, 2);
   }
   return rate;
-}
-
-Eigen::VectorXd normal(std::mt19937& random, Eigen::Index count) {
-  std::normal_distribution<double> draw;
-  return Eigen::VectorXd::NullaryExpr(count, [&](Eigen::Index) { return draw(random); });
 }
 
 // Three markers at rest: nothing tells what is rough from what is smooth.

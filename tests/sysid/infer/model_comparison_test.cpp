@@ -6,30 +6,10 @@
 #include <cmath>
 #include <random>
 
+#include "tests/sysid/infer/strip_rows.h"
+
 namespace flash::sysid {
 namespace {
-
-constexpr double kNoise = 1e-3;  // [m]
-
-/// A strip of 20 cm seen at `keyframes` times within 0.8 s, `points` at each.
-ObservedRows strip_rows(int keyframes, int points) {
-  ObservedRows rows;
-  const int count = keyframes * points;
-  rows.places.resize(count, 2);
-  rows.weights = Eigen::VectorXd::Ones(count);
-  for (int k = 0; k < keyframes; ++k) rows.times.push_back(0.8 * k / (keyframes - 1));
-  for (int i = 0; i < count; ++i) {
-    rows.keyframe.push_back(i / points);
-    rows.channel.push_back(0);
-    rows.places.row(i) << 0.2 * (i % points + 0.5) / points, 0.025 * ((7 * i) % points) / (points - 1);
-  }
-  return rows;
-}
-
-Eigen::VectorXd normal(std::mt19937& random, Eigen::Index count) {
-  std::normal_distribution<double> draw;
-  return Eigen::VectorXd::NullaryExpr(count, [&](Eigen::Index) { return draw(random); });
-}
 
 /// By what two models differ, of unit root mean square.
 Eigen::VectorXd difference(const ObservedRows& rows) {
