@@ -200,7 +200,7 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
         motions.take(slices);
         const double here = likelihood.deviance(
             [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); });
-        deviance[static_cast<Eigen::Index>(first)] = std::isnan(here) ? INFINITY : here;
+        deviance[static_cast<Eigen::Index>(first)] = here;
         if (told) told({0, 1}, {});
         return;
       }
