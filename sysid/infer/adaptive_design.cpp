@@ -198,9 +198,8 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
       if (k == axes.size()) {
         if (stop != nullptr && *stop) throw data::Stopped();
         motions.take(slices);
-        const double here = likelihood.deviance(
+        deviance[static_cast<Eigen::Index>(first)] = likelihood.deviance(
             [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); });
-        deviance[static_cast<Eigen::Index>(first)] = here;
         if (told) told({0, 1}, {});
         return;
       }
