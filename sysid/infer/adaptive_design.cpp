@@ -95,7 +95,7 @@ Extent next_extent(const Extent& extent, const Posterior& posterior, const std::
     const double best = posterior.estimate[static_cast<Eigen::Index>(k)];
     double reach = 0;  // the larger half of the interval
     for (const std::size_t side : {0, 1}) {
-      const bool open = posterior.end(k, side == 1) < kUnlikely;
+      const bool open = posterior.ends(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(side)) < kUnlikely;
       const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
       // Past an open end by a quarter of the width or more; a longer way would lose what the last extents
       // told.
@@ -160,6 +160,40 @@ class ReadMotions {
   std::vector<std::vector<bool>> made_;
 };
 
+/// What is fitted at the points of a part of a grid, one after another, and what that makes likely at the
+/// next: along an axis it goes on as from the last two points to the last.
+class FittedNearby {
+ public:
+  using Fitted = std::vector<MotionLikelihood::Nuisance>;
+
+  /// `counts`: values of each axis of the part, the last fastest.
+  explicit FittedNearby(std::vector<std::size_t> counts) : counts_(std::move(counts)) {}
+
+  /// At the next point; empty where nothing is known.
+  Fitted guess() const {
+    std::size_t stride = 1;
+    for (std::size_t k = counts_.size(); k-- > 0; stride *= counts_[k]) {
+      const std::size_t at = known_.size() / stride % counts_[k];
+      if (at == 0) continue;
+      const Fitted& last = known_[known_.size() - stride];
+      if (at == 1) return last;
+      const Fitted& before = known_[known_.size() - 2 * stride];
+      Fitted next = last;
+      for (std::size_t r = 0; r < next.size(); ++r) {
+        next[r].registration += last[r].registration - before[r].registration;
+        next[r].errors += last[r].errors - before[r].errors;
+      }
+      return next;
+    }
+    return {};
+  }
+  void add(Fitted fitted) { known_.push_back(std::move(fitted)); }
+
+ private:
+  std::vector<std::size_t> counts_;
+  std::vector<Fitted> known_;
+};
+
 /// Slices of all recordings with one axis more held.
 void hold(const std::vector<TwoMeshSlice>& from, double value, std::vector<TwoMeshSlice>& to) {
   if (to.empty()) to = std::vector<TwoMeshSlice>(from.size());
@@ -193,13 +227,20 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
     std::call_once(each.made, [&] { hold(all, axes[0].values[pair / seconds], each.slices); });
     std::vector<Slices> held(axes.size());  // one an axis
     ReadMotions motions(emulator);
+    std::vector<std::size_t> counts;
+    for (std::size_t k = 2; k < axes.size(); ++k) counts.push_back(axes[k].values.size());
+    FittedNearby nearby(counts);
     const auto visit = [&](const auto& self, const Slices& slices, std::size_t k, std::size_t first,
                            std::size_t count) -> void {
       if (k == axes.size()) {
         if (stop != nullptr && *stop) throw data::Stopped();
         motions.take(slices);
-        deviance[static_cast<Eigen::Index>(first)] = likelihood.deviance(
-            [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); });
+        FittedNearby::Fitted fitted = nearby.guess();
+        const double here = likelihood.deviance(
+            [&](std::size_t r, double time_offset) -> const Motion& { return motions.at(r, time_offset); },
+            fitted);
+        deviance[static_cast<Eigen::Index>(first)] = std::isnan(here) ? INFINITY : here;
+        nearby.add(std::move(fitted));
         if (told) told({0, 1}, {});
         return;
       }
@@ -349,7 +390,7 @@ Extent next_lattice(const Extent& extent, const Posterior& posterior, const std:
     const auto [low, high] = extent[k];
     const double width = distance(axis, low, high), first = axis.values.front(), last = axis.values.back();
     const auto leaves = [&](bool upper, double looked_to, double side, double range) {
-      return posterior.end(k, upper) < kUnlikely &&
+      return posterior.ends(static_cast<Eigen::Index>(k), upper ? 1 : 0) < kUnlikely &&
              std::abs(distance(axis, looked_to, side)) <= kSame * width &&
              std::abs(distance(axis, side, range)) > kSame * width;
     };

@@ -195,12 +195,14 @@ double weight_of(const GridSettings& grid) {
   return candidate.solid ? candidate.solid->density : candidate.material.areal_density;
 }
 
-enum class Settled { yes, at_points, elsewhere };
+enum class Settled { by_emulator, by_points, elsewhere };
 
 /// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
 /// emulator's grid. Where folds fall another way between two simulations such a point is likelier than the
-/// mode, and the posterior becomes that of the points (explore_at_points). Elsewhere: the `best` of the
-/// search, perhaps beyond the emulator's grid, is likelier than both.
+/// mode. The posterior is a mixture: what the mode turned out to be likely, over the likeliest, is the share of
+/// the emulator, and each point speaks for the rest (explore_at_points). A share, since a likelihood of
+/// motions that change abruptly differs by chance from point to point: whatever were chosen by it would be as
+/// much by chance. Elsewhere: the `best` of the search, beyond the emulator's grid, is likelier than all.
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
                const std::vector<KnownError>& held) {
   constexpr double kMatters = 1;  // of a deviance
@@ -212,8 +214,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   MotionLikelihood likelihood = likelihood_about(
       task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
   const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
-  Eigen::Index likeliest;
-  const double least = of_points.minCoeff(&likeliest), of_mode = likelihood.deviance(motions_in(*simulated));
+  const double fall = std::max(0.0, likelihood.deviance(motions_in(*simulated)) - of_points.minCoeff());
 
   // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
   std::vector<KnownError> errors = held;
@@ -225,20 +226,19 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   std::vector<Motion> of_best;
   for (const Replay& replay : task.replays)
     of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)).motion);
-  const double fall = std::max(0.0, of_mode - least);
-  const bool best_is_likelier = on_own.deviance(motions_in(own)) - fall > on_own.deviance(of_best) + kMatters;
+  const double fall_to_best = on_own.deviance(motions_in(own)) - on_own.deviance(of_best);
   Extent at_best;
   for (const double value : best) at_best.push_back({value, value});
-  if (best_is_likelier && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
-  if (best_is_likelier || fall > kMatters) {
-    found.look.posterior = explore_at_points(found.axes, of_points);
-    found.look.likelihood = std::move(likelihood);
-    found.errors = errors_about(found, held);
-    return Settled::at_points;
-  }
-  if (fall > 0)
-    set_estimate(found.look.posterior, found.axes, values_of(found.axes, static_cast<int>(likeliest)));
-  return Settled::yes;
+  if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
+  const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, fall_to_best));
+  if (!(share_of_points > 0)) return Settled::by_emulator;
+  Posterior by_points = explore_at_points(found.axes, of_points);
+  if (!(fall > 0)) set_estimate(by_points, found.axes, mode);
+  found.look.posterior = mixture(found.look.posterior, std::move(by_points), share_of_points);
+  if (share_of_points < 0.5) return Settled::by_emulator;
+  found.look.likelihood = std::move(likelihood);
+  found.errors = errors_about(found, held);
+  return Settled::by_points;
 }
 
 /// The posterior by what was simulated alone, on the search's own mesh (explore_at_points). No motion is
@@ -368,7 +368,7 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
     found = std::move(about);
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
-  if (settled != Settled::yes)
+  if (settled != Settled::by_emulator)
     answer.warnings.emplace_back(
         "the motion changes too abruptly between the values searched: the answer is by these alone; search "
         "more values");

@@ -139,35 +139,50 @@ void MotionLikelihood::set_shifts(const Recording& recording, const Nuisance& nu
 std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     const Recording& recording, const Nuisance& start,
     const std::function<const Motion&(double time_offset)>& motion_at) {
-  constexpr int kSteps = 6;
+  constexpr int kSteps = 30;
   // Of the noise: what a step moves rows by. Over four parameters, with steps without end and six seeds of
   // draws each, Poisson's mean standard deviation is 0.033 at a tenth, 0.031 at 0.03, 0.028 at a hundredth,
   // 0.030 at a thousandth; seeds differ by 0.001. A tenth errs on the wide side and takes less than half of
   // the steps.
   constexpr double kSame = 0.1;
+  const auto is_same = [&](const Nuisance& a, const Nuisance& b) {
+    const Eigen::VectorXd moved = recording.registered * (b.registration - a.registration) +
+                                  known_at(recording, a.errors) * (b.errors - a.errors);
+    return moved.norm() <
+           kSame * recording.likelihood->misfit().noise * std::sqrt(static_cast<double>(moved.size()));
+  };
+  // Beyond its bounds a registration costs nothing, and no step back within them would fall.
   Nuisance at = start;
-  ResidualLikelihood::Fit fit;
+  at.registration = at.registration.cwiseMax(-recording.bounds).cwiseMin(recording.bounds).eval();
+  Nuisance next = at;
+  double here = INFINITY;  // at `at`
   SheetDistance sheet = sheet_of(recording.replay);
   std::vector<int> triangles;
   SheetShifts shifts;
   for (int step = 0; step < kSteps; ++step) {
-    const Motion& motion = motion_at(at.registration[4]);
-    if (!is_read(recording, motion, at.registration[4])) return {at, NAN};
-    set_shifts(recording, at, shifts);
+    const Motion& motion = motion_at(next.registration[4]);
+    if (!is_read(recording, motion, next.registration[4])) return {next, NAN};
+    set_shifts(recording, next, shifts);
     const Eigen::VectorXd residuals = recording.linear.scale.cwiseProduct(recording.near->distances(
-        recording.replay, motion, registration_of(recording, at), shifts, sheet, triangles));
-    const Eigen::MatrixXd known = known_at(recording, at.errors);
-    fit = recording.likelihood->fit(residuals + recording.registered * at.registration + known * at.errors,
-                                    known);
-    const Nuisance next{recording.bounds.cwiseProduct(fit.free), fit.known};
-    const Eigen::VectorXd moved =
-        recording.registered * (next.registration - at.registration) + known * (next.errors - at.errors);
+        recording.replay, motion, registration_of(recording, next), shifts, sheet, triangles));
+    // Errors that bend, and surfaces that are left for another, make a step too long.
+    const double there = recording.likelihood->deviance_of(
+        residuals, next.registration.cwiseQuotient(recording.bounds.cwiseMax(1e-300)), next.errors);
+    if (!(there <= here)) {
+      if (is_same(at, next)) return {at, here};
+      next.registration = 0.5 * (at.registration + next.registration);
+      next.errors = 0.5 * (at.errors + next.errors);
+      continue;
+    }
     at = next;
-    if (moved.norm() <
-        kSame * recording.likelihood->misfit().noise * std::sqrt(static_cast<double>(moved.size())))
-      break;
+    here = there;
+    const Eigen::MatrixXd known = known_at(recording, at.errors);
+    const ResidualLikelihood::Fit fit = recording.likelihood->fit(
+        residuals + recording.registered * at.registration + known * at.errors, known);
+    next = {recording.bounds.cwiseProduct(fit.free), fit.known};
+    if (is_same(at, next)) return {next, fit.deviance};
   }
-  return {at, fit.deviance};
+  return {at, here};
 }
 
 double MotionLikelihood::spread_of(std::size_t error) const {

@@ -6,7 +6,9 @@
 #include <limits>
 #include <numeric>
 #include <random>
+#include <utility>
 
+#include "sysid/emulate/tensor_spline.h"
 #include "sysid/infer/ensemble_sampler.h"
 
 namespace flash::sysid {
@@ -87,16 +89,6 @@ double Posterior::quantile(std::size_t k, double share) const {
   return column[at];
 }
 
-double Posterior::end(std::size_t k, bool high) const {
-  const auto axis = static_cast<Eigen::Index>(k);
-  const Eigen::VectorXd& knots = deviance.knots(axis);
-  const double there = high ? knots[knots.size() - 1] : knots[0];
-  double end = std::numeric_limits<double>::infinity();
-  for (Eigen::Index i = 0; i < deviance.values().size(); ++i)
-    if (node_of(deviance, i)[axis] == there) end = std::min(end, deviance.values()[i]);
-  return std::max(0.0, end - least);
-}
-
 namespace {
 
 /// The deviance over that of the likeliest point. Far from what is likely the values do not matter, and a
@@ -111,6 +103,20 @@ TensorSpline spline_of(const std::vector<Axis>& axes, const Eigen::VectorXd& dev
   return {knots_of(axes), bent};
 }
 
+/// Least values at the ends of each axis of a spline, over `least`.
+Eigen::ArrayX2d ends_of(const TensorSpline& spline, double least) {
+  Eigen::ArrayX2d ends = Eigen::ArrayX2d::Constant(spline.dimensions(), 2, INFINITY);
+  for (Eigen::Index i = 0; i < spline.values().size(); ++i) {
+    const Eigen::VectorXd node = node_of(spline, i);
+    for (Eigen::Index k = 0; k < spline.dimensions(); ++k) {
+      const Eigen::VectorXd& knots = spline.knots(k);
+      for (const auto& [side, end] : {std::pair(0, knots[0]), {1, knots[knots.size() - 1]}})
+        if (node[k] == end) ends(k, side) = std::min(ends(k, side), spline.values()[i]);
+    }
+  }
+  return (ends - least).max(0);
+}
+
 /// The part of an axis between the neighbours of one of its knots.
 std::array<double, 2> cells_about(const Eigen::VectorXd& knots, double knot) {
   const auto at = std::find(knots.begin(), knots.end(), knot) - knots.begin();
@@ -120,17 +126,18 @@ std::array<double, 2> cells_about(const Eigen::VectorXd& knots, double knot) {
 }  // namespace
 
 Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance, unsigned seed) {
-  Posterior posterior{axes, spline_of(axes, deviance), {}, 0, {}};
+  const TensorSpline spline = spline_of(axes, deviance);
+  Posterior posterior{axes, {}, {}, {}};
   Eigen::Index best;
-  posterior.deviance.values().minCoeff(&best);
-  posterior.estimate = node_of(posterior.deviance, best);
-  posterior.least = posterior.deviance.minimize(posterior.estimate);
-  const TensorSpline& spline = posterior.deviance;
+  spline.values().minCoeff(&best);
+  posterior.estimate = node_of(spline, best);
+  double least = spline.minimize(posterior.estimate);
   std::vector<Eigen::Index> free;  // an axis of one value is no direction
   for (Eigen::Index k = 0; k < spline.dimensions(); ++k)
     if (spline.knots(k).size() > 1) free.push_back(k);
   if (free.empty()) {
     posterior.samples = posterior.estimate.transpose();
+    posterior.ends = ends_of(spline, least);
     return posterior;
   }
   Eigen::VectorXd x = posterior.estimate;
@@ -142,7 +149,7 @@ Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd
     }
     return -0.5 * spline(x);
   };
-  const Eigen::MatrixXd start = walkers_of(spline, posterior.least, seed);
+  const Eigen::MatrixXd start = walkers_of(spline, least, seed);
   const Eigen::MatrixXd draws = sample_ensemble(log_density, start(Eigen::all, free), {200, 800, 4, seed});
   posterior.samples = posterior.estimate.transpose().replicate(draws.rows(), 1);
   posterior.samples(Eigen::all, free) = draws;
@@ -157,20 +164,20 @@ Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd
     }
   }
   Eigen::VectorXd other = posterior.samples.row(lowest_draw).transpose();
-  if (const double there = spline.minimize(other); there < posterior.least) {
-    posterior.least = there;
+  if (const double there = spline.minimize(other); there < least) {
+    least = there;
     posterior.estimate = other;
   }
+  posterior.ends = ends_of(spline, least);
   return posterior;
 }
 
 Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance, unsigned seed) {
   constexpr Eigen::Index kDraws = 12'800;
-  Posterior posterior{axes, spline_of(axes, deviance), {}, 0, {}};
-  const TensorSpline& points = posterior.deviance;
+  const TensorSpline points = spline_of(axes, deviance);
   Eigen::Index likeliest;
-  posterior.least = points.values().minCoeff(&likeliest);
-  posterior.estimate = node_of(points, likeliest);
+  const double least = points.values().minCoeff(&likeliest);
+  Posterior posterior{axes, node_of(points, likeliest), {}, ends_of(points, least)};
   std::vector<double> sums;
   for (Eigen::Index i = 0; i < points.values().size(); ++i) {
     const Eigen::VectorXd node = node_of(points, i);
@@ -193,6 +200,15 @@ Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd
     }
   }
   return posterior;
+}
+
+Posterior mixture(const Posterior& posterior, Posterior other, double share) {
+  for (Eigen::Index i = 0; i < other.samples.rows(); ++i) {
+    const bool kept = std::floor(share * static_cast<double>(i + 1)) > std::floor(share * static_cast<double>(i));
+    if (!kept) other.samples.row(i) = posterior.samples.row(i % posterior.samples.rows());
+  }
+  other.ends = -2 * ((1 - share) * (-0.5 * posterior.ends).exp() + share * (-0.5 * other.ends).exp()).log();
+  return other;
 }
 
 }  // namespace flash::sysid

@@ -3,7 +3,6 @@
 #include <vector>
 
 #include "sysid/emulate/parameter_grid.h"
-#include "sysid/emulate/tensor_spline.h"
 
 namespace flash::sysid {
 
@@ -18,14 +17,12 @@ double value_of(const Axis& axis, double coordinate);
 /// What a likelihood says over a grid of parameter values, flat before in the coordinates of the axes.
 struct Posterior {
   std::vector<Axis> axes;    ///< of the grid
-  TensorSpline deviance;     ///< -2 log likelihood over coordinates, above that of the likeliest point
-  Eigen::VectorXd estimate;  ///< coordinates where it is least
-  double least = 0;          ///< deviance there
+  Eigen::VectorXd estimate;  ///< coordinates of the likeliest
   Eigen::MatrixXd samples;   ///< coordinates, a draw a row
+  Eigen::ArrayX2d ends;      ///< least deviance at the low and the high end of each axis, over that of all
 
   std::vector<double> values() const;                  ///< of the estimate
   double quantile(std::size_t k, double share) const;  ///< coordinate of axis k
-  double end(std::size_t k, bool high) const;  ///< least deviance at an end of axis k, over that of all
 };
 
 /// `deviance`: of each point of the grid of `axes`, the last axis fastest; a point without one is infinite.
@@ -36,5 +33,8 @@ Posterior explore_posterior(const std::vector<Axis>& axes, const Eigen::VectorXd
 /// each point speaks for all up to its neighbours. The estimate is the likeliest point.
 Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd& deviance,
                             unsigned seed = 1);
+
+/// A mixture of two posteriors, over the axes and with the estimate of `other`, which has `share` of it.
+Posterior mixture(const Posterior& posterior, Posterior other, double share);
 
 }  // namespace flash::sysid

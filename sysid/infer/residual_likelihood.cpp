@@ -78,18 +78,24 @@ ResidualLikelihood::Fit ResidualLikelihood::fit(const Eigen::VectorXd& residuals
     }
     errors = solve_within(normal.selfadjointView<Eigen::Lower>(), right, free_);
     fit.left = residuals - columns * errors;
-    double sum = 0;
-    for (Eigen::Index i = 0; i < fit.left.size(); ++i) {
-      const double size = std::abs(fit.left[i]);
-      sum += weights_[i] * (size <= limit_ ? size * size : limit_ * (2 * size - limit_));
-    }
-    fit.deviance = precision * sum + errors.cwiseAbs2().dot(priors_);
     fit.free = errors.head(free_);
     fit.known = errors.tail(errors.size() - free_);
+    fit.deviance = deviance_of(fit.left, fit.free, fit.known);
     if (before - fit.deviance < kSameFit * (1 + fit.deviance)) break;
     before = fit.deviance;
   }
   return fit;
+}
+
+double ResidualLikelihood::deviance_of(const Eigen::VectorXd& left, const Eigen::VectorXd& free,
+                                       const Eigen::VectorXd& known) const {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < left.size(); ++i) {
+    const double size = std::abs(left[i]);
+    sum += weights_[i] * (size <= limit_ ? size * size : limit_ * (2 * size - limit_));
+  }
+  return sum / (spread_ * spread_) + free.cwiseAbs2().dot(priors_.head(free_)) +
+         known.cwiseAbs2().dot(priors_.tail(known.size()));
 }
 
 Eigen::MatrixXd ResidualLikelihood::weigh(const Eigen::MatrixXd& columns,

@@ -40,6 +40,10 @@ class ResidualLikelihood {
   Fit fit(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& known = {}) const;
   double deviance(const Eigen::VectorXd& residuals) const { return fit(residuals).deviance; }
 
+  /// What `left` costs where the errors are given, `free` and `known` as in Fit.
+  double deviance_of(const Eigen::VectorXd& left, const Eigen::VectorXd& free,
+                     const Eigen::VectorXd& known) const;
+
   double spread() const { return spread_; }  ///< s [m]
 
   /// How well the residuals tell each known error beside the parameters, in its standard deviations.

@@ -104,6 +104,27 @@ TEST(MotionLikelihood, AnErrorThatBendsIsFollowedAlongItsCurve) {
   EXPECT_NEAR(likelihood.deviance({cloth.bulged(0)}), 1.449 * 1.449, 0.1);
 }
 
+// Where the curve turns, at u = -1, a step of Gauss and Newton is ten times too long and more.
+TEST(MotionLikelihood, WhatIsFittedIsFoundFromWhereAStepIsFarTooLong) {
+  Cloth cloth(12);
+  cloth.see(cloth.bulged(0.03 + 0.02));
+  KnownError bulge{from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.02))};
+  bulge.bend = from_to(cloth, cloth.bulged(0), cloth, cloth.bulged(0.01));
+  ScoreSettings settings;
+  settings.objective.robust.kind = RobustKind::plain;
+  const Motion flat = cloth.bulged(0);
+  const MotionLikelihood likelihood({cloth.replay}, result_of(flat), settings, {}, {bulge}, {});
+  for (const double start : {-0.9, -0.8, 0.0, 8.0}) {
+    std::vector<MotionLikelihood::Nuisance> fitted(1);
+    fitted[0].registration.setZero();
+    fitted[0].errors = Eigen::VectorXd::Constant(1, start);
+    const double deviance =
+        likelihood.deviance([&](std::size_t, double) -> const Motion& { return flat; }, fitted);
+    EXPECT_NEAR(deviance, 1.449 * 1.449, 0.1) << start;
+    EXPECT_NEAR(fitted[0].errors[0], 1.449, 0.02) << start;
+  }
+}
+
 TEST(MotionLikelihood, ARegistrationEndsWithinItsBoundsWhereverItBegins) {
   Cloth cloth(12);
   Motion risen = cloth.bulged(0.03);

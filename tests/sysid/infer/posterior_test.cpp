@@ -70,8 +70,8 @@ TEST(Posterior, EachPointSpeaksUpToItsNeighboursWhateverTheLevelOfTheDeviance) {
   for (const double level : {-2e4, 0.0, 2e4}) {
     const Posterior posterior = explore_at_points(axes, deviance.array() + level);
     EXPECT_EQ(posterior.values(), (std::vector<double>{0.25, 0.3}));
-    EXPECT_NEAR(posterior.end(0, false), 2.2, 1e-9);
-    EXPECT_NEAR(posterior.end(0, true), 1.4, 1e-9);
+    EXPECT_NEAR(posterior.ends(0, 0), 2.2, 1e-9);
+    EXPECT_NEAR(posterior.ends(0, 1), 1.4, 1e-9);
     const Eigen::ArrayXd draws = posterior.samples.col(0);
     const auto count = static_cast<double>(draws.size());
     for (int k = 0; k < 4; ++k)
@@ -81,6 +81,33 @@ TEST(Posterior, EachPointSpeaksUpToItsNeighboursWhateverTheLevelOfTheDeviance) {
         EXPECT_NEAR(inside / count, share, 4 * std::sqrt(share * (1 - share) / count));
       }
   }
+}
+
+TEST(Posterior, AMixtureHasItsShareOfEachsDraws) {
+  const std::vector<Axis> narrow = {parse_axis("start_yaw", "0.2:0.4:17")},
+                          wide = {parse_axis("start_yaw", "0:1:3")};
+  Eigen::VectorXd valley(17), points(3);
+  for (int i = 0; i < 17; ++i) valley[i] = std::pow((i - 8) / 3.0, 2);
+  points << 900, 2, 0;  // none of its draws is below 0.5 but a few of the middle's
+  const Posterior by_valley = explore_posterior(narrow, valley), by_points = explore_at_points(wide, points);
+  const auto below = [](const Posterior& posterior) {
+    return (posterior.samples.col(0).array() < 0.45).cast<double>().mean();
+  };
+  const double of_points = below(by_points);
+  ASSERT_LT(of_points, 0.5);
+  for (const double share : {0.0, 1e-3, 0.3, 1.0}) {
+    const Posterior mixed = mixture(by_valley, by_points, share);
+    EXPECT_NEAR(below(mixed), 1 - share + share * of_points, 0.005);
+    EXPECT_EQ(mixed.values(), by_points.values());
+    EXPECT_EQ(mixed.axes.front().values, wide.front().values);
+    for (const int side : {0, 1})  // likelihoods there, over the likeliest, in their shares
+      EXPECT_NEAR(std::exp(-0.5 * mixed.ends(0, side)),
+                  (1 - share) * std::exp(-0.5 * by_valley.ends(0, side)) +
+                      share * std::exp(-0.5 * by_points.ends(0, side)),
+                  1e-12);
+  }
+  EXPECT_EQ(mixture(by_valley, by_points, 0).samples, by_valley.samples);
+  EXPECT_EQ(mixture(by_valley, by_points, 1).samples, by_points.samples);
 }
 
 TEST(Posterior, BothOfTwoValleysAreDrawnFrom) {
