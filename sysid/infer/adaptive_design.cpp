@@ -95,7 +95,8 @@ Extent next_extent(const Extent& extent, const Posterior& posterior, const std::
     const double best = posterior.estimate[static_cast<Eigen::Index>(k)];
     double reach = 0;  // the larger half of the interval
     for (const std::size_t side : {0, 1}) {
-      const bool open = posterior.ends(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(side)) < kUnlikely;
+      const bool open =
+          posterior.ends(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(side)) < kUnlikely;
       const bool more = std::abs(now[side] - range[side]) > 1e-9 * width;
       // Past an open end by a quarter of the width or more; a longer way would lose what the last extents
       // told.

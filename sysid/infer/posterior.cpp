@@ -204,7 +204,8 @@ Posterior explore_at_points(const std::vector<Axis>& axes, const Eigen::VectorXd
 
 Posterior mixture(const Posterior& posterior, Posterior other, double share) {
   for (Eigen::Index i = 0; i < other.samples.rows(); ++i) {
-    const bool kept = std::floor(share * static_cast<double>(i + 1)) > std::floor(share * static_cast<double>(i));
+    const bool kept =
+        std::floor(share * static_cast<double>(i + 1)) > std::floor(share * static_cast<double>(i));
     if (!kept) other.samples.row(i) = posterior.samples.row(i % posterior.samples.rows());
   }
   other.ends = -2 * ((1 - share) * (-0.5 * posterior.ends).exp() + share * (-0.5 * other.ends).exp()).log();

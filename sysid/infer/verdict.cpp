@@ -87,7 +87,9 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
     finding.estimate = estimate;
     if (looked.values.size() > 1) {
       // What a look leaves likely at its end may be likely up to the end of the range.
-      const auto open = [&](bool high) { return posterior.ends(static_cast<Eigen::Index>(k), high ? 1 : 0) < kExcluded; };
+      const auto open = [&](bool high) {
+        return posterior.ends(static_cast<Eigen::Index>(k), high ? 1 : 0) < kExcluded;
+      };
       // So may what draws are cut off at.
       const double first = coordinate_of(range, range.values.front()),
                    last = coordinate_of(range, range.values.back());
