@@ -364,9 +364,9 @@ std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searche
   return axes;
 }
 
-bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes) {
+bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes, double share) {
   for (std::size_t k = 0; k < axes.size(); ++k)
-    if (axes[k].values.size() > 1 && cell_of(lattice[k]) <= 0.5 * cell_of(axes[k])) return true;
+    if (axes[k].values.size() > 1 && cell_of(lattice[k]) <= share * cell_of(axes[k])) return true;
   return false;
 }
 

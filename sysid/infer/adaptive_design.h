@@ -71,8 +71,8 @@ int most_scores(const std::vector<Axis>& axes, Points points = Points::hundreds)
 std::vector<Axis> lattice(const Extent& extent, const std::vector<Axis>& searched, int count,
                           std::size_t at_most);
 
-/// Whether a lattice has, in any direction, cells of no more than half those of `axes`.
-bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes);
+/// Whether a lattice has, in any direction, cells of no more than `share` of those of `axes`.
+bool is_finer(const std::vector<Axis>& lattice, const std::vector<Axis>& axes, double share = 0.5);
 
 /// Whether an extent goes beyond the values of `axes`.
 bool reaches_beyond(const Extent& extent, const std::vector<Axis>& axes);

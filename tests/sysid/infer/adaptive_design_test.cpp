@@ -142,6 +142,7 @@ TEST(AdaptiveDesign, ALatticeIsFinerByHalfOfACellInAnyDirection) {
   EXPECT_FALSE(is_finer(other, searched));
   other[1] = parse_axis("start_yaw", "0:1:8");
   EXPECT_FALSE(is_finer(other, searched));  // 4 / 7 of a cell
+  EXPECT_TRUE(is_finer(other, searched, 0.6));
   other[1] = parse_axis("start_yaw", "0:1:9");
   EXPECT_TRUE(is_finer(other, searched));
 }

@@ -1,0 +1,186 @@
+#include "sysid/infer/lattice_about.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+namespace flash::sysid {
+
+std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
+                                      const std::vector<Axis>& finer, bool told_own) {
+  Emulator emulator{{}, finer.empty() ? own_mesh : no_cells};
+  GridSettings grid = task.grid;
+  grid.axes = axes;
+  const std::function<void()> motion = [&] { task.tell_motion(); };
+  if (!finer.empty() && task.finer.empty()) return std::nullopt;
+  for (std::size_t r = 0; r < task.replays.size(); ++r) {
+    const Replay& replay = task.replays[r];
+    const auto motions =
+        motion_interpolant(replay, grid, task.store, told_own ? motion : std::function<void()>());
+    if (!motions) return std::nullopt;
+    auto model = finer.empty()
+                     ? ModelledReplay{replay, TwoMeshMotions(*motions)}
+                     : with_finer_mesh(replay, task.finer[r], *motions, finer, grid, task.store, motion);
+    if (!model) return std::nullopt;
+    emulator.models.push_back(std::move(*model));
+  }
+  return emulator;
+}
+
+std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
+                               const Extent& extent, const std::vector<double>& at,
+                               std::vector<KnownError> errors, std::vector<KnownError>& held) {
+  const auto look = [&](const Extent& start, const std::vector<double>& values) {
+    return narrow(emulator, start, values, axes, task.grid, task.settings.repeatability, errors, task.told);
+  };
+  const Look first = look(extent, at);
+  std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values());
+  if (!estimate) return std::nullopt;
+  if (held.empty()) held = errors_of_held(task, first.posterior.values(), estimate->motions);
+  errors = estimate->errors;
+  errors.insert(errors.end(), held.begin(), held.end());
+  for (KnownError& error : errors_at_draws(task, emulator, *estimate, first.posterior))
+    errors.push_back(std::move(error));
+  Look second = look(extent_of(first.posterior.axes), first.posterior.values());
+  return Found{std::move(emulator), axes, std::move(second), std::move(*estimate), std::move(errors)};
+}
+
+std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes) {
+  std::size_t fewest = 1, own = 1, finer = 1;
+  const std::vector<Axis> thin = thinned(axes);
+  for (std::size_t k = 0; k < axes.size(); ++k) {
+    const std::size_t count = axes[k].values.size();
+    if (count < 2) continue;
+    fewest *= std::min<std::size_t>(count, 3);
+    own *= std::max<std::size_t>(count, 4);
+    finer *= std::max<std::size_t>(thin[k].values.size(), 2);
+  }
+  if (fewest > few_motions) return {0, 0};
+  return {std::min(own, many_motions), std::min(finer, many_motions)};
+}
+
+std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
+                                bool finer, const std::vector<KnownError>& errors,
+                                std::vector<KnownError>& held, bool many) {
+  const std::size_t most = many ? many_motions : few_motions;
+  const std::vector<Axis> axes = lattice(extent, task.ranges, many ? 4 : 3, most);
+  if (cartesian_product(axes).size() > most) return std::nullopt;
+  std::optional<Emulator> emulator = emulator_over(
+      task, axes, finer ? thinned(lattice(extent, task.ranges, 2, most / 3)) : std::vector<Axis>{}, true);
+  if (!emulator) return std::nullopt;
+  return look_with(task, std::move(*emulator), axes, extent, at, errors, held);
+}
+
+std::vector<KnownError> errors_about(const Found& found, std::vector<KnownError> more) {
+  more.insert(more.end(), found.estimate.errors.begin() + 1, found.estimate.errors.end());
+  return more;
+}
+
+MotionLikelihood likelihood_about(const Task& task, const Found& found, const std::vector<Replay>& replays,
+                                  const std::vector<double>& values,
+                                  const std::vector<ReplayResult>& reference, std::vector<KnownError> more) {
+  return {replays,
+          reference,
+          task.grid.score,
+          task.settings.repeatability,
+          errors_about(found, std::move(more)),
+          rates_at(found.emulator, values, extent_of(found.look.posterior.axes), found.axes)};
+}
+
+namespace {
+
+/// How far an error of the estimate moves the surface, and the parameters if they had to explain it.
+SolverCheck check_of(const KnownError& error, const Sensitivity& sensitivity, const std::vector<Axis>& axes) {
+  const Motions &from = *error.terms[0].motions, &to = *error.terms[1].motions;
+  return compare_solutions(error.name, sensitivity, from.replays, from.results, to.replays, to.results, axes);
+}
+
+/// How motions change with the parameters at the estimate, by the emulator.
+Sensitivity sensitivity_of(const Task& task, const Found& found) {
+  GridSettings grid = task.grid;
+  grid.axes = found.look.posterior.axes;
+  return measure_sensitivity(replays_of(found.emulator), grid, found.look.posterior.values(), true,
+                             motions_of(found.emulator.models, found.emulator.share));
+}
+
+/// Whether what the emulator misses, at the estimate or at the draws at which it was tried, would move a
+/// parameter by much of what it is known to.
+bool misses_much(const Task& task, const Found& found) {
+  constexpr double kMuch = 0.5;  // of a standard deviation
+  const Posterior& posterior = found.look.posterior;
+  const Sensitivity sensitivity = sensitivity_of(task, found);
+  using Shifts = std::map<std::string, double>;
+  const auto shifts_of = [&](const KnownError& error) {
+    return check_of(error, sensitivity, posterior.axes).shift;
+  };
+  const Shifts at_estimate = shifts_of(found.estimate.errors.front());
+  Shifts half_step;
+  for (const KnownError& error : found.estimate.errors)
+    if (error.name == "half_step") half_step = shifts_of(error);
+  std::vector<Shifts> at_draws;
+  for (const KnownError& error : found.errors)
+    if (error.name.empty()) at_draws.push_back(shifts_of(error));
+  for (std::size_t k = 0; k < posterior.axes.size(); ++k) {
+    if (posterior.axes[k].values.size() < 2) continue;
+    const std::string& name = posterior.axes[k].name;
+    const Eigen::VectorXd draws = posterior.samples.col(static_cast<Eigen::Index>(k));
+    const double much = kMuch * std::sqrt((draws.array() - draws.mean()).square().mean());
+    double sum = 0;
+    for (const Shifts& shifts : at_draws)  // which take half the step, where that is an error of its own
+      sum += std::pow(shifts.at(name) - (half_step.empty() ? 0 : half_step.at(name)), 2);
+    if (std::abs(at_estimate.at(name)) > much || sum > much * much * static_cast<double>(at_draws.size()))
+      return true;
+  }
+  return false;
+}
+
+Extent both(Extent a, const Extent& b) {
+  for (std::size_t k = 0; k < a.size(); ++k) a[k] = {std::min(a[k][0], b[k][0]), std::max(a[k][1], b[k][1])};
+  return a;
+}
+
+}  // namespace
+
+Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held) {
+  const bool finer = found.emulator.share != own_mesh;
+  Extent extent = next_lattice(extent_of(found.axes), found.look.posterior, task.ranges);
+  if (!reaches_beyond(extent, found.axes) &&
+      !is_finer(lattice(extent, task.ranges, 3, few_motions), found.axes) && !misses_much(task, found))
+    return found;
+  constexpr double kNarrower = 0.8;  // cells over cells, for a lattice more
+  constexpr int kSettling =
+      3;  // rounds; later a lattice does not narrow again, or two might follow each other
+  bool many = false, likely_alone = false;
+  for (int round = 0; round < lattice_rounds; ++round) {
+    std::optional<Found> there =
+        look_about(task, extent, found.look.posterior.values(), finer, found.errors, held, many);
+    if (!there) break;
+    found = std::move(*there);
+    Extent next = next_lattice(extent, found.look.posterior, task.ranges);
+    if (next == extent) {
+      if (likely_alone || !misses_much(task, found)) break;
+      likely_alone = many;
+      many = true;
+      if (likely_alone) {
+        next = extent_of(found.look.posterior.axes);
+        if (!is_finer(lattice(next, task.ranges, 4, many_motions), found.axes, kNarrower)) break;
+      }
+    } else if (round >= kSettling) {
+      many = true;
+      next = both(extent, next);
+    }
+    extent = std::move(next);
+  }
+  return found;
+}
+
+std::vector<SolverCheck> checks_of(const Task& task, const Found& found) {
+  const Sensitivity sensitivity = sensitivity_of(task, found);
+  std::vector<SolverCheck> checks;
+  for (const KnownError& error : found.estimate.errors)
+    checks.push_back(check_of(error, sensitivity, found.look.posterior.axes));
+  return checks;
+}
+
+}  // namespace flash::sysid

@@ -1,0 +1,63 @@
+#pragma once
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "sysid/infer/adaptive_design.h"
+#include "sysid/infer/estimate_errors.h"
+#include "sysid/infer/motion_likelihood.h"
+#include "sysid/infer/solver_check.h"
+
+namespace flash::sysid {
+
+inline constexpr int lattice_rounds = 8;          // of motions about an answer
+inline constexpr std::size_t few_motions = 30;    // of a lattice
+inline constexpr std::size_t many_motions = 100;  // where the emulator by few misses too much
+
+/// The motions at every point of `axes`; with `finer` axes (none: empty) those of a finer mesh at theirs.
+/// Empty where one diverged or there is no finer mesh.
+std::optional<Emulator> emulator_over(const Task& task, const std::vector<Axis>& axes,
+                                      const std::vector<Axis>& finer, bool told_own);
+
+/// An emulator, and the posterior by it.
+struct Found {
+  Emulator emulator;
+  std::vector<Axis> axes;  ///< of it: at their values it is exact
+  Look look;
+  Estimate estimate;
+  std::vector<KnownError> errors;  ///< all that the look knows
+};
+
+/// Looks twice: for the estimate, and again with what solving it says of errors. `held`: errors by what is
+/// held, found at the first estimate. Empty where the estimate diverges.
+std::optional<Found> look_with(const Task& task, Emulator emulator, const std::vector<Axis>& axes,
+                               const Extent& extent, const std::vector<double>& at,
+                               std::vector<KnownError> errors, std::vector<KnownError>& held);
+
+/// One lattice over an extent, of few values or of many, and what its motions say; empty where too many would
+/// be needed, or one diverged.
+std::optional<Found> look_about(const Task& task, const Extent& extent, const std::vector<double>& at,
+                                bool finer, const std::vector<KnownError>& errors,
+                                std::vector<KnownError>& held, bool many = false);
+
+/// Motions simulated anew about the answer, where few simulations do: again while it leaves them or takes too
+/// little of them; with more of them where the emulator misses much, and then about what is likely alone.
+Found simulate_about(const Task& task, Found found, std::vector<KnownError>& held);
+
+/// Simulations of one recording in a round of it, on the own mesh and on the finer one, at most; none where
+/// they would be too many.
+std::pair<std::size_t, std::size_t> most_motions(const std::vector<Axis>& axes);
+
+/// All errors that are known but those of the emulator, and `more`.
+std::vector<KnownError> errors_about(const Found& found, std::vector<KnownError> more);
+
+/// The likelihood of motions on the mesh of `replays`, with all errors that are known but those of the
+/// emulator and `more`.
+MotionLikelihood likelihood_about(const Task& task, const Found& found, const std::vector<Replay>& replays,
+                                  const std::vector<double>& values,
+                                  const std::vector<ReplayResult>& reference, std::vector<KnownError> more);
+
+/// How far each error of the estimate moves the surface, and the parameters if they had to explain it.
+std::vector<SolverCheck> checks_of(const Task& task, const Found& found);
+
+}  // namespace flash::sysid

@@ -1,0 +1,72 @@
+#include "sysid/infer/settle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+namespace flash::sysid {
+namespace {
+
+void set_estimate(Posterior& posterior, const std::vector<Axis>& axes, const std::vector<double>& values) {
+  for (std::size_t k = 0; k < values.size(); ++k)
+    posterior.estimate[static_cast<Eigen::Index>(k)] = coordinate_of(axes[k], values[k]);
+}
+
+std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
+  std::vector<Motion> motions;
+  for (const ReplayResult& result : results) motions.push_back(result.motion);
+  return motions;
+}
+
+}  // namespace
+
+Settled settle(const Task& task, Found& found, const std::vector<double>& best,
+               const std::vector<KnownError>& held) {
+  constexpr double kMatters = 1;  // of a deviance
+  const std::vector<Replay> on_model = replays_of(found.emulator);
+  const std::vector<double> mode = found.look.posterior.values();
+  std::vector<ReplayResult> own;
+  auto simulated = simulate_at(task, found.emulator, mode, false, own);
+  if (!simulated) return Settled::elsewhere;
+  MotionLikelihood likelihood = likelihood_about(
+      task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
+  const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
+  const double fall = std::max(0.0, likelihood.deviance(motions_in(*simulated)) - of_points.minCoeff());
+
+  // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
+  std::vector<KnownError> errors = held;
+  errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, own})},
+                     {1, std::make_shared<const Motions>(Motions{on_model, std::move(*simulated)})}},
+                    true,
+                    true});
+  const MotionLikelihood on_own = likelihood_about(task, found, task.replays, mode, own, std::move(errors));
+  std::vector<Motion> of_best;
+  for (const Replay& replay : task.replays)
+    of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)).motion);
+  const double fall_to_best = on_own.deviance(motions_in(own)) - on_own.deviance(of_best);
+  Extent at_best;
+  for (const double value : best) at_best.push_back({value, value});
+  if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
+  const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, fall_to_best));
+  if (!(share_of_points > 0)) return Settled::by_emulator;
+  Posterior by_points = explore_at_points(found.axes, of_points);
+  if (!(fall > 0)) set_estimate(by_points, found.axes, mode);
+  found.look.posterior = mixture(found.look.posterior, std::move(by_points), share_of_points);
+  if (share_of_points < 0.5) return Settled::by_emulator;
+  found.look.likelihood = std::move(likelihood);
+  found.errors = errors_about(found, held);
+  return Settled::by_points;
+}
+
+void keep_to_simulated(const Task& task, Found& found, const std::vector<double>& best,
+                       const std::vector<KnownError>& held) {
+  found.emulator.share = own_mesh;
+  for (KnownError& error : found.estimate.errors) error.corrects = false;
+  found.errors = errors_about(found, held);
+  found.look.likelihood = likelihood_about(task, found, replays_of(found.emulator), best,
+                                           motions_at(found.emulator, best, own_mesh), held);
+  found.look.posterior = explore_at_points(
+      found.axes, deviance_over(found.emulator, found.axes, found.look.likelihood, task.grid));
+}
+
+}  // namespace flash::sysid

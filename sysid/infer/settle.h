@@ -1,0 +1,24 @@
+#pragma once
+#include <vector>
+
+#include "sysid/infer/lattice_about.h"
+
+namespace flash::sysid {
+
+enum class Settled { by_emulator, by_points, elsewhere };
+
+/// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
+/// emulator's grid. Where folds fall another way between two simulations such a point is likelier than the
+/// mode. The posterior is a mixture: what the mode turned out to be likely, over the likeliest, is the share
+/// of the emulator, and each point speaks for the rest (explore_at_points). A share, since a likelihood of
+/// motions that change abruptly differs by chance from point to point: whatever were chosen by it would be as
+/// much by chance. Elsewhere: the `best` of the search, beyond the emulator's grid, is likelier than all.
+Settled settle(const Task& task, Found& found, const std::vector<double>& best,
+               const std::vector<KnownError>& held);
+
+/// The posterior by what was simulated alone, on the search's own mesh (explore_at_points). No motion is
+/// corrected by what was seen at another.
+void keep_to_simulated(const Task& task, Found& found, const std::vector<double>& best,
+                       const std::vector<KnownError>& held);
+
+}  // namespace flash::sysid
