@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 namespace flash::sysid {
 namespace {
@@ -51,7 +52,22 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   if (!(share_of_points > 0)) return Settled::by_emulator;
   Posterior by_points = explore_at_points(found.axes, of_points);
   if (!(fall > 0)) set_estimate(by_points, found.axes, mode);
-  found.look.posterior = mixture(found.look.posterior, std::move(by_points), share_of_points);
+  Posterior mixed = mixture(found.look.posterior, std::move(by_points), share_of_points);
+  if (share_of_points >= 0.5 && found.emulator.share != own_mesh) {
+    const double share = std::exchange(found.emulator.share, own_mesh);
+    Eigen::Index likeliest;
+    const double better =
+        of_points.minCoeff() -
+        deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(&likeliest);
+    if (better > 0) {
+      keep_to_simulated(task, found, values_of(found.axes, static_cast<int>(likeliest)), held);
+      found.look.posterior =
+          mixture(mixed, std::move(found.look.posterior), 1 / (1 + std::exp(-0.5 * better)));
+      return Settled::by_points;
+    }
+    found.emulator.share = share;
+  }
+  found.look.posterior = std::move(mixed);
   if (share_of_points < 0.5) return Settled::by_emulator;
   found.look.likelihood = std::move(likelihood);
   found.errors = errors_about(found, held);
