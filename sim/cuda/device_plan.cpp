@@ -85,14 +85,16 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.hinge_sources = upload(layout.hinge_sources, ints_);
 }
 
-void DevicePlan::share_out_solves(const FrontPlan& plan, int team_blocks) {
+FrontTables DevicePlan::shared_out(const FrontPlan& plan, int team_blocks) {
   const SolvePlan solve = plan_solve(plan, team_blocks);
-  fronts.chunks = upload(solve.chunks, chunks_);
-  fronts.chunk_starts = upload(solve.starts, ints_);
-  fronts.gathers = upload(solve.gathers, gathers_);
-  fronts.parted = upload(solve.parted, gathers_);
-  fronts.parted_count = static_cast<int>(solve.parted.size());
-  fronts.vector_size = solve.vector_size;
+  FrontTables shared = fronts;
+  shared.chunks = upload(solve.chunks, chunks_);
+  shared.chunk_starts = upload(solve.starts, ints_);
+  shared.gathers = upload(solve.gathers, gathers_);
+  shared.parted = upload(solve.parted, gathers_);
+  shared.parted_count = static_cast<int>(solve.parted.size());
+  shared.vector_size = solve.vector_size;
+  return shared;
 }
 
 }  // namespace flash::sim::cuda
