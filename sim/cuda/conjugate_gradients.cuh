@@ -30,6 +30,7 @@ struct LinearVectors {
   Four<float>* near;    ///< four: a copy of `search` for products on chip, free during a solve; or `search`
   float* solved;        ///< what a solve works on (solve_chunk.h)
   bool solved_on_chip = false;
+  StepRing step_ring = {};  ///< for products, free during a solve too
   PhaseClock clock = {};
 };
 
@@ -117,8 +118,9 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   const int size = sheet.size;
   float *residual = v.residual, *preconditioned = v.solved + 3 * size;
   const Restrictions& restrictions = problem.restrictions;
-  const auto multiply_search = [&] {
-    return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image, partial);
+  const auto multiply_search = [&](StepsOnTheirWay& steps) {
+    return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, steps, v.near, v.image,
+                    partial);
   };
   const auto put_search = [&](int i, const Numbers3& own) {
     const Four<float> four = {own.x, own.y, own.z, 0};
@@ -145,7 +147,8 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
       });
   const bool starts_elsewhere = any_of_team(moved != 0);
   if (starts_elsewhere) {
-    multiply_search();
+    StepsOnTheirWay steps(sheet, v.step_ring);
+    multiply_search(steps);
     synchronize_team();
     for_own_vertices(
         size, [&](int i) { return numbers_at(v.image, i); },
@@ -195,6 +198,8 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     v.clock.count(ReplayPhase::directions);
     solve<parts>(fronts, problem.factor, v, chip);
     v.clock.count(ReplayPhase::solves);
+    // Nothing that follows keeps the product's numbers from being sent for.
+    StepsOnTheirWay steps(sheet, v.step_ring);
     // The residual has free parts alone, so that those of what the factor gives need not be taken for this.
     add_up<1, 2>(
         size, partial, [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },
@@ -213,7 +218,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
         put_search);
     synchronize_team();
     v.clock.count(ReplayPhase::directions);
-    const float curvature = multiply_search();
+    const float curvature = multiply_search(steps);
     v.clock.count(ReplayPhase::products);
     // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
     if (curvature <= 0 && iteration > 1) break;

@@ -1,6 +1,7 @@
 #include "sim/cuda/device_plan.h"
 
 #include <algorithm>
+#include <stdexcept>
 
 #include "sim/cuda/layout/solve_plan.h"
 
@@ -27,6 +28,17 @@ std::vector<double> by_halves(const std::vector<double>& steps) {
   return halves;
 }
 
+std::vector<StepColumns> by_steps_together(const std::vector<int>& columns) {
+  constexpr std::size_t lanes = 4 * bundle_groups;
+  std::vector<StepColumns> together(columns.size() / steps_together);
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const std::size_t step = k / lanes;
+    together[lanes * (step / steps_together) + k % lanes].of[step % steps_together] =
+        static_cast<unsigned short>(columns[k]);
+  }
+  return together;
+}
+
 }  // namespace
 
 template <typename Number>
@@ -37,6 +49,7 @@ const Number* DevicePlan::upload(const std::vector<Number>& numbers,
 }
 
 DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
+  if (layout.size > 1 << 16) throw std::invalid_argument("a sheet may have 65536 vertices on a CUDA device");
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
@@ -66,7 +79,7 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.slice_columns = upload(layout.slice_columns, ints_);
   sheet.group_rows = upload(layout.group_rows, ints_);
   sheet.bundle_starts = upload(layout.bundle_starts, ints_);
-  sheet.step_columns = upload(layout.step_columns, ints_);
+  sheet.step_columns = upload(by_steps_together(layout.step_columns), columns_);
   sheet.step_values = upload(by_halves(layout.step_values), doubles_);
   sheet.single_step_values =
       upload(std::vector<float>(layout.step_values.begin(), layout.step_values.end()), floats_);

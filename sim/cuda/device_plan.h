@@ -33,6 +33,7 @@ class DevicePlan {
   std::vector<DeviceArray<SolveChunk>> chunks_;
   std::vector<DeviceArray<Gather>> gathers_;
   std::vector<DeviceArray<EdgeSources>> sources_;
+  std::vector<DeviceArray<StepColumns>> columns_;
 };
 
 }  // namespace flash::sim::cuda

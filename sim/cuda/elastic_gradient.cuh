@@ -110,9 +110,9 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
     }
     synchronize_team();
   }
-  multiply_scalar_rows(tables, tables.step_values, place, [&](int row, int c, double sum) {
-    gradient[3 * row + c] = environment.rigidity * sum;
-  });
+  multiply_scalar_rows<double>(
+      tables, StepsInMemory<double>{tables.step_values}, place,
+      [&](int row, int c, double sum) { gradient[3 * row + c] = environment.rigidity * sum; });
   triangle_gradients(tables, environment, place, shares.triangles, sums(membrane));
   if (tables.hinge_count > 0)
     hinge_gradients(tables, environment, start.angles, place, shares.hinges, sums(hinges));

@@ -66,7 +66,8 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
         reinterpret_cast<float*>(v.near)[i] = search[i];
       synchronize_team();
     }
-    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image, partial);
+    StepsOnTheirWay steps(sheet, v.step_ring);
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, steps, v.near, v.image, partial);
     synchronize_team();
   };
   const auto norm_of = [&](const float* x) {

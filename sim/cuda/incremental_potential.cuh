@@ -102,8 +102,9 @@ __device__ inline double add_turned_damping(const SheetTables& tables, const Ste
   }
   synchronize_team();
   const double rigidity = step.numbers.damping_share * step.numbers.rigidity;
-  multiply_scalar_rows(
-      tables, tables.step_values, [&](int vertex) { return triple(memory.bent[vertex]); },
+  multiply_scalar_rows<double>(
+      tables, StepsInMemory<double>{tables.step_values},
+      [&](int vertex) { return triple(memory.bent[vertex]); },
       [&](int row, int c, double sum) { memory.damped[3 * row + c] = rigidity * sum; });
   synchronize_team();
   double totals[4];

@@ -134,6 +134,7 @@ __device__ inline LinearWork linear_work(const Work& w, const StepProblem& step)
            on_chip(w.replay.search_at, m.search),
            on_chip(w.replay.solved_at, m.solved),
            w.replay.solved_at >= 0,
+           {chip + w.replay.step_ring_at, w.replay.step_depth},
            {m.clocks}},
           reinterpret_cast<float*>(chip),
           chip + linear_partial_bytes};

@@ -162,25 +162,25 @@ void place_on_chip(ReplayNumbers& numbers, int blocks) {
   const int room = bytes_of(fronts);
   constexpr long number = sizeof(float);
   const long vector = number * fronts.vector_size + 16;
+  // What has no room at all leaves it to the chunks.
+  const bool solved_fits = linear_bytes_of(1) + vector <= room;
   for (const int depth : {1, 2, chunks_ahead})
-    if (linear_bytes_of(depth) + vector <= room) fronts.solve_depth = depth;
+    if (linear_bytes_of(depth) + (solved_fits ? vector : 0) <= room) fronts.solve_depth = depth;
   const int near = gradient_memory(fronts.size, true), triangles = numbers.sheet.triangle_count;
   numbers.places_on_chip = near <= room;
   // What triangles give is read by other threads, of other blocks too.
   numbers.gradient_shares_at = blocks == 1 && near + gradient_share_memory(triangles) <= room ? near : -1;
   numbers.matrix_shares_on_chip =
       blocks == 1 && static_cast<int>(sizeof(float)) * hessian_memory_with_shares(triangles) <= room;
-  int used = linear_bytes_of(fronts.solve_depth);
-  const auto place = [&](long bytes) {
-    if (used + bytes > room) return -1;
-    const int at = used;
-    used += rounded_up(static_cast<int>(bytes), 16);
-    return at;
-  };
-  numbers.solved_at = place(number * fronts.vector_size);
-  // Where a solve has its chunks.
-  const bool fits = 4 * number * fronts.size <= linear_bytes_of(fronts.solve_depth) - linear_partial_bytes;
-  numbers.search_at = fits ? linear_partial_bytes : -1;
+  // At the end; products have what is before it to themselves.
+  numbers.solved_at = solved_fits ? (room - static_cast<int>(number * fronts.vector_size)) / 16 * 16 : -1;
+  int used = linear_partial_bytes;
+  const int end = solved_fits ? numbers.solved_at : room, search = 4 * static_cast<int>(number) * fronts.size;
+  numbers.search_at = used + search <= end ? used : -1;
+  if (numbers.search_at >= 0) used += search;
+  numbers.step_ring_at = used;
+  const int depth = std::min((end - used) / step_ring_bytes, most_step_depth);
+  numbers.step_depth = depth < least_step_depth ? 0 : depth;
 }
 
 int resident_replay_teams(const FrontTables& fronts, int blocks) {
