@@ -101,7 +101,7 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
       x[i] = {from[0], from[1], from[2], 0};
     }
     synchronize_team();
-    StepsOnTheirWay steps(batch.sheet, {});
+    StepsOnTheirWay<float> steps(batch.sheet, batch.sheet.single_step_values, {});
     multiply(batch.sheet, batch.block_rows + batch.block_row_size * e,
              static_cast<float>(batch.environments[e].rigidity), {}, steps, x, result_of(batch, e),
              shared_memory<float>());

@@ -118,7 +118,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   const int size = sheet.size;
   float *residual = v.residual, *preconditioned = v.solved + 3 * size;
   const Restrictions& restrictions = problem.restrictions;
-  const auto multiply_search = [&](StepsOnTheirWay& steps) {
+  const auto multiply_search = [&](StepsOnTheirWay<float>& steps) {
     return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, steps, v.near, v.image,
                     partial);
   };
@@ -147,7 +147,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
       });
   const bool starts_elsewhere = any_of_team(moved != 0);
   if (starts_elsewhere) {
-    StepsOnTheirWay steps(sheet, v.step_ring);
+    StepsOnTheirWay<float> steps(sheet, sheet.single_step_values, v.step_ring);
     multiply_search(steps);
     synchronize_team();
     for_own_vertices(
@@ -199,7 +199,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     solve<parts>(fronts, problem.factor, v, chip);
     v.clock.count(ReplayPhase::solves);
     // Nothing that follows keeps the product's numbers from being sent for.
-    StepsOnTheirWay steps(sheet, v.step_ring);
+    StepsOnTheirWay<float> steps(sheet, sheet.single_step_values, v.step_ring);
     // The residual has free parts alone, so that those of what the factor gives need not be taken for this.
     add_up<1, 2>(
         size, partial, [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },

@@ -66,7 +66,7 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
         reinterpret_cast<float*>(v.near)[i] = search[i];
       synchronize_team();
     }
-    StepsOnTheirWay steps(sheet, v.step_ring);
+    StepsOnTheirWay<float> steps(sheet, sheet.single_step_values, v.step_ring);
     multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, steps, v.near, v.image, partial);
     synchronize_team();
   };

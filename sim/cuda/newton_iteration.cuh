@@ -30,10 +30,11 @@ __device__ inline void evaluate(const Work& w, const StepProblem& step, const Co
   const int shares_at = w.replay.gradient_shares_at;
   double* shares = shares_at < 0 ? w.memory.triangle_gradients
                                  : reinterpret_cast<double*>(shared_memory<char>() + shares_at);
+  const StepRing ring = {shared_memory<char>() + w.replay.gradient_ring_at, w.replay.gradient_depth};
   if (w.replay.places_on_chip)
-    evaluate<true>(w.replay.sheet, step, w.memory, shares, line, at);
+    evaluate<true>(w.replay.sheet, step, w.memory, shares, ring, line, at);
   else
-    evaluate<false>(w.replay.sheet, step, w.memory, shares, line, at);
+    evaluate<false>(w.replay.sheet, step, w.memory, shares, ring, line, at);
   count_phase(w.memory, ReplayPhase::evaluation);
 }
 

@@ -155,6 +155,12 @@ int bytes_of(const FrontTables& fronts) {
                    most_memory() / resident_blocks_each - reserved});
 }
 
+/// Of a StepRing with so many bytes.
+int step_depth_in(int bytes) {
+  const int depth = std::min(bytes / step_ring_bytes, most_step_depth);
+  return depth < least_step_depth ? 0 : depth;
+}
+
 }  // namespace
 
 void place_on_chip(ReplayNumbers& numbers, int blocks) {
@@ -179,8 +185,9 @@ void place_on_chip(ReplayNumbers& numbers, int blocks) {
   numbers.search_at = used + search <= end ? used : -1;
   if (numbers.search_at >= 0) used += search;
   numbers.step_ring_at = used;
-  const int depth = std::min((end - used) / step_ring_bytes, most_step_depth);
-  numbers.step_depth = depth < least_step_depth ? 0 : depth;
+  numbers.step_depth = step_depth_in(end - used);
+  numbers.gradient_ring_at = rounded_up(gradient_memory(fronts.size, numbers.places_on_chip), 16);
+  numbers.gradient_depth = step_depth_in(room - numbers.gradient_ring_at);
 }
 
 int resident_replay_teams(const FrontTables& fronts, int blocks) {

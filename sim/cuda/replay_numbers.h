@@ -133,11 +133,12 @@ struct ReplayNumbers {
   SheetTables sheet;
   const TeamMemory* teams;
   WaitingEnvironments waiting;
-  int places_on_chip;            ///< whether there is room
-  int gradient_shares_at;        ///< what triangles give to gradients, on chip, -1 without room
-  int matrix_shares_on_chip;     ///< whether there is room for what they give to matrices
-  int solved_at, search_at;      ///< these vectors of the linear problem on chip, -1 without room
-  int step_ring_at, step_depth;  ///< of a StepRing on chip
+  int places_on_chip;                    ///< whether there is room
+  int gradient_shares_at;                ///< what triangles give to gradients, on chip, -1 without room
+  int matrix_shares_on_chip;             ///< whether there is room for what they give to matrices
+  int solved_at, search_at;              ///< these vectors of the linear problem on chip, -1 without room
+  int step_ring_at, step_depth;          ///< of a StepRing on chip for products
+  int gradient_ring_at, gradient_depth;  ///< of one for gradients
 
   // Settings.
   double time_step, tolerance;

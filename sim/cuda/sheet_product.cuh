@@ -74,12 +74,13 @@ struct StepRing {
 inline constexpr int step_ring_bytes = block_warps * steps_together * 32 * (4 * 4 + 2);  ///< a depth of one
 inline constexpr int least_step_depth = 2, most_step_depth = 4;
 
-/// Steps in single precision that come to the chip in the background, ahead of their use: those of all
-/// bundles of a warp, one after the other. Each lane reads what it has sent for itself.
+/// Steps that come to the chip in the background, ahead of their use: those of all bundles of a warp, one
+/// after the other. Each lane reads what it has sent for itself.
+template <typename Number>
 class StepsOnTheirWay {
  public:
-  __device__ StepsOnTheirWay(const SheetTables& tables, const StepRing& ring)
-      : values_(reinterpret_cast<const char*>(tables.single_step_values) + 16 * lane()),
+  __device__ StepsOnTheirWay(const SheetTables& tables, const Number* values, const StepRing& ring)
+      : values_(reinterpret_cast<const char*>(values) + 16 * lane()),
         depth_(ring.depth),
         first_(chip_address(ring.chip) + warp() * ring.depth * group_bytes),
         end_(first_ + ring.depth * group_bytes),
@@ -101,24 +102,34 @@ class StepsOnTheirWay {
         wait_for_copies<2>();
       else
         wait_for_copies<1>();
-      StepNumbers<float> now;
+      StepNumbers<Number> now;
+      int4 pieces[4];
 #pragma unroll
-      for (int k = 0; k < together; ++k) {
-        const int4 row = load_int4(at_ + 512 * k + 16 * lane());
-        now.rows[k] = {__int_as_float(row.x), __int_as_float(row.y), __int_as_float(row.z),
-                       __int_as_float(row.w)};
-      }
-      const int2 columns = load_int2(at_ + 512 * together + 8 * lane());
-      now.columns[0] = static_cast<unsigned>(columns.x);
-      now.columns[1] = static_cast<unsigned>(columns.y);
+      for (int k = 0; k < 4; ++k) pieces[k] = load_int4(at_ + 512 * k + 16 * lane());
+#pragma unroll
+      for (int k = 0; k < together; ++k) now.rows[k] = four_of(pieces + 4 / together * k, Number{});
+      const unsigned columns = at_ + 4 * 512 + 2 * together * lane();
+#pragma unroll
+      for (int k = 0; k < together / 2; ++k)
+        now.columns[k] = static_cast<unsigned>(load_int(columns + 4 * k));
       use(now);
       send(tables);
     }
   }
 
  private:
-  static constexpr int together = StepNumbers<float>::together, group_bytes = step_ring_bytes / block_warps;
-  static_assert(together == steps_together && together == 4);
+  static constexpr int together = StepNumbers<Number>::together;
+  static constexpr int group_bytes = step_ring_bytes / block_warps;
+  static_assert(together * sizeof(Four<Number>) == 4 * 16 && steps_together == 4);
+
+  __device__ static Four<float> four_of(const int4* piece, float) {
+    return {__int_as_float(piece->x), __int_as_float(piece->y), __int_as_float(piece->z),
+            __int_as_float(piece->w)};
+  }
+  __device__ static Four<double> four_of(const int4* pieces, double) {
+    return {__hiloint2double(pieces[0].y, pieces[0].x), __hiloint2double(pieces[0].w, pieces[0].z),
+            __hiloint2double(pieces[1].y, pieces[1].x), __hiloint2double(pieces[1].w, pieces[1].z)};
+  }
 
   __device__ void begin_bundle(const SheetTables& tables) {
     if (bundle_ >= tables.bundle_count) return;
@@ -128,10 +139,10 @@ class StepsOnTheirWay {
   /// Sends the next steps to the place that is free; behind the last ones nothing.
   __device__ void send(const SheetTables& tables) {
     if (bundle_ < tables.bundle_count) {
+      const char* from = values_ + 32L * sizeof(Four<Number>) * next_;
 #pragma unroll
-      for (int k = 0; k < together; ++k)
-        copy_to_chip<16>(at_ + 512 * k + 16 * lane(), values_ + 512L * (next_ + k));
-      copy_to_chip<8>(at_ + 512 * together + 8 * lane(), columns_at<together>(tables, next_));
+      for (int k = 0; k < 4; ++k) copy_to_chip<16>(at_ + 512 * k + 16 * lane(), from + 512 * k);
+      copy_to_chip<2 * together>(at_ + 4 * 512 + 2 * together * lane(), columns_at<together>(tables, next_));
       next_ += together;
       if (next_ >= bundle_end_) {
         bundle_ += team_warps();
@@ -197,7 +208,7 @@ inline __device__ float add_block_rows(const SheetTables& tables, const float* b
                                        const HingeMatrix& hinges, const Four<float>* x, float* y,
                                        float* partial) {
   // The blocks of most rows are no more than this, and are on their way together.
-  constexpr int together = 8;
+  constexpr int together = 9;
   float product[1];
   sum_over_team(3 * tables.size, product, partial, [&](int i, float(&sums)[1]) {
     const int slice = i / (3 * slice_size), row = i - slice * 3 * slice_size, vertex = row / 3;
@@ -227,19 +238,26 @@ inline __device__ float add_block_rows(const SheetTables& tables, const float* b
   return product[0];
 }
 
+/// The same where `steps` may be without room on chip.
+template <typename Number, typename Places, typename Write>
+__device__ void multiply_scalar_rows(const SheetTables& tables, const Number* values,
+                                     StepsOnTheirWay<Number>& steps, const Places& x, const Write& write) {
+  if (steps.are_sent())
+    multiply_scalar_rows<Number>(tables, steps, x, write);
+  else
+    multiply_scalar_rows<Number>(tables, StepsInMemory<Number>{values}, x, write);
+}
+
 /// y = (B + scale S + hinges) x, x four numbers a vertex. The caller has synchronized x; y is of the calling
 /// threads' own rows. Returns x.y, to all threads, behind a barrier. `steps`: those of S. `partial`: as
 /// sum_over_team wants it.
 inline __device__ float multiply(const SheetTables& tables, const float* blocks, float scale,
-                                 const HingeMatrix& hinges, StepsOnTheirWay& steps, const Four<float>* x,
-                                 float* y, float* partial) {
+                                 const HingeMatrix& hinges, StepsOnTheirWay<float>& steps,
+                                 const Four<float>* x, float* y, float* partial) {
   if (hinges.gradients != nullptr) multiply_hinges(tables, hinges, x);
   const auto place = [&](int vertex) { return x[vertex]; };
   const auto write = [&](int row, int c, float sum) { y[3 * row + c] = scale * sum; };
-  if (steps.are_sent())
-    multiply_scalar_rows<float>(tables, steps, place, write);
-  else
-    multiply_scalar_rows<float>(tables, StepsInMemory<float>{tables.single_step_values}, place, write);
+  multiply_scalar_rows(tables, tables.single_step_values, steps, place, write);
   return add_block_rows(tables, blocks, hinges, x, y, partial);
 }
 
