@@ -106,9 +106,13 @@ __device__ inline Numbers3 free_part(const Restrictions& restrictions, int verte
           free[2] * v.x + free[5] * v.y + free[8] * v.z};
 }
 
+/// Numbers on chip for sums over the team: those of norms have a place of their own, so that no barrier parts
+/// them from the others.
+inline constexpr int linear_partials = 2 * seats;
+
 /// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
 /// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
-/// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, a number a warp
+/// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, linear_partials
 /// and solve_memory.
 template <int parts>
 __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
@@ -155,11 +159,12 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
         [&](int i, const Numbers3& own) { put(own, change, i); });
   }
   // The norm of the residual, of which `step` times the image is taken off. What the restrictions leave
-  // becomes the next right-hand side of the factor.
+  // becomes the next right-hand side of the factor. Behind a barrier.
+  float* norm_partial = partial + seats;
   const auto take_residual = [&](float step) {
-    synchronize_team();
+    put_zero(fronts, v.solved);
     add_up<1, 2>(
-        size, partial,
+        size, norm_partial,
         [&](int i) {
           const Numbers3 own = numbers_at(residual, i);
           const Numbers3 left = step == 0 ? own : scaled_sum(own, -step, numbers_at(v.image, i));
@@ -174,7 +179,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
           squares[0] += product(left, left);
         });
     synchronize_team();
-    return sqrtf(total(size, partial));
+    return sqrtf(total(size, norm_partial));
   };
   // Goes a step along the search direction, the image with it.
   const auto go = [&](float step) {

@@ -103,6 +103,7 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
     for (int i = v.solved_on_chip ? first_of_copy : first; i < size;
          i += v.solved_on_chip ? block_threads : step)
       preconditioned[i] = last[i];
+    put_zero(fronts, v.solved);
     synchronize_team();
     solve<parts>(fronts, problem.factor, v, chip);
     restrict_to_free(restrictions, preconditioned, v.solved_on_chip);

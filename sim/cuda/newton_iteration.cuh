@@ -108,7 +108,7 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
 }
 
 /// On-chip bytes for sums over the team, before what a solve needs.
-inline constexpr int linear_partial_bytes = seats * static_cast<int>(sizeof(float));
+inline constexpr int linear_partial_bytes = linear_partials * static_cast<int>(sizeof(float));
 
 /// A linear problem and what a team solves it with.
 struct LinearWork {
