@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 
 #include "sim/cuda/layout/solve_plan.h"
+#include "sim/cuda/most_vertices.h"
 
 namespace flash::sim::cuda {
 
@@ -49,7 +51,8 @@ const Number* DevicePlan::upload(const std::vector<Number>& numbers,
 }
 
 DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
-  if (layout.size > 1 << 16) throw std::invalid_argument("a sheet may have 65536 vertices on a CUDA device");
+  if (layout.size > most_vertices)
+    throw std::invalid_argument("more than " + std::to_string(most_vertices) + " vertices");
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
