@@ -10,6 +10,7 @@
 #include "data/error.h"
 #include "data/parallel.h"
 #include "sim/cuda/most_obstacles.h"
+#include "sim/cuda/most_vertices.h"
 #ifdef FLASH_HAVE_CUDA
 #include "sim/cuda/device_error.h"
 #include "sim/cuda/devices.h"
@@ -33,6 +34,9 @@ std::string why_not_on_device(const Environment& environment) {
   if (environment.obstacles.size() > most_obstacles)
     return "more than " + std::to_string(most_obstacles) + " obstacles: found " +
            std::to_string(environment.obstacles.size());
+  if (environment.state.positions.rows() > cuda::most_vertices)
+    return "more than " + std::to_string(cuda::most_vertices) + " vertices: found " +
+           std::to_string(environment.state.positions.rows());
   return {};
 }
 

@@ -86,6 +86,8 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
   FOR_OWN_ENVIRONMENTS(batch, e) {
     const LinearVectors v = linear_vectors(batch);
     for (int i = team_rank(); i < size; i += team_size()) v.solved[size + i] = vector_of(batch, e)[i];
+    put_zero(batch.fronts, v.solved);
+    synchronize_team();
     solve<parts>(batch.fronts, factor_of<parts>(batch, e), v, shared_memory<char>());
     for (int i = team_rank(); i < size; i += team_size()) result_of(batch, e)[i] = v.solved[size + i];
     synchronize_team();
@@ -101,8 +103,9 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
       x[i] = {from[0], from[1], from[2], 0};
     }
     synchronize_team();
+    StepsOnTheirWay<float> steps(batch.sheet, batch.sheet.single_step_values, {});
     multiply(batch.sheet, batch.block_rows + batch.block_row_size * e,
-             static_cast<float>(batch.environments[e].rigidity), {}, x, result_of(batch, e),
+             static_cast<float>(batch.environments[e].rigidity), {}, steps, x, result_of(batch, e),
              shared_memory<float>());
     synchronize_team();
   }
@@ -124,7 +127,7 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
         tolerance};
     const int solves = conjugate_gradients<parts>(
         batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
-        batch.changes + 3L * batch.sheet.size * e, chip, reinterpret_cast<char*>(chip + seats));
+        batch.changes + 3L * batch.sheet.size * e, chip, reinterpret_cast<char*>(chip + linear_partials));
     if (team_rank() == 0) batch.solves[e] = solves;
   }
 }
@@ -162,7 +165,7 @@ Choice choice(BatchKernel kernel, const FrontTables& fronts) {
     case BatchKernel::find_directions:
       break;
   }
-  return {find_directions_kernel<parts>, solve_bytes + number * seats};
+  return {find_directions_kernel<parts>, solve_bytes + number * linear_partials};
 }
 
 Choice choice(BatchKernel kernel, FactorPrecision precision, const FrontTables& fronts) {

@@ -12,6 +12,7 @@
 
 #include "sim/cuda/device_plan.h"
 #include "sim/cuda/devices.h"
+#include "sim/cuda/layout/team_stages.h"
 #include "sim/cuda/projective_replay.h"
 #include "sim/cuda/replay_kernel.h"
 #include "sim/cuda/team_memory.h"
@@ -169,7 +170,7 @@ struct BatchReplay::Memory {
   std::vector<int> obstacle_counts;  ///< of each environment
   DeviceArray<ReplayMaterial> materials;
   DeviceArray<Point> positions, velocities, bristles, loads;
-  DeviceArray<int> hold_starts, kept_index, order, steps;
+  DeviceArray<int> hold_starts, kept_index, order, steps, work, unfinished;
   DeviceArray<HeldPlace> holds;
   DeviceArray<PlacedObstacle> obstacles;
   DeviceArray<FramePose> poses;
@@ -177,8 +178,10 @@ struct BatchReplay::Memory {
   DeviceArray<double> kept, hold_forces;
   DeviceArray<char> arena;
   DeviceArray<TeamMemory> team_memory;
-  int teams = 0, team_blocks = 1;
+  int teams = 0, team_blocks = 1;  ///< at first
   ReplayNumbers numbers{};
+  std::vector<TeamStage> stages;
+  std::vector<FrontTables> stage_fronts;
   std::unique_ptr<ProjectiveReplay> projection;  ///< of the projective method
 
   Memory(const SheetPlan& sheet, const std::vector<ReplayEnvironment>& environments,
@@ -199,19 +202,19 @@ struct BatchReplay::Memory {
     const int most_obstacles_each = upload_obstacles(environments);
     upload_bristles(environments, most_obstacles_each);
     if (!settings.projective) {
-      team_blocks = settings.team_blocks > 0 ? settings.team_blocks : team_blocks_for(plan.fronts, count);
-      plan.share_out_solves(front_plan, team_blocks);
+      plan_stages();
       lay_out_teams({plan.fronts, layout, damped, most_held, most_obstacles_each});
     }
     steps = DeviceArray<int>(environments.size());
+    work = DeviceArray<int>(environments.size());
+    unfinished = DeviceArray<int>(1);
 
     numbers.fronts = plan.fronts;
     numbers.sheet = plan.sheet;
     numbers.teams = team_memory.data();
     check(cudaMallocHost(&stop, sizeof(int)));
     *stop = 0;
-    numbers.waiting = {steps.data(), count, stop};
-    if (!settings.projective) place_on_chip(numbers, team_blocks);
+    numbers.waiting = {steps.data(), work.data(), unfinished.data(), count, 0, 0, 0, stop};
     numbers.time_step = settings.time_step;
     numbers.tolerance = settings.tolerance;
     numbers.max_iterations = settings.max_iterations;
@@ -345,9 +348,24 @@ struct BatchReplay::Memory {
     kept = DeviceArray<double>(static_cast<std::size_t>(count) * settings.kept_steps.size() * 3 * size());
   }
 
+  /// Where an environment has but one turn with a team, none waits for a second one.
+  void plan_stages() {
+    const int turns = settings.steps - settings.first_step > settings.restart_interval ? 2 : 1;
+    const auto resident = [&](int blocks) { return resident_replay_teams(plan.fronts, blocks); };
+    if (settings.team_blocks > 0)
+      stages = {{settings.team_blocks, std::min(count, resident(settings.team_blocks)), 0}};
+    else
+      stages = team_stages(count, turns, launches_clusters() ? most_team_blocks : 1, resident);
+    require(!stages.empty() && stages.front().teams > 0, "the sheet is too large for the device");
+    for (const TeamStage& stage : stages) {
+      stage_fronts.push_back(plan.shared_out(front_plan, stage.blocks));
+      plan.fronts.vector_size = std::max(plan.fronts.vector_size, stage_fronts.back().vector_size);
+      teams = std::max(teams, stage.teams);
+    }
+    team_blocks = stages.front().blocks;
+  }
+
   void lay_out_teams(const TeamSizes& sizes) {
-    teams = std::min(count, resident_replay_teams(plan.fronts, team_blocks));
-    require(teams > 0, "the sheet is too large for the device");
     DeviceArena counting(nullptr);
     lay_out_team(sizes, counting);
     const std::size_t bytes = counting.used();
@@ -375,12 +393,26 @@ struct BatchReplay::Memory {
     wait();
     const std::vector<int> stand(static_cast<std::size_t>(count), step);
     steps.write(0, stand.data(), stand.size());
-    numbers.end_step = end;
+    work.write(0, std::vector<int>(stand.size(), 0).data(), stand.size());
+    unfinished.write(0, &count, 1);
     if (projection)
-      projection->run(end, stream);
+      projection->run(step, end, stream);
     else
-      run_replay(numbers, teams, team_blocks, stream);
+      run_stages(end);
     step = end;
+  }
+
+  void run_stages(int end) const {
+    for (std::size_t k = 0; k < stages.size(); ++k) {
+      const TeamStage& stage = stages[k];
+      ReplayNumbers own = numbers;
+      own.fronts = stage_fronts[k];
+      own.waiting.begin = step;
+      own.waiting.end = end;
+      own.waiting.leave_at = stage.leave_at;
+      place_on_chip(own, stage.blocks);
+      run_replay(own, stage.teams, stage.blocks, stream);
+    }
   }
 
   /// A part of an array with a point for each vertex.

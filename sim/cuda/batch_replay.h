@@ -57,7 +57,7 @@ struct ReplaySettings {
   int steps = 0;                  ///< the last one
   std::vector<int> kept_steps{};  ///< whose positions are kept, ascending; step 0 is the start
   int restart_interval = 10;      ///< steps after which a solver forgets its factor and may change its team
-  int team_blocks = 0;  ///< processors that work on an environment, 1, 2, 4 or 8; 0: as many as there are
+  int team_blocks = 0;  ///< processors that work on an environment, 1, 2, 4 or 8; 0: team_stages has it
   FrontSettings fronts{};
 
   /// The projective method in place of Newton's; its time step and tolerance are those above. Without
@@ -91,8 +91,8 @@ class BatchReplay {
 
   int size() const;
   int step() const;         ///< steps that are queued or taken, first_step included
-  int teams() const;        ///< environments that the device works on at the same time
-  int team_blocks() const;  ///< processors that work on an environment
+  int teams() const;        ///< environments that the device works on at the same time, at first
+  int team_blocks() const;  ///< processors that work on an environment, at first
 
   /// Queues the next steps of all environments and returns; what reads results waits for them.
   void advance(int steps);

@@ -39,7 +39,7 @@ struct BatchSystem::Memory {
         layout(lay_out(sheet, bending, front_plan)),
         plan(front_plan, layout),
         environments(materials) {
-    plan.share_out_solves(front_plan, 1);
+    plan.fronts = plan.shared_out(front_plan, 1);
     teams = std::min(count, most_teams());
 
     const size_t environment_count = materials.size(), team_count = static_cast<size_t>(teams);

@@ -30,6 +30,7 @@ struct LinearVectors {
   Four<float>* near;    ///< four: a copy of `search` for products on chip, free during a solve; or `search`
   float* solved;        ///< what a solve works on (solve_chunk.h)
   bool solved_on_chip = false;
+  StepRing step_ring = {};  ///< for products, free during a solve too
   PhaseClock clock = {};
 };
 
@@ -105,9 +106,13 @@ __device__ inline Numbers3 free_part(const Restrictions& restrictions, int verte
           free[2] * v.x + free[5] * v.y + free[8] * v.z};
 }
 
+/// Numbers on chip for sums over the team: those of norms have a place of their own, so that no barrier parts
+/// them from the others.
+inline constexpr int linear_partials = 2 * seats;
+
 /// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
 /// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
-/// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, a number a warp
+/// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, linear_partials
 /// and solve_memory.
 template <int parts>
 __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
@@ -117,8 +122,9 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
   const int size = sheet.size;
   float *residual = v.residual, *preconditioned = v.solved + 3 * size;
   const Restrictions& restrictions = problem.restrictions;
-  const auto multiply_search = [&] {
-    return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image, partial);
+  const auto multiply_search = [&](StepsOnTheirWay<float>& steps) {
+    return multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, steps, v.near, v.image,
+                    partial);
   };
   const auto put_search = [&](int i, const Numbers3& own) {
     const Four<float> four = {own.x, own.y, own.z, 0};
@@ -145,18 +151,20 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
       });
   const bool starts_elsewhere = any_of_team(moved != 0);
   if (starts_elsewhere) {
-    multiply_search();
+    StepsOnTheirWay<float> steps(sheet, sheet.single_step_values, v.step_ring);
+    multiply_search(steps);
     synchronize_team();
     for_own_vertices(
         size, [&](int i) { return numbers_at(v.image, i); },
         [&](int i, const Numbers3& own) { put(own, change, i); });
   }
   // The norm of the residual, of which `step` times the image is taken off. What the restrictions leave
-  // becomes the next right-hand side of the factor.
+  // becomes the next right-hand side of the factor. Behind a barrier.
+  float* norm_partial = partial + seats;
   const auto take_residual = [&](float step) {
-    synchronize_team();
+    put_zero(fronts, v.solved);
     add_up<1, 2>(
-        size, partial,
+        size, norm_partial,
         [&](int i) {
           const Numbers3 own = numbers_at(residual, i);
           const Numbers3 left = step == 0 ? own : scaled_sum(own, -step, numbers_at(v.image, i));
@@ -171,7 +179,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
           squares[0] += product(left, left);
         });
     synchronize_team();
-    return sqrtf(total(size, partial));
+    return sqrtf(total(size, norm_partial));
   };
   // Goes a step along the search direction, the image with it.
   const auto go = [&](float step) {
@@ -195,6 +203,8 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     v.clock.count(ReplayPhase::directions);
     solve<parts>(fronts, problem.factor, v, chip);
     v.clock.count(ReplayPhase::solves);
+    // Nothing that follows keeps the product's numbers from being sent for.
+    StepsOnTheirWay<float> steps(sheet, sheet.single_step_values, v.step_ring);
     // The residual has free parts alone, so that those of what the factor gives need not be taken for this.
     add_up<1, 2>(
         size, partial, [&](int i) { return product(numbers_at(residual, i), numbers_at(preconditioned, i)); },
@@ -213,7 +223,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
         put_search);
     synchronize_team();
     v.clock.count(ReplayPhase::directions);
-    const float curvature = multiply_search();
+    const float curvature = multiply_search(steps);
     v.clock.count(ReplayPhase::products);
     // Where the sheet is about to buckle the matrix is indefinite, and what was found so far leads down.
     if (curvature <= 0 && iteration > 1) break;

@@ -1,8 +1,11 @@
 #include "sim/cuda/device_plan.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 
 #include "sim/cuda/layout/solve_plan.h"
+#include "sim/cuda/most_vertices.h"
 
 namespace flash::sim::cuda {
 
@@ -27,6 +30,17 @@ std::vector<double> by_halves(const std::vector<double>& steps) {
   return halves;
 }
 
+std::vector<StepColumns> by_steps_together(const std::vector<int>& columns) {
+  constexpr std::size_t lanes = 4 * bundle_groups;
+  std::vector<StepColumns> together(columns.size() / steps_together);
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    const std::size_t step = k / lanes;
+    together[lanes * (step / steps_together) + k % lanes].of[step % steps_together] =
+        static_cast<unsigned short>(columns[k]);
+  }
+  return together;
+}
+
 }  // namespace
 
 template <typename Number>
@@ -37,6 +51,8 @@ const Number* DevicePlan::upload(const std::vector<Number>& numbers,
 }
 
 DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
+  if (layout.size > most_vertices)
+    throw std::invalid_argument("more than " + std::to_string(most_vertices) + " vertices");
   fronts.size = plan.size;
   fronts.level_count = static_cast<int>(plan.levels.size());
   fronts.shared_panel = plan.shared_panel;
@@ -66,7 +82,7 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.slice_columns = upload(layout.slice_columns, ints_);
   sheet.group_rows = upload(layout.group_rows, ints_);
   sheet.bundle_starts = upload(layout.bundle_starts, ints_);
-  sheet.step_columns = upload(layout.step_columns, ints_);
+  sheet.step_columns = upload(by_steps_together(layout.step_columns), columns_);
   sheet.step_values = upload(by_halves(layout.step_values), doubles_);
   sheet.single_step_values =
       upload(std::vector<float>(layout.step_values.begin(), layout.step_values.end()), floats_);
@@ -85,14 +101,16 @@ DevicePlan::DevicePlan(const FrontPlan& plan, const SheetLayout& layout) {
   sheet.hinge_sources = upload(layout.hinge_sources, ints_);
 }
 
-void DevicePlan::share_out_solves(const FrontPlan& plan, int team_blocks) {
+FrontTables DevicePlan::shared_out(const FrontPlan& plan, int team_blocks) {
   const SolvePlan solve = plan_solve(plan, team_blocks);
-  fronts.chunks = upload(solve.chunks, chunks_);
-  fronts.chunk_starts = upload(solve.starts, ints_);
-  fronts.gathers = upload(solve.gathers, gathers_);
-  fronts.parted = upload(solve.parted, gathers_);
-  fronts.parted_count = static_cast<int>(solve.parted.size());
-  fronts.vector_size = solve.vector_size;
+  FrontTables shared = fronts;
+  shared.chunks = upload(solve.chunks, chunks_);
+  shared.chunk_starts = upload(solve.starts, ints_);
+  shared.gathers = upload(solve.gathers, gathers_);
+  shared.parted = upload(solve.parted, gathers_);
+  shared.parted_count = static_cast<int>(solve.parted.size());
+  shared.vector_size = solve.vector_size;
+  return shared;
 }
 
 }  // namespace flash::sim::cuda

@@ -14,11 +14,11 @@ class DevicePlan {
  public:
   DevicePlan(const FrontPlan& fronts, const SheetLayout& layout);
 
-  /// How the warps of teams of so many blocks share solves; has to be called once.
-  void share_out_solves(const FrontPlan& fronts, int team_blocks);
+  /// `fronts` with how the warps of teams of so many blocks share solves.
+  FrontTables shared_out(const FrontPlan& plan, int team_blocks);
 
-  FrontTables fronts;
-  SheetTables sheet;
+  FrontTables fronts{};
+  SheetTables sheet{};
 
  private:
   template <typename Number>
@@ -33,6 +33,7 @@ class DevicePlan {
   std::vector<DeviceArray<SolveChunk>> chunks_;
   std::vector<DeviceArray<Gather>> gathers_;
   std::vector<DeviceArray<EdgeSources>> sources_;
+  std::vector<DeviceArray<StepColumns>> columns_;
 };
 
 }  // namespace flash::sim::cuda

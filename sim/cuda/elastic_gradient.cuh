@@ -85,14 +85,17 @@ __device__ void add_up_gradient(const SheetTables& tables, const Places& place, 
 }
 
 /// Membrane and bending energy [J], to all threads, and the gradient of both [N], three numbers a vertex;
-/// with the damping of elements since `start`. `chip`: gradient_memory, free for all threads.
+/// with the damping of elements since `start`. `chip`: gradient_memory, free for all threads. `ring`: behind
+/// that, where `shares` may be too.
 template <bool places_on_chip>
 __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const EnvironmentNumbers& environment,
                                             const StepStart& start, const Point* positions, double* gradient,
-                                            const GradientShares& shares, double* chip) {
+                                            const GradientShares& shares, double* chip,
+                                            const StepRing& ring = {}) {
   double* near = chip + most_sums * seats;
   enum { membrane, bending, damping, hinges, hinge_damping };  // sums
   const auto sums = [&](int k) { return chip + seats * k; };
+  StepsOnTheirWay<double> steps(tables, tables.step_values, ring);
   // Far from the origin places would round the energy of bending.
   const Triple origin = triple(positions[0]);
   const auto place = [&](int vertex) -> Triple {
@@ -110,9 +113,10 @@ __device__ ElasticEnergies elastic_gradient(const SheetTables& tables, const Env
     }
     synchronize_team();
   }
-  multiply_scalar_rows(tables, tables.step_values, place, [&](int row, int c, double sum) {
+  multiply_scalar_rows(tables, tables.step_values, steps, place, [&](int row, int c, double sum) {
     gradient[3 * row + c] = environment.rigidity * sum;
   });
+  if (steps.are_sent()) __syncthreads();
   triangle_gradients(tables, environment, place, shares.triangles, sums(membrane));
   if (tables.hinge_count > 0)
     hinge_gradients(tables, environment, start.angles, place, shares.hinges, sums(hinges));

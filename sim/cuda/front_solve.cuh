@@ -220,17 +220,18 @@ __device__ int run_chunks(unsigned first_slot, const Vector& vector, float (&sum
 }
 
 /// All heights upwards, or downwards. Blocks of a team wait for each other only where they share fronts.
+/// Behind a barrier.
 template <int parts, bool backward, int width, typename Vector>
 __device__ void run_levels(int count, ChunkStream<parts, width>& stream, const Vector& vector) {
   float sums[4] = {};
-  int flags = SolveChunk::next_is_shared;
   for (int level = 0; level < count; ++level) {
+    int flags;
+    do flags = run_chunks<parts, backward, width>(stream.take(), vector, sums);
+    while (!(flags & SolveChunk::ends_level));
     if (flags & SolveChunk::next_is_shared)
       synchronize_team();
     else
       __syncthreads();
-    do flags = run_chunks<parts, backward, width>(stream.take(), vector, sums);
-    while (!(flags & SolveChunk::ends_level));
   }
 }
 
@@ -238,7 +239,6 @@ template <int parts, int width, typename Vector>
 __device__ void run_both_ways(const FrontTables& tables, const __half* factor, const Vector& vector,
                               const char* chip) {
   ChunkStream<parts, width> stream(tables, factor, chip);
-  if (threadIdx.x == 0) vector.numbers[6 * tables.size] = 0;
   run_levels<parts, false>(tables.level_count, stream, vector);
   run_levels<parts, true>(tables.level_count, stream, vector);
   wait_for_copies<0>();
@@ -259,8 +259,13 @@ __device__ void add_second_parts(const FrontTables& tables, float* vector) {
     synchronize_team();
 }
 
-/// x <- (L L^T)^-1 x, x behind the first 3 a vertex of `vector`, whose layout is that of solve_chunk.h.
-/// `chip`: solve_memory. `on_chip`: whether `vector` is there too.
+/// The zero of a vector; to be there before a solve.
+__device__ inline void put_zero(const FrontTables& tables, float* vector) {
+  if (threadIdx.x == 0) vector[6 * tables.size] = 0;
+}
+
+/// x <- (L L^T)^-1 x, x behind the first 3 a vertex of `vector`, whose layout is that of solve_chunk.h. It is
+/// there, put_zero too, behind a barrier. `chip`: solve_memory. `on_chip`: whether `vector` is there too.
 template <int parts, bool on_chip>
 __device__ void solve(const FrontTables& tables, const __half* factor, float* vector, const char* chip) {
 #ifdef __CUDA_ARCH__
@@ -270,7 +275,6 @@ __device__ void solve(const FrontTables& tables, const __half* factor, float* ve
     run_both_ways<parts, chunks_together>(tables, factor, SolveVector<on_chip>{vector}, chip);
   else
     run_both_ways<parts, 1>(tables, factor, SolveVector<on_chip>{vector}, chip);
-  synchronize_team();
   add_second_parts<on_chip>(tables, vector);
 }
 

@@ -66,7 +66,8 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
         reinterpret_cast<float*>(v.near)[i] = search[i];
       synchronize_team();
     }
-    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, v.near, v.image, partial);
+    StepsOnTheirWay<float> steps(sheet, sheet.single_step_values, v.step_ring);
+    multiply(sheet, problem.block_rows, problem.rigidity, problem.hinges, steps, v.near, v.image, partial);
     synchronize_team();
   };
   const auto norm_of = [&](const float* x) {
@@ -102,6 +103,7 @@ __device__ int generalized_residuals(const FrontTables& fronts, const SheetTable
     for (int i = v.solved_on_chip ? first_of_copy : first; i < size;
          i += v.solved_on_chip ? block_threads : step)
       preconditioned[i] = last[i];
+    put_zero(fronts, v.solved);
     synchronize_team();
     solve<parts>(fronts, problem.factor, v, chip);
     restrict_to_free(restrictions, preconditioned, v.solved_on_chip);

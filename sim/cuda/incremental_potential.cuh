@@ -102,8 +102,9 @@ __device__ inline double add_turned_damping(const SheetTables& tables, const Ste
   }
   synchronize_team();
   const double rigidity = step.numbers.damping_share * step.numbers.rigidity;
-  multiply_scalar_rows(
-      tables, tables.step_values, [&](int vertex) { return triple(memory.bent[vertex]); },
+  multiply_scalar_rows<double>(
+      tables, StepsInMemory<double>{tables.step_values},
+      [&](int vertex) { return triple(memory.bent[vertex]); },
       [&](int row, int c, double sum) { memory.damped[3 * row + c] = rigidity * sum; });
   synchronize_team();
   double totals[4];
@@ -302,16 +303,16 @@ __device__ __noinline__ VertexSums balance_vertices(const SheetTables& tables, c
 }
 
 /// Fills in an iterate from its positions. `line`: contacts of the iterate from which a line leads here, null
-/// without. `triangle_shares`: for what triangles give to the gradient.
+/// without. `triangle_shares`: for what triangles give to the gradient. `ring`: as elastic_gradient has it.
 template <bool places_on_chip>
 __device__ __noinline__ void evaluate(const SheetTables& tables, const StepProblem& step,
-                                      const TeamMemory& memory, double* triangle_shares,
+                                      const TeamMemory& memory, double* triangle_shares, const StepRing& ring,
                                       const ContactSet* line, Iterate& at) {
   double* partial = shared_memory<double>();
   synchronize_team();
   const ElasticEnergies elastic =
       elastic_gradient<places_on_chip>(tables, step.numbers, step.damped_since, at.positions, at.force,
-                                       {triangle_shares, memory.hinge_gradients}, partial);
+                                       {triangle_shares, memory.hinge_gradients}, partial, ring);
   double damping = elastic.damping;
   if (step.damped_since.metrics != nullptr && tables.bundle_count > 0)
     damping += add_turned_damping(tables, step, memory, at.positions, at.force, partial);

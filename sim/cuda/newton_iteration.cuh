@@ -30,10 +30,11 @@ __device__ inline void evaluate(const Work& w, const StepProblem& step, const Co
   const int shares_at = w.replay.gradient_shares_at;
   double* shares = shares_at < 0 ? w.memory.triangle_gradients
                                  : reinterpret_cast<double*>(shared_memory<char>() + shares_at);
+  const StepRing ring = {shared_memory<char>() + w.replay.gradient_ring_at, w.replay.gradient_depth};
   if (w.replay.places_on_chip)
-    evaluate<true>(w.replay.sheet, step, w.memory, shares, line, at);
+    evaluate<true>(w.replay.sheet, step, w.memory, shares, ring, line, at);
   else
-    evaluate<false>(w.replay.sheet, step, w.memory, shares, line, at);
+    evaluate<false>(w.replay.sheet, step, w.memory, shares, ring, line, at);
   count_phase(w.memory, ReplayPhase::evaluation);
 }
 
@@ -107,7 +108,7 @@ __device__ __noinline__ bool factorize(const Work& w, StepProblem& step) {
 }
 
 /// On-chip bytes for sums over the team, before what a solve needs.
-inline constexpr int linear_partial_bytes = seats * static_cast<int>(sizeof(float));
+inline constexpr int linear_partial_bytes = linear_partials * static_cast<int>(sizeof(float));
 
 /// A linear problem and what a team solves it with.
 struct LinearWork {
@@ -134,6 +135,7 @@ __device__ inline LinearWork linear_work(const Work& w, const StepProblem& step)
            on_chip(w.replay.search_at, m.search),
            on_chip(w.replay.solved_at, m.solved),
            w.replay.solved_at >= 0,
+           {chip + w.replay.step_ring_at, w.replay.step_depth},
            {m.clocks}},
           reinterpret_cast<float*>(chip),
           chip + linear_partial_bytes};

@@ -189,10 +189,10 @@ __global__ void __launch_bounds__(block_threads, 1)
     const int e = take(replay.waiting, &first);
     if (e < 0) return;
     const int interval = replay.restart_interval,
-              end = min(replay.end_step, (first / interval + 1) * interval);
+              end = min(replay.waiting.end, (first / interval + 1) * interval);
     advance<parts>(common, e, first, end);
     synchronize_team();
-    if (team_rank() == 0 && end < replay.end_step) add(replay.waiting, e, end);
+    if (team_rank() == 0) give_back(replay.waiting, e, end, end - first);
   }
 }
 

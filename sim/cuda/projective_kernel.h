@@ -15,7 +15,7 @@ int resident_projective_teams(const ProjectiveNumbers& numbers, InversePrecision
 /// Blocks of a team: as many as leave each environment a team of its own.
 int projective_team_blocks(ProjectiveNumbers numbers, InversePrecision precision, int environments);
 
-/// Queues steps of the environments that wait, up to numbers.replay.end_step.
+/// Queues steps of the environments that wait, up to numbers.replay.waiting.end.
 void run_projective(const ProjectiveNumbers& numbers, InversePrecision precision, int teams, int blocks,
                     cudaStream_t stream);
 

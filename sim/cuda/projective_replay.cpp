@@ -197,8 +197,9 @@ void ProjectiveReplay::lay_out_teams(const ProjectiveSizes& sizes, int environme
   numbers_.teams = team_memory_.data();
 }
 
-void ProjectiveReplay::run(int end, cudaStream_t stream) {
-  numbers_.replay.end_step = end;
+void ProjectiveReplay::run(int begin, int end, cudaStream_t stream) {
+  numbers_.replay.waiting.begin = begin;
+  numbers_.replay.waiting.end = end;
   run_projective(numbers_, precision_, teams(), blocks_, stream);
 }
 

@@ -55,8 +55,13 @@ __device__ Work& begin_work(CommonState& common) {
   });
 }
 
-/// Takes an environment from its step `first` up to `end`.
-__device__ void advance(CommonState& common, int e, int first, int end) {
+/// What a step took, in solves, about: by the parts of steps of 1,024 vertices on one processor.
+__device__ int work_of(const ReplayStats& stats) {
+  return stats.solves + 2 * stats.iterations + 8 * stats.factorizations;
+}
+
+/// Takes an environment from its step `first` up to `end`. Returns the work that it took.
+__device__ int advance(CommonState& common, int e, int first, int end) {
   Work& w = begin_work(common);
   const ReplayNumbers& replay = w.replay;
   const TeamMemory& memory = w.memory;
@@ -86,6 +91,7 @@ __device__ void advance(CommonState& common, int e, int first, int end) {
   Iterate& now = w.now;
   for (int i = team_rank(); i < size; i += team_size()) now.positions[i] = state.positions[i];
   evaluate(w, step, nullptr, now);
+  int work = 0;
   for (int at = first; at < end; ++at) {
     const long row = static_cast<long>(material.motion) * replay.motion_steps + (at - replay.stats_begin);
     const int* starts = replay.hold_starts + row;
@@ -104,6 +110,7 @@ __device__ void advance(CommonState& common, int e, int first, int end) {
       step.restrictions.count = step.held_count = motion.held_count;
     });
     const ReplayStats stats = advance_step(w, step, motion, state);
+    work += work_of(stats);
     const long place = at - replay.stats_begin;
     if (team_rank() == 0) replay.stats[static_cast<long>(replay.stats_each) * e + place] = stats;
     const int kept = replay.kept_index[place];
@@ -111,10 +118,11 @@ __device__ void advance(CommonState& common, int e, int first, int end) {
       keep(replay, state.positions,
            replay.kept + 3L * size * (static_cast<long>(replay.kept_count) * e + kept));
   }
+  return work;
 }
 
 /// A team takes an environment through some steps, until the solver forgets what it holds,
-/// and then takes the one that is furthest behind. So none waits for another, and all end at nearly the same
+/// and then takes the one with the most work left. So none waits for another, and all end at nearly the same
 /// time.
 __global__ void __launch_bounds__(block_threads, resident_blocks_each)
     replay_kernel(const __grid_constant__ ReplayNumbers given) {
@@ -127,11 +135,11 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
     const int e = take(replay.waiting, &first);
     if (e < 0) return;
     const int interval = replay.restart_interval,
-              end = min(replay.end_step, (first / interval + 1) * interval);
-    advance(common, e, first, end);
+              end = min(replay.waiting.end, (first / interval + 1) * interval);
+    const int work = advance(common, e, first, end);
     count_phase(memory, ReplayPhase::rest);
     synchronize_team();
-    if (team_rank() == 0 && end < replay.end_step) add(replay.waiting, e, end);
+    if (team_rank() == 0) give_back(replay.waiting, e, end, work);
   }
 }
 
@@ -147,6 +155,12 @@ int bytes_of(const FrontTables& fronts) {
                    most_memory() / resident_blocks_each - reserved});
 }
 
+/// Of a StepRing with so many bytes.
+int step_depth_in(int bytes) {
+  const int depth = std::min(bytes / step_ring_bytes, most_step_depth);
+  return depth < least_step_depth ? 0 : depth;
+}
+
 }  // namespace
 
 void place_on_chip(ReplayNumbers& numbers, int blocks) {
@@ -154,36 +168,30 @@ void place_on_chip(ReplayNumbers& numbers, int blocks) {
   const int room = bytes_of(fronts);
   constexpr long number = sizeof(float);
   const long vector = number * fronts.vector_size + 16;
+  // What has no room at all leaves it to the chunks.
+  const bool solved_fits = linear_bytes_of(1) + vector <= room;
   for (const int depth : {1, 2, chunks_ahead})
-    if (linear_bytes_of(depth) + vector <= room) fronts.solve_depth = depth;
+    if (linear_bytes_of(depth) + (solved_fits ? vector : 0) <= room) fronts.solve_depth = depth;
   const int near = gradient_memory(fronts.size, true), triangles = numbers.sheet.triangle_count;
   numbers.places_on_chip = near <= room;
   // What triangles give is read by other threads, of other blocks too.
   numbers.gradient_shares_at = blocks == 1 && near + gradient_share_memory(triangles) <= room ? near : -1;
   numbers.matrix_shares_on_chip =
       blocks == 1 && static_cast<int>(sizeof(float)) * hessian_memory_with_shares(triangles) <= room;
-  int used = linear_bytes_of(fronts.solve_depth);
-  const auto place = [&](long bytes) {
-    if (used + bytes > room) return -1;
-    const int at = used;
-    used += rounded_up(static_cast<int>(bytes), 16);
-    return at;
-  };
-  numbers.solved_at = place(number * fronts.vector_size);
-  // Where a solve has its chunks.
-  const bool fits = 4 * number * fronts.size <= linear_bytes_of(fronts.solve_depth) - linear_partial_bytes;
-  numbers.search_at = fits ? linear_partial_bytes : -1;
+  // At the end; products have what is before it to themselves.
+  numbers.solved_at = solved_fits ? (room - static_cast<int>(number * fronts.vector_size)) / 16 * 16 : -1;
+  int used = linear_partial_bytes;
+  const int end = solved_fits ? numbers.solved_at : room, search = 4 * static_cast<int>(number) * fronts.size;
+  numbers.search_at = used + search <= end ? used : -1;
+  if (numbers.search_at >= 0) used += search;
+  numbers.step_ring_at = used;
+  numbers.step_depth = step_depth_in(end - used);
+  numbers.gradient_ring_at = rounded_up(gradient_memory(fronts.size, numbers.places_on_chip), 16);
+  numbers.gradient_depth = step_depth_in(room - numbers.gradient_ring_at);
 }
 
 int resident_replay_teams(const FrontTables& fronts, int blocks) {
   return resident_teams(replay_kernel, bytes_of(fronts), blocks);
-}
-
-int team_blocks_for(const FrontTables& fronts, int environments) {
-  if (!launches_clusters()) return 1;
-  int blocks = most_team_blocks;
-  while (blocks > 1 && resident_replay_teams(fronts, blocks) < environments) blocks /= 2;
-  return blocks;
 }
 
 void run_replay(const ReplayNumbers& numbers, int teams, int blocks, cudaStream_t stream) {

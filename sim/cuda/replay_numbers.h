@@ -119,8 +119,12 @@ struct SheetState {
 
 /// The environments that no team works on.
 struct WaitingEnvironments {
-  int* steps;  ///< where each of them stands; -1: a team works on it, or it is at its end
+  int* steps;       ///< where each of them stands; -1: a team works on it, or it is at its end
+  int* work;        ///< that each took since `begin`, in solves
+  int* unfinished;  ///< how many are not at their end
   int count;
+  int begin, end;   ///< steps
+  int leave_at;     ///< so many unfinished ones teams leave to others
   const int* stop;  ///< of the host: once set no team takes another environment
 };
 
@@ -129,15 +133,16 @@ struct ReplayNumbers {
   SheetTables sheet;
   const TeamMemory* teams;
   WaitingEnvironments waiting;
-  int places_on_chip;         ///< whether there is room
-  int gradient_shares_at;     ///< what triangles give to gradients, on chip, -1 without room
-  int matrix_shares_on_chip;  ///< whether there is room for what they give to matrices
-  int solved_at, search_at;   ///< these vectors of the linear problem on chip, -1 without room
+  int places_on_chip;                    ///< whether there is room
+  int gradient_shares_at;                ///< what triangles give to gradients, on chip, -1 without room
+  int matrix_shares_on_chip;             ///< whether there is room for what they give to matrices
+  int solved_at, search_at;              ///< these vectors of the linear problem on chip, -1 without room
+  int step_ring_at, step_depth;          ///< of a StepRing on chip for products
+  int gradient_ring_at, gradient_depth;  ///< of one for gradients
 
   // Settings.
   double time_step, tolerance;
   int max_iterations, stale_factor_solves, halvings, restart_interval;
-  int end_step;                 ///< of this launch
   int stats_begin, stats_each;  ///< the step that comes first in `stats`, and how many an environment has
 
   const ReplayMaterial* materials;

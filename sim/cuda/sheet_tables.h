@@ -3,6 +3,11 @@
 
 namespace flash::sim::cuda {
 
+/// The columns of a lane in steps_together steps of the scalar rows.
+struct alignas(8) StepColumns {
+  unsigned short of[steps_together];
+};
+
 /// A SheetLayout in the memory of a device.
 struct SheetTables {
   int size, triangle_count, block_count, bundle_count;
@@ -12,8 +17,9 @@ struct SheetTables {
   const EdgeSources *pair_sources, *slice_sources;
   const int *block_rows, *block_columns;
   const int *slice_starts, *slice_columns;
-  const int *group_rows, *bundle_starts, *step_columns;
-  const double* step_values;  ///< of a step, the first two numbers of each lane and then the others
+  const int *group_rows, *bundle_starts;
+  const StepColumns* step_columns;  ///< one a lane and steps_together steps
+  const double* step_values;        ///< of a step, the first two numbers of each lane and then the others
   const float *single_step_values, *stand_in;
   const double* vertex_area;
   int edge_count;  ///< the first pairs

@@ -160,6 +160,9 @@ TEST(DeviceBatch, WhatTheDeviceCannotDoIsRefusedByName) {
   EXPECT_EQ(why_not_on_device(environment), "obstacles of shape mesh are met on the CPU alone");
   Batch batch(plan, {environment}, settings_on(Device::cuda));
   EXPECT_THROW(batch.advance(1), data::InputError);
+  environment.obstacles.clear();
+  environment.state.positions = data::Points::Zero(65537, 3);
+  EXPECT_EQ(why_not_on_device(environment), "more than 65536 vertices: found 65537");
 }
 
 }  // namespace

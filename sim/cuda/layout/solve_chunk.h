@@ -17,10 +17,10 @@ struct alignas(16) SolveChunk {
   enum {
     ends = 1,
     ends_level = 2,
-    next_is_shared =
-        4,  ///< with ends_level: blocks of the team need of each other what they have, in the next level
-    own_to_all = 8,     ///< results that stay in the front go to all blocks of the team
-    passed_to_all = 16  ///< those that it passes up do
+    next_is_shared = 4,  ///< with ends_level: blocks of the team need of each other what they have, in the
+                         ///< next level, or behind the last one
+    own_to_all = 8,      ///< results that stay in the front go to all blocks of the team
+    passed_to_all = 16   ///< those that it passes up do
   };
 
   // To have it sent to the chip.

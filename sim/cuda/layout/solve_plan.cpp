@@ -315,7 +315,7 @@ SolvePlan plan_solve(const FrontPlan& plan, int team_blocks) {
               tasks.push_back(backward_task(plan, solve.entries, front, column, columns));
           return tasks;
         },
-        team_blocks, is_shared(l), parts, warps);
+        team_blocks, l == 0 || is_shared(l), parts, warps);
   solve.gathers = gathers_of(plan, team, parts);
   for (int at = 3 * plan.size; at < 6 * plan.size; ++at)
     if (parts.second(at) != plan.nothing_passed()) solve.parted.push_back({at, parts.second(at)});

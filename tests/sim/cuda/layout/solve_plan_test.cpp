@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <limits>
 #include <numeric>
 #include <random>
@@ -220,16 +221,40 @@ TEST(SolvePlan, ItsChunksComeToTheSolveInWhateverOrderWarpsTakeThem) {
   }
 }
 
-TEST(SolvePlan, SomeHeightsNeedOneBlockAlone) {
+/// Of a team's heights, upwards and downwards, those behind which all blocks wait for each other.
+std::vector<bool> shared_heights(const SolvePlan& solve) {
+  std::vector<bool> shared;
+  for (int k = solve.starts[0]; k < solve.starts[1]; ++k) {
+    const int flags = solve.chunks[static_cast<std::size_t>(k)].flags;
+    if (flags & SolveChunk::ends_level) shared.push_back((flags & SolveChunk::next_is_shared) != 0);
+  }
+  return shared;
+}
+
+TEST(SolvePlan, AllBlocksWaitAtTheRootAndForTheSolution) {
   for (const auto& [name, sheet] : small_plans()) {
     SCOPED_TRACE(name);
     const FrontPlan fronts = plan_fronts(sheet->pattern, sheet->sheet.rest.vertices);
-    const SolvePlan solve = plan_solve(fronts, 8);
-    int shared = 0;
-    for (int k = solve.starts[0]; k < solve.starts[1]; ++k)
-      shared += (solve.chunks[static_cast<std::size_t>(k)].flags & SolveChunk::next_is_shared) != 0;
-    EXPECT_GT(shared, 0);
-    EXPECT_LT(shared, static_cast<int>(2 * fronts.levels.size()));
+    const std::vector<bool> shared = shared_heights(plan_solve(fronts, 8));
+    ASSERT_EQ(shared.size(), 2 * fronts.levels.size());
+    EXPECT_TRUE(shared[fronts.levels.size() - 1]);
+    EXPECT_TRUE(shared.back());
+  }
+}
+
+TEST(SolvePlan, SomeHeightsNeedOneBlockAlone) {
+  const auto sheet = make_sheet_plan(
+      make_sheet(data::rectangle({.width = 0.4, .height = 0.4, .cells_x = 31, .cells_y = 31})));
+  const FrontPlan fronts = plan_fronts(sheet->pattern, sheet->sheet.rest.vertices);
+  for (const int blocks : {2, 4, 8}) {
+    const std::vector<bool> shared = shared_heights(plan_solve(fronts, blocks));
+    // Both ways, beside the ends.
+    const auto way = [&](std::size_t first) {
+      const auto begin = shared.begin() + static_cast<std::ptrdiff_t>(first);
+      return std::count(begin, begin + std::ssize(fronts.levels) - 1, false);
+    };
+    EXPECT_GT(way(0), 0) << blocks;
+    EXPECT_GT(way(fronts.levels.size()), 0) << blocks;
   }
 }
 
