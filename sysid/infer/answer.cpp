@@ -19,6 +19,10 @@
 namespace flash::sysid {
 namespace {
 
+constexpr double kFarther = 1.3;  // of a distance over that of the best candidate
+
+std::string millimetres(double distance) { return data::format_short(1e3 * distance) + " mm"; }
+
 int best_of(const GridResults& results) {
   int best = -1;
   for (std::size_t i = 0; i < results.candidates.size(); ++i)
@@ -62,9 +66,9 @@ std::vector<Replay> finer_replays(const std::vector<Replay>& replays, const Answ
   return settings.solver_check ? on_half_the_cell(replays) : std::vector<Replay>();
 }
 
-/// Friction, weight, two angles of a pinch, start yaw and table height, and what was stated with a deviation,
-/// to both sides.
-std::size_t most_held_motions(const GridSettings& grid) { return 2 * (6 + grid.deviations.size()); }
+/// Friction, weight, a stiffness, two angles of a pinch, start yaw and table height, and what was stated with
+/// a deviation, to both sides.
+std::size_t most_held_motions(const GridSettings& grid) { return 2 * (7 + grid.deviations.size()); }
 
 std::vector<std::size_t> stiffnesses_of(const std::vector<Axis>& axes) {
   std::vector<std::size_t> stiffnesses;
@@ -255,6 +259,13 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
   concluded.answer.warnings.insert(concluded.answer.warnings.begin(), answer.warnings.begin(),
                                    answer.warnings.end());
   answer = std::move(concluded.answer);
+  const CandidateResult& nearest = results.candidates[static_cast<std::size_t>(answer.best)];
+  if (answer.estimate.score > kFarther * nearest.score)
+    answer.warnings.push_back(
+        "the best candidate misses the cloth by " + millimetres(nearest.score) + ", the estimate by " +
+        millimetres(answer.estimate.score) +
+        " on the same mesh: errors of the cells, of the step and of what is held decide "
+        "between them; search on a finer mesh, with a shorter step, or what is held too");
   warn_of_held(task, there.look.likelihood, there.errors, answer.warnings);
 
   Posterior posterior = there.look.posterior;

@@ -8,8 +8,8 @@
 namespace flash::sysid {
 namespace {
 
-constexpr double kFriction = 2, kWeight = 1.1;  // factors within which both are known unless measured
-constexpr double kPinch = 0.2;                  // angles of the ridge that two fingers fold [rad]
+constexpr double kFriction = 2, kStiffness = 2, kWeight = 1.1;  // factors within which each is known
+constexpr double kPinch = 0.2;  // angles of the ridge that two fingers fold [rad]
 
 bool is_searched(const std::string& name, const GridSettings& grid) {
   return std::any_of(grid.axes.begin(), grid.axes.end(),
@@ -63,10 +63,13 @@ std::vector<HeldParameter> held_parameters(const GridSettings& grid, const std::
   };
   if (std::any_of(replays.begin(), replays.end(), [](const Replay& r) { return r.recording.has_table; }))
     add("friction", candidate.solid ? candidate.solid->friction : candidate.material.friction, kFriction);
-  if (candidate.solid)
+  if (candidate.solid) {
     add("density", candidate.solid->density, kWeight);
-  else
+  } else {
     add("areal_density", candidate.material.areal_density, kWeight);
+    if (is_searched("bending", grid)) add("young", candidate.material.membrane_stiffness, kStiffness);
+    if (is_searched("young", grid)) add("bending", candidate.material.bending_rigidity, kStiffness);
+  }
   double yaw = 0, height = 0;
   for (const Replay& replay : replays) {
     yaw = std::max(yaw, replay.recording.nuisance.start_yaw);

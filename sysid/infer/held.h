@@ -15,7 +15,8 @@ struct HeldParameter {
 };
 
 /// What was stated with a standard deviation. Friction within a factor of 2 of the value that the search
-/// holds it at: it competes with bending where a sheet is lifted off a table. The weight within 10 %:
+/// holds it at: it competes with bending where a sheet is lifted off a table. So are stretching and bending
+/// of a sheet of which the other is searched: a soft sheet is moved by both. The weight within 10 %:
 /// stiffnesses are known as ratios to it. The bounds of a recording on start yaw and table height, over
 /// sqrt(3), where it has any. Of a pinch its pitch, and its direction where the recording does not give one,
 /// within 0.2 rad: fingers fold what they find. The other properties of the asset, shape and size of the

@@ -140,11 +140,9 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     const Recording& recording, const Nuisance& start,
     const std::function<const Motion&(double time_offset)>& motion_at) {
   constexpr int kSteps = 30;
-  // Of the noise: what a step moves rows by. Over four parameters, with steps without end and six seeds of
-  // draws each, Poisson's mean standard deviation is 0.033 at a tenth, 0.031 at 0.03, 0.028 at a hundredth,
-  // 0.030 at a thousandth; seeds differ by 0.001. A tenth errs on the wide side and takes less than half of
-  // the steps.
-  constexpr double kSame = 0.1;
+  // Of the noise: what a last step may move rows by. At a tenth the intervals of equal searches by two routes
+  // differed by 12 %, at this by 6 %, for a tenth more of time.
+  constexpr double kSame = 0.02;
   const auto is_same = [&](const Nuisance& a, const Nuisance& b) {
     const Eigen::VectorXd moved = recording.registered * (b.registration - a.registration) +
                                   known_at(recording, a.errors) * (b.errors - a.errors);
@@ -161,13 +159,18 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
   SheetShifts shifts;
   for (int step = 0; step < kSteps; ++step) {
     const Motion& motion = motion_at(next.registration[4]);
-    if (!is_read(recording, motion, next.registration[4])) return {next, NAN};
-    set_shifts(recording, next, shifts);
-    const Eigen::VectorXd residuals = recording.linear.scale.cwiseProduct(recording.near->distances(
-        recording.replay, motion, registration_of(recording, next), shifts, sheet, triangles));
+    const bool read = is_read(recording, motion, next.registration[4]);
+    if (!read && step == 0) return {next, NAN};
+    Eigen::VectorXd residuals;
+    double there = INFINITY;
+    if (read) {
+      set_shifts(recording, next, shifts);
+      residuals = recording.linear.scale.cwiseProduct(recording.near->distances(
+          recording.replay, motion, registration_of(recording, next), shifts, sheet, triangles));
+      there = recording.likelihood->deviance_of(
+          residuals, next.registration.cwiseQuotient(recording.bounds.cwiseMax(1e-300)), next.errors);
+    }
     // Errors that bend, and surfaces that are left for another, make a step too long.
-    const double there = recording.likelihood->deviance_of(
-        residuals, next.registration.cwiseQuotient(recording.bounds.cwiseMax(1e-300)), next.errors);
     if (!(there <= here)) {
       if (is_same(at, next)) return {at, here};
       next.registration = 0.5 * (at.registration + next.registration);

@@ -32,7 +32,8 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   MotionLikelihood likelihood = likelihood_about(
       task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
   const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
-  const double fall = std::max(0.0, likelihood.deviance(motions_in(*simulated)) - of_points.minCoeff());
+  const double of_mode = likelihood.deviance(motions_in(*simulated)),
+               fall = std::isnan(of_mode) ? INFINITY : std::max(0.0, of_mode - of_points.minCoeff());
 
   // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
   std::vector<KnownError> errors = held;
@@ -51,7 +52,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, fall_to_best));
   if (!(share_of_points > 0)) return Settled::by_emulator;
   Posterior by_points = explore_at_points(found.axes, of_points);
-  if (!(fall > 0)) set_estimate(by_points, found.axes, mode);
+  if (share_of_points < 0.5 || !(fall > 0)) set_estimate(by_points, found.axes, mode);
   Posterior mixed = mixture(found.look.posterior, std::move(by_points), share_of_points);
   if (share_of_points >= 0.5 && found.emulator.share != own_mesh) {
     const double share = std::exchange(found.emulator.share, own_mesh);

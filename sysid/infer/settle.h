@@ -7,14 +7,14 @@ namespace flash::sysid {
 
 enum class Settled { by_emulator, by_points, elsewhere };
 
-/// The estimate becomes the likeliest of what was simulated: the mode of the posterior, or a point of the
-/// emulator's grid. Where folds fall another way between two simulations such a point is likelier than the
-/// mode. The posterior is a mixture: what the mode turned out to be likely, over the likeliest, is the share
-/// of the emulator, and each point speaks for the rest (explore_at_points). A share, since a likelihood of
-/// motions that change abruptly differs by chance from point to point: whatever were chosen by it would be as
-/// much by chance. Where points rule and those of the search's own mesh are likelier than those of no cells,
-/// the answer is of that mesh: what changes abruptly is not extrapolated. Elsewhere: the `best` of the
-/// search, beyond the emulator's grid, is likelier than all.
+/// Where folds fall another way between two simulations, a point of the emulator's grid is likelier than the
+/// mode of the posterior once that is simulated. The posterior is a mixture: what the mode turned out to be
+/// likely, over the likeliest point, is the share of the emulator, and each point speaks for the rest
+/// (explore_at_points). A share, since a likelihood of motions that change abruptly differs by chance from
+/// point to point: whatever were chosen by it would be as much by chance. The estimate is the mode, or the
+/// likeliest point where points have more than half. Where they have, and those of the search's own mesh are
+/// likelier than those of no cells, the answer is of that mesh: what changes abruptly is not extrapolated.
+/// Elsewhere: the `best` of the search, beyond the emulator's grid, is likelier than all.
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
                const std::vector<KnownError>& held);
 

@@ -22,7 +22,7 @@ TEST(Held, FrictionIsUncertainUnlessItWasSearchedOrMeasured) {
   grid.base.material = short_lift_material();
   grid.base.material.friction = 0.3;
   grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
-  grid.fixed = {parse_hold("areal_density=0.2:measured").axis};
+  grid.fixed = {parse_hold("areal_density=0.2:measured").axis, parse_hold("young=30:measured").axis};
   const std::vector<HeldParameter> held = held_parameters(grid, replays);
   ASSERT_EQ(names_of(held), std::vector<std::string>{"friction"});
   EXPECT_DOUBLE_EQ(held[0].values[0], 0.15);
@@ -40,6 +40,31 @@ TEST(Held, FrictionIsUncertainUnlessItWasSearchedOrMeasured) {
   GridSettings measured = grid;
   measured.fixed.push_back(parse_hold("friction=0.3").axis);
   EXPECT_TRUE(held_parameters(measured, replays).empty());
+}
+
+// A soft sheet is moved by its stretching too: which of both stiffnesses is not searched counts as assumed.
+TEST(Held, TheOtherStiffnessIsUncertainUnlessItWasMeasured) {
+  const data::TemporaryFolder folder;
+  const std::vector<Replay> replays = {short_lift(folder)};
+  GridSettings grid;
+  grid.base.material = short_lift_material();  // 30 N/m, 2e-4 N m
+  grid.fixed = {parse_hold("areal_density=0.2:measured").axis, parse_hold("friction=0.3:measured").axis};
+  const auto held_beside = [&](const std::vector<std::pair<std::string, std::string>>& axes) {
+    GridSettings asked = grid;
+    for (const auto& [name, values] : axes) asked.axes.push_back(parse_axis(name, values));
+    return held_parameters(asked, replays);
+  };
+  std::vector<HeldParameter> held = held_beside({{"bending", "1e-4:4e-4:3:log"}});
+  ASSERT_EQ(names_of(held), std::vector<std::string>{"young"});
+  EXPECT_DOUBLE_EQ(held[0].values[0], 15);
+  EXPECT_DOUBLE_EQ(held[0].values[1], 60);
+  held = held_beside({{"bending", "1e-4:4e-4:3:log"}, {"young", "50"}});  // assumed on the command line
+  EXPECT_DOUBLE_EQ(held[0].values[1], 100);
+  held = held_beside({{"young", "10:100:3:log"}});
+  ASSERT_EQ(names_of(held), std::vector<std::string>{"bending"});
+  EXPECT_DOUBLE_EQ(held[0].values[1], 4e-4);
+  EXPECT_TRUE(held_beside({{"bending", "1e-4:4e-4:3:log"}, {"young", "10:100:3:log"}}).empty());
+  EXPECT_TRUE(held_beside({{"start_yaw", "-0.1:0.1:3"}}).empty());  // neither is asked for
 }
 
 // Nobody weighed it: known to 10 %, whatever the asset says. A stated deviation takes the place of that, and
