@@ -7,6 +7,7 @@
 
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -220,7 +221,8 @@ TEST(Asset, SheetsMayBeWoven) {
   std::vector<std::string> notices;
   EXPECT_EQ(express_as(woven, AssetFormat::published, 0.1, notices).weave, Weave{});
   EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [](const std::string& notice) {
-    return notice.find("bending_ratio, twisting_ratio and warp_direction") != std::string::npos;
+    return notice.find("bending_ratio, twisting_ratio, young_ratio, shear_ratio and warp_direction") !=
+           std::string::npos;
   }));
   const auto error = [&](const char* text, const json& changes) {
     return input_error_of([&] { load(text, changes); });
@@ -231,6 +233,43 @@ TEST(Asset, SheetsMayBeWoven) {
       error(kFlash, {{"bending_ratio", 2}, {"bending_model", "hinge"}}).find("expected bending_model plate"),
       std::string::npos);
   EXPECT_NE(error(kPublished, {{"warp_direction", 10}}).find("flash-asset/1"), std::string::npos);
+}
+
+TEST(Asset, MembranesMayBeWoven) {
+  const TemporaryFolder folder;
+  const auto load = [&](const json& changes) {
+    json file = json::parse(kFlash);
+    file["mechanical_props"].update(changes);
+    return load_asset(folder.write("towel.json", file.dump()));
+  };
+  const json weave = {
+      {"constitutive", "TRI_STVK"}, {"young_ratio", 0.25}, {"shear_ratio", 0.1}, {"warp_direction", 30}};
+  const Asset woven = load(weave);
+  const ResolvedSheet sheet = resolve_sheet(woven, 0.1);
+  const SheetMaterial& m = sheet.material;
+  EXPECT_EQ(m.weave.young_ratio, 0.25);
+  EXPECT_EQ(m.weave.shear_ratio, 0.1);
+  save_asset(woven, folder / "copy.json");
+  EXPECT_EQ(load_asset(folder / "copy.json").weave, woven.weave);
+  // nu_12 / E_1 = nu_21 / E_2, and nu^2 = nu_12 nu_21.
+  const std::string said = "E_2 t = " + format_short(0.25 * m.membrane_stiffness) + " N/m, G t = " +
+                           format_short(0.1 * 0.5 * m.membrane_stiffness / (2 * (1 + m.poissons_ratio))) +
+                           " N/m, nu_12 = " + format_short(2 * m.poissons_ratio);
+  EXPECT_TRUE(std::any_of(sheet.notices.begin(), sheet.notices.end(), [&](const std::string& notice) {
+    return notice.find(said) != std::string::npos;
+  })) << said;
+  const auto error = [&](const json& changes) { return input_error_of([&] { load(changes); }); };
+  for (const char* key : {"young_ratio", "shear_ratio"}) {
+    EXPECT_NE(error({{"constitutive", "TRI_COROTATED"}, {key, 0.5}})
+                  .find("expected constitutive TRI_STVK, the only"),
+              std::string::npos);
+    EXPECT_NE(error({{"constitutive", "TRI_STVK"}, {key, -1}}).find("found -1, expected a number above 0"),
+              std::string::npos);
+  }
+  EXPECT_NE(
+      error({{"bending_model", "hinge"}, {"warp_direction", 5}}).find("constitutive TRI_STVK, which may"),
+      std::string::npos);
+  EXPECT_EQ(error({{"bending_model", "hinge"}, {"constitutive", "TRI_STVK"}, {"warp_direction", 5}}), "");
 }
 
 TEST(Asset, BendingOfHingesMayYield) {
