@@ -91,8 +91,14 @@ void read_weave(const JsonObject& props, Asset& asset) {
     throw props.error("warp_direction", "bending_model plate or constitutive TRI_STVK, which may be woven");
   asset.weave.bending_ratio = props.positive("bending_ratio", 1);
   asset.weave.twisting_ratio = props.positive("twisting_ratio", 1);
-  asset.weave.young_ratio = props.positive("young_ratio", 1);
-  asset.weave.shear_ratio = props.positive("shear_ratio", 1);
+  const auto within = [&](const char* key, double low, double high) {
+    const double ratio = props.positive(key, 1);
+    if (ratio < low || ratio > high)
+      throw props.error(key, "a number from " + format_short(low) + " to " + format_short(high));
+    return ratio;
+  };
+  asset.weave.young_ratio = within("young_ratio", 0.01, 100);
+  asset.weave.shear_ratio = within("shear_ratio", 1e-3, 100);
   asset.weave.warp_direction = props.number("warp_direction", 0) * std::numbers::pi / 180;
 }
 
@@ -122,10 +128,17 @@ void read_properties(const JsonObject& props, Asset& asset) {
   if (solid != is_solid(asset.constitutive))
     throw props.error("constitutive",
                       solid ? "TET_... for element_type TETRAHEDRON" : "TRI_... for element_type TRIANGLE");
-  asset.young = props.positive("young");
+  const auto at_most = [&](const char* key, double value, double most) {
+    if (value > most) throw props.error(key, "at most " + format_short(most));
+    return value;
+  };
+  asset.young = at_most("young", props.positive("young"), 1e13);
   asset.poisson = props.number("poisson");
   if (!(asset.poisson > -1 && (asset.poisson < 0.5 || (!solid && asset.poisson == 0.5))))
     throw props.error("poisson", solid ? "above -1 and below 0.5" : "above -1 and at most 0.5");
+  for (const char* key : {"thickness", "bending", "bending_rigidity", "bending_model"})
+    if (solid && !published && props.has(key))
+      throw props.error(key, "no such field for element_type TETRAHEDRON");
   if (props.has("thickness")) asset.thickness = props.positive("thickness");
   if (props.has("bending")) asset.published_bending = props.not_negative("bending");
   if (props.has("bending_rigidity")) asset.bending_rigidity = props.not_negative("bending_rigidity");
@@ -141,7 +154,7 @@ void read_properties(const JsonObject& props, Asset& asset) {
     throw props.error("areal_density", "density, mass or obj_mass for a solid");
   if (!published && !solid && !asset.thickness && !asset.bending_rigidity)
     throw props.error("bending_rigidity", "D [N m], or a thickness for the plate formula");
-  asset.friction = props.not_negative("friction", asset.friction);
+  asset.friction = at_most("friction", props.not_negative("friction", asset.friction), 1e3);
   asset.air_drag = props.not_negative("air_drag", 0);
   asset.stiffness_damping = props.not_negative("stiffness_damping", 0);
 }

@@ -235,6 +235,31 @@ TEST(Asset, SheetsMayBeWoven) {
   EXPECT_NE(error(kPublished, {{"warp_direction", 10}}).find("flash-asset/1"), std::string::npos);
 }
 
+TEST(Asset, WhatNoMaterialHasIsRefused) {
+  const TemporaryFolder folder;
+  const auto error = [&](const json& changes) {
+    json file = json::parse(kFlash);
+    file["mechanical_props"].update(changes);
+    return input_error_of([&] { load_asset(folder.write("towel.json", file.dump())); });
+  };
+  EXPECT_NE(error({{"young", 1e300}}).find("young: found 1e+300, expected at most 1e+13"), std::string::npos);
+  EXPECT_NE(error({{"friction", 1e9}}).find("friction: found 1000000000.0, expected at most 1000"),
+            std::string::npos);
+  EXPECT_NE(error({{"constitutive", "TRI_STVK"}, {"young_ratio", 1e-9}}).find("a number from 0.01 to 100"),
+            std::string::npos);
+  const auto solid_error = [&](const char* key) {
+    const json file = {
+        {"schema", "flash-asset/1"},
+        {"mesh", "box:1x1x1:1"},
+        {"element_type", "TETRAHEDRON"},
+        {"mechanical_props",
+         {{"density", 1}, {"young", 1}, {"poisson", 0.3}, {"constitutive", "TET_ARAP"}, {key, 1}}}};
+    return input_error_of([&] { load_asset(folder.write("cube.json", file.dump())); });
+  };
+  for (const char* key : {"thickness", "bending_rigidity", "bending_model"})
+    EXPECT_NE(solid_error(key).find("no such field for element_type TETRAHEDRON"), std::string::npos) << key;
+}
+
 TEST(Asset, MembranesMayBeWoven) {
   const TemporaryFolder folder;
   const auto load = [&](const json& changes) {
@@ -302,8 +327,9 @@ TEST(Asset, ElementsMayBeQuadratic) {
   const TemporaryFolder folder;
   const auto load = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {
     return load_asset(folder.write("part.json", "{" + fields + R"(, "mesh": "box:1x1x1:1",
-      "mechanical_props": {"mass": 1, "young": 1, "poisson": 0.3, "thickness": 1, "constitutive": ")" +
-                                                    law + "\"}}"));
+      "mechanical_props": {"mass": 1, "young": 1, "poisson": 0.3, )" +
+                                                    (law.starts_with("TRI") ? "\"thickness\": 1, " : "") +
+                                                    "\"constitutive\": \"" + law + "\"}}"));
   };
   const auto error = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {
     return input_error_of([&] { load(fields, law); });
