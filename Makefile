@@ -21,7 +21,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
-.PHONY: grasp-shapes few-views-study knock-study locking drape self-contact contact-counts scene-batch reference fuzz sanitize
+.PHONY: grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -123,6 +123,9 @@ self-contact: configure-test  ## Say what sheets do that meet themselves and eac
 	cmake --build $(BUILD) -j $(JOBS) --target self_contact_study
 	$(BUILD)/tests/self_contact_study
 
+contact-metrics: build packages-test  ## Say how far a sheet sinks and creeps under the published method's inexact metric, beside the full and the exact one
+	$(PYTHON) tests/validation/contact_metrics.py --sim $(BUILD)/bin/flash-sim --out $(BUILD)/contact_metrics
+
 contact-counts: configure-test  ## Say how many iterations a step takes as contacts grow, up to some 100,000 in one environment
 	cmake --build $(BUILD) -j $(JOBS) --target self_contact_study
 	$(BUILD)/tests/self_contact_study contacts
@@ -130,6 +133,9 @@ contact-counts: configure-test  ## Say how many iterations a step takes as conta
 scene-batch: configure-test  ## Say how long steps of the T-shirt take in 1, 64 and 256 environments, on two threads
 	cmake --build $(BUILD) -j $(JOBS) --target scene_batch_study
 	$(BUILD)/tests/scene_batch_study examples/tshirt_fold.json 2 1 30 64 1 256 1
+
+silicone: build packages-test  ## Say what E silicone parts that sag have by clouds of a lidar, from $(DATA)/silicone
+	$(PYTHON) tests/validation/silicone.py --sysid $(sysid) --data $(DATA)/silicone --out $(BUILD)/silicone
 
 locking: configure-test  ## Say how far tetrahedra lock: the tip of a cantilever over Poisson's ratio and mesh
 	cmake --build $(BUILD) -j $(JOBS) --target locking_study

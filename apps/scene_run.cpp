@@ -245,6 +245,17 @@ std::set<int> frames_to_write(const data::Scene& scene, int steps) {
   return frames;
 }
 
+/// Keyframes after the last step, which are not written.
+std::vector<std::string> keyframe_warnings(const data::Scene& scene, int steps) {
+  const double end = (steps + 0.5) * scene.time_step;
+  const auto late = std::count_if(scene.keyframe_times.begin(), scene.keyframe_times.end(),
+                                  [&](double t) { return t > end; });
+  if (late == 0) return {};
+  return {"keyframes: " + std::to_string(late) + " of " + std::to_string(scene.keyframe_times.size()) +
+          " lie after the end at " + data::format_short(steps * scene.time_step) +
+          " s and are not written: is the duration right?"};
+}
+
 /// Takes away all velocity; returns the largest there was [m/s].
 double stop_motion(std::vector<SceneBody>& bodies) {
   double fastest = 0;
@@ -384,6 +395,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
       summary.warnings.push_back(bodies[b].name + ": " + warning);
   for (const std::string& warning : coming_through_warnings(bodies)) summary.warnings.push_back(warning);
+  if (!scene.rest_motion && !summary.interrupted)
+    for (const std::string& warning : keyframe_warnings(scene, summary.steps))
+      summary.warnings.push_back(warning);
   summary.held_penetration_max = held.penetration.depth;
   summary.start_penetration_max = started.penetration.depth;
   if (held.penetration.depth > told_depth)

@@ -76,15 +76,29 @@ void read_mass(const JsonObject& props, Asset& asset) {
 }
 
 void read_weave(const JsonObject& props, Asset& asset) {
-  for (const char* key : {"bending_ratio", "twisting_ratio", "warp_direction"}) {
-    if (!props.has(key)) continue;
-    if (asset.format == AssetFormat::published || asset.element_type != ElementType::triangle)
+  const bool bends = !asset.bending_model || *asset.bending_model == BendingModel::plate,
+             stretches = asset.constitutive == Constitutive::tri_stvk;
+  for (const char* key : {"bending_ratio", "twisting_ratio", "young_ratio", "shear_ratio", "warp_direction"})
+    if (props.has(key) &&
+        (asset.format == AssetFormat::published || asset.element_type != ElementType::triangle))
       throw props.error(key, "no such field but for sheets in \"schema\": \"flash-asset/1\"");
-    if (asset.bending_model && *asset.bending_model != BendingModel::plate)
-      throw props.error(key, "bending_model plate, the only one that is woven");
-  }
+  for (const char* key : {"bending_ratio", "twisting_ratio"})
+    if (props.has(key) && !bends) throw props.error(key, "bending_model plate, the only one that is woven");
+  for (const char* key : {"young_ratio", "shear_ratio"})
+    if (props.has(key) && !stretches)
+      throw props.error(key, "constitutive TRI_STVK, the only one that is woven");
+  if (props.has("warp_direction") && !bends && !stretches)
+    throw props.error("warp_direction", "bending_model plate or constitutive TRI_STVK, which may be woven");
   asset.weave.bending_ratio = props.positive("bending_ratio", 1);
   asset.weave.twisting_ratio = props.positive("twisting_ratio", 1);
+  const auto within = [&](const char* key, double low, double high) {
+    const double ratio = props.positive(key, 1);
+    if (ratio < low || ratio > high)
+      throw props.error(key, "a number from " + format_short(low) + " to " + format_short(high));
+    return ratio;
+  };
+  asset.weave.young_ratio = within("young_ratio", 0.01, 100);
+  asset.weave.shear_ratio = within("shear_ratio", 1e-3, 100);
   asset.weave.warp_direction = props.number("warp_direction", 0) * std::numbers::pi / 180;
 }
 
@@ -106,18 +120,25 @@ void read_properties(const JsonObject& props, Asset& asset) {
     throw props.error("bending_rigidity", "bending, or \"schema\": \"flash-asset/1\"");
   props.expect_fields({"obj_mass", "mass", "density", "areal_density", "young", "poisson", "constitutive",
                        "thickness", published ? "bending" : "bending_rigidity", "bending_model",
-                       "bending_ratio", "twisting_ratio", "warp_direction", "yield_curvature", "friction",
-                       "air_drag", "stiffness_damping"});
+                       "bending_ratio", "twisting_ratio", "young_ratio", "shear_ratio", "warp_direction",
+                       "yield_curvature", "friction", "air_drag", "stiffness_damping"});
   asset.constitutive =
       parse_constitutive(props.string("constitutive"), asset.source, props.name_of("constitutive"));
   const bool solid = asset.element_type == ElementType::tetrahedron;
   if (solid != is_solid(asset.constitutive))
     throw props.error("constitutive",
                       solid ? "TET_... for element_type TETRAHEDRON" : "TRI_... for element_type TRIANGLE");
-  asset.young = props.positive("young");
+  const auto at_most = [&](const char* key, double value, double most) {
+    if (value > most) throw props.error(key, "at most " + format_short(most));
+    return value;
+  };
+  asset.young = at_most("young", props.positive("young"), 1e13);
   asset.poisson = props.number("poisson");
   if (!(asset.poisson > -1 && (asset.poisson < 0.5 || (!solid && asset.poisson == 0.5))))
     throw props.error("poisson", solid ? "above -1 and below 0.5" : "above -1 and at most 0.5");
+  for (const char* key : {"thickness", "bending", "bending_rigidity", "bending_model"})
+    if (solid && !published && props.has(key))
+      throw props.error(key, "no such field for element_type TETRAHEDRON");
   if (props.has("thickness")) asset.thickness = props.positive("thickness");
   if (props.has("bending")) asset.published_bending = props.not_negative("bending");
   if (props.has("bending_rigidity")) asset.bending_rigidity = props.not_negative("bending_rigidity");
@@ -133,7 +154,7 @@ void read_properties(const JsonObject& props, Asset& asset) {
     throw props.error("areal_density", "density, mass or obj_mass for a solid");
   if (!published && !solid && !asset.thickness && !asset.bending_rigidity)
     throw props.error("bending_rigidity", "D [N m], or a thickness for the plate formula");
-  asset.friction = props.not_negative("friction", asset.friction);
+  asset.friction = at_most("friction", props.not_negative("friction", asset.friction), 1e3);
   asset.air_drag = props.not_negative("air_drag", 0);
   asset.stiffness_damping = props.not_negative("stiffness_damping", 0);
 }
@@ -152,6 +173,19 @@ double areal_density_of(const Asset& asset, double rest_area) {
   if (asset.areal_density) return *asset.areal_density;
   if (asset.density) return *asset.density * asset.thickness.value_or(1);
   return (asset.mass ? *asset.mass : asset.object_mass.value_or(0)) / rest_area;
+}
+
+/// A woven sheet's numbers across its warp and between.
+std::string weave_text(const SheetMaterial& m) {
+  std::string text;
+  if (m.weave.is_of_membrane()) {
+    const double mean = std::sqrt(m.weave.young_ratio);
+    text = "E_2 t = " + format_short(m.weave.young_ratio * m.membrane_stiffness) + " N/m, G t = " +
+           format_short(m.weave.shear_ratio * mean * m.membrane_stiffness / (2 * (1 + m.poissons_ratio))) +
+           " N/m, nu_12 = " + format_short(m.poissons_ratio / mean) + ", ";
+  }
+  return text + "D_2 = " + format_short(m.weave.bending_ratio * m.bending_rigidity) + " N m, warp at " +
+         format_short(m.weave.warp_direction * 180 / std::numbers::pi) + " deg from x";
 }
 
 }  // namespace
@@ -235,6 +269,8 @@ void save_asset(const Asset& asset, const std::string& path) {
     const Weave& weave = asset.weave;
     if (weave.bending_ratio != 1) props["bending_ratio"] = weave.bending_ratio;
     if (weave.twisting_ratio != 1) props["twisting_ratio"] = weave.twisting_ratio;
+    if (weave.young_ratio != 1) props["young_ratio"] = weave.young_ratio;
+    if (weave.shear_ratio != 1) props["shear_ratio"] = weave.shear_ratio;
     if (weave.warp_direction != 0) props["warp_direction"] = weave.warp_direction * 180 / std::numbers::pi;
     if (asset.yield_curvature) props["yield_curvature"] = *asset.yield_curvature;
     props["friction"] = asset.friction;
@@ -289,10 +325,7 @@ ResolvedSheet resolve_sheet(const Asset& asset, double rest_area) {
                           "), nu = " + format_short(m.poissons_ratio));
   sheet.notices.push_back(source + ": D = " + format_short(m.bending_rigidity) + " N m (" +
                           origin_of_bending + "), bending_model " + to_string(m.bending_model));
-  if (m.weave != Weave{})
-    sheet.notices.push_back(
-        source + ": woven: D_2 = " + format_short(m.weave.bending_ratio * m.bending_rigidity) +
-        " N m, warp at " + format_short(m.weave.warp_direction * 180 / std::numbers::pi) + " deg from x");
+  if (m.weave != Weave{}) sheet.notices.push_back(source + ": woven: " + weave_text(m));
   if (asset.yield_curvature)
     sheet.notices.push_back(source + ": bending yields at " + format_short(m.yield_curvature) +
                             " 1/m, at a moment of " + format_short(m.bending_rigidity * m.yield_curvature) +
@@ -367,7 +400,9 @@ Asset express_as(const Asset& asset, AssetFormat format, double rest_area,
     result.bending_rigidity.reset();
     result.bending_model.reset();
     if (asset.weave != Weave{})
-      lose("bending_ratio, twisting_ratio and warp_direction: its sheets are isotropic");
+      lose(
+          "bending_ratio, twisting_ratio, young_ratio, shear_ratio and warp_direction: its sheets are "
+          "isotropic");
     result.weave = {};
     if (asset.yield_curvature) lose("yield_curvature: bending does not yield");
     result.yield_curvature.reset();

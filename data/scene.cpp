@@ -23,8 +23,20 @@ std::string existing_file(const JsonObject& object, const char* key) {
   return path;
 }
 
+constexpr double farthest = 1e5;  // from there on rounding is a tenth of a nanometre [m]
+constexpr double fastest = 1e3;   // [m/s]
+constexpr double most_friction = 1e3;
+
+/// A place or a size, within `farthest` along each axis.
+Eigen::Vector3d near(const JsonObject& object, const char* key, const Eigen::Vector3d& place) {
+  if (!(place.cwiseAbs().maxCoeff() <= farthest))
+    throw object.error(key, "coordinates of at most " + format_short(farthest) + " m");
+  return place;
+}
+
 Eigen::Isometry3d read_pose(const JsonObject& object, const char* key) {
   const Eigen::Matrix<double, 7, 1> pose = object.vector(key, 7);
+  near(object, key, pose.head<3>());
   if (std::abs(pose.tail<4>().norm() - 1) > 1e-3)
     throw object.error(key, "[x, y, z, qx, qy, qz, qw] with a unit quaternion");
   return from_vector(pose);
@@ -74,11 +86,21 @@ void read_solver(const JsonObject& file, SceneSolver& solver) {
 }
 
 std::optional<double> read_friction(const JsonObject& object) {
-  return object.has("friction") ? std::optional<double>(object.not_negative("friction")) : std::nullopt;
+  if (!object.has("friction")) return std::nullopt;
+  const double friction = object.not_negative("friction");
+  if (friction > most_friction) throw object.error("friction", "at most " + format_short(most_friction));
+  return friction;
+}
+
+/// A length above 0 and within `farthest`.
+double read_length(const JsonObject& object, const char* key) {
+  const double length = object.positive(key);
+  if (length > farthest) throw object.error(key, "at most " + format_short(farthest) + " m");
+  return length;
 }
 
 ScenePlane read_plane(const JsonObject& object) {
-  return {object.vector3("point", Eigen::Vector3d::Zero()),
+  return {near(object, "point", object.vector3("point", Eigen::Vector3d::Zero())),
           object.direction("normal", Eigen::Vector3d::UnitZ())};
 }
 
@@ -113,7 +135,7 @@ Trajectory read_trajectory(const JsonObject& object) {
       throw keyframe.error(
           "t", "a time after " + format_number(trajectory.times.back()) + " s, the keyframe before");
     Eigen::Matrix<double, 7, 1> pose;
-    pose.head<3>() = keyframe.vector3("translation", Eigen::Vector3d::Zero());
+    pose.head<3>() = near(keyframe, "translation", keyframe.vector3("translation", Eigen::Vector3d::Zero()));
     pose.tail<4>() = Eigen::Vector4d::UnitW();
     if (keyframe.has("rotation_xyzw")) pose.tail<4>() = Eigen::Vector4d(keyframe.vector("rotation_xyzw", 4));
     if (std::abs(pose.tail<4>().norm() - 1) > 1e-3)
@@ -128,11 +150,12 @@ Trajectory read_trajectory(const JsonObject& object) {
 SceneCapsule read_capsule(const JsonObject& object, bool has_length) {
   SceneCapsule capsule;
   capsule.trajectory = read_trajectory(object);
-  if (capsule.trajectory.times.empty() || object.has("point")) capsule.point = object.vector("point", 3);
-  capsule.radius = object.positive("radius");
+  if (capsule.trajectory.times.empty() || object.has("point"))
+    capsule.point = near(object, "point", object.vector("point", 3));
+  capsule.radius = read_length(object, "radius");
   if (has_length) {
     capsule.axis = object.direction("axis", Eigen::Vector3d::UnitX());
-    capsule.half_length = object.positive("half_length");
+    capsule.half_length = read_length(object, "half_length");
   }
   return capsule;
 }
@@ -167,8 +190,8 @@ void read_obstacles(const JsonObject& file, Scene& scene) {
     } else if (shape == "cylinder") {
       object.expect_fields({"shape", "point", "axis", "radius", "friction"});
       obstacle.shape =
-          SceneCylinder{object.vector("point", 3), object.direction("axis", Eigen::Vector3d::UnitX()),
-                        object.positive("radius")};
+          SceneCylinder{near(object, "point", object.vector("point", 3)),
+                        object.direction("axis", Eigen::Vector3d::UnitX()), read_length(object, "radius")};
     } else if (shape == "sphere") {
       object.expect_fields({"shape", "point", "radius", "trajectory", "keyframes", "friction"});
       obstacle.shape = read_capsule(object, false);
@@ -181,7 +204,7 @@ void read_obstacles(const JsonObject& file, Scene& scene) {
     } else {
       object.expect_fields({"shape", "size", "pose", "trajectory", "keyframes", "friction"});
       SceneBox box;
-      box.size = object.vector("size", 3);
+      box.size = near(object, "size", object.vector("size", 3));
       if (!(box.size.array() > 0).all()) throw object.error("size", "three lengths above 0");
       read_place(object, box);
       obstacle.shape = box;
@@ -266,6 +289,8 @@ SceneObject read_object(const std::string& name, const JsonObject& object, const
   result.name = name;
   result.asset = existing_file(object, "asset");
   result.start_velocity = object.vector3("velocity", result.start_velocity);
+  if (!(result.start_velocity.norm() <= fastest))
+    throw object.error("velocity", "at most " + format_short(fastest) + " m/s");
   if (object.raw("start").is_string()) {
     result.start_mesh = existing_file(object, "start");
   } else if (object.has("start")) {
@@ -332,9 +357,15 @@ void read_self_contact(const JsonObject& file, Scene& scene) {
   const JsonObject object = file.object("self_contact");
   object.expect_fields({"thickness", "friction", "pressure"});
   SceneSelfContact& contact = scene.self_contact.emplace();
-  contact.thickness = object.positive("thickness", contact.thickness);
-  if (object.has("friction")) contact.friction = object.not_negative("friction");
-  contact.pressure = object.positive("pressure", contact.pressure);
+  const auto within = [&](const char* key, double& value, double low, double high) {
+    if (!object.has(key)) return;
+    value = object.number(key);
+    if (!(value >= low && value <= high))
+      throw object.error(key, "a number from " + format_short(low) + " to " + format_short(high));
+  };
+  within("thickness", contact.thickness, 1e-6, 1);
+  within("friction", contact.friction, 0, most_friction);
+  within("pressure", contact.pressure, 1e-3, 1e9);
   if (scene.solver.integrator != "newton")
     throw file.error("self_contact", "solver.type newton, which alone has it");
 }
@@ -364,7 +395,8 @@ void read_pair_friction(const JsonObject& file, Scene& scene) {
   for (const JsonObject& entry : file.objects("friction")) {
     entry.expect_fields({"a", "b", "friction"});
     for (const char* key : {"a", "b"}) read_choice(entry, key, "", names);
-    ScenePairFriction pair{entry.string("a"), entry.string("b"), entry.not_negative("friction")};
+    if (!entry.has("friction")) throw entry.error("friction", "a number of 0 or above");
+    ScenePairFriction pair{entry.string("a"), entry.string("b"), *read_friction(entry)};
     const auto among = [](const std::vector<std::string>& list, const std::string& name) {
       return std::find(list.begin(), list.end(), name) != list.end();
     };

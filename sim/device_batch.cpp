@@ -27,6 +27,9 @@ std::string why_not_on_device(const Environment& environment) {
   if (std::any_of(environment.materials.begin(), environment.materials.end(),
                   [](const auto& material) { return std::isfinite(material.yield_curvature); }))
     return "bending that yields (yield_curvature) is simulated on the CPU alone";
+  if (std::any_of(environment.materials.begin(), environment.materials.end(),
+                  [](const auto& material) { return material.weave.is_of_membrane(); }))
+    return "woven membranes (young_ratio, shear_ratio) are simulated on the CPU alone";
   if (environment.materials.size() > 1) return "several bodies in one environment";
   if (std::any_of(environment.obstacles.begin(), environment.obstacles.end(),
                   [](const Obstacle& obstacle) { return std::holds_alternative<Mesh>(obstacle.shape); }))

@@ -1,5 +1,6 @@
 #include "data/meshing/scanned_surface.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -17,12 +18,24 @@ InputError unfit(const std::string& source, const std::string& what) {
   return InputError(source + ": " + what + " (is it in metres? --scale 0.001 takes millimetres)");
 }
 
-/// The scan has to be some edges wide, and its mesh no larger than anybody simulates.
+/// How wide points are across the direction in which they are longest: of a strip its width [m].
+double width_of(const Points& points) {
+  const Points around = points.rowwise() - points.colwise().mean();
+  const Eigen::Matrix3d moments =
+      around.transpose() * around / static_cast<double>(std::max<Eigen::Index>(1, points.rows()));
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments, Eigen::EigenvaluesOnly);
+  return std::sqrt(12 * std::max(0.0, axes.eigenvalues()[1]));
+}
+
+/// The scan has to be some edges long and one wide, and its mesh no larger than anybody simulates.
 void check_size(const Points& points, double area, const ScanSettings& settings, const std::string& source) {
   const Eigen::RowVector3d span = points.colwise().maxCoeff() - points.colwise().minCoeff();
   if (!(span.norm() >= 4 * settings.edge))
     throw unfit(source, "spans " + format_short(span.norm()) + " m, expected four times --edge " +
                             format_short(settings.edge) + " at least");
+  if (const double width = width_of(points); !(width >= settings.edge))
+    throw unfit(source, "is " + format_short(width) + " m wide where it spans " + format_short(span.norm()) +
+                            " m, expected --edge " + format_short(settings.edge) + " at least");
   const double vertices = area * 2 / std::sqrt(3) / (settings.edge * settings.edge);
   if (!(vertices <= most_vertices))  // nor where the area overflows
     throw unfit(source, "spans " + format_short(span.norm()) + " m and would take " +

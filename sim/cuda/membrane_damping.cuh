@@ -4,7 +4,7 @@
 
 namespace flash::sim::cuda {
 
-// The Kelvin-Voigt membrane of sim/step/membrane_damping.h. A thread takes a triangle.
+// The Kelvin-Voigt membrane of sim/step/strain_energy.h. A thread takes a triangle.
 
 /// Symmetric 2 x 2.
 struct Metric {

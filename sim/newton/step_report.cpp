@@ -117,7 +117,7 @@ bool account_for_energy(const StepProblem& problem, const ElasticEnergy& elastic
     if (law.solid == nullptr) rounding += 2 * law.material.bending_rigidity * law.bending.flat_energy;
     rounding += law.solid != nullptr
                     ? 1e-14 * law.solid->youngs_modulus * body_mass / law.solid->density
-                    : 1e-14 * law.material.membrane_stiffness * body_mass / law.material.areal_density;
+                    : 1e-14 * law.material.largest_stiffness() * body_mass / law.material.areal_density;
   }
   const double allowed = energy_tolerance * there + unbalanced + bristles + rounding;
   if (!(gain <= allowed)) return false;

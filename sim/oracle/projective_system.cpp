@@ -59,10 +59,14 @@ ProjectiveMatrix projective_matrix(const SheetPlan& plan, const std::vector<data
                                    double time_step) {
   ProjectiveMatrix made{plan.sheet.vertex_area, {}};
   std::vector<Eigen::Triplet<double>> entries;
-  for (const data::SheetMaterial& material : materials)
+  for (const data::SheetMaterial& material : materials) {
     if (std::isfinite(material.yield_curvature))
       throw data::InputError(
           "yield_curvature: bending does not yield under the projective method, expected newton");
+    if (material.weave.is_of_membrane())
+      throw data::InputError(
+          "young_ratio, shear_ratio: membranes are isotropic under the projective method, expected newton");
+  }
   for (std::size_t b = 0; b < materials.size(); ++b)
     add_body(plan.sheet, plan.sheet.bodies[b], materials[b], time_step, made.mass, entries);
   made.matrix.resize(made.mass.size(), made.mass.size());

@@ -59,7 +59,7 @@ Eigen::Matrix3d plate_rigidity(double poissons_ratio, const data::Weave& weave, 
   Eigen::Matrix3d rigidity;
   rigidity << 1, poissons_ratio * mean, 0, poissons_ratio * mean, weft, 0, 0, 0,
       2 * (1 - poissons_ratio) * weave.twisting_ratio * mean;
-  if (weave == data::Weave{}) return rigidity;
+  if (!weave.is_of_bending()) return rigidity;
   Eigen::Vector3d x = Eigen::Vector3d::UnitX() - plane.normal.x() * plane.normal;
   if (x.norm() < 1e-6) x = Eigen::Vector3d::UnitY() - plane.normal.y() * plane.normal;
   const double angle = std::atan2(x.dot(plane.v), x.dot(plane.u)) + weave.warp_direction;

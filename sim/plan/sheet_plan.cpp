@@ -128,7 +128,7 @@ const BendingOperator& bending_operator(const SheetPlan& plan, data::BendingMode
                                         double poissons_ratio, int body, const data::Weave& weave) {
   const bool plate = model == data::BendingModel::plate;
   const BendingOperators::Key key = {body, model, plate ? poissons_ratio : 0.0,
-                                     plate ? weave : data::Weave{}};
+                                     plate ? weave.of_bending() : data::Weave{}};
   const std::lock_guard lock(plan.bending->mutex);
   auto& made = plan.bending->made;
   const auto known =

@@ -180,17 +180,17 @@ void add_end_effectors(const data::Scene& scene, const std::string& object, Scen
 double total_area(const Sheet& sheet) { return sheet.vertex_area.sum(); }
 
 /// Mesh and material of an object of triangles.
-void make_sheet_body(const data::Scene& scene, const data::Asset& asset, SceneBody& body,
+void make_sheet_body(const data::Scene& scene, data::Asset asset, SceneBody& body,
                      std::vector<std::string>& notices) {
+  if (scene.bending_model) asset.bending_model = scene.bending_model;
   body.sheet = make_sheet(data::load_asset_mesh(asset));
   const data::ResolvedSheet resolved = data::resolve_sheet(asset, total_area(body.sheet));
   for (const std::string& notice : resolved.notices) notices.push_back(body.name + ": " + notice);
   if (resolved.uniform_vertex_mass) body.sheet.vertex_area.setConstant(body.sheet.vertex_area.mean());
   body.environment.materials[0] = resolved.material;
   if (!scene.bending_model) return;
-  data::SheetMaterial& material = body.environment.materials[0];
-  material.bending_model = *scene.bending_model;
-  if (material.bending_model != data::BendingModel::plate && material.weave != data::Weave{})
+  const data::SheetMaterial& material = body.environment.materials[0];
+  if (material.bending_model != data::BendingModel::plate && material.weave.is_of_bending())
     throw data::input_error(scene.source, "bending_model",
                             std::string("found ") + data::to_string(material.bending_model) +
                                 ", expected plate, as " + asset.source + " is woven");

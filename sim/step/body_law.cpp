@@ -20,6 +20,11 @@ std::vector<BodyLaw> body_laws(const SheetPlan& plan, const Environment& environ
                     has_material ? &solid->second : nullptr});
     BodyLaw& law = laws.back();
     law.hinges = std::span(plan.hinges).subspan(law.place.first_hinge, law.place.hinge_count);
+    if (law.solid == nullptr && material.weave.is_of_membrane() &&
+        material.constitutive != data::Constitutive::tri_stvk)
+      throw data::input_error("young_ratio, shear_ratio", "constitutive",
+                              std::string("found ") + data::to_string(material.constitutive) +
+                                  ", expected TRI_STVK, the only one that is woven");
     if (!law.yields()) continue;
     if (material.bending_model != data::BendingModel::hinge)
       throw data::input_error("yield_curvature", "bending_model",

@@ -29,8 +29,8 @@ struct BodyLaw {
 };
 
 /// The laws of all bodies, in the order of the plan. Plan and environment have to outlive them. Throws as
-/// bending_operator does, data::InputError where a sheet yields whose bending model does not, and
-/// std::invalid_argument where the solids of both are not the same.
+/// bending_operator does, data::InputError where a sheet yields whose bending model does not or
+/// is woven whose membrane law is not, and std::invalid_argument where the solids of both are not the same.
 std::vector<BodyLaw> body_laws(const SheetPlan& plan, const Environment& environment);
 
 }  // namespace flash::sim

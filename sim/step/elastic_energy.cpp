@@ -3,6 +3,7 @@
 #include "sim/cpu/kernels.h"
 #include "sim/step/hinge_energy.h"
 #include "sim/step/solid_energy.h"
+#include "sim/step/strain_energy.h"
 
 namespace flash::sim {
 
@@ -13,6 +14,29 @@ using data::Points;
 /// The membrane's part of the material.
 Membrane membrane_of(const data::SheetMaterial& material) {
   return membrane_of(material.constitutive, sheet_lame(material.membrane_stiffness, material.poissons_ratio));
+}
+
+double add_membrane_gradient(const SheetPlan& plan, const BodyLaw& law, const Points& positions,
+                             Points& gradient) {
+  const BodyPlan& place = law.place;
+  if (law.material.weave.is_of_membrane())
+    return add_strain_gradient(plan, place, {}, SheetStiffness(law.material), positions, gradient);
+  const Membrane membrane = membrane_of(law.material);
+  return plan.kernels->add_membrane_gradient(membrane.law, membrane.lame,
+                                             plan.triangle_groups.data() + place.first_group,
+                                             place.group_count, positions.data(), gradient.data());
+}
+
+void add_membrane_hessian(const SheetPlan& plan, const BodyLaw& law, const Points& positions, double scale,
+                          Curvature curvature, BlockValues<double>& values) {
+  const BodyPlan& place = law.place;
+  if (law.material.weave.is_of_membrane())
+    return add_strain_hessian(plan, place, {}, SheetStiffness(law.material) * scale, positions, curvature,
+                              values);
+  const Membrane membrane = membrane_of(law.material);
+  plan.kernels->add_membrane_hessian(
+      membrane.law, membrane.lame, plan.triangle_groups.data() + place.first_group, place.group_count,
+      positions.data(), scale, curvature == Curvature::positive, values.data());
 }
 
 /// Positions with four numbers a vertex, the last zero.
@@ -39,10 +63,7 @@ ElasticEnergy add_elastic_gradient(const SheetPlan& plan, const BodyLaw& law, co
     energy.solid = add_solid_gradient(plan, place.body, solid_of(*law.solid), positions, gradient);
     return energy;
   }
-  const Membrane membrane = membrane_of(law.material);
-  energy.membrane = plan.kernels->add_membrane_gradient(membrane.law, membrane.lame,
-                                                        plan.triangle_groups.data() + place.first_group,
-                                                        place.group_count, positions.data(), gradient.data());
+  energy.membrane = add_membrane_gradient(plan, law, positions, gradient);
   if (law.bends_at_hinges()) {
     energy.bending = add_hinge_gradient(hinges_in(plan, law),
                                         {law.material.bending_rigidity, law.material.yield_curvature},
@@ -61,10 +82,7 @@ void add_elastic_hessian(const SheetPlan& plan, const BodyLaw& law, const Points
                          Curvature curvature, BlockValues<double>& values) {
   if (law.solid != nullptr)
     return add_solid_hessian(plan, law.place.body, solid_of(*law.solid), positions, scale, curvature, values);
-  const Membrane membrane = membrane_of(law.material);
-  plan.kernels->add_membrane_hessian(
-      membrane.law, membrane.lame, plan.triangle_groups.data() + law.place.first_group, law.place.group_count,
-      positions.data(), scale, curvature == Curvature::positive, values.data());
+  add_membrane_hessian(plan, law, positions, scale, curvature, values);
   if (law.bends_at_hinges())
     add_hinge_hessian(plan, law.place, hinges_in(plan, law),
                       {scale * law.material.bending_rigidity, law.material.yield_curvature}, positions,

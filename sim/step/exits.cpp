@@ -57,7 +57,7 @@ bool exits_gently(const ContactStep& step, const SheetPlan& plan, const std::vec
     if (solid != step.environment.solids.end())
       return step.way_out.speed * std::sqrt(solid->second.density / solid->second.youngs_modulus);
     const data::SheetMaterial& material = step.environment.materials[body];
-    return step.way_out.speed * std::sqrt(material.areal_density / material.membrane_stiffness);
+    return step.way_out.speed * std::sqrt(material.areal_density / material.largest_stiffness());
   };
   std::vector<bool> exiting(static_cast<size_t>(start.rows()), false);
   for (const std::vector<int>& vertices : inside)

@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "sim/step/hinge_energy.h"
-#include "sim/step/membrane_damping.h"
 #include "sim/step/rigid_turn.h"
 #include "sim/step/solid_damping.h"
+#include "sim/step/strain_energy.h"
 
 namespace flash::sim {
 
@@ -39,11 +39,8 @@ IncrementalPotential::IncrementalPotential(const SheetPlan& plan, const std::vec
   }
 }
 
-SheetLame IncrementalPotential::damping_lame(const BodyLaw& law) const {
-  const data::SheetMaterial& material = law.material;
-  SheetLame lame = sheet_lame(damping_share(law) * material.membrane_stiffness, material.poissons_ratio);
-  if (material.constitutive == data::Constitutive::tri_arap) lame.lambda = 0;
-  return lame;
+SheetStiffness IncrementalPotential::damping_stiffness(const BodyLaw& law) const {
+  return SheetStiffness(law.material) * damping_share(law);
 }
 
 SolidLame IncrementalPotential::solid_damping_lame(const BodyLaw& law) const {
@@ -86,7 +83,7 @@ double IncrementalPotential::add_damping(const BodyLaw& law, const Points& posit
                                       force);
   const double rigidity = damping_share(law) * law.material.bending_rigidity;
   const double potential =
-      add_membrane_damping_gradient(plan_, law.place, start_metrics_, damping_lame(law), positions, force);
+      add_strain_gradient(plan_, law.place, start_metrics_, damping_stiffness(law), positions, force);
   if (law.bends_at_hinges())
     return potential + add_hinge_gradient(hinges_of(law.place, start_hinges_), {rigidity}, positions, force);
   // Quadratic models know positions, not angles: what the body turned by as a whole is taken out.
@@ -114,8 +111,8 @@ void IncrementalPotential::assemble(const Points& positions, Curvature curvature
       add_solid_damping_hessian(plan_, law.place.body, solid_start_metrics_, solid_damping_lame(law),
                                 positions, curvature, values);
     } else if (law.stiffness_damping() > 0) {
-      add_membrane_damping_hessian(plan_, law.place, start_metrics_, damping_lame(law), positions, curvature,
-                                   values);
+      add_strain_hessian(plan_, law.place, start_metrics_, damping_stiffness(law), positions, curvature,
+                         values);
       if (law.bends_at_hinges())
         add_hinge_hessian(plan_, law.place, hinges_of(law.place, start_hinges_),
                           {damping_share(law) * law.material.bending_rigidity}, positions, values);

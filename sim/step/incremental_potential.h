@@ -2,6 +2,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "sim/law/sheet_stiffness.h"
 #include "sim/law/solid.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
@@ -47,7 +48,7 @@ class IncrementalPotential {
   double damping_share(const BodyLaw& law) const { return law.stiffness_damping() / h_; }
 
   /// Moduli of a body's membrane times b / h, and those of a solid.
-  SheetLame damping_lame(const BodyLaw& law) const;
+  SheetStiffness damping_stiffness(const BodyLaw& law) const;
   SolidLame solid_damping_lame(const BodyLaw& law) const;
 
   /// Adds the gradient of a body's a / (2 h) |x - x_0|^2_M to `force` and returns its value [J]; `moved`:

@@ -59,7 +59,7 @@ void add_solid_damping_hessian(const SheetPlan& plan, const Body& body,
         stress = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
                  eigen.eigenvectors().transpose();
       }
-      // As that of a triangle in sim/step/membrane_damping.cpp.
+      // As that of a triangle in sim/step/strain_energy.cpp.
       for_blocks(element, values, [&](int i, int j, auto& block) {
         const Vector3d wi = point.gradients.row(i), wj = point.gradients.row(j);
         const Matrix3d material = lame.mu * (wi.dot(wj) * Matrix3d::Identity() + wj * wi.transpose()) +

@@ -11,7 +11,7 @@ namespace flash::sim {
 std::vector<Eigen::Matrix3d> solid_metrics(const SheetPlan& plan, const data::Points& positions);
 
 /// Potential of the Kelvin-Voigt solid over a step that started at `start_metrics`, as that of the membrane
-/// (sim/step/membrane_damping.h): with dE = (F^T F - C_0) / 2,
+/// (sim/step/strain_energy.h): with dE = (F^T F - C_0) / 2,
 ///
 ///   sum V (mu |dE|^2 + lambda / 2 (tr dE)^2) [J],
 ///

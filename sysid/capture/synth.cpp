@@ -370,6 +370,8 @@ std::string truth_text(const data::SheetMaterial& material, const SynthSettings&
   json["parameters"] = {{"poisson", material.poissons_ratio},
                         {"bending", material.bending_rigidity},
                         {"bending_ratio", material.weave.bending_ratio},
+                        {"young_ratio", material.weave.young_ratio},
+                        {"shear_ratio", material.weave.shear_ratio},
                         {"areal_density", material.areal_density},
                         {"friction", material.friction},
                         {"air_drag", material.air_drag},

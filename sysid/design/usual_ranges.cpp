@@ -12,6 +12,8 @@ double own_value(const MaterialBase& base, const std::string& name) {
   if (name == "poisson") return m.poissons_ratio;
   if (name == "bending") return make_candidate(base, {}, {}).material.bending_rigidity;
   if (name == "bending_ratio") return m.weave.bending_ratio;
+  if (name == "young_ratio") return m.weave.young_ratio;
+  if (name == "shear_ratio") return m.weave.shear_ratio;
   if (name == "yield_curvature") return m.yield_curvature;
   if (name == "friction") return m.friction;
   if (name == "areal_density") return m.areal_density;

@@ -189,6 +189,8 @@ void add_material(const MaterialBase& base, Fingerprint& print) {
   if (m.weave != data::Weave{})
     print["asset weave"] =
         values_text({m.weave.bending_ratio, m.weave.twisting_ratio, m.weave.warp_direction});
+  if (m.weave.is_of_membrane())
+    print["asset weave of the membrane"] = values_text({m.weave.young_ratio, m.weave.shear_ratio});
   if (std::isfinite(m.yield_curvature))
     print["asset yield_curvature"] = data::format_number(m.yield_curvature);
   print["asset thickness"] = base.thickness ? data::format_number(*base.thickness) : "none";

@@ -55,6 +55,8 @@ const std::vector<ParameterInfo>& known_parameters() {
       {"poisson", "", true, -0.99, 0.5, "Poisson's ratio"},
       {"bending", "N m", true, 0, 1e6, "flexural rigidity D"},
       {"bending_ratio", "", true, 0.01, 100, "woven: D across the warp over D along it"},
+      {"young_ratio", "", true, 0.01, 100, "woven: E across the warp over E along it"},
+      {"shear_ratio", "", true, 1e-3, 100, "woven: G over that of an isotropic sheet"},
       {"yield_curvature", "1/m", true, 1e-3, 1e6, "curvature at which bending begins to yield"},
       {"friction", "", true, 0, 10, "Coulomb coefficient against the table"},
       {"areal_density", "kg/m^2", true, kTiny, 1e4, "mass per area"},
@@ -189,8 +191,8 @@ void check_kind(const Axis& axis, const MaterialBase& base) {
       throw data::InputError("--density: found a sheet, expected a solid; a sheet has --areal-density");
     return;
   }
-  for (const char* own :
-       {"bending", "bending_ratio", "yield_curvature", "areal_density", "start_yaw", "table_height"})
+  for (const char* own : {"bending", "bending_ratio", "young_ratio", "shear_ratio", "yield_curvature",
+                          "areal_density", "start_yaw", "table_height"})
     if (name == own)
       throw data::InputError(option_of(name) + ": found a solid, expected a sheet" +
                              (name == "areal_density" ? "; a solid has --density" : ""));
@@ -213,6 +215,11 @@ void check_axes(const std::vector<Axis>& axes, const MaterialBase& base) {
       throw data::InputError("--bending-ratio: found bending_model " +
                              std::string(data::to_string(material.bending_model)) +
                              ", expected plate, the only one that is woven");
+    if ((axes[i].name == "young_ratio" || axes[i].name == "shear_ratio") &&
+        material.constitutive != data::Constitutive::tri_stvk)
+      throw data::InputError(option_of(axes[i].name) + ": found constitutive " +
+                             data::to_string(material.constitutive) +
+                             ", expected TRI_STVK, the only one that is woven");
     if (axes[i].name == "yield_curvature" && material.bending_model != data::BendingModel::hinge)
       throw data::InputError("--yield-curvature: found bending_model " +
                              std::string(data::to_string(material.bending_model)) +
@@ -282,6 +289,8 @@ ReplayCandidate make_candidate(const MaterialBase& base, const std::vector<Axis>
       bending_given = true;
     }
     if (name == "bending_ratio") material.weave.bending_ratio = value;
+    if (name == "young_ratio") material.weave.young_ratio = value;
+    if (name == "shear_ratio") material.weave.shear_ratio = value;
     if (name == "yield_curvature") material.yield_curvature = value;
     if (name == "friction") material.friction = value;
     if (name == "areal_density") material.areal_density = value;

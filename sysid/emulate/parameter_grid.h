@@ -24,9 +24,9 @@ struct ParameterInfo {
   std::string meaning;
 };
 
-/// young, poisson, bending, bending_ratio, yield_curvature, friction, areal_density, density, air_drag,
-/// stiffness_damping;
-/// start_yaw, table_height, grasp_depth, grasp_direction, grasp_pitch.
+/// young, poisson, bending, bending_ratio, young_ratio, shear_ratio, yield_curvature, friction,
+/// areal_density, density, air_drag, stiffness_damping; start_yaw, table_height, grasp_depth,
+/// grasp_direction, grasp_pitch.
 const std::vector<ParameterInfo>& known_parameters();
 
 /// How the command line calls a parameter: "--start-yaw" for start_yaw.
@@ -72,7 +72,8 @@ struct MaterialBase {
 
 /// Refuses what no experiment can answer: a parameter named twice; young and poisson searched together under
 /// TRI_ARAP, whose motion depends on them through E / (1 + nu) only; bending_ratio under a bending model that
-/// is not woven, yield_curvature under one that does not yield; what a sheet has alone of a solid, and the
+/// is not woven, young_ratio and shear_ratio under such a membrane law, yield_curvature under a bending model
+/// that does not yield; what a sheet has alone of a solid, and the
 /// other way round; more than a million candidates. Throws data::InputError with the reason.
 void check_axes(const std::vector<Axis>& axes, const MaterialBase& base);
 

@@ -17,10 +17,17 @@ constexpr double kLeastBits = 1;
 /// What is usual, 5 to 95 % of woven and knitted fabrics, paper and film, as coordinates of an axis: bending
 /// of 618 fabrics 1.1 to 110 uN m, membranes of 10 to 2000 N/m. Of another parameter the searched range.
 std::array<double, 2> usual_of(const Axis& axis) {
-  static const std::map<std::string, std::array<double, 2>> usual = {
-      {"young", {10, 2000}},       {"poisson", {0, 0.5}},   {"bending", {1.1e-6, 1.1e-4}},
-      {"bending_ratio", {0.2, 5}}, {"friction", {0.1, 1}},  {"areal_density", {0.03, 0.5}},
-      {"density", {100, 2000}},    {"air_drag", {0.1, 10}}, {"stiffness_damping", {1e-4, 1e-1}}};
+  static const std::map<std::string, std::array<double, 2>> usual = {{"young", {10, 2000}},
+                                                                     {"poisson", {0, 0.5}},
+                                                                     {"bending", {1.1e-6, 1.1e-4}},
+                                                                     {"bending_ratio", {0.2, 5}},
+                                                                     {"young_ratio", {0.2, 5}},
+                                                                     {"shear_ratio", {0.01, 1}},
+                                                                     {"friction", {0.1, 1}},
+                                                                     {"areal_density", {0.03, 0.5}},
+                                                                     {"density", {100, 2000}},
+                                                                     {"air_drag", {0.1, 10}},
+                                                                     {"stiffness_damping", {1e-4, 1e-1}}};
   const auto found = usual.find(axis.name);
   const auto [low, high] =
       found == usual.end() ? std::array{axis.values.front(), axis.values.back()} : found->second;

@@ -107,6 +107,9 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
         static_cast<double>(replay.settings.device), static_cast<double>(replay.recording.has_table),
         sim::bristle_length(replay.settings.solver.time_step)})
     bytes.add(value);
+  if (m.weave.is_of_membrane())
+    for (const double value : {m.weave.young_ratio, m.weave.shear_ratio, m.weave.warp_direction})
+      bytes.add(value);
   bytes.add_matrix(replay.recording.table_point);
   bytes.add_matrix(replay.recording.table_normal);
   for (const sim::Hold& hold : world.holds) {

@@ -102,6 +102,8 @@ std::map<std::string, double> values_of_sheet(const data::Asset& asset) {
                                           {"poisson", asset.poisson},
                                           {"bending", material.bending_rigidity},
                                           {"bending_ratio", asset.weave.bending_ratio},
+                                          {"young_ratio", asset.weave.young_ratio},
+                                          {"shear_ratio", asset.weave.shear_ratio},
                                           {"friction", asset.friction},
                                           {"areal_density", material.areal_density},
                                           {"air_drag", asset.air_drag},
@@ -165,8 +167,12 @@ data::Asset tuned_asset(const data::Asset& base, const Summary& summary) {
     asset.object_mass.reset();
     return asset;
   }
-  if (const auto ratio = values.find("bending_ratio"); ratio != values.end())
-    asset.weave.bending_ratio = ratio->second;
+  const auto take = [&](const char* name, double& ratio) {
+    if (const auto value = values.find(name); value != values.end()) ratio = value->second;
+  };
+  take("bending_ratio", asset.weave.bending_ratio);
+  take("young_ratio", asset.weave.young_ratio);
+  take("shear_ratio", asset.weave.shear_ratio);
   if (const auto yield = values.find("yield_curvature"); yield != values.end() && yield_is_told)
     asset.yield_curvature = yield->second;
   asset.friction = values.at("friction");

@@ -10,6 +10,8 @@ ParameterLabel parameter_label(const std::string& name, bool has_thickness) {
       {"poisson", {"Poisson's ratio", "ν", ""}},
       {"bending", {"bending rigidity", "D", "N m"}},
       {"bending_ratio", {"bending, weft over warp", "D₂/D₁", ""}},
+      {"young_ratio", {"stiffness, weft over warp", "E₂/E₁", ""}},
+      {"shear_ratio", {"shear modulus over that of an isotropic sheet", "G/G₀", ""}},
       {"yield_curvature", {"curvature at which it yields", "κ", "1/m"}},
       {"friction", {"friction", "μ", ""}},
       {"areal_density", {"areal density", "ρ", "kg/m²"}},

@@ -302,6 +302,16 @@ TEST_F(SceneRunTest, BadInputIsNamed) {
             std::string::npos);
 }
 
+TEST_F(SceneRunTest, KeyframesAfterTheEndAreWarnedOf) {
+  const std::string path = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 2,
+    "gravity": [0, 0, -9.81], "keyframes": [0.02, 0.03, 1], "objects": {"cloth": {"asset": "cloth.json"}}})");
+  const SceneSummary summary = run_scene(data::load_scene(path), {}, out());
+  EXPECT_EQ(summary.frames, 1);
+  ASSERT_EQ(summary.warnings.size(), 1u);
+  EXPECT_EQ(summary.warnings[0],
+            "keyframes: 2 of 3 lie after the end at 0.02 s and are not written: is the duration right?");
+}
+
 TEST_F(SceneRunTest, AHandBelowTheTableAndAStartInsideItAreWarnedOf) {
   const std::string common =
       R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5, "gravity": [0, 0, -9.81],

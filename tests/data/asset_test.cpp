@@ -7,6 +7,7 @@
 
 #include "data/mesh_io.h"
 #include "data/procedural_mesh.h"
+#include "data/text.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -220,7 +221,8 @@ TEST(Asset, SheetsMayBeWoven) {
   std::vector<std::string> notices;
   EXPECT_EQ(express_as(woven, AssetFormat::published, 0.1, notices).weave, Weave{});
   EXPECT_TRUE(std::any_of(notices.begin(), notices.end(), [](const std::string& notice) {
-    return notice.find("bending_ratio, twisting_ratio and warp_direction") != std::string::npos;
+    return notice.find("bending_ratio, twisting_ratio, young_ratio, shear_ratio and warp_direction") !=
+           std::string::npos;
   }));
   const auto error = [&](const char* text, const json& changes) {
     return input_error_of([&] { load(text, changes); });
@@ -231,6 +233,68 @@ TEST(Asset, SheetsMayBeWoven) {
       error(kFlash, {{"bending_ratio", 2}, {"bending_model", "hinge"}}).find("expected bending_model plate"),
       std::string::npos);
   EXPECT_NE(error(kPublished, {{"warp_direction", 10}}).find("flash-asset/1"), std::string::npos);
+}
+
+TEST(Asset, WhatNoMaterialHasIsRefused) {
+  const TemporaryFolder folder;
+  const auto error = [&](const json& changes) {
+    json file = json::parse(kFlash);
+    file["mechanical_props"].update(changes);
+    return input_error_of([&] { load_asset(folder.write("towel.json", file.dump())); });
+  };
+  EXPECT_NE(error({{"young", 1e300}}).find("young: found 1e+300, expected at most 1e+13"), std::string::npos);
+  EXPECT_NE(error({{"friction", 1e9}}).find("friction: found 1000000000.0, expected at most 1000"),
+            std::string::npos);
+  EXPECT_NE(error({{"constitutive", "TRI_STVK"}, {"young_ratio", 1e-9}}).find("a number from 0.01 to 100"),
+            std::string::npos);
+  const auto solid_error = [&](const char* key) {
+    const json file = {
+        {"schema", "flash-asset/1"},
+        {"mesh", "box:1x1x1:1"},
+        {"element_type", "TETRAHEDRON"},
+        {"mechanical_props",
+         {{"density", 1}, {"young", 1}, {"poisson", 0.3}, {"constitutive", "TET_ARAP"}, {key, 1}}}};
+    return input_error_of([&] { load_asset(folder.write("cube.json", file.dump())); });
+  };
+  for (const char* key : {"thickness", "bending_rigidity", "bending_model"})
+    EXPECT_NE(solid_error(key).find("no such field for element_type TETRAHEDRON"), std::string::npos) << key;
+}
+
+TEST(Asset, MembranesMayBeWoven) {
+  const TemporaryFolder folder;
+  const auto load = [&](const json& changes) {
+    json file = json::parse(kFlash);
+    file["mechanical_props"].update(changes);
+    return load_asset(folder.write("towel.json", file.dump()));
+  };
+  const json weave = {
+      {"constitutive", "TRI_STVK"}, {"young_ratio", 0.25}, {"shear_ratio", 0.1}, {"warp_direction", 30}};
+  const Asset woven = load(weave);
+  const ResolvedSheet sheet = resolve_sheet(woven, 0.1);
+  const SheetMaterial& m = sheet.material;
+  EXPECT_EQ(m.weave.young_ratio, 0.25);
+  EXPECT_EQ(m.weave.shear_ratio, 0.1);
+  save_asset(woven, folder / "copy.json");
+  EXPECT_EQ(load_asset(folder / "copy.json").weave, woven.weave);
+  // nu_12 / E_1 = nu_21 / E_2, and nu^2 = nu_12 nu_21.
+  const std::string said = "E_2 t = " + format_short(0.25 * m.membrane_stiffness) + " N/m, G t = " +
+                           format_short(0.1 * 0.5 * m.membrane_stiffness / (2 * (1 + m.poissons_ratio))) +
+                           " N/m, nu_12 = " + format_short(2 * m.poissons_ratio);
+  EXPECT_TRUE(std::any_of(sheet.notices.begin(), sheet.notices.end(), [&](const std::string& notice) {
+    return notice.find(said) != std::string::npos;
+  })) << said;
+  const auto error = [&](const json& changes) { return input_error_of([&] { load(changes); }); };
+  for (const char* key : {"young_ratio", "shear_ratio"}) {
+    EXPECT_NE(error({{"constitutive", "TRI_COROTATED"}, {key, 0.5}})
+                  .find("expected constitutive TRI_STVK, the only"),
+              std::string::npos);
+    EXPECT_NE(error({{"constitutive", "TRI_STVK"}, {key, -1}}).find("found -1, expected a number above 0"),
+              std::string::npos);
+  }
+  EXPECT_NE(
+      error({{"bending_model", "hinge"}, {"warp_direction", 5}}).find("constitutive TRI_STVK, which may"),
+      std::string::npos);
+  EXPECT_EQ(error({{"bending_model", "hinge"}, {"constitutive", "TRI_STVK"}, {"warp_direction", 5}}), "");
 }
 
 TEST(Asset, BendingOfHingesMayYield) {
@@ -263,8 +327,9 @@ TEST(Asset, ElementsMayBeQuadratic) {
   const TemporaryFolder folder;
   const auto load = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {
     return load_asset(folder.write("part.json", "{" + fields + R"(, "mesh": "box:1x1x1:1",
-      "mechanical_props": {"mass": 1, "young": 1, "poisson": 0.3, "thickness": 1, "constitutive": ")" +
-                                                    law + "\"}}"));
+      "mechanical_props": {"mass": 1, "young": 1, "poisson": 0.3, )" +
+                                                    (law.starts_with("TRI") ? "\"thickness\": 1, " : "") +
+                                                    "\"constitutive\": \"" + law + "\"}}"));
   };
   const auto error = [&](const std::string& fields, const std::string& law = "TET_COROTATED") {
     return input_error_of([&] { load(fields, law); });

@@ -227,6 +227,20 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
       "obstacles.rail.shape: found \"cone\", expected one of plane, box, cylinder, sphere, capsule, mesh");
   EXPECT_EQ(changed(kFlash, "/obstacles/rail/radius", -1),
             "obstacles.rail.radius: found -1, expected a number above 0");
+  EXPECT_EQ(changed(kFlash, "/obstacles/rail/radius", 1e300),
+            "obstacles.rail.radius: found 1e+300, expected at most 1e+05 m");
+  EXPECT_EQ(changed(kFlash, "/obstacles/rail/point", {0, 0, 1e300}),
+            "obstacles.rail.point: found [0,0,1e+300], expected coordinates of at most 1e+05 m");
+  EXPECT_EQ(changed(kFlash, "/obstacles/rail/friction", 1e300),
+            "obstacles.rail.friction: found 1e+300, expected at most 1000");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/velocity", {1e6, 0, 0}),
+            "objects.cloth.velocity: found [1000000.0,0,0], expected at most 1000 m/s");
+  EXPECT_EQ(changed(kFlash, "/self_contact", {{"thickness", 1e-300}}),
+            "self_contact.thickness: found 1e-300, expected a number from 1e-06 to 1");
+  EXPECT_EQ(changed(kFlash, "/self_contact", {{"pressure", 1e300}}),
+            "self_contact.pressure: found 1e+300, expected a number from 0.001 to 1e+09");
+  EXPECT_EQ(changed(kFlash, "/friction/0", {{"a", "cloth"}, {"b", "table"}}),
+            "friction[0].friction: missing, expected a number of 0 or above");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/axes", "w"),
             "objects.cloth.fixed[0].axes: found \"w\", expected letters of xyz, such as \"z\" for a roller");
   EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/vertices", {1, -2}),

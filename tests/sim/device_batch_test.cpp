@@ -158,6 +158,25 @@ TEST(DeviceBatch, WhatTheDeviceCannotDoIsRefusedByName) {
   EXPECT_EQ(why_not_on_device(environment), "more than 8 obstacles: found 9");
   environment.obstacles = {{Mesh{}}};
   EXPECT_EQ(why_not_on_device(environment), "obstacles of shape mesh are met on the CPU alone");
+  const auto changed = [&](auto change) {
+    Environment other = lift(*plan, 0);
+    change(other);
+    return why_not_on_device(other);
+  };
+  EXPECT_EQ(changed([](Environment& e) { e.solids[0] = {}; }),
+            "solids (element_type TETRAHEDRON) are simulated on the CPU alone");
+  EXPECT_EQ(changed([](Environment& e) { e.self_contact = SelfContact{}; }),
+            "self-contact (self_contact) is simulated on the CPU alone");
+  EXPECT_EQ(changed([](Environment& e) {
+              e.point_masses.push_back({0, 0.1});
+            }),
+            "point masses (attached_mass) are simulated on the CPU alone");
+  EXPECT_EQ(changed([](Environment& e) { e.materials.push_back(e.materials[0]); }),
+            "several bodies in one environment");
+  EXPECT_EQ(changed([](Environment& e) { e.materials[0].yield_curvature = 10; }),
+            "bending that yields (yield_curvature) is simulated on the CPU alone");
+  EXPECT_EQ(changed([](Environment& e) { e.materials[0].weave.young_ratio = 0.5; }),
+            "woven membranes (young_ratio, shear_ratio) are simulated on the CPU alone");
   Batch batch(plan, {environment}, settings_on(Device::cuda));
   EXPECT_THROW(batch.advance(1), data::InputError);
   environment.obstacles.clear();

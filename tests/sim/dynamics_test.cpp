@@ -99,7 +99,7 @@ TEST_P(Incline, SticksBelowTheConeAndSlidesAboveIt) {
   const Sheet sheet = small_sheet();
   const double direction = GetParam(), friction = 0.3, h = 0.01;
   const int steps = 100;
-  for (const double offset : {-0.001, 0.001}) {
+  for (const double offset : {-0.001, -0.0001, 0.0001, 0.001}) {
     const double angle = std::atan(friction + offset);
     Environment environment = on_incline(sheet, angle, direction, friction);
     Solver solver(sheet, {.time_step = h, .tolerance = 1e-10});

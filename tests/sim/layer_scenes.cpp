@@ -76,11 +76,12 @@ LayerScene layer_on_incline(double slope, const SelfContact& contact) {
   return scene;
 }
 
-LayerScene block_on_incline(double slope, const SelfContact& contact, bool sheet_between) {
-  const Vector3d size(0.06, 0.06, 0.02);
-  std::vector<Sheet> bodies = {solid_box(size, {4, 4, 2})};
+LayerScene block_on_incline(double slope, const SelfContact& contact, bool sheet_between,
+                            const BlockMeshes& meshes) {
+  const Vector3d size(0.06, 0.06, 0.02), upper_size(0.03, 0.03, 0.015);
+  std::vector<Sheet> bodies = {solid_box(size, {meshes.lower, meshes.lower, 2})};
   if (sheet_between) bodies.push_back(square(0.05, 5, 5));
-  bodies.push_back(solid_box({0.03, 0.03, 0.015}, {3, 3, 2}));
+  bodies.push_back(solid_box(upper_size, {meshes.upper, meshes.upper, 2}));
   const std::size_t last = bodies.size() - 1;
   LayerScene scene = scene_of(joined(bodies), contact);
   data::SolidMaterial soft;
@@ -89,6 +90,10 @@ LayerScene block_on_incline(double slope, const SelfContact& contact, bool sheet
   scene.environment.solids = {{0, soft}, {static_cast<int>(last), soft}};
   tilt(slope, scene.environment);
   scene.environment.holds = {{.vertices = face_of(bodies[0], 2, 0)}};
+  auto upper = rows_of(scene.sheet.bodies[last], scene.environment.state.positions);
+  const Eigen::RowVector3d middle = 0.5 * upper_size.transpose();
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(meshes.turn, Vector3d::UnitZ()).matrix();
+  if (meshes.turn != 0) upper = ((upper.rowwise() - middle) * turn.transpose()).eval().rowwise() + middle;
   const double apart = start_share * contact.thickness;
   if (sheet_between) shift(scene, 1, {0.002, 0.004, size.z() + apart});
   shift(scene, last, {0.007, 0.013, size.z() + static_cast<double>(last) * apart});

@@ -15,9 +15,17 @@ LayerScene pile(int count, const SelfContact& contact, double side, int cells);
 /// A sheet on a larger one, on a plane tilted to a `slope`, its tangent.
 LayerScene layer_on_incline(double slope, const SelfContact& contact);
 
+/// Cells along a side of the lower and the upper block, and how far the upper one's mesh is turned against
+/// the lower one's [rad].
+struct BlockMeshes {
+  int lower = 4, upper = 3;
+  double turn = 0;
+};
+
 /// A soft block on a larger one whose bottom is held, both tilted to a `slope`; `sheet_between`: with a sheet
 /// between them. The block on top is the last body.
-LayerScene block_on_incline(double slope, const SelfContact& contact, bool sheet_between);
+LayerScene block_on_incline(double slope, const SelfContact& contact, bool sheet_between,
+                            const BlockMeshes& meshes = {});
 
 /// A sheet bent to a U whose legs fly at each other at `speed` [m/s].
 LayerScene thrown(const SelfContact& contact, double speed);

@@ -214,6 +214,23 @@ TEST(SelfContact, IsTheSameOnAnyNumberOfThreadsAndAfterARestart) {
   EXPECT_EQ(std::memcmp(one.first.data(), rest.positions().data, one.first.size() * sizeof(double)), 0);
 }
 
+TEST(SelfContact, APermutedBatchHasPermutedResults) {
+  const LayerScene world = thrown(cloth, 1.5);
+  const auto plan = make_sheet_plan(world.sheet);
+  constexpr int steps = 40, count = 3, order[count] = {2, 0, 1};
+  std::vector<Environment> environments(count, world.environment), permuted;
+  environments[1].materials[0].bending_rigidity = 5e-5;
+  environments[2].self_contact->friction = 0.6;
+  for (const int e : order) permuted.push_back(environments[static_cast<std::size_t>(e)]);
+  const BatchSettings settings{.solver = {.time_step = h}, .steps = steps, .threads = 2};
+  Batch batch(plan, environments, settings), other(plan, permuted, settings);
+  batch.advance(steps);
+  other.advance(steps);
+  for (int e = 0; e < count; ++e)
+    EXPECT_EQ((other.state(e).positions - batch.state(order[e]).positions).cwiseAbs().maxCoeff(), 0) << e;
+  EXPECT_GT((batch.state(0).positions - batch.state(2).positions).cwiseAbs().maxCoeff(), 0);
+}
+
 TEST(SelfContact, RefusesAStartThatPassesThroughItself) {
   LayerScene world = pile(2, cloth, 0.1, 6);
   world.environment.state.positions(world.sheet.bodies[1].first_vertex + 20, 2) = -0.01;

@@ -75,6 +75,36 @@ INSTANTIATE_TEST_SUITE_P(Membranes, Patch,
                          testing::Values(Constitutive::tri_arap, Constitutive::tri_corotated,
                                          Constitutive::tri_stvk, Constitutive::tri_neohookean));
 
+/// The pull of Patch on a woven sheet, along its warp, its weft and between. The state is uniform at any
+/// angle: both ends may slide across, so that the sheet shears as it likes.
+TEST(Statics, AWovenSheetStretchesAsItsDirectionsSay) {
+  const double width = 0.1, height = 0.08, stretch = 1e-4, e1 = 120, e2 = 36, degree = M_PI / 180;
+  const double g12 = 0.1 * std::sqrt(e1 * e2) / (2 * 1.3), nu12 = 0.3 / std::sqrt(e2 / e1);
+  const Sheet sheet = make_sheet(data::delaunay_rectangle(width, height, 0.012, 3));
+  for (const double warp : {0.0, 90.0, 45.0, -25.0}) {
+    Environment environment = environment_of(sheet);
+    environment.gravity.setZero();
+    environment.materials[0] = {
+        .constitutive = Constitutive::tri_stvk,
+        .membrane_stiffness = e1,
+        .weave = {.warp_direction = warp * degree, .young_ratio = e2 / e1, .shear_ratio = 0.1}};
+    for (int i = 0; i < sheet.rest.vertices.rows(); ++i) {
+      const auto x = sheet.rest.vertices.row(i);
+      const bool left = x[0]<1e-9, right = x[0]> width - 1e-9;
+      environment.holds.push_back(
+          support(i, {left || right, left && x[1] < 1e-9, true}, {right ? width * (1 + stretch) : 0, 0, 0}));
+    }
+    const StepReport report = settle(sheet, environment, 10, 12, 1e-11);
+    const double c = std::cos(warp * degree), s = std::sin(warp * degree);
+    const double compliance =
+        std::pow(c, 4) / e1 + std::pow(s, 4) / e2 + (1 / g12 - 2 * nu12 / e1) * c * c * s * s;
+    // Green's strain differs from the stretch by 3/2 of it, that of shear by its square over E.
+    EXPECT_NEAR(report.membrane, 0.5 / compliance * stretch * stretch * width * height,
+                1e-3 * report.membrane)
+        << warp;
+  }
+}
+
 TEST(Statics, AHangingStripStretchesByItsOwnWeight) {
   const double length = 0.5, width = 0.02;
   const Sheet sheet =

@@ -114,6 +114,9 @@ TEST(ScannedSurface, WhatIsNoScanInMetresIsRefused) {
   const Points cloud = drawn_rectangle(0.3, 0.2, 5000, 0, 6);
   EXPECT_EQ(refusal(cloud.topRows(1), 1), "scan.ply: found 1 points, expected 20 at least");
   EXPECT_NE(refusal(cloud, 0.001).find("expected four times --edge 0.01 at least"), std::string::npos);
+  Points line = cloud;
+  line.rightCols<2>().setZero();
+  EXPECT_NE(refusal(line, 1).find("is 0 m wide where it spans"), std::string::npos);
   EXPECT_NE(refusal(cloud, 1000).find("m apart, expected at most 3/4 of --edge 0.01"), std::string::npos);
   EXPECT_NE(refusal(cloud, 1000).find("--scale 0.001"), std::string::npos);
   EXPECT_NE(refusal(cloud, 1e6).find("expected at most 100,000 times --edge"), std::string::npos);

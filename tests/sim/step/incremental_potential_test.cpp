@@ -5,7 +5,6 @@
 #include <cmath>
 #include <random>
 
-#include "sim/step/membrane_damping.h"
 #include "tests/sim/sheet_scene.h"
 
 namespace flash::sim {
@@ -57,33 +56,6 @@ TEST(IncrementalPotential, TheForceIsItsGradient) {
                          (2 * step);
     EXPECT_NEAR(force.cwiseProduct(along).sum(), slope, 1e-6 * std::abs(slope)) << int(model);
   }
-}
-
-TEST(IncrementalPotential, TheMembraneDampingsHessianIsTheDerivativeOfItsGradient) {
-  const Sheet sheet = small_sheet();
-  const auto plan = make_sheet_plan(sheet);
-  const Environment environment = moving_environment(sheet, BendingModel::plate);
-  const Points& start = environment.state.positions;
-  const auto metrics = triangle_metrics(*plan, start);
-  const SheetLame lame = sheet_lame(200, 0.3);
-  const Points x = start + noise(start.rows(), 2e-3, 3), along = noise(x.rows(), 1, 4);
-  BlockValues<double> values(9 * (plan->pattern.size + plan->pattern.pairs.size()), 0.0);
-  add_membrane_damping_hessian(*plan, plan->bodies[0], metrics, lame, x, Curvature::exact, values);
-  Points product = Points::Zero(x.rows(), 3);
-  for (int i = 0; i < plan->pattern.size; ++i)
-    product.row(i) += along.row(i) * Eigen::Map<const Eigen::Matrix3d>(values.data() + 9 * i).transpose();
-  for (size_t k = 0; k < plan->pattern.pairs.size(); ++k) {
-    const auto [row, column] = plan->pattern.pairs[k];
-    const Eigen::Map<const Eigen::Matrix3d> block(values.data() + 9 * (plan->pattern.size + k));
-    product.row(row) += along.row(column) * block.transpose();
-    product.row(column) += along.row(row) * block;
-  }
-  const double step = 1e-7;
-  Points ahead = Points::Zero(x.rows(), 3), behind = ahead;
-  add_membrane_damping_gradient(*plan, plan->bodies[0], metrics, lame, x + step * along, ahead);
-  add_membrane_damping_gradient(*plan, plan->bodies[0], metrics, lame, x - step * along, behind);
-  const Points expected = (ahead - behind) / (2 * step);
-  EXPECT_LT((product - expected).norm(), 1e-6 * expected.norm());
 }
 
 TEST(IncrementalPotential, DampingPutsNoTorqueAndNoForceOnAStressedSheetThatTurns) {

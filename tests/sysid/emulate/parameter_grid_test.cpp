@@ -61,6 +61,17 @@ TEST(ParameterGrid, AWeaveIsSearchedWhereBendingIsThatOfAPlate) {
   EXPECT_EQ(make_candidate({}, axes, {3}).material.weave, (data::Weave{.bending_ratio = 3}));
 }
 
+TEST(ParameterGrid, AWovenMembraneIsSearchedWhereItsLawMayBeWoven) {
+  const std::vector<Axis> axes = {parse_axis("young_ratio", "0.2:1:3"), parse_axis("shear_ratio", "0.1,1")};
+  EXPECT_EQ(message_of([&] { check_axes(axes, {{.constitutive = data::Constitutive::tri_stvk}, {}}); }), "");
+  EXPECT_NE(message_of([&] {
+              check_axes(axes, {});
+            }).find("--young-ratio: found constitutive TRI_COROTATED, expected TRI_STVK"),
+            std::string::npos);
+  EXPECT_EQ(make_candidate({}, axes, {0.4, 0.1}).material.weave,
+            (data::Weave{.young_ratio = 0.4, .shear_ratio = 0.1}));
+}
+
 TEST(ParameterGrid, AYieldIsSearchedWhereHingesBend) {
   const std::vector<Axis> axes = {parse_axis("yield_curvature", "10:100:3:log")};
   EXPECT_NE(message_of([&] {

@@ -1,4 +1,4 @@
-#include "sim/step/membrane_damping.h"
+#include "sim/step/strain_energy.h"
 
 #include <Eigen/Eigenvalues>
 
@@ -9,6 +9,7 @@ using data::Points;
 using Eigen::Matrix2d;
 using Eigen::Matrix3d;
 using Eigen::Vector2d;
+using Eigen::Vector3d;
 using Matrix32 = Eigen::Matrix<double, 3, 2>;
 
 /// One triangle: vertices, blocks, F = sum_i x_i w_i^T.
@@ -44,9 +45,27 @@ void for_each_triangle(const SheetPlan& plan, const BodyPlan& place, const Point
   }
 }
 
-/// Second Piola-Kirchhoff stress of a strain: 2 mu E + lambda tr(E) I.
-Matrix2d stress_of(const SheetLame& lame, const Matrix2d& strain) {
-  return 2 * lame.mu * strain + lame.lambda * strain.trace() * Matrix2d::Identity();
+/// Green's strain against the start of a triangle, and the matrix that gives its stress.
+struct Strained {
+  Matrix3d stiffness;
+  Vector3d strain;  ///< (E_11, E_22, 2 E_12)
+
+  Matrix2d stress() const {
+    const Vector3d s = stiffness * strain;
+    return (Matrix2d() << s[0], s[2], s[2], s[1]).finished();
+  }
+};
+
+Strained strained(const SheetPlan& plan, std::span<const Matrix2d> start_metrics,
+                  const SheetStiffness& stiffness, std::size_t index, const Matrix32& F) {
+  const Matrix2d start = start_metrics.empty() ? Matrix2d::Identity() : start_metrics[index];
+  const Matrix2d change = 0.5 * (F.transpose() * F - start);
+  return {stiffness.in(plan.sheet.triangles[index].x_axis), {change(0, 0), change(1, 1), 2 * change(0, 1)}};
+}
+
+/// The strain (E_11, E_22, 2 E_12) that a motion u of a vertex makes, by F^T u.
+Eigen::Matrix<double, 3, 2> strain_of(const Vector2d& w) {
+  return (Eigen::Matrix<double, 3, 2>() << w[0], 0, 0, w[1], w[1], w[0]).finished();
 }
 
 }  // namespace
@@ -60,37 +79,35 @@ std::vector<Matrix2d> triangle_metrics(const SheetPlan& plan, const Points& posi
   return metrics;
 }
 
-double add_membrane_damping_gradient(const SheetPlan& plan, const BodyPlan& place,
-                                     const std::vector<Matrix2d>& start_metrics, const SheetLame& lame,
-                                     const Points& positions, Points& gradient) {
-  double potential = 0;
-  for_each_triangle(plan, place, positions, [&](size_t index, const Triangle& triangle) {
-    const Matrix2d strain = 0.5 * (triangle.F.transpose() * triangle.F - start_metrics[index]);
-    const Matrix2d stress = stress_of(lame, strain);
-    potential += 0.5 * triangle.area * stress.cwiseProduct(strain).sum();
-    const Matrix32 P = triangle.area * triangle.F * stress;
+double add_strain_gradient(const SheetPlan& plan, const BodyPlan& place,
+                           std::span<const Matrix2d> start_metrics, const SheetStiffness& stiffness,
+                           const Points& positions, Points& gradient) {
+  double energy = 0;
+  for_each_triangle(plan, place, positions, [&](std::size_t index, const Triangle& triangle) {
+    const Strained now = strained(plan, start_metrics, stiffness, index, triangle.F);
+    energy += 0.5 * triangle.area * now.strain.dot(now.stiffness * now.strain);
+    const Matrix32 P = triangle.area * triangle.F * now.stress();
     for (int k = 0; k < 3; ++k) gradient.row(triangle.vertices[k]) += (P * triangle.w[k]).transpose();
   });
-  return potential;
+  return energy;
 }
 
-void add_membrane_damping_hessian(const SheetPlan& plan, const BodyPlan& place,
-                                  const std::vector<Matrix2d>& start_metrics, const SheetLame& lame,
-                                  const Points& positions, Curvature curvature, BlockValues<double>& values) {
-  for_each_triangle(plan, place, positions, [&](size_t index, const Triangle& triangle) {
+void add_strain_hessian(const SheetPlan& plan, const BodyPlan& place, std::span<const Matrix2d> start_metrics,
+                        const SheetStiffness& stiffness, const Points& positions, Curvature curvature,
+                        BlockValues<double>& values) {
+  for_each_triangle(plan, place, positions, [&](std::size_t index, const Triangle& triangle) {
     const Matrix32& F = triangle.F;
-    Matrix2d stress = stress_of(lame, 0.5 * (F.transpose() * F - start_metrics[index]));
+    const Strained now = strained(plan, start_metrics, stiffness, index, F);
+    Matrix2d stress = now.stress();
     if (curvature == Curvature::positive) {
       const Eigen::SelfAdjointEigenSolver<Matrix2d> eigen(stress);
       stress = eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).asDiagonal() *
                eigen.eigenvectors().transpose();
     }
-    // d(F S) w_i for dF = u w_j^T: u (w_j.S w_i) + F (mu ((F^T u) (w_j.w_i) + w_j (F^T u).w_i) +
-    // lambda (F^T u).w_j w_i).
+    // d(F S) w_i for dF = u w_j^T: u (w_j.S w_i) + F B_i^T C B_j F^T u.
     const auto block = [&](int i, int j) -> Matrix3d {
       const Vector2d &wi = triangle.w[i], &wj = triangle.w[j];
-      const Matrix2d material = lame.mu * (wi.dot(wj) * Matrix2d::Identity() + wj * wi.transpose()) +
-                                lame.lambda * wi * wj.transpose();
+      const Matrix2d material = strain_of(wi).transpose() * now.stiffness * strain_of(wj);
       return triangle.area * (wj.dot(stress * wi) * Matrix3d::Identity() + F * material * F.transpose());
     };
     const auto add = [&](int slot, const Matrix3d& b) {
