@@ -148,11 +148,14 @@ Found simulate_about(const Task& task, Found found, std::vector<KnownError>& hel
   if (!reaches_beyond(extent, found.axes) &&
       !is_finer(lattice(extent, task.ranges, 3, few_motions), found.axes) && !misses_much(task, found))
     return found;
+  constexpr int kDense = 3;          // lattices of many motions
   constexpr double kNarrower = 0.8;  // cells over cells, for a lattice more
   constexpr int kSettling =
       3;  // rounds; later a lattice does not narrow again, or two might follow each other
   bool many = false, likely_alone = false;
-  for (int round = 0; round < lattice_rounds; ++round) {
+  int dense = 0;
+  for (int round = 0; round < lattice_rounds && dense < kDense; ++round) {
+    if (many) ++dense;
     std::optional<Found> there =
         look_about(task, extent, found.look.posterior.values(), finer, found.errors, held, many);
     if (!there) break;

@@ -140,14 +140,13 @@ std::pair<MotionLikelihood::Nuisance, double> MotionLikelihood::fit_nuisance(
     const Recording& recording, const Nuisance& start,
     const std::function<const Motion&(double time_offset)>& motion_at) {
   constexpr int kSteps = 30;
-  // Of the noise: what a last step may move rows by. At a tenth the intervals of equal searches by two routes
-  // differed by 12 %, at this by 6 %, for a tenth more of time.
-  constexpr double kSame = 0.02;
+  // Of s: what a last step may move all rows by, a quarter of a unit of deviance. With steps that moved them
+  // by seven the intervals of equal searches by two routes differed by 12 %, now by 6 %.
+  constexpr double kSame = 0.5;
   const auto is_same = [&](const Nuisance& a, const Nuisance& b) {
     const Eigen::VectorXd moved = recording.registered * (b.registration - a.registration) +
                                   known_at(recording, a.errors) * (b.errors - a.errors);
-    return moved.norm() <
-           kSame * recording.likelihood->misfit().noise * std::sqrt(static_cast<double>(moved.size()));
+    return moved.norm() < kSame * recording.likelihood->spread();
   };
   // Beyond its bounds a registration costs nothing, and no step back within them would fall.
   Nuisance at = start;
