@@ -24,6 +24,10 @@ std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
                const std::vector<KnownError>& held) {
   constexpr double kMatters = 1;  // of a deviance
+  constexpr double kFails = 3;    // of a deviance: strips on either mesh differ by 2 at most
+  constexpr double kUnlikely = 9;
+  constexpr double kLikely = 3.84;  // as verdicts have it
+  constexpr double kFarther = 1.3;  // of a distance
   const std::vector<Replay> on_model = replays_of(found.emulator);
   const std::vector<double> mode = found.look.posterior.values();
   std::vector<ReplayResult> own;
@@ -49,26 +53,40 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   Extent at_best;
   for (const double value : best) at_best.push_back({value, value});
   if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
+  if (found.emulator.share != own_mesh) {
+    const double share = std::exchange(found.emulator.share, own_mesh);
+    Eigen::Index likeliest;
+    const double on_own_mesh =
+                     deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(&likeliest),
+                 better =
+                     std::min(of_points.minCoeff(), std::isnan(of_mode) ? INFINITY : of_mode) - on_own_mesh;
+    found.emulator.share = share;
+    std::vector<Motion> mode_on_own;
+    for (std::size_t r = 0; r < own.size(); ++r)
+      mode_on_own.push_back(found.emulator.models[r].model.on_its_mesh(own[r].motion));
+    const bool by_extrapolation_alone =
+        better > -kFails && !(likelihood.deviance(mode_on_own) - on_own_mesh < kUnlikely);
+    if (better > kFails || by_extrapolation_alone) {
+      keep_to_simulated(task, found, values_of(found.axes, static_cast<int>(likeliest)), held);
+      return Settled::by_points;
+    }
+  }
+  // Of values that are as good as equally likely, those whose motion is nearest.
+  if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes)) {
+    std::vector<ReplayResult> there;
+    for (const Replay& replay : task.replays)
+      there.push_back(task.store.run(replay, candidate_at(best, task.grid)));
+    if (kFarther * score_motions(task.replays, there, task.grid.score).score <
+        score_motions(task.replays, own, task.grid.score).score) {
+      set_estimate(found.look.posterior, found.axes, best);
+      return Settled::by_emulator;
+    }
+  }
   const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, fall_to_best));
   if (!(share_of_points > 0)) return Settled::by_emulator;
   Posterior by_points = explore_at_points(found.axes, of_points);
   if (share_of_points < 0.5 || !(fall > 0)) set_estimate(by_points, found.axes, mode);
-  Posterior mixed = mixture(found.look.posterior, std::move(by_points), share_of_points);
-  if (share_of_points >= 0.5 && found.emulator.share != own_mesh) {
-    const double share = std::exchange(found.emulator.share, own_mesh);
-    Eigen::Index likeliest;
-    const double better =
-        of_points.minCoeff() -
-        deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(&likeliest);
-    if (better > 0) {
-      keep_to_simulated(task, found, values_of(found.axes, static_cast<int>(likeliest)), held);
-      found.look.posterior =
-          mixture(mixed, std::move(found.look.posterior), 1 / (1 + std::exp(-0.5 * better)));
-      return Settled::by_points;
-    }
-    found.emulator.share = share;
-  }
-  found.look.posterior = std::move(mixed);
+  found.look.posterior = mixture(found.look.posterior, std::move(by_points), share_of_points);
   if (share_of_points < 0.5) return Settled::by_emulator;
   found.look.likelihood = std::move(likelihood);
   found.errors = errors_about(found, held);
