@@ -18,8 +18,7 @@ void add(const Vector3d& force, const Vector3d& point, const Vector3d& couple, W
 Resultants resultants_of(std::span<const ContactForce> contacts, std::size_t bodies, std::size_t obstacles) {
   Resultants sums{std::vector<Wrench>(bodies), std::vector<Wrench>(obstacles)};
   for (const ContactForce& contact : contacts) {
-    std::vector<Wrench>& others =
-        contact.kind == ContactKind::vertex_obstacle ? sums.obstacles : sums.bodies;
+    std::vector<Wrench>& others = contact.kind == ContactKind::vertex_obstacle ? sums.obstacles : sums.bodies;
     add(contact.force(), contact.point, contact.couple, sums.bodies[static_cast<std::size_t>(contact.body)]);
     add(-contact.force(), contact.other_point, -contact.couple,
         others[static_cast<std::size_t>(contact.other)]);
