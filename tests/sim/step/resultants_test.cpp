@@ -67,8 +67,7 @@ double expect_newton_and_euler(LayerScene scene, int steps, std::size_t first_fr
     const StepReport report = solver.step(environment);
     if (report.substeps > 1 || !report.converged) continue;
     const std::vector<ContactForce> contacts = solver.contacts(environment);
-    const Resultants sums =
-        resultants_of(contacts, scene.sheet.bodies.size(), environment.obstacles.size());
+    const Resultants sums = resultants_of(contacts, scene.sheet.bodies.size(), environment.obstacles.size());
     for (const ContactForce& contact : contacts) couple = std::max(couple, contact.couple.norm());
     for (std::size_t b = first_free_body; b < scene.sheet.bodies.size(); ++b) {
       const Body& body = scene.sheet.bodies[b];
@@ -81,8 +80,8 @@ double expect_newton_and_euler(LayerScene scene, int steps, std::size_t first_fr
         torque += x.cross(needed);
       }
       // |sum r| <= sqrt(n) |r| with |r| <= residual |M g|.
-      const double left = std::sqrt(body.vertex_count) * (report.residual + 1e-9) *
-                          rows_of(body, mass).norm() * 9.81;
+      const double left =
+          std::sqrt(body.vertex_count) * (report.residual + 1e-9) * rows_of(body, mass).norm() * 9.81;
       EXPECT_LE((sums.bodies[b].force - force).norm(), left) << k << " body " << b;
       EXPECT_LE((sums.bodies[b].torque - torque).norm(), 2 * reach * left) << k << " body " << b;
       ++checked;
@@ -101,8 +100,8 @@ TEST(Resultants, AreWhatTheMotionOfBodiesAsksFor) {
 
 TEST(Resultants, HoldTheCouplesOfNearlyParallelEdges) {
   // Turned by 0.05 the edges of two blocks cross at a squared sine of 0.0025, below 0.01.
-  const double couple =
-      expect_newton_and_euler(block_on_incline(0.2, cloth, false, {.lower = 4, .upper = 4, .turn = 0.05}), 20, 1);
+  const double couple = expect_newton_and_euler(
+      block_on_incline(0.2, cloth, false, {.lower = 4, .upper = 4, .turn = 0.05}), 20, 1);
   EXPECT_GT(couple, 0);
 }
 
