@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
 #include <sstream>
 #include <string>
@@ -65,14 +66,19 @@ class ContactTablesTest : public testing::Test {
   }
   ~ContactTablesTest() override { fs::remove_all(folder_); }
 
-  SceneSummary run(const std::string& scene, bool contacts) {
+  SceneSummary run(const std::string& scene, bool contacts, int threads = 1) {
     std::ofstream(folder_ / "scene.json") << scene;
-    return run_scene(data::load_scene((folder_ / "scene.json").string()), {.contacts = contacts},
-                     out().string());
+    return run_scene(data::load_scene((folder_ / "scene.json").string()),
+                     {.threads = threads, .contacts = contacts}, out().string());
+  }
+  std::string text_of(const std::string& file) const {
+    std::ifstream in(out() / file);
+    return {std::istreambuf_iterator<char>(in), {}};
   }
   fs::path out() const { return folder_ / "out"; }
 
-  /// The contacts of a frame agree with its mesh, and their sums with the resultants at `time`. Returns those.
+  /// The contacts of a frame agree with its mesh, and their sums with the resultants at `time`. Returns
+  /// those.
   std::map<std::string, Wrench> checked(const std::string& frame, const std::string& time) const {
     const data::TriangleMesh mesh = data::load_triangle_mesh((out() / "frames" / (frame + ".ply")).string());
     std::map<std::string, Wrench> sums, told;
@@ -82,7 +88,8 @@ class ContactTablesTest : public testing::Test {
       const Vector3d force = std::stod(row.at("normal_force")) * normal + vector_of(row, "friction_");
       const bool at_vertex = row.at("kind") != "edge_edge";
       if (at_vertex) {
-        EXPECT_LE((mesh.vertices.row(std::stoi(row.at("v0"))).transpose() - point).norm(), 1e-6);  // of the file
+        EXPECT_LE((mesh.vertices.row(std::stoi(row.at("v0"))).transpose() - point).norm(),
+                  1e-6);  // of the file
       }
       EXPECT_EQ(row.at("v1") == "-1", row.at("kind") == "vertex_obstacle");
       Wrench &on = sums[row.at("body")], &against = sums[row.at("other")];
@@ -123,17 +130,29 @@ TEST_F(ContactTablesTest, ContactsOfLayersAddUpToTheResultants) {
   EXPECT_NEAR(end.at("table").force.z(), -2 * weight, 1e-2 * weight);
 }
 
-TEST_F(ContactTablesTest, ObjectsThatDoNotMeetShareTheirObstacle) {
-  run(R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5, "gravity": [0, 0, -9.81], "keyframes": [0.05],
-    "objects": {"here": {"asset": "cloth.json"},
+constexpr const char* apart = R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5,
+    "gravity": [0, 0, -9.81], "keyframes": [0.05], "objects": {"here": {"asset": "cloth.json"},
       "there": {"asset": "cloth.json", "start": {"T_base_object": [1, 0, 0, 0, 0, 0, 1]}}},
-    "obstacles": {"table": {"shape": "plane", "normal": [0, 0, 1]}}})",
-      true);
+    "obstacles": {"table": {"shape": "plane", "normal": [0, 0, 1]}}})";
+
+TEST_F(ContactTablesTest, ObjectsThatDoNotMeetShareTheirObstacle) {
+  run(apart, true);
   const std::map<std::string, Wrench> end = checked("000005", "0.05");
   EXPECT_NEAR(end.at("table").force.z(), -2 * weight, 1e-2 * weight);
   // About the origin: the middles of the sheets are at x = 0.05 and 1.05.
   EXPECT_NEAR(end.at("here").torque.y(), -0.05 * weight, 1e-2 * weight);
   EXPECT_NEAR(end.at("there").torque.y(), -1.05 * weight, 1e-2 * weight);
+}
+
+TEST_F(ContactTablesTest, AreTheSameOnAnyNumberOfThreads) {
+  run(apart, true);
+  const std::string contacts = text_of("contacts/000005.csv"), resultants = text_of("resultants.csv");
+  EXPECT_GT(contacts.size(), 1000u);
+  for (const int threads : {2, 3}) {
+    run(apart, true, threads);
+    EXPECT_EQ(text_of("contacts/000005.csv"), contacts) << threads;
+    EXPECT_EQ(text_of("resultants.csv"), resultants) << threads;
+  }
 }
 
 TEST_F(ContactTablesTest, AreThereWhereAskedForAlone) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 
 #include "tests/sim/layer_scenes.h"
@@ -68,7 +69,12 @@ double expect_newton_and_euler(LayerScene scene, int steps, std::size_t first_fr
     if (report.substeps > 1 || !report.converged) continue;
     const std::vector<ContactForce> contacts = solver.contacts(environment);
     const Resultants sums = resultants_of(contacts, scene.sheet.bodies.size(), environment.obstacles.size());
-    for (const ContactForce& contact : contacts) couple = std::max(couple, contact.couple.norm());
+    for (const ContactForce& contact : contacts) {
+      couple = std::max(couple, contact.couple.norm());
+      if (contact.kind == ContactKind::vertex_obstacle) continue;
+      EXPECT_LE(contact.friction.norm(), cloth.friction * contact.normal_force * (1 + 1e-9));
+      EXPECT_LE(std::abs(contact.friction.dot(contact.normal)), 1e-9 * contact.normal_force);
+    }
     for (std::size_t b = first_free_body; b < scene.sheet.bodies.size(); ++b) {
       const Body& body = scene.sheet.bodies[b];
       Vector3d force = Vector3d::Zero(), torque = force;
