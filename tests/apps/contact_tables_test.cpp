@@ -68,8 +68,10 @@ class ContactTablesTest : public testing::Test {
 
   SceneSummary run(const std::string& scene, bool contacts, int threads = 1) {
     std::ofstream(folder_ / "scene.json") << scene;
-    return run_scene(data::load_scene((folder_ / "scene.json").string()),
-                     {.threads = threads, .contacts = contacts}, out().string());
+    SceneRun settings;
+    settings.threads = threads;
+    settings.contacts = contacts;
+    return run_scene(data::load_scene((folder_ / "scene.json").string()), settings, out().string());
   }
   std::string text_of(const std::string& file) const {
     std::ifstream in(out() / file);
