@@ -11,6 +11,8 @@
 #include <set>
 #include <utility>
 
+#include "apps/contact_tables.h"
+#include "apps/csv_text.h"
 #include "apps/hold_watch.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
@@ -30,8 +32,17 @@ namespace {
 
 using Eigen::Vector3d;
 
-/// Advances an environment by one step.
-using Stepper = std::function<StepReport(Environment&)>;
+/// What advances an environment, by either method.
+struct Stepper {
+  std::function<StepReport(Environment&)> step;
+  std::function<std::vector<ContactForce>(const Environment&)> contacts;  ///< of the last step
+};
+
+template <class Method>
+Stepper stepper_of(const std::shared_ptr<Method>& method) {
+  return {[method](Environment& e) { return method->step(e); },
+          [method](const Environment& e) { return method->contacts(e); }};
+}
 
 Stepper make_stepper(const data::SceneSolver& solver, double time_step, const SceneBody& body) {
   if (solver.integrator != "newton" && has_solids(body.sheet))
@@ -46,8 +57,7 @@ Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sc
     settings.max_iterations = solver.max_iterations;
     settings.tolerance = solver.tolerance;
     settings.exit_speed = solver.exit_speed;
-    return
-        [newton = std::make_shared<Solver>(body.sheet, settings)](Environment& e) { return newton->step(e); };
+    return stepper_of(std::make_shared<Solver>(body.sheet, settings));
   }
   ProjectiveSettings settings;
   settings.time_step = time_step;
@@ -60,9 +70,7 @@ Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sc
   settings.constraints.tolerance = solver.constraint_tolerance;
   settings.constraints.max_force = solver.max_force;
   settings.constraints.linear.solver = dual_solver_from_name(solver.constraint_linear_solver);
-  return [projective = std::make_shared<ProjectiveSolver>(body.sheet, settings)](Environment& e) {
-    return projective->step(e);
-  };
+  return stepper_of(std::make_shared<ProjectiveSolver>(body.sheet, settings));
 }
 
 data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
@@ -79,13 +87,6 @@ data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
     triangles += t.rows();
   }
   return mesh;
-}
-
-/// Without the last digits that adding up steps leaves.
-std::string time_text(double seconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.12g", seconds);
-  return text;
 }
 
 std::size_t vertices_of(const std::vector<SceneBody>& bodies) {
@@ -151,14 +152,6 @@ std::string log_row(int step, double time, const std::vector<StepReport>& report
   }
   if (yields) row += "," + data::format_number(sum.yielding);
   return row + "\n";
-}
-
-/// In quotes where a comma, a quote or a line break would end it.
-std::string csv_field(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
 }
 
 std::string force_rows(double time, const std::vector<SceneBody>& bodies,
@@ -292,10 +285,13 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
 
   const std::set<int> frames = frames_to_write(scene, steps);
-  const auto write_frame = [&](int step, const data::TriangleMesh& mesh) {
+  const auto path_of = [&](const char* folder, int step, const char* ending) {
     char name[32];
-    std::snprintf(name, sizeof name, "%06d.ply", step);
-    data::save_triangle_mesh(mesh, (fs::path(output_dir) / "frames" / name).string());
+    std::snprintf(name, sizeof name, "%06d%s", step, ending);
+    return (fs::path(output_dir) / folder / name).string();
+  };
+  const auto write_frame = [&](int step, const data::TriangleMesh& mesh) {
+    data::save_triangle_mesh(mesh, path_of("frames", step, ".ply"));
     ++summary.frames;
   };
   std::string log =
@@ -304,10 +300,18 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   if (scene.self_contact) log += ",layer_distance_m,layer_touches,layer_pairs,layers_J";
   const bool yields = any_yields(bodies);
   log += yields ? ",yielding_J\n" : "\n";
-  std::string forces = "t,body,fx,fy,fz\n";
+  std::string forces = "t,body,fx,fy,fz\n", resultants = resultant_columns;
   const auto write_tables = [&] {
     data::write_atomically((fs::path(output_dir) / "log.csv").string(), log);
     data::write_atomically((fs::path(output_dir) / "forces.csv").string(), forces);
+    if (run.contacts) data::write_atomically((fs::path(output_dir) / "resultants.csv").string(), resultants);
+  };
+  const auto write_contacts = [&](int step, double time) {
+    std::vector<std::vector<ContactForce>> contacts;
+    for (std::size_t b = 0; b < bodies.size(); ++b)
+      contacts.push_back(steppers[b].contacts(bodies[b].environment));
+    data::write_atomically(path_of("contacts", step, ".csv"), contact_table(bodies, contacts));
+    resultants += resultant_rows(time, bodies, contacts);
   };
 
   // A run that is killed leaves them as they were some seconds before.
@@ -329,7 +333,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   const data::TriangleMesh at_start = merged(bodies);
   const auto begin_writing = [&] {
     // Of a former run; its tables first, so that they never stand beside frames of this one.
-    for (const char* old : {"log.csv", "forces.csv", "frames"}) fs::remove_all(fs::path(output_dir) / old);
+    for (const char* old : {"log.csv", "forces.csv", "resultants.csv", "contacts", "frames"})
+      fs::remove_all(fs::path(output_dir) / old);
     if (frames.count(0)) write_frame(0, at_start);
   };
   try {
@@ -339,7 +344,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     begins("solving the first step of " + size);
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
       std::vector<std::future<void>> pending;
-      const auto advance = [&](std::size_t b) { reports[b] = steppers[b](bodies[b].environment); };
+      const auto advance = [&](std::size_t b) { reports[b] = steppers[b].step(bodies[b].environment); };
       for (std::size_t b = 0; b < bodies.size(); ++b)
         if (run.threads > 1 && b + 1 < bodies.size())
           pending.push_back(std::async(std::launch::async, advance, b));
@@ -379,8 +384,10 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
                                       [](const SceneBody& body) { return motion_is_over(body.environment); });
         done = summary.at_rest = over && summary.last_motion <= *scene.rest_motion;
       }
-      if (frames.count(step) || (scene.rest_motion && (done || step == steps)))
+      if (frames.count(step) || (scene.rest_motion && (done || step == steps))) {
         write_frame(step, merged(bodies));
+        if (run.contacts) write_contacts(step, time);
+      }
       write_tables_at_times();
       if (run.progress && !run.progress(step, steps)) summary.interrupted = step < steps;
     }

@@ -35,6 +35,7 @@ struct SceneSummary {
 struct SceneRun {
   int steps = -1;                                  ///< to run; below zero: the scene's
   int threads = 1;                                 ///< objects step in parallel
+  bool contacts = false;                           ///< whether to write contacts and resultants at each frame
   std::function<void(const std::string&)> notice;  ///< told each notice before the first step
   std::function<void(const std::string&)> phase;   ///< told what begins that may take minutes
   /// Before the first step and after each; false stops the run.
@@ -45,10 +46,11 @@ struct SceneRun {
 /// log.csv (step, t, residual, iterations, penetration_max_m, complementarity, kinetic_J, elastic_J,
 /// potential_J, converged, membrane_J, bending_J, substeps; with self-contact then layer_distance_m,
 /// layer_touches, layer_pairs, layers_J) and forces.csv (t, body, fx, fy, fz: of the body
-/// on the objects [N]). The last step of a quasistatic run is always a frame. What was
-/// done is kept when the run stops early; nothing is written before the first step is done, and then frames
-/// and tables of an earlier run go first. Throws data::InputError, too, where the scene needs more memory
-/// than there is.
+/// on the objects [N]). With run.contacts also contacts/%06d.csv beside each frame but that of the start, and
+/// resultants.csv, as contact_table and resultant_rows say. The last step of a quasistatic run is always a
+/// frame. What was done is kept when the run stops early; nothing is written before the first step is done,
+/// and then frames and tables of an earlier run go first. Throws data::InputError, too, where the scene needs
+/// more memory than there is.
 SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std::string& output_dir);
 
 }  // namespace flash::sim

@@ -32,7 +32,7 @@ struct RunOptions {
   std::string scene, out, device = "auto";
   int threads = 0, steps = -1;
   std::optional<double> duration;  // [s]
-  bool quiet = false, verbose = false, json = false, force = false;
+  bool contacts = false, quiet = false, verbose = false, json = false, force = false;
 };
 
 /// A line on stderr about what is being done, where that takes longer than two seconds.
@@ -112,12 +112,12 @@ int steps_to_run(const RunOptions& options, const data::Scene& scene) {
 }
 
 /// What a run that was stopped leaves, and how to go on.
-void say_what_is_left(const sim::SceneSummary& summary, int steps, const std::string& out) {
+void say_what_is_left(const sim::SceneSummary& summary, int steps, const std::string& tables,
+                      const std::string& out) {
   std::cerr << "flash-sim: stopped after " << data::format_count(std::size_t(summary.steps)) << " of "
             << data::format_count(std::size_t(steps)) << " steps; " << out << " holds their "
-            << data::format_count(std::size_t(summary.frames))
-            << " frames, log.csv and forces.csv; a run begins again from the start, with --force in the same "
-               "folder\n";
+            << data::format_count(std::size_t(summary.frames)) << " frames, " << tables
+            << "; a run begins again from the start, with --force in the same folder\n";
 }
 
 int run(const RunOptions& options) {
@@ -134,6 +134,7 @@ int run(const RunOptions& options) {
   ProgressLine progress(!options.quiet);
   sim::SceneRun settings;
   settings.steps = steps_to_run(options, scene);
+  settings.contacts = options.contacts;
   settings.threads =
       options.threads > 0 ? options.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   settings.notice = [&](const std::string& notice) {
@@ -149,7 +150,10 @@ int run(const RunOptions& options) {
   const sim::SceneSummary summary = sim::run_scene(scene, settings, options.out);
 
   if (summary.interrupted)
-    say_what_is_left(summary, settings.steps < 0 ? scene.steps : settings.steps, options.out);
+    say_what_is_left(
+        summary, settings.steps < 0 ? scene.steps : settings.steps,
+        options.contacts ? "contacts, log.csv, forces.csv and resultants.csv" : "log.csv and forces.csv",
+        options.out);
   const double unconverged_share = double(summary.unconverged_steps) / std::max(1, summary.steps);
   const bool unusable = !sim::accepted(unconverged_share, summary.residual_max) || !summary.at_rest;
   const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
@@ -179,7 +183,8 @@ int run(const RunOptions& options) {
     if (summary.layer_touches_max > 0)
       std::printf("layers touched at up to %d places, no nearer than %s m\n", summary.layer_touches_max,
                   data::format_short(summary.layer_distance_min).c_str());
-    std::printf("%s: %d frames, log.csv, forces.csv\n", options.out.c_str(), summary.frames);
+    std::printf("%s: %d frames, log.csv, forces.csv%s\n", options.out.c_str(), summary.frames,
+                options.contacts ? ", contacts, resultants.csv" : "");
   }
   return exit_code;
 }
@@ -207,6 +212,9 @@ void add_run_verb(CLI::App& app, Action& action) {
   verb.add_option("--duration", options->duration, "In place of the scene's [s]")
       ->check(number_from(0))
       ->excludes("--steps");
+  verb.add_flag(
+      "--contacts", options->contacts,
+      "Write contacts/, the force of each contact, and resultants.csv, of each body, at each frame");
   verb.add_flag("--json", options->json, "Print the summary as JSON on stdout");
   CLI::Option* quiet = verb.add_flag("--quiet", options->quiet, "Print nothing but errors and warnings");
   verb.add_flag("--verbose", options->verbose, "Print every notice (the default)")->excludes(quiet);

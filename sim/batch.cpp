@@ -13,10 +13,22 @@
 #include "sim/cuda/projective_phases.h"
 #include "sim/device_batch.h"
 #include "sim/device_error.h"
+#include "sim/step/resultants.h"
 
 namespace flash::sim {
 
 using data::Points;
+
+namespace {
+
+void copy_wrenches(const std::vector<Wrench>& wrenches, double* to) {
+  for (const Wrench& wrench : wrenches) {
+    to = std::copy(wrench.force.data(), wrench.force.data() + 3, to);
+    to = std::copy(wrench.torque.data(), wrench.torque.data() + 3, to);
+  }
+}
+
+}  // namespace
 
 struct Batch::Storage {
   std::shared_ptr<const SheetPlan> plan;
@@ -25,9 +37,11 @@ struct Batch::Storage {
   std::vector<std::optional<Solver>> solvers;                       ///< of environments under way
   std::vector<std::optional<ProjectiveSolver>> projective_solvers;  ///< likewise
   int step = 0;
-  std::ptrdiff_t vertices = 0, holds = 0;
+  std::ptrdiff_t vertices = 0, holds = 0, bodies = 0, obstacles = 0;
   std::vector<double> positions, velocities, kept, hold_forces;
   std::vector<StepStats> stats;
+  std::vector<std::vector<ContactForce>> contacts;
+  std::vector<double> body_resultants, obstacle_resultants;
   std::vector<double> phase_ticks;  ///< of a device
   std::mutex of_ticks;
 
@@ -100,6 +114,17 @@ struct Batch::Storage {
       std::copy(report.hold_forces[k].data(), report.hold_forces[k].data() + 3,
                 hold_forces.data() + (place * holds + k) * 3);
     keep(e, before + 1);
+  }
+
+  /// Keeps the contacts of the last step of environment e, and their sums.
+  void keep_contacts(int e) {
+    const Environment& environment = environments[e];
+    contacts[e] =
+        solvers[e] ? solvers[e]->contacts(environment) : projective_solvers[e]->contacts(environment);
+    const Resultants sums =
+        resultants_of(contacts[e], static_cast<std::size_t>(bodies), static_cast<std::size_t>(obstacles));
+    copy_wrenches(sums.bodies, body_resultants.data() + 6 * e * bodies);
+    copy_wrenches(sums.obstacles, obstacle_resultants.data() + 6 * e * obstacles);
   }
 };
 
@@ -179,6 +204,14 @@ Batch::Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> env
   s.kept.resize(numbers * s.settings.kept_steps.size());
   s.stats.resize(count * s.steps());
   s.hold_forces.resize(3 * s.holds * s.stats.size());
+  s.contacts.resize(count);
+  if (s.settings.contacts) {
+    s.bodies = std::ssize(s.plan->bodies);
+    for (const Environment& environment : s.environments)
+      s.obstacles = std::max(s.obstacles, std::ssize(environment.obstacles));
+    s.body_resultants.resize(6 * count * s.bodies);
+    s.obstacle_resultants.resize(6 * count * s.obstacles);
+  }
   for (int e = 0; e < size(); ++e) {
     s.keep(e, s.step);
     s.show(e);
@@ -216,6 +249,7 @@ void Batch::advance(int steps, const std::function<void(int)>& finished) {
       throw_if_stopped();
     }
     s.show(e);
+    if (s.settings.contacts && steps > 0) s.keep_contacts(e);
     if (first + steps == s.settings.steps) {
       s.solvers[e].reset();
       s.projective_solvers[e].reset();
@@ -246,6 +280,18 @@ View<double> Batch::hold_forces() const {
 std::span<const StepStats> Batch::stats(int environment) const {
   const auto steps = static_cast<std::size_t>(storage_->steps());
   return std::span(storage_->stats).subspan(environment * steps, steps);
+}
+
+std::span<const ContactForce> Batch::contacts(int environment) const {
+  return storage_->contacts[environment];
+}
+
+View<double> Batch::body_resultants() const {
+  return dense(storage_->body_resultants, {size(), storage_->bodies, 6});
+}
+
+View<double> Batch::obstacle_resultants() const {
+  return dense(storage_->obstacle_resultants, {size(), storage_->obstacles, 6});
 }
 
 std::vector<PhaseShare> Batch::phases() const {

@@ -12,6 +12,7 @@
 #include "sim/oracle/projective.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
+#include "sim/step/contact_force.h"
 
 namespace flash::sim {
 
@@ -44,6 +45,7 @@ struct BatchSettings {
   bool half_factor = false;       ///< of the projective method on a device: its factor in half precision
   int steps = 0;                  ///< last step of the whole replay
   std::vector<int> kept_steps{};  ///< steps whose positions are kept, ascending; step 0 is the start
+  bool contacts = false;          ///< whether contacts and resultants are kept; on the CPU alone
   int first_step = 0;             ///< step at which the states of the environments stand
   int threads = 1;                ///< 0: one a processor; on a device they take the results
   Device device = Device::cpu;
@@ -83,6 +85,12 @@ class Batch {
   View<double> kept_positions() const;  ///< environments x kept steps x vertices x 3 [m]
   View<double> hold_forces() const;     ///< hold on sheet: environments x steps x holds x 3 [N]
   std::span<const StepStats> stats(int environment) const;  ///< a step each, from first_step on
+
+  // With settings.contacts, as they are at the end of the last step of the last advance, or of the last part
+  // of a step in parts; else empty. A force, then its torque about the origin of the base frame [N, N m].
+  std::span<const ContactForce> contacts(int environment) const;
+  View<double> body_resultants() const;      ///< on bodies of the sheet: environments x bodies x 6
+  View<double> obstacle_resultants() const;  ///< on obstacles: environments x most obstacles of one x 6
 
   /// Where the time of the steps went on a device; empty on the CPU.
   std::vector<PhaseShare> phases() const;

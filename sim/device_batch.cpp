@@ -56,6 +56,10 @@ std::string why_not_on_device(const ProjectiveSettings& settings) {
 namespace {
 
 void check_on_device(const std::vector<Environment>& environments, const BatchSettings& settings) {
+  if (settings.contacts)
+    throw data::InputError(
+        "--device cuda: forces of each contact and resultants of bodies (contacts) are told on the CPU "
+        "alone");
   if (settings.projective)
     if (const std::string why = why_not_on_device(*settings.projective); !why.empty())
       throw data::InputError("--device cuda: " + why);

@@ -209,6 +209,13 @@ StepReport Solver::step(Environment& environment) {
   return advance(environment, h, w.settings.halvings, w);
 }
 
+std::vector<ContactForce> Solver::contacts(const Environment& environment) const {
+  const Iterate& end = workspace_->now;
+  // Forces of an iterate that is not finite are none.
+  if (!end.positions.allFinite()) return {};
+  return contacts_of(workspace_->plan->sheet, environment, end.positions, end.contacts, end.layers);
+}
+
 void check_self_contact(const Sheet& sheet, double thickness, const Points& positions) {
   PairSurface surface(sheet);
   check_thickness(sheet, surface, thickness);

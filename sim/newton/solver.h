@@ -1,11 +1,13 @@
 #pragma once
 #include <memory>
+#include <vector>
 
 #include "sim/newton/solver_settings.h"
 #include "sim/newton/step_report.h"
 #include "sim/plan/sheet_plan.h"
 #include "sim/scene/environment.h"
 #include "sim/scene/sheet.h"
+#include "sim/step/contact_force.h"
 
 namespace flash::sim {
 
@@ -30,6 +32,10 @@ class Solver {
   /// data::InputError for a material that the sheet cannot have, such as a plate with a rest shape not flat,
   /// and where the surface that meets itself passes through itself at the first step.
   StepReport step(Environment& environment);
+
+  /// The contacts at the end of the last step, or of its last part, of the environment that took it. Empty
+  /// before the first step.
+  std::vector<ContactForce> contacts(const Environment& environment) const;
 
   /// The next step starts as that of a new Solver does.
   void forget();

@@ -30,6 +30,8 @@ struct ProjectiveSolver::Workspace {
   std::shared_ptr<const SheetPlan> plan;
   ProjectiveSettings settings;
   std::list<std::pair<std::vector<data::SheetMaterial>, ProjectiveSystem>> systems;
+  std::vector<ProjectiveContact> contacts;  ///< of the end of the last step
+  VectorXd multiplier;                      ///< theirs
 
   ProjectiveSystem& system_of(const std::vector<data::SheetMaterial>& materials) {
     for (auto& [known, system] : systems)
@@ -245,6 +247,8 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   }
 
   report_forces(environment, settings, holds, contacts, multiplier, force - reaction, report);
+  w.contacts = std::move(contacts);
+  w.multiplier = std::move(multiplier);
   environment.state.velocities = (x - environment.state.positions) / h;
   environment.state.positions = x;
   environment.state.time = time;
@@ -252,6 +256,25 @@ ProjectiveReport ProjectiveSolver::step(Environment& environment) {
   report.kinetic = 0.5 * (system.mass().asDiagonal() * v).cwiseProduct(v).sum();
   report.gravitational = -(system.mass().transpose() * x * environment.gravity)(0);
   return report;
+}
+
+std::vector<ContactForce> ProjectiveSolver::contacts(const Environment& environment) const {
+  const Workspace& w = *workspace_;
+  std::vector<ContactForce> all;
+  for (std::size_t k = 0; k < w.contacts.size(); ++k) {
+    const ProjectiveContact& touch = w.contacts[k];
+    const Vector3d l = w.multiplier.segment<3>(3 * static_cast<Index>(k));
+    if (l[0] == 0) continue;
+    ContactForce contact{.body = body_of(w.plan->sheet, touch.vertex),
+                         .other = touch.obstacle,
+                         .vertices = {touch.vertex, -1, -1, -1}};
+    contact.point = contact.other_point = environment.state.positions.row(touch.vertex).transpose();
+    contact.normal = touch.directions.row(0).transpose();
+    contact.normal_force = l[0];
+    contact.friction = touch.directions.bottomRows<2>().transpose() * l.tail<2>();
+    all.push_back(contact);
+  }
+  return all;
 }
 
 }  // namespace flash::sim

@@ -1,6 +1,7 @@
 #pragma once
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "sim/newton/solver.h"
 #include "sim/oracle/constraint_newton.h"
@@ -54,6 +55,9 @@ class ProjectiveSolver {
   /// Advances environment.state by one time step. The state returned is the iterate whose residual is
   /// reported.
   ProjectiveReport step(Environment& environment);
+
+  /// The contacts at the end of the last step of the environment that took it, as Solver::contacts.
+  std::vector<ContactForce> contacts(const Environment& environment) const;
 
  private:
   struct Workspace;

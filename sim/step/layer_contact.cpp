@@ -181,6 +181,7 @@ void LayerStep::add_forces(const Points& positions, LayerContact& contact, Point
     for (int k = 0; k < 4; ++k) add_row(force, pair.vertices[k], touch.weights[k] * needed);
     if (crossing.factor < 1) {
       const double energy = pair.area * response.energy;
+      touch.couple = energy * cross(crossing.by_first, x[1] - x[0]);
       for (int k = 0; k < 4; ++k)
         add_row(force, pair.vertices[k],
                 (k % 2 == 0 ? -energy : energy) * (k < 2 ? crossing.by_first : crossing.by_second));

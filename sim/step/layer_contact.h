@@ -21,6 +21,7 @@ struct LayerTouch {
   Vector3<double> bristle{};         ///< deflection at the start of the step [m]
   Vector3<double> slip_direction{};  ///< the slip over its friction_length
   Vector3<double> dual{};            ///< what the linear problems take for it, at most 1 long
+  Vector3<double> couple{};          ///< torque on the first of two edges that are nearly parallel [N m]
 };
 
 /// What the surface does to itself at an iterate.

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -114,6 +115,48 @@ TEST(Batch, KeepsTheStepsThatAreWanted) {
       for (int axis = 0; axis < 3; ++axis)
         EXPECT_EQ(now.data[e * now.strides[0] + i * now.strides[1] + axis * now.strides[2]],
                   environment.state.positions(i, axis));
+  }
+}
+
+bool same(const ContactForce& a, const ContactForce& b) {
+  return a.kind == b.kind && a.body == b.body && a.other == b.other && a.vertices == b.vertices &&
+         a.point == b.point && a.other_point == b.other_point && a.normal == b.normal &&
+         a.normal_force == b.normal_force && a.friction == b.friction && a.couple == b.couple;
+}
+
+TEST(Batch, ContactsAreThoseOfItsEnvironmentsAloneBitForBit) {
+  const Sheet sheet = small_sheet();
+  const auto plan = make_sheet_plan(sheet);
+  std::vector<Environment> environments = three_lifts(sheet);
+  environments[1].obstacles.push_back({Plane{.point = {0, 0, -1}}});  // never met
+  for (const int threads : {1, 2, 5}) {
+    Batch batch(plan, environments, {.steps = 30, .contacts = true, .threads = threads});
+    Batch without(plan, environments, {.steps = 30, .threads = threads});
+    without.advance(30);
+    EXPECT_EQ(batch.body_resultants().shape, (std::vector<std::ptrdiff_t>{3, 1, 6}));
+    EXPECT_EQ(batch.obstacle_resultants().shape, (std::vector<std::ptrdiff_t>{3, 2, 6}));
+    EXPECT_EQ(without.obstacle_resultants().shape, (std::vector<std::ptrdiff_t>{3, 0, 6}));
+    for (int part = 0; part < 2; ++part) {
+      batch.advance(15);
+      batch.advance(0);
+      const View<double> bodies = batch.body_resultants(), obstacles = batch.obstacle_resultants();
+      for (int e = 0; e < 3; ++e) {
+        Environment alone = environments[static_cast<std::size_t>(e)];
+        Solver solver(plan, {});
+        for (int k = 0; k < 15 * (part + 1); ++k) solver.step(alone);
+        const std::vector<ContactForce> expected = solver.contacts(alone);
+        EXPECT_GT(expected.size(), 5u);
+        EXPECT_TRUE(std::ranges::equal(batch.contacts(e), expected, same)) << threads << ' ' << e;
+        Eigen::Vector3d force = Eigen::Vector3d::Zero();
+        for (const ContactForce& contact : expected) force += contact.force();
+        for (int axis = 0; axis < 3; ++axis) {
+          EXPECT_EQ(bodies.data[e * bodies.strides[0] + axis], force[axis]);
+          EXPECT_EQ(obstacles.data[e * obstacles.strides[0] + axis], -force[axis]);
+          EXPECT_EQ(obstacles.data[e * obstacles.strides[0] + obstacles.strides[1] + axis], 0);
+        }
+        EXPECT_TRUE(without.contacts(e).empty());
+      }
+    }
   }
 }
 

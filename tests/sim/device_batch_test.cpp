@@ -179,6 +179,15 @@ TEST(DeviceBatch, WhatTheDeviceCannotDoIsRefusedByName) {
             "woven membranes (young_ratio, shear_ratio) are simulated on the CPU alone");
   Batch batch(plan, {environment}, settings_on(Device::cuda));
   EXPECT_THROW(batch.advance(1), data::InputError);
+  BatchSettings with_contacts = settings_on(Device::cuda);
+  with_contacts.contacts = true;
+  Batch told(plan, {lift(*plan, 0)}, with_contacts);
+  try {
+    told.advance(1);
+    FAIL() << "it has to be refused";
+  } catch (const data::InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("(contacts) are told on the CPU alone"), std::string::npos);
+  }
   environment.obstacles.clear();
   environment.state.positions = data::Points::Zero(65537, 3);
   EXPECT_EQ(why_not_on_device(environment), "more than 65536 vertices: found 65537");

@@ -2,6 +2,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "tests/sim/obstacle_depth.h"
@@ -96,6 +97,32 @@ RC_GTEST_PROP(Properties, ForcesOfPlanesAreInTheConeOfFriction, ()) {
       RC_ASSERT(normal >= -unbalanced);
       RC_ASSERT(along <= friction * normal + (1 + friction) * unbalanced);
     }
+  }
+}
+
+// The contacts of any step are what its report sums, and each of them is in the cone of its obstacle.
+RC_GTEST_PROP(Properties, ForcesOfContactsAreInTheirConesAndAddUp, ()) {
+  Run run;
+  const Environment& environment = run.environment;
+  for (int step = 0; step < run.steps; ++step) {
+    const StepReport report = run.solver.step(run.environment);
+    std::vector<Vector3d> sums(environment.obstacles.size(), Vector3d::Zero());
+    double largest = 0;
+    for (const ContactForce& contact : run.solver.contacts(environment)) {
+      const Obstacle& obstacle = environment.obstacles[static_cast<std::size_t>(contact.other)];
+      const double bound = friction_between(environment, obstacle, 0) * contact.normal_force;
+      const double rounding = 1e-12 * contact.normal_force;
+      RC_ASSERT(contact.kind == ContactKind::vertex_obstacle && contact.normal_force > 0);
+      RC_ASSERT(std::abs(contact.normal.norm() - 1) < 1e-12);
+      // Of a way of centimetres over bristles of 4e-8 m, which friction is in proportion to.
+      RC_ASSERT(std::abs(contact.friction.dot(contact.normal)) <= 1e-9 * contact.normal_force);
+      RC_ASSERT(contact.friction.norm() <= bound + rounding);
+      sums[static_cast<std::size_t>(contact.other)] += contact.force();
+      largest += contact.force().norm();
+    }
+    if (report.substeps > 1) continue;  // the report has the mean over the parts
+    for (std::size_t k = 0; k < sums.size(); ++k)
+      RC_ASSERT((sums[k] - report.obstacle_forces[k]).norm() <= 1e-12 * largest);
   }
 }
 
