@@ -441,6 +441,35 @@ TEST_F(SceneRunTest, SolidsRunFromFilesAndTellWhereTheyLock) {
 
 // The mesh is made on the spot; vertices count as it numbers them, and what holds a face holds the vertices
 // in the middle of its edges, at rest and where it is moved to.
+TEST_F(SceneRunTest, ASolidThatCollapsesToAPointIsNamed) {
+  const data::TetMesh mesh = data::tet_box({0.04, 0.04, 0.04}, {2, 2, 2});
+  data::save_point_cloud(0.05 * mesh.vertices, (folder_ / "start.ply").string());
+  const auto run = [&](const std::string& law, const std::string& order) {
+    write("block.json", R"({"schema": "flash-asset/1", "mesh": "box:0.04x0.04x0.04:0.02",
+      "element_type": "TETRAHEDRON", "element_order": )" +
+                            order + R"(, "mechanical_props": {"constitutive": ")" + law +
+                            R"(", "density": 300, "young": 3e4, "poisson": 0}})");
+    return run_scene(
+        data::load_scene(write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 30,
+      "gravity": [0, 0, 0], "objects": {"block": {"asset": "block.json", "start": {"mesh": "start.ply"}}}})")),
+        {}, out());
+  };
+  for (const char* order : {"1", "2"}) {
+    const SceneSummary collapsed = run("TET_NEOHOOKEAN", order);
+    EXPECT_EQ(collapsed.collapsed_elements, 40);
+    ASSERT_EQ(collapsed.warnings.size(), 1u);
+    const std::string& warning = collapsed.warnings[0];
+    EXPECT_TRUE(
+        warning.starts_with("block: 40 of 40 tetrahedra have less than 0.001 of their rest volume at "))
+        << warning;
+    EXPECT_NE(warning.find(" s, and 40 at the end: "), std::string::npos) << warning;
+    EXPECT_NE(warning.find("take TET_NEOHOOKEAN_LOG"), std::string::npos) << warning;
+    const SceneSummary back = run("TET_NEOHOOKEAN_LOG", order);
+    EXPECT_TRUE(back.warnings.empty());
+    EXPECT_EQ(back.collapsed_elements, 0);
+  }
+}
+
 TEST_F(SceneRunTest, QuadraticSolidsAreHeldByTheVerticesOfTheirMesh) {
   write("box.json", R"({"schema": "flash-asset/1", "mesh": "box:0.04x0.02x0.02:0.02",
       "element_type": "TETRAHEDRON", "element_order": 2, "mechanical_props": {"constitutive": "TET_NEOHOOKEAN",
