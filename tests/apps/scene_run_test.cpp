@@ -115,6 +115,26 @@ TEST_F(SceneRunTest, StartThatPassesThroughItselfIsRefused) {
   EXPECT_FALSE(fs::exists(out()));
 }
 
+TEST_F(SceneRunTest, LayersThatStartInOnePlaceAreRefused) {
+  const auto scene = [&](const std::string& upper) {
+    return data::load_scene(write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 2,
+    "gravity": [0, 0, -9.81], "self_contact": {}, "objects": {"lower": {"asset": "cloth.json", "fixed": [{"vertices": "all"}]},
+      "upper": {"asset": "cloth.json")" + upper + "}}}"));
+  };
+  for (const char* upper : {"", R"(, "start": {"T_base_object": [0.033, 0.007, 1e-12, 0, 0, 0, 1]})"}) try {
+      run_scene(scene(upper), {}, out());
+      FAIL() << "it has to be refused";
+    } catch (const data::InputError& error) {
+      const std::string text = error.what();
+      EXPECT_NE(text.find(" of lower"), std::string::npos) << text;
+      EXPECT_NE(text.find(" of upper"), std::string::npos) << text;
+      EXPECT_NE(text.find("start them a thickness apart"), std::string::npos) << text;
+    }
+  EXPECT_FALSE(fs::exists(out()));
+  // What holds carry whole has no say in it.
+  EXPECT_EQ(run_scene(scene(R"(, "fixed": [{"vertices": "all"}])"), {}, out()).unconverged_steps, 0);
+}
+
 TEST_F(SceneRunTest, RestingSheetIsCarriedByTheTable) {
   const std::string path = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5,
     "gravity": [0, 0, -9.81], "objects": {"cloth": {"asset": "cloth.json",
