@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,8 +28,8 @@ struct SceneSummary {
   int frames = 0;              ///< written
   double wall_seconds = 0;
   bool interrupted = false;
-  double last_motion = 0;  ///< quasistatic: of the vertex that moved farthest in the last step [m]
-  bool at_rest = true;     ///< quasistatic: whether that is below the scene's bound
+  double last_motion = 0;       ///< quasistatic: of the vertex that moved farthest in the last step [m]
+  std::optional<bool> at_rest;  ///< whether that is below the scene's bound; none: not quasistatic
   std::vector<std::string> notices;
   std::vector<std::string> warnings;  ///< of solids that lock or collapse, of holds, and of vertices held
                                       ///< inside an obstacle or that start there

@@ -91,9 +91,10 @@ void print_json(const sim::SceneSummary& summary, const std::string& out, int ex
                                  {"frames", summary.frames},
                                  {"wall_seconds", summary.wall_seconds},
                                  {"interrupted", summary.interrupted},
-                                 {"at_rest", summary.at_rest},
+                                 {"at_rest", nullptr},
                                  {"warnings", warnings},
                                  {"exit_code", exit_code}};
+  if (summary.at_rest) json["at_rest"] = *summary.at_rest;
   if (summary.self_contact) {
     json["layer_distance_min_m"] = summary.layer_distance_min;
     json["layer_touches_max"] = summary.layer_touches_max;
@@ -152,10 +153,11 @@ int run(const RunOptions& options) {
   if (summary.interrupted)
     say_what_is_left(summary, settings.steps < 0 ? scene.steps : settings.steps, options.out);
   const double unconverged_share = double(summary.unconverged_steps) / std::max(1, summary.steps);
-  const bool unusable = !sim::accepted(unconverged_share, summary.residual_max) || !summary.at_rest ||
-                        summary.collapsed_elements > 0;
+  const bool moves = !summary.at_rest.value_or(true);
+  const bool unusable =
+      !sim::accepted(unconverged_share, summary.residual_max) || moves || summary.collapsed_elements > 0;
   const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
-  if (!summary.at_rest && !summary.interrupted)
+  if (moves && !summary.interrupted)
     std::cerr << "flash-sim: warning: not at rest after " << summary.steps << " steps: a vertex still moves "
               << data::format_short(summary.last_motion) << " m a step; allow more steps or longer ones\n";
   for (const std::string& warning : summary.warnings) std::cerr << "flash-sim: warning: " << warning << '\n';
