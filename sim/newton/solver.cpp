@@ -221,19 +221,24 @@ void check_apart(const Sheet& sheet, PairSurface& surface, const Environment& en
   }
 }
 
-/// Layers that start on both sides of each other would stay so.
+/// Layers that start on both sides of each other would stay so, and so would a body inside a solid.
 void check_start(const Sheet& sheet, PairSurface& surface, const Points& positions) {
-  const auto passing = first_intersection(surface, positions);
-  if (!passing) return;
-  const auto name_of = [&](int triangle) {
-    const Body& body = sheet.bodies[static_cast<size_t>(body_of(sheet, surface.triangles(triangle, 0)))];
-    const int first = body.is_solid() ? 0 : body.first_triangle;
-    return "triangle " + std::to_string(triangle - first) + (body.name.empty() ? "" : " of " + body.name);
-  };
-  throw data::input_error("self_contact", "start",
-                          "found " + name_of(passing->first) + " passing through " +
-                              name_of(passing->second) +
-                              ", expected a surface that does not pass through itself");
+  if (const auto passing = first_intersection(surface, positions)) {
+    const auto name_of = [&](int triangle) {
+      const Body& body = sheet.bodies[static_cast<size_t>(body_of(sheet, surface.triangles(triangle, 0)))];
+      const int first = body.is_solid() ? 0 : body.first_triangle;
+      return "triangle " + std::to_string(triangle - first) + (body.name.empty() ? "" : " of " + body.name);
+    };
+    throw data::input_error("self_contact", "start",
+                            "found " + name_of(passing->first) + " passing through " +
+                                name_of(passing->second) +
+                                ", expected a surface that does not pass through itself");
+  }
+  if (const auto enclosed = first_enclosed(sheet, surface, positions))
+    throw data::input_error("self_contact", "start",
+                            "found " + sheet.bodies[static_cast<size_t>(enclosed->first)].name +
+                                " wholly inside " + sheet.bodies[static_cast<size_t>(enclosed->second)].name +
+                                ", expected it outside: surfaces alone meet, so that it would stay there");
 }
 
 }  // namespace

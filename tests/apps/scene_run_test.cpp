@@ -136,6 +136,33 @@ TEST_F(SceneRunTest, LayersThatStartInOnePlaceAreRefused) {
   EXPECT_EQ(run_scene(scene(R"(, "fixed": [{"vertices": "all"}])"), {}, out()).unconverged_steps, 0);
 }
 
+TEST_F(SceneRunTest, AnObjectWhollyInsideASolidIsRefused) {
+  write("block.json",
+        R"({"schema": "flash-asset/1", "mesh": "box:0.06x0.06x0.06:0.02", "element_type": "TETRAHEDRON",
+      "mechanical_props": {"constitutive": "TET_NEOHOOKEAN", "density": 300, "young": 3e4, "poisson": 0.3}})");
+  write("small.json",
+        R"({"schema": "flash-asset/1", "mesh": "sheet:0.02x0.02:0.01", "element_type": "TRIANGLE",
+      "mechanical_props": {"constitutive": "TRI_COROTATED", "areal_density": 0.2, "young": 100, "poisson": 0.3,
+      "bending_rigidity": 1e-5}})");
+  const auto run = [&](const std::string& small) {
+    return run_scene(
+        data::load_scene(write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 1,
+      "gravity": [0, 0, 0], "self_contact": {}, "objects": {"block": {"asset": "block.json"},
+      "small": {"asset": "small.json", "start": {"T_base_object": [)" +
+                                                 small + R"(, 0, 0, 0, 1]}}}})")),
+        {}, out());
+  };
+  for (const char* place : {"0.02, 0.02, 0.03", "0.001, 0.001, 0.05"}) try {
+      run(place);
+      FAIL() << "it has to be refused";
+    } catch (const data::InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("found small wholly inside block"), std::string::npos)
+          << error.what();
+    }
+  for (const char* place : {"0.02, 0.02, 0.07", "-0.03, 0.02, 0.03", "0.02, 0.02, -0.01"})
+    EXPECT_EQ(run(place).steps, 1) << place;
+}
+
 TEST_F(SceneRunTest, RestingSheetIsCarriedByTheTable) {
   const std::string path = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 5,
     "gravity": [0, 0, -9.81], "objects": {"cloth": {"asset": "cloth.json",
