@@ -11,7 +11,7 @@
 
 namespace flash::sim {
 
-Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name) {
+Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name, const Eigen::Matrix3d& axes) {
   Sheet sheet{rest,
               {},
               Eigen::VectorXd::Zero(rest.vertices.rows()),
@@ -41,7 +41,9 @@ Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name) {
     Eigen::Matrix2d edges;
     edges << edge1.dot(axis1), edge2.dot(axis1), edge1.dot(axis2), edge2.dot(axis2);
     sheet.triangles.push_back({v, edges.inverse(), area});
-    const auto in_plane = [&](int axis) { return Eigen::Vector2d(axis1[axis], axis2[axis]); };
+    const auto in_plane = [&](int axis) {
+      return Eigen::Vector2d(axis1.dot(axes.col(axis)), axis2.dot(axes.col(axis)));
+    };
     const Eigen::Vector2d along_x = in_plane(0);
     sheet.triangles.back().x_axis = (along_x.norm() > 1e-6 ? along_x : in_plane(1)).normalized();
     for (int corner : {v[0], v[1], v[2]}) sheet.vertex_area[corner] += area / 3;

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+#include "data/asset.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
@@ -261,6 +262,43 @@ TEST_F(SceneRunTest, QuasistaticPullComesToRestWithTheForceOnEachSupport) {
   EXPECT_NEAR(mesh.vertices(35, 1), 0.1 * (1 - 0.3 * 0.1), 1e-9);
   const double energy = std::stod(column("log.csv", "membrane_J").back());
   EXPECT_NEAR(energy, 0.5 * 100 * 0.1 * 0.1 * 0.01, 1e-9);  // E t strain^2 / 2 times the area
+}
+
+// A woven strip is pulled along the x of its mesh, and another hangs over by its own weight: both wherever
+// the asset turns the mesh to.
+TEST_F(SceneRunTest, TheWarpTurnsWithTheMeshOfAnAsset) {
+  const auto end_of_strip = [&](const std::string& rotation, const Eigen::Vector3d& gravity,
+                                const std::string& held) {
+    write("woven.json",
+          R"({"schema": "flash-asset/1", "mesh": "sheet:0.1x0.04:0.02", "element_type": "TRIANGLE",
+      "transformation": {"trans": [0, 0, 0], "rotation": )" +
+              rotation + R"(}, "mechanical_props": {"constitutive": "TRI_STVK",
+      "areal_density": 0.2, "young": 500, "young_ratio": 0.4, "shear_ratio": 0.5, "warp_direction": 20, "poisson": 0.2,
+      "bending_rigidity": 1e-3, "bending_ratio": 0.3, "twisting_ratio": 0.6}})");
+    std::ostringstream text;
+    text << R"({"schema": "flash-scene/1", "timestep": 0.5, "steps": 20, "solver": {"tolerance": 1e-8},
+      "gravity": [)"
+         << gravity.x() << ", " << gravity.y() << ", " << gravity.z() << R"(], "objects": {"strip": {
+      "asset": "woven.json", "fixed": [{"vertices": )"
+         << held << "}]}}}";
+    run_scene(data::load_scene(write("scene.json", text.str())), {}, out());
+    const data::TriangleMesh end = data::load_triangle_mesh(out() + "/frames/000020.ply");
+    return Eigen::Vector3d(end.vertices.row(11));
+  };
+  const Eigen::Vector3d pull(100, 0, 0), fall(0, 0, -0.3);
+  const char *edge = "[0, 6, 12]", *clamp = "[0, 1, 6, 7, 12, 13]";
+  const Eigen::Vector3d pulled = end_of_strip("[0, 0, 0]", pull, edge),
+                        hanging = end_of_strip("[0, 0, 0]", fall, clamp);
+  EXPECT_GT(pulled.x(), 0.1001);
+  EXPECT_LT(hanging.z(), -1e-4);
+  for (const Eigen::Vector3d& degrees :
+       {Eigen::Vector3d(0, 0, 90), Eigen::Vector3d(0, 90, 0), Eigen::Vector3d(20, -35, 130)}) {
+    std::ostringstream rotation;
+    rotation << "[" << degrees.x() << ", " << degrees.y() << ", " << degrees.z() << "]";
+    const Eigen::Matrix3d turn = data::rotation_from_degrees(degrees);
+    EXPECT_LT((end_of_strip(rotation.str(), turn * pull, edge) - turn * pulled).norm(), 1e-7) << degrees;
+    EXPECT_LT((end_of_strip(rotation.str(), turn * fall, clamp) - turn * hanging).norm(), 1e-7) << degrees;
+  }
 }
 
 TEST_F(SceneRunTest, QuasistaticRunThatDoesNotComeToRestSaysSo) {
