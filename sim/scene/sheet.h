@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/mesh.h"
@@ -64,6 +66,10 @@ struct Sheet {
 /// Throws data::InputError on degenerate or duplicate triangles and on vertices without a triangle.
 Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name = {},
                  const Eigen::Matrix3d& axes = Eigen::Matrix3d::Identity());
+
+/// Two triangles of a flat rest shape with a common edge that lie on the same side of it, so that they cover
+/// each other; those of the lowest numbers. Empty where there are none, or where the shape is not flat.
+std::optional<std::pair<int, int>> first_overlap(const data::TriangleMesh& rest);
 
 /// Whether any body is a solid.
 bool has_solids(const Sheet& sheet);

@@ -301,6 +301,32 @@ TEST_F(SceneRunTest, TheWarpTurnsWithTheMeshOfAnAsset) {
   }
 }
 
+TEST_F(SceneRunTest, AFlatMeshThatCoversItselfIsSaid) {
+  const auto notices_of = [&](const data::TriangleMesh& mesh) {
+    data::save_triangle_mesh(mesh, (folder_ / "mesh.ply").string());
+    write("sheet.json", R"({"schema": "flash-asset/1", "mesh": "mesh.ply", "element_type": "TRIANGLE",
+      "mechanical_props": {"constitutive": "TRI_COROTATED", "areal_density": 0.2, "young": 100, "poisson": 0.3,
+      "bending_rigidity": 1e-5, "bending_model": "hinge"}})");
+    std::string all;
+    for (const std::string& notice :
+         run_scene(data::load_scene(write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01,
+      "steps": 1, "gravity": [0, 0, 0], "objects": {"cloth": {"asset": "sheet.json"}}})")),
+                   {}, out())
+             .notices)
+      all += notice + "\n";
+    return all;
+  };
+  data::TriangleMesh mesh = data::parse_mesh_spec("sheet:0.1x0.1:0.02", "", "");
+  EXPECT_EQ(notices_of(mesh).find("cover each other"), std::string::npos);
+  data::TriangleMesh curved = mesh;
+  curved.vertices.row(7) << 0.05, 0.05, 0.01;
+  EXPECT_EQ(notices_of(curved).find("cover each other"), std::string::npos);
+  mesh.vertices.row(7) << 0.05, 0.05, 0;  // beyond its neighbours
+  const std::string told = notices_of(mesh);
+  EXPECT_NE(told.find("cloth: "), std::string::npos);
+  EXPECT_NE(told.find(" cover each other at rest, though the mesh is flat"), std::string::npos) << told;
+}
+
 TEST_F(SceneRunTest, QuasistaticRunThatDoesNotComeToRestSaysSo) {
   const std::string path = write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 3,
     "gravity": [0, 0, -9.81], "quasistatic": {"motion": 1e-9}, "objects": {"cloth": "cloth.json"}})");
