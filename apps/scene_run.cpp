@@ -209,6 +209,27 @@ std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) 
   return warnings;
 }
 
+/// The most tetrahedra of a solid that have collapsed at the end of a step.
+struct Collapse {
+  int elements = 0;
+  double time = 0;  ///< [s]
+};
+
+std::string collapse_warning(const SceneBody& in, int number, const Collapse& worst) {
+  const Body& body = in.sheet.bodies[static_cast<std::size_t>(number)];
+  const data::Constitutive law = in.environment.solids.at(number).constitutive;
+  const bool rests_at_a_point = law == data::Constitutive::tet_neohookean;
+  return (body.name.empty() ? in.name : body.name) + ": " + std::to_string(worst.elements) + " of " +
+         std::to_string(body.tetrahedron_count) + " tetrahedra have less than " +
+         data::format_short(collapsed_volume_share) + " of their rest volume at " +
+         data::format_short(worst.time) + " s, and " +
+         std::to_string(count_collapsed(in.sheet, body, in.environment.state.positions)) +
+         " at the end: the solid is pressed farther than its law carries" +
+         (rests_at_a_point ? "; TET_NEOHOOKEAN stays where it has come to a point" : "") +
+         (law == data::Constitutive::tet_neohookean_log ? "" : "; take TET_NEOHOOKEAN_LOG") +
+         ", or press it less (docs/theory.md, Solids)";
+}
+
 constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
 
 /// Of bodies that a mesh comes through between their vertices, at the end of a run.
@@ -330,6 +351,16 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   double inside_at_end = 0;  // depth at the start of the last step [m]
   std::string holder;
   std::vector<HoldWatch> watches(bodies.size());
+  std::map<std::pair<std::size_t, int>, Collapse> collapses;  // of solids
+  const auto see_collapse = [&](std::size_t b, double time) {
+    for (const auto& [number, material] : bodies[b].environment.solids) {
+      const Body& body = bodies[b].sheet.bodies[static_cast<std::size_t>(number)];
+      const int elements = count_collapsed(bodies[b].sheet, body, bodies[b].environment.state.positions);
+      Collapse& worst = collapses[{b, number}];
+      if (elements > worst.elements) worst = {elements, time};
+      summary.collapsed_elements = std::max(summary.collapsed_elements, elements);
+    }
+  };
   const data::TriangleMesh at_start = merged(bodies);
   const auto begin_writing = [&] {
     // Of a former run; its tables first, so that they never stand beside frames of this one.
@@ -361,6 +392,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       for (std::size_t b = 0; b < reports.size(); ++b) {
         const StepReport& report = reports[b];
         watches[b].see(bodies[b].environment);
+        see_collapse(b, time);
         converged = converged && report.converged;
         halved = halved || report.substeps > 1;
         started.see(report.start_penetration, b, time - scene.time_step);
@@ -382,7 +414,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
         summary.last_motion = scene.time_step * stop_motion(bodies);
         const bool over = std::all_of(bodies.begin(), bodies.end(),
                                       [](const SceneBody& body) { return motion_is_over(body.environment); });
-        done = summary.at_rest = over && summary.last_motion <= *scene.rest_motion;
+        done = over && summary.last_motion <= *scene.rest_motion;
+        summary.at_rest = done;
       }
       if (frames.count(step) || (scene.rest_motion && (done || step == steps))) {
         write_frame(step, merged(bodies));
@@ -398,6 +431,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   write_tables();
   if (nearest < no_layers) summary.layer_distance_min = nearest;
   summary.warnings = locking_warnings(bodies);
+  for (const auto& [solid, worst] : collapses)
+    if (worst.elements > 0)
+      summary.warnings.push_back(collapse_warning(bodies[solid.first], solid.second, worst));
   for (std::size_t b = 0; b < bodies.size() && !summary.interrupted && summary.steps > 0; ++b)
     for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
       summary.warnings.push_back(bodies[b].name + ": " + warning);

@@ -1,5 +1,6 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,17 +20,19 @@ struct SceneSummary {
   double start_penetration_max = 0;  ///< of vertices that start a step inside an obstacle [m]
   bool self_contact = false;         ///< whether objects meet themselves and each other
   double layer_distance_min =
-      0;                      ///< with self-contact: the nearest that layers came at the end of a step [m]
-  int layer_touches_max = 0;  ///< pairs of features that pressed each other, at most
-  long iterations = 0;        ///< of all objects and steps
-  int frames = 0;             ///< written
+      0;                       ///< with self-contact: the nearest that layers came at the end of a step [m]
+  int layer_touches_max = 0;   ///< pairs of features that pressed each other, at most
+  int collapsed_elements = 0;  ///< tetrahedra of one object with less than a thousandth of their rest volume
+                               ///< at the end of a step, at most
+  long iterations = 0;         ///< of all objects and steps
+  int frames = 0;              ///< written
   double wall_seconds = 0;
   bool interrupted = false;
-  double last_motion = 0;  ///< quasistatic: of the vertex that moved farthest in the last step [m]
-  bool at_rest = true;     ///< quasistatic: whether that is below the scene's bound
+  double last_motion = 0;       ///< quasistatic: of the vertex that moved farthest in the last step [m]
+  std::optional<bool> at_rest;  ///< whether that is below the scene's bound; none: not quasistatic
   std::vector<std::string> notices;
-  std::vector<std::string> warnings;  ///< of solids that lock, of holds, and of vertices held inside an
-                                      ///< obstacle or that start there
+  std::vector<std::string> warnings;  ///< of solids that lock or collapse, of holds, and of vertices held
+                                      ///< inside an obstacle or that start there
 };
 
 struct SceneRun {

@@ -86,13 +86,15 @@ void print_json(const sim::SceneSummary& summary, const std::string& out, int ex
                                  {"penetration_max_m", summary.penetration_max},
                                  {"held_penetration_max_m", summary.held_penetration_max},
                                  {"start_penetration_max_m", summary.start_penetration_max},
+                                 {"collapsed_elements", summary.collapsed_elements},
                                  {"iterations", summary.iterations},
                                  {"frames", summary.frames},
                                  {"wall_seconds", summary.wall_seconds},
                                  {"interrupted", summary.interrupted},
-                                 {"at_rest", summary.at_rest},
+                                 {"at_rest", nullptr},
                                  {"warnings", warnings},
                                  {"exit_code", exit_code}};
+  if (summary.at_rest) json["at_rest"] = *summary.at_rest;
   if (summary.self_contact) {
     json["layer_distance_min_m"] = summary.layer_distance_min;
     json["layer_touches_max"] = summary.layer_touches_max;
@@ -155,9 +157,11 @@ int run(const RunOptions& options) {
         options.contacts ? "contacts, log.csv, forces.csv and resultants.csv" : "log.csv and forces.csv",
         options.out);
   const double unconverged_share = double(summary.unconverged_steps) / std::max(1, summary.steps);
-  const bool unusable = !sim::accepted(unconverged_share, summary.residual_max) || !summary.at_rest;
+  const bool moves = !summary.at_rest.value_or(true);
+  const bool unusable =
+      !sim::accepted(unconverged_share, summary.residual_max) || moves || summary.collapsed_elements > 0;
   const int exit_code = summary.interrupted ? exit_failed : unusable ? exit_unusable : exit_done;
-  if (!summary.at_rest && !summary.interrupted)
+  if (moves && !summary.interrupted)
     std::cerr << "flash-sim: warning: not at rest after " << summary.steps << " steps: a vertex still moves "
               << data::format_short(summary.last_motion) << " m a step; allow more steps or longer ones\n";
   for (const std::string& warning : summary.warnings) std::cerr << "flash-sim: warning: " << warning << '\n';
@@ -196,7 +200,7 @@ void add_run_verb(CLI::App& app, Action& action) {
   const auto options = std::make_shared<RunOptions>();
   verb.footer(
       "Up to 1 % of the steps may end above the tolerance, none out of balance by more than the weight (a\n"
-      "residual of 1): else the exit code is 3.\n"
+      "residual of 1), and no tetrahedron below a thousandth of its rest volume: else the exit code is 3.\n"
       "A scene that names neither steps nor duration runs 100 steps.\n"
       "Example:\n  flash-sim run scene.json -o out");
   verb.add_option("scene", options->scene, "Scene file (.json)")->required();

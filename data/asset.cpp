@@ -185,7 +185,7 @@ std::string weave_text(const SheetMaterial& m) {
            " N/m, nu_12 = " + format_short(m.poissons_ratio / mean) + ", ";
   }
   return text + "D_2 = " + format_short(m.weave.bending_ratio * m.bending_rigidity) + " N m, warp at " +
-         format_short(m.weave.warp_direction * 180 / std::numbers::pi) + " deg from x";
+         format_short(m.weave.warp_direction * 180 / std::numbers::pi) + " deg from the mesh's x axis";
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "data/text.h"
 #include "sim/law/feasible_place.h"
 #include "sim/newton/newton_iteration.h"
+#include "sim/pairs/candidate_pairs.h"
 #include "sim/pairs/intersection.h"
 #include "sim/step/exits.h"
 #include "sim/step/feasible_positions.h"
@@ -71,10 +72,11 @@ bool start_search(const StepProblem& problem, NewtonWorkspace& w) {
   return free;
 }
 
-/// Whether holds have squeezed layers to a distance at which no force would keep them apart.
+constexpr double crushed_share = 1e-6;  ///< of the thickness, below which no force keeps layers apart
+
+/// Whether holds have squeezed layers to such a distance.
 bool crushed(const Environment& environment, double layer_distance) {
-  constexpr double least_share = 1e-6;  ///< of the thickness
-  return environment.self_contact && layer_distance < least_share * environment.self_contact->thickness;
+  return environment.self_contact && layer_distance < crushed_share * environment.self_contact->thickness;
 }
 
 /// Solves one step of `h` as a whole: w.now is its end. Returns whether it is as good as halves would be:
@@ -173,19 +175,70 @@ void check_thickness(const Sheet& sheet, const PairSurface& surface, double thic
   }
 }
 
-/// Layers that start on both sides of each other would stay so.
+/// Vertices that holds carry in all axes.
+std::vector<bool> carried_vertices(const Environment& environment) {
+  Eigen::Array<bool, Eigen::Dynamic, 3> held(environment.state.positions.rows(), 3);
+  held.setConstant(false);
+  for (std::size_t k = 0; k < environment.state.held.size(); ++k)
+    for (const int vertex : environment.state.held[k].vertices)
+      for (int axis = 0; axis < 3; ++axis)
+        held(vertex, axis) |= environment.holds[k].axes[static_cast<std::size_t>(axis)];
+  std::vector<bool> carried;
+  for (Eigen::Index i = 0; i < held.rows(); ++i) carried.push_back(held.row(i).all());
+  return carried;
+}
+
+/// Between layers that start in one place no force can say which is above.
+void check_apart(const Sheet& sheet, PairSurface& surface, const Environment& environment) {
+  const Points& positions = environment.state.positions;
+  const double least = crushed_share * environment.self_contact->thickness;
+  std::vector<Bounds> boxes;
+  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+    const Eigen::Array3d place = positions.row(i).transpose().array();
+    boxes.push_back({place, place});
+  }
+  std::vector<CandidatePair> pairs;
+  find_candidates(surface, boxes, least, carried_vertices(environment), pairs);
+  for (const CandidatePair& pair : pairs) {
+    Vector3<double> x[4];
+    for (int k = 0; k < 4; ++k) {
+      const auto at = positions.row(pair.vertices[static_cast<std::size_t>(k)]);
+      x[k] = {at[0], at[1], at[2]};
+    }
+    const double distance = nearest_points(pair.kind, x).distance;
+    if (!(distance < least && distance < pair.thickness)) continue;
+    const auto name_of = [&](int vertex) {
+      const Body& body = sheet.bodies[static_cast<std::size_t>(body_of(sheet, vertex))];
+      return "vertex " + std::to_string(vertex - body.first_vertex) +
+             (body.name.empty() ? "" : " of " + body.name);
+    };
+    throw data::input_error("self_contact", "start",
+                            "found the surface at " + name_of(pair.vertices[0]) + " " +
+                                data::format_short(distance) + " m from that at " +
+                                name_of(pair.vertices[pair.kind == PairKind::vertex_face ? 1 : 2]) +
+                                ", expected at least " + data::format_short(least) +
+                                " m: layers in one place cannot part; start them a thickness apart");
+  }
+}
+
+/// Layers that start on both sides of each other would stay so, and so would a body inside a solid.
 void check_start(const Sheet& sheet, PairSurface& surface, const Points& positions) {
-  const auto passing = first_intersection(surface, positions);
-  if (!passing) return;
-  const auto name_of = [&](int triangle) {
-    const Body& body = sheet.bodies[static_cast<size_t>(body_of(sheet, surface.triangles(triangle, 0)))];
-    const int first = body.is_solid() ? 0 : body.first_triangle;
-    return "triangle " + std::to_string(triangle - first) + (body.name.empty() ? "" : " of " + body.name);
-  };
-  throw data::input_error("self_contact", "start",
-                          "found " + name_of(passing->first) + " passing through " +
-                              name_of(passing->second) +
-                              ", expected a surface that does not pass through itself");
+  if (const auto passing = first_intersection(surface, positions)) {
+    const auto name_of = [&](int triangle) {
+      const Body& body = sheet.bodies[static_cast<size_t>(body_of(sheet, surface.triangles(triangle, 0)))];
+      const int first = body.is_solid() ? 0 : body.first_triangle;
+      return "triangle " + std::to_string(triangle - first) + (body.name.empty() ? "" : " of " + body.name);
+    };
+    throw data::input_error("self_contact", "start",
+                            "found " + name_of(passing->first) + " passing through " +
+                                name_of(passing->second) +
+                                ", expected a surface that does not pass through itself");
+  }
+  if (const auto enclosed = first_enclosed(sheet, surface, positions))
+    throw data::input_error("self_contact", "start",
+                            "found " + sheet.bodies[static_cast<size_t>(enclosed->first)].name +
+                                " wholly inside " + sheet.bodies[static_cast<size_t>(enclosed->second)].name +
+                                ", expected it outside: surfaces alone meet, so that it would stay there");
 }
 
 }  // namespace
@@ -199,13 +252,14 @@ Solver::Solver(Solver&&) noexcept = default;
 
 StepReport Solver::step(Environment& environment) {
   NewtonWorkspace& w = *workspace_;
+  const double h = w.settings.time_step;
+  update_holds(environment, environment.state.time + h);
   if (environment.self_contact && !w.layers) {
     w.layers = std::make_unique<LayerMemory>(w.plan->sheet);
     check_thickness(w.plan->sheet, w.layers->surface, environment.self_contact->thickness);
     check_start(w.plan->sheet, w.layers->surface, environment.state.positions);
+    check_apart(w.plan->sheet, w.layers->surface, environment);
   }
-  const double h = w.settings.time_step;
-  update_holds(environment, environment.state.time + h);
   return advance(environment, h, w.settings.halvings, w);
 }
 

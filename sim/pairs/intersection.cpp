@@ -1,6 +1,7 @@
 #include "sim/pairs/intersection.h"
 
 #include <algorithm>
+#include <vector>
 
 namespace flash::sim {
 
@@ -58,6 +59,34 @@ std::optional<std::pair<int, int>> first_intersection(PairSurface& surface, cons
       found = both;
   });
   return found;
+}
+
+std::optional<std::pair<int, int>> first_enclosed(const Sheet& sheet, const PairSurface& surface,
+                                                  const Points& positions) {
+  const Vector3d low = positions.colwise().minCoeff(), high = positions.colwise().maxCoeff();
+  // Askew, so that it meets no edge of a mesh in rows.
+  const Vector3d far = Vector3d(0.8164, 0.4387, 0.3754) * 4 * (high - low).norm();
+  const int bodies = static_cast<int>(sheet.bodies.size());
+  for (int inner = 0; inner < bodies; ++inner) {
+    std::vector<int> leaves(sheet.bodies.size(), 0);
+    int seen = -1;  // a vertex of the surface of the inner body
+    for (Eigen::Index t = 0; t < surface.triangles.rows() && seen < 0; ++t)
+      if (surface.body[static_cast<std::size_t>(surface.triangles(t, 0))] == inner)
+        seen = surface.triangles(t, 0);
+    if (seen < 0) continue;
+    const Vector3d from = positions.row(seen), to = from + far;
+    for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t) {
+      const int outer = surface.body[static_cast<std::size_t>(surface.triangles(t, 0))];
+      if (outer == inner || !sheet.bodies[static_cast<std::size_t>(outer)].is_solid()) continue;
+      const Vector3d face[3] = {positions.row(surface.triangles(t, 0)),
+                                positions.row(surface.triangles(t, 1)),
+                                positions.row(surface.triangles(t, 2))};
+      leaves[static_cast<std::size_t>(outer)] += passes(from, to, face);
+    }
+    for (int outer = 0; outer < bodies; ++outer)
+      if (leaves[static_cast<std::size_t>(outer)] % 2 == 1) return {{inner, outer}};
+  }
+  return {};
 }
 
 }  // namespace flash::sim

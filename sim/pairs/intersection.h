@@ -14,4 +14,10 @@ bool passes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vec
 /// the lowest numbers. Empty where there are none.
 std::optional<std::pair<int, int>> first_intersection(PairSurface& surface, const data::Points& positions);
 
+/// Two bodies, the first of which stands wholly inside the second, a solid, at `positions` where no triangles
+/// pass through each other; those of the lowest numbers. Empty where there are none. It asks one vertex of
+/// each body how often a ray from it leaves each solid.
+std::optional<std::pair<int, int>> first_enclosed(const Sheet& sheet, const PairSurface& surface,
+                                                  const data::Points& positions);
+
 }  // namespace flash::sim

@@ -25,6 +25,7 @@ Sparse sparse(Eigen::Index rows, Eigen::Index cols, const Triplets& entries) {
 struct Plane {
   Eigen::Vector3d normal, u, v;
   Eigen::Matrix2Xd coordinates;  ///< of the vertices
+  Eigen::Vector3d x;             ///< axis of the mesh
 };
 
 Plane plane_of(const Sheet& sheet) {
@@ -50,7 +51,12 @@ Plane plane_of(const Sheet& sheet) {
     throw data::input_error("mesh", "bending_model",
                             "plate needs a flat rest shape; this one leaves its plane by " +
                                 std::to_string(height) + " m (use hinge)");
-  return {normal, u, v, plane};
+  const RestTriangle& first = sheet.triangles.front();
+  const Eigen::Vector3d edge = at(first.vertices[1]) - at(first.vertices[0]), along = edge.normalized(),
+                        across = edge.cross(at(first.vertices[2]) - at(first.vertices[0]))
+                                     .cross(along)
+                                     .normalized();
+  return {normal, u, v, plane, first.x_axis.x() * along + first.x_axis.y() * across};
 }
 
 /// The rigidity of D_1 = 1 on the curvatures (k11, k22, k12) along u and v.
@@ -60,9 +66,7 @@ Eigen::Matrix3d plate_rigidity(double poissons_ratio, const data::Weave& weave, 
   rigidity << 1, poissons_ratio * mean, 0, poissons_ratio * mean, weft, 0, 0, 0,
       2 * (1 - poissons_ratio) * weave.twisting_ratio * mean;
   if (!weave.is_of_bending()) return rigidity;
-  Eigen::Vector3d x = Eigen::Vector3d::UnitX() - plane.normal.x() * plane.normal;
-  if (x.norm() < 1e-6) x = Eigen::Vector3d::UnitY() - plane.normal.y() * plane.normal;
-  const double angle = std::atan2(x.dot(plane.v), x.dot(plane.u)) + weave.warp_direction;
+  const double angle = std::atan2(plane.x.dot(plane.v), plane.x.dot(plane.u)) + weave.warp_direction;
   const double c = std::cos(angle), s = std::sin(angle);
   Eigen::Matrix3d turn;  // curvatures along warp and weft from those along u and v
   turn << c * c, s * s, 2 * c * s, s * s, c * c, -2 * c * s, -c * s, c * s, c * c - s * s;

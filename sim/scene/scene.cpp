@@ -183,7 +183,12 @@ double total_area(const Sheet& sheet) { return sheet.vertex_area.sum(); }
 void make_sheet_body(const data::Scene& scene, data::Asset asset, SceneBody& body,
                      std::vector<std::string>& notices) {
   if (scene.bending_model) asset.bending_model = scene.bending_model;
-  body.sheet = make_sheet(data::load_asset_mesh(asset));
+  body.sheet =
+      make_sheet(data::load_asset_mesh(asset), {}, data::rotation_from_degrees(asset.rotation_degrees));
+  if (const auto overlap = first_overlap(body.sheet.rest))
+    notices.push_back(body.name + ": " + asset.mesh + ": triangles " + std::to_string(overlap->first) +
+                      " and " + std::to_string(overlap->second) +
+                      " cover each other at rest, though the mesh is flat: is a vertex in the wrong place?");
   const data::ResolvedSheet resolved = data::resolve_sheet(asset, total_area(body.sheet));
   for (const std::string& notice : resolved.notices) notices.push_back(body.name + ": " + notice);
   if (resolved.uniform_vertex_mass) body.sheet.vertex_area.setConstant(body.sheet.vertex_area.mean());

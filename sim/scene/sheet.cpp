@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "data/error.h"
 
 namespace flash::sim {
 
-Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name) {
+Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name, const Eigen::Matrix3d& axes) {
   Sheet sheet{rest,
               {},
               Eigen::VectorXd::Zero(rest.vertices.rows()),
@@ -41,7 +43,9 @@ Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name) {
     Eigen::Matrix2d edges;
     edges << edge1.dot(axis1), edge2.dot(axis1), edge1.dot(axis2), edge2.dot(axis2);
     sheet.triangles.push_back({v, edges.inverse(), area});
-    const auto in_plane = [&](int axis) { return Eigen::Vector2d(axis1[axis], axis2[axis]); };
+    const auto in_plane = [&](int axis) {
+      return Eigen::Vector2d(axis1.dot(axes.col(axis)), axis2.dot(axes.col(axis)));
+    };
     const Eigen::Vector2d along_x = in_plane(0);
     sheet.triangles.back().x_axis = (along_x.norm() > 1e-6 ? along_x : in_plane(1)).normalized();
     for (int corner : {v[0], v[1], v[2]}) sheet.vertex_area[corner] += area / 3;
@@ -50,6 +54,34 @@ Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name) {
     if (sheet.vertex_area[i] == 0)
       throw data::input_error("mesh", "vertex " + std::to_string(i), "belongs to no triangle");
   return sheet;
+}
+
+std::optional<std::pair<int, int>> first_overlap(const data::TriangleMesh& rest) {
+  const auto at = [&](int vertex) -> Eigen::Vector3d { return rest.vertices.row(vertex); };
+  const auto normal_of = [&](int t) {
+    const Eigen::Vector3i v = rest.triangles.row(t);
+    return Eigen::Vector3d((at(v[1]) - at(v[0])).cross(at(v[2]) - at(v[0])));
+  };
+  constexpr double flat = 1e-6;  // height over size
+  if (rest.triangles.rows() == 0) return {};
+  int largest = 0;
+  for (int t = 1; t < rest.triangles.rows(); ++t)
+    if (normal_of(t).norm() > normal_of(largest).norm()) largest = t;
+  const Eigen::Vector3d normal = normal_of(largest).normalized(), centre = rest.vertices.colwise().mean();
+  const data::Points d = rest.vertices.rowwise() - centre.transpose();
+  if ((d * normal).cwiseAbs().maxCoeff() > flat * d.rowwise().norm().maxCoeff()) return {};
+  std::map<std::pair<int, int>, std::pair<int, bool>> seen;  // of an edge: a triangle and its side
+  std::optional<std::pair<int, int>> found;
+  for (int t = 0; t < rest.triangles.rows() && !found; ++t)
+    for (int k = 0; k < 3; ++k) {
+      const int a = rest.triangles(t, k), b = rest.triangles(t, (k + 1) % 3),
+                c = rest.triangles(t, (k + 2) % 3);
+      const auto [low, high] = std::minmax(a, b);
+      const bool side = (at(high) - at(low)).cross(at(c) - at(low)).dot(normal) > 0;
+      const auto [other, fresh] = seen.try_emplace({low, high}, t, side);
+      if (!fresh && other->second.second == side && !found) found = {other->second.first, t};
+    }
+  return found;
 }
 
 bool has_solids(const Sheet& sheet) { return !sheet.tetrahedra.empty(); }

@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/mesh.h"
@@ -15,7 +17,7 @@ struct RestTriangle {
   Eigen::Matrix2d inverse_edges;  ///< inverse of the 2 x 2 matrix of rest edges (x1 - x0, x2 - x0) [1/m]
   double area;                    ///< [m^2]
   bool stiff = false;             ///< inside a clamp: does not bend (plate only)
-  /// The base frame's x axis in the triangle's plane, its y axis where x stands upright.
+  /// The mesh's x axis in the triangle's plane, its y axis where x stands upright.
   Eigen::Vector2d x_axis = Eigen::Vector2d::UnitX();
 };
 
@@ -60,9 +62,14 @@ struct Sheet {
   std::vector<Midside> midsides = {};  ///< of quadratic bodies, each behind the body's other vertices
 };
 
-/// A sheet of one body. Throws data::InputError on degenerate or duplicate triangles and on vertices without
-/// a triangle.
-Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name = {});
+/// A sheet of one body. `axes`: those of the mesh, from which its warp is counted, where it has been turned.
+/// Throws data::InputError on degenerate or duplicate triangles and on vertices without a triangle.
+Sheet make_sheet(const data::TriangleMesh& rest, const std::string& name = {},
+                 const Eigen::Matrix3d& axes = Eigen::Matrix3d::Identity());
+
+/// Two triangles of a flat rest shape with a common edge that lie on the same side of it, so that they cover
+/// each other; those of the lowest numbers. Empty where there are none, or where the shape is not flat.
+std::optional<std::pair<int, int>> first_overlap(const data::TriangleMesh& rest);
 
 /// Whether any body is a solid.
 bool has_solids(const Sheet& sheet);

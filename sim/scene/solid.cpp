@@ -143,4 +143,11 @@ int first_inverted(const Sheet& sheet, const data::Points& positions) {
   return -1;
 }
 
+int count_collapsed(const Sheet& sheet, const Body& body, const data::Points& positions) {
+  const auto first = sheet.tetrahedra.begin() + body.first_tetrahedron;
+  return static_cast<int>(std::count_if(first, first + body.tetrahedron_count, [&](const RestTetrahedron& t) {
+    return !(edges_of(positions, t.vertices).determinant() >= collapsed_volume_share * 6 * t.volume);
+  }));
+}
+
 }  // namespace flash::sim

@@ -37,4 +37,10 @@ inline constexpr double locking_poissons_ratio = 0.4;
 /// The first tetrahedron that `positions` turn inside out or flatten; -1: none.
 int first_inverted(const Sheet& sheet, const data::Points& positions);
 
+/// Of its rest volume, below which a tetrahedron counts as collapsed.
+inline constexpr double collapsed_volume_share = 1e-3;
+
+/// How many tetrahedra of a body have collapsed at `positions`, or are inside out, by their corners.
+int count_collapsed(const Sheet& sheet, const Body& body, const data::Points& positions);
+
 }  // namespace flash::sim

@@ -285,6 +285,26 @@ def check_file_limit(options, folder):
                f"{words[1]}, files of 1 KB: {done.stderr}")
 
 
+def check_collapse(options, folder):
+    """A solid at a point, where its law leaves it, ends with 3 by name; and a run in motion is not said to be at rest."""
+    corners = [[0.02 * x, 0.02 * y, 0.02 * z] for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+    props = {"constitutive": "TET_NEOHOOKEAN", "density": 300, "young": 3e4, "poisson": 0}
+    (folder / "block_asset.json").write_text(json.dumps(
+        {"schema": "flash-asset/1", "mesh": "box:0.02x0.02x0.02:0.02", "element_type": "TETRAHEDRON", "mechanical_props": props}))
+    for name, share, code in (("whole", 1, 0), ("point", 0.05, 3)):
+        (folder / f"{name}.obj").write_text("".join("v %g %g %g\n" % tuple(share * a for a in v) for v in corners) + "f 1 2 3\n")
+        (folder / f"{name}.json").write_text(json.dumps(
+            {"schema": "flash-scene/1", "timestep": 0.01, "steps": 20, "gravity": [0, 0, 0],
+             "objects": {"block": {"asset": "block_asset.json", "start": {"mesh": f"{name}.obj"}}}}))
+        done = program.call(options.sim, "run", folder / f"{name}.json", "--json", "-o", folder / name)
+        yield done.returncode == code, f"a block, {name}: exit code {done.returncode}: {done.stderr}"
+        summary = json.loads(done.stdout)
+        yield summary["at_rest"] is None, f"at_rest of a run in motion: {summary['at_rest']}"
+        named = [text for text in (done.stderr, *summary["warnings"]) if "block: 5 of 5 tetrahedra have less than" in text]
+        yield len(named) == (2 if code else 0), f"a block, {name}: {done.stderr} {summary['warnings']}"
+        yield summary["collapsed_elements"] == (5 if code else 0), f"a block, {name}: {summary['collapsed_elements']}"
+
+
 def check_fixed(options, folder):
     """What is said to be understood is what is simulated: a constant of the command line, not the asset's."""
     words = ["--asset", folder / "asset.json", "--hold", "areal_density=0.25:measured", "-o", folder / "fixed", "--force"]
@@ -342,7 +362,7 @@ def main():
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
         for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume,
-                      check_order, check_file_limit, check_fixed, check_killed_replay, check_fit):
+                      check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay, check_fit):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds
