@@ -77,6 +77,7 @@ TEST(Held, TheWeightIsUncertainUnlessItWasMeasured) {
   grid.base.material = short_lift_material();
   grid.base.material.areal_density = 0.2;
   grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
+  grid.fixed = {parse_hold("young=30:measured").axis};
   const std::vector<HeldParameter> held = held_parameters(grid, replays);
   ASSERT_EQ(names_of(held), std::vector<std::string>{"areal_density"});
   EXPECT_DOUBLE_EQ(held[0].values[0], 0.2 / 1.1);
@@ -109,7 +110,7 @@ TEST(Held, BoundsOfTheRecordingAreThoseOfAnEvenDistribution) {
   GridSettings grid;
   grid.base.material = short_lift_material();
   grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
-  grid.fixed = {parse_hold("areal_density=0.2:measured").axis};
+  grid.fixed = {parse_hold("areal_density=0.2:measured").axis, parse_hold("young=30:measured").axis};
   const std::vector<HeldParameter> held = held_parameters(grid, replays);
   ASSERT_EQ(names_of(held), std::vector<std::string>{"start_yaw"});
   EXPECT_DOUBLE_EQ(held[0].values[1], 0.2 / std::sqrt(3.0));
@@ -123,7 +124,7 @@ TEST(Held, APinchIsFoldedAboutAsItIsSaid) {
   GridSettings grid;
   grid.base.material = short_lift_material();
   grid.axes = {parse_axis("bending", "1e-4:4e-4:3:log")};
-  grid.fixed = {parse_hold("areal_density=0.2:measured").axis};
+  grid.fixed = {parse_hold("areal_density=0.2:measured").axis, parse_hold("young=30:measured").axis};
   EXPECT_TRUE(held_parameters(grid, replays).empty());  // a clamp has no ridge
   data::RecordedGrasp& grasp = replays[0].recording.grasps.at(0);
   grasp.shape = data::GraspShape::pinch;
