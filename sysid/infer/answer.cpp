@@ -148,7 +148,11 @@ Concluded conclude(const Task& task, Found found, const std::vector<double>& bes
     found = std::move(about);
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
-  if (settled != Settled::by_emulator)
+  if (settled == Settled::on_own_mesh)
+    answer.warnings.emplace_back(
+        "the search's own mesh explains the recordings better than cells of no size: the answer is of that "
+        "mesh, by the simulated values alone");
+  else if (settled != Settled::by_emulator)
     answer.warnings.emplace_back(
         "the motion changes too abruptly between the values searched: the answer is by these alone; search "
         "more values");

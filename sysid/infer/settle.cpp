@@ -68,7 +68,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
         better > -kFails && !(likelihood.deviance(mode_on_own) - on_own_mesh < kUnlikely);
     if (better > kFails || by_extrapolation_alone) {
       keep_to_simulated(task, found, values_of(found.axes, static_cast<int>(likeliest)), held);
-      return Settled::by_points;
+      return Settled::on_own_mesh;
     }
   }
   // Of values that are as good as equally likely, those whose motion is nearest.

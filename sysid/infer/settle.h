@@ -5,7 +5,7 @@
 
 namespace flash::sysid {
 
-enum class Settled { by_emulator, by_points, elsewhere };
+enum class Settled { by_emulator, by_points, on_own_mesh, elsewhere };
 
 /// Where folds fall another way between two simulations, a point of the emulator's grid is likelier than the
 /// mode of the posterior once that is simulated. The posterior is a mixture: what the mode turned out to be
