@@ -46,10 +46,10 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
                     true,
                     true});
   const MotionLikelihood on_own = likelihood_about(task, found, task.replays, mode, own, std::move(errors));
-  std::vector<Motion> of_best;
+  std::vector<ReplayResult> of_best;
   for (const Replay& replay : task.replays)
-    of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)).motion);
-  const double fall_to_best = on_own.deviance(motions_in(own)) - on_own.deviance(of_best);
+    of_best.push_back(task.store.run(replay, candidate_at(best, task.grid)));
+  const double fall_to_best = on_own.deviance(motions_in(own)) - on_own.deviance(motions_in(of_best));
   Extent at_best;
   for (const double value : best) at_best.push_back({value, value});
   if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
@@ -72,15 +72,11 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
     }
   }
   // Of values that are as good as equally likely, those whose motion is nearest.
-  if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes)) {
-    std::vector<ReplayResult> there;
-    for (const Replay& replay : task.replays)
-      there.push_back(task.store.run(replay, candidate_at(best, task.grid)));
-    if (kFarther * score_motions(task.replays, there, task.grid.score).score <
-        score_motions(task.replays, own, task.grid.score).score) {
-      set_estimate(found.look.posterior, found.axes, best);
-      return Settled::by_emulator;
-    }
+  if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes) &&
+      kFarther * score_motions(task.replays, of_best, task.grid.score).score <
+          score_motions(task.replays, own, task.grid.score).score) {
+    set_estimate(found.look.posterior, found.axes, best);
+    return Settled::by_emulator;
   }
   const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, fall_to_best));
   if (!(share_of_points > 0)) return Settled::by_emulator;
