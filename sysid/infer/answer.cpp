@@ -137,22 +137,57 @@ struct Concluded {
   Answer answer;  ///< values, motions, estimate, fit, agreement, warnings
 };
 
+Concluded conclude(const Task& task, Found found, const std::vector<double>& best,
+                   std::vector<KnownError>& held, const std::vector<Alone>& alone);
+
+/// The answer of the search's own mesh, as if nothing finer were there. What `about`, an answer of cells of no
+/// size, says of errors of the mesh and of the step is by how much it may be wrong, but corrects nothing.
+/// Empty where the estimate diverges.
+std::optional<Concluded> conclude_on_own_mesh(const Task& task, const Found& about,
+                                              const std::vector<double>& best,
+                                              const std::vector<KnownError>& held,
+                                              const std::vector<Alone>& alone) {
+  AnswerSettings settings = task.settings;
+  settings.solver_check = false;
+  const std::vector<Replay> nothing_finer;
+  const Task own{task.replays, nothing_finer, task.grid, task.ranges, settings, task.store, task.told};
+  const std::vector<Axis>& axes = task.grid.axes;
+  std::optional<Emulator> emulator = emulator_over(own, axes, {}, false);
+  if (!emulator) return std::nullopt;
+  if (task.told) {  // few answers need it, so most_work leaves it out
+    const AnswerWork more = most_work(task.grid, 1, false);
+    task.told({}, {-more.motions * static_cast<int>(task.replays.size()), -more.scores});
+  }
+  std::vector<KnownError> of_solution = errors_about(about, {}), errors = held;
+  for (KnownError& error : of_solution) error.corrects = false;
+  errors.insert(errors.end(), of_solution.begin(), of_solution.end());
+  std::optional<Found> found =
+      look_with(own, std::move(*emulator), axes, cells_about(best, axes), best, errors, errors);
+  if (!found) return std::nullopt;
+  Concluded concluded = conclude(own, std::move(*found), best, errors, alone);
+  concluded.found.estimate.errors.insert(concluded.found.estimate.errors.end(), of_solution.begin(),
+                                         of_solution.end());
+  concluded.answer.warnings.emplace_back(
+      "the search's own mesh explains the recordings better than cells of no size: the answer is of that "
+      "mesh");
+  return concluded;
+}
+
 /// `best`: the candidate from which to go on; `alone`: what each recording asks for, if there are several.
 Concluded conclude(const Task& task, Found found, const std::vector<double>& best,
                    std::vector<KnownError>& held, const std::vector<Alone>& alone) {
   Found about = simulate_about(task, found, held);
   const Settled settled = settle(task, about, best, held);
-  if (settled == Settled::elsewhere)
-    keep_to_simulated(task, found, best, held);
-  else
+  if (settled == Settled::on_own_mesh)
+    if (std::optional<Concluded> own = conclude_on_own_mesh(task, about, best, held, alone))
+      return std::move(*own);
+  if (settled == Settled::by_emulator || settled == Settled::by_points)
     found = std::move(about);
+  else
+    keep_to_simulated(task, found, best, held);
   Concluded concluded{std::move(found), {}};
   Answer& answer = concluded.answer;
-  if (settled == Settled::on_own_mesh)
-    answer.warnings.emplace_back(
-        "the search's own mesh explains the recordings better than cells of no size: the answer is of that "
-        "mesh, by the simulated values alone");
-  else if (settled != Settled::by_emulator)
+  if (settled != Settled::by_emulator)
     answer.warnings.emplace_back(
         "the motion changes too abruptly between the values searched: the answer is by these alone; search "
         "more values");

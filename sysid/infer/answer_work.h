@@ -11,8 +11,8 @@ struct AnswerWork {
   int scores = 0;   ///< of interpolated motions
 };
 
-/// Told of work that is `done`, and of work that was allowed for and turned out not to be needed (`spared`),
-/// by any thread.
+/// Told of work that is `done`, and of work that was allowed for and turned out not to be needed (`spared`;
+/// below 0: needed beside it), by any thread.
 using TellWork = std::function<void(const AnswerWork& done, const AnswerWork& spared)>;
 
 /// How much work there is left at most, and for how long, from what the work before took.

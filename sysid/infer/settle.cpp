@@ -55,9 +55,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   if (fall_to_best > fall + kMatters && reaches_beyond(at_best, found.axes)) return Settled::elsewhere;
   if (found.emulator.share != own_mesh) {
     const double share = std::exchange(found.emulator.share, own_mesh);
-    Eigen::Index likeliest;
-    const double on_own_mesh =
-                     deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(&likeliest),
+    const double on_own_mesh = deviance_over(found.emulator, found.axes, likelihood, task.grid).minCoeff(),
                  better =
                      std::min(of_points.minCoeff(), std::isnan(of_mode) ? INFINITY : of_mode) - on_own_mesh;
     found.emulator.share = share;
@@ -66,10 +64,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
       mode_on_own.push_back(found.emulator.models[r].model.on_its_mesh(own[r].motion));
     const bool by_extrapolation_alone =
         better > -kFails && !(likelihood.deviance(mode_on_own) - on_own_mesh < kUnlikely);
-    if (better > kFails || by_extrapolation_alone) {
-      keep_to_simulated(task, found, values_of(found.axes, static_cast<int>(likeliest)), held);
-      return Settled::on_own_mesh;
-    }
+    if (better > kFails || by_extrapolation_alone) return Settled::on_own_mesh;
   }
   // Of values that are as good as equally likely, those whose motion is nearest.
   if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes) &&

@@ -162,24 +162,34 @@ TEST(Synth, SaysWhatItCannotDo) {
 }
 
 // The whole way: a recording with known truth, a search, an answer whose interval holds the truth.
-TEST(Answer, FindsTheTruthOfASyntheticLift) {
-  const data::TemporaryFolder folder;
-  SynthRecording synthetic = make(short_lift());
-  save_synthetic(synthetic, folder / "lift");
-  std::vector<Replay> replays = {make_replay(data::load_recording(folder / "lift"), {})};
+/// A search of D about 2e-4 N m in a recording of it, simulated on the search's own mesh, not on cells of no
+/// size.
+struct LiftSearch {
+  data::TemporaryFolder folder;
+  std::vector<Replay> replays;
   GridSettings grid;
-  grid.base.material = stiff_towel();
-  grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log")};
-  grid.fixed = {parse_hold("friction=0.3").axis};
-  grid.rollouts = folder / "motions";
-  ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), Existing::refuse);
-  ASSERT_TRUE(grid_search(replays, grid, store));
-  GridResults results = store.results();
-  // The truth was simulated on the search's own mesh, not on cells of no size.
+  GridResults results;
+
+  LiftSearch() {
+    SynthRecording synthetic = make(short_lift());
+    save_synthetic(synthetic, folder / "lift");
+    replays = {make_replay(data::load_recording(folder / "lift"), {})};
+    grid.base.material = stiff_towel();
+    grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log")};
+    grid.fixed = {parse_hold("friction=0.3").axis};
+    grid.rollouts = folder / "motions";
+    ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), Existing::refuse);
+    EXPECT_TRUE(grid_search(replays, grid, store));
+    results = store.results();
+  }
+};
+
+TEST(Answer, FindsTheTruthOfASyntheticLift) {
+  LiftSearch search;
   AnswerSettings settings;
   settings.solver_check = false;
-  const Answer answer = find_answer(results, replays, grid, settings);
-  const Summary summary = summarize(results, answer, replays, grid, settings);
+  const Answer answer = find_answer(search.results, search.replays, search.grid, settings);
+  const Summary summary = summarize(search.results, answer, search.replays, search.grid, settings);
   EXPECT_EQ(summary.exit_code, 0);
   ASSERT_EQ(summary.parameters.size(), 1u);
   const ParameterFinding& bending = summary.parameters[0];
@@ -192,6 +202,23 @@ TEST(Answer, FindsTheTruthOfASyntheticLift) {
   EXPECT_TRUE(summary.solver_check.empty());
   EXPECT_EQ(summary.samples.rows(), 64);
   EXPECT_EQ(summary.recordings[0].sha256.size(), 64u);
+}
+
+TEST(Answer, IsThatOfTheSearchsOwnMeshWhereThatExplainsMore) {
+  LiftSearch search;
+  const Answer answer = find_answer(search.results, search.replays, search.grid, {});
+  EXPECT_TRUE(std::any_of(answer.warnings.begin(), answer.warnings.end(), [](const std::string& warning) {
+    return warning.find("the answer is of that mesh") != std::string::npos;
+  }));
+  ASSERT_EQ(answer.parameters.size(), 1u);
+  const ParameterFinding& bending = answer.parameters[0];
+  EXPECT_EQ(bending.identifiable, Identifiable::yes);
+  EXPECT_LE((*bending.interval95)[0], 2e-4);
+  EXPECT_GE((*bending.interval95)[1], 2e-4);
+  // Between the values searched, which are a factor of 2 apart.
+  EXPECT_LT((*bending.interval95)[1] / (*bending.interval95)[0], 1.5);
+  EXPECT_TRUE(std::any_of(answer.checks.begin(), answer.checks.end(),
+                          [](const SolverCheck& check) { return check.what == "double_mesh"; }));
 }
 
 }  // namespace
