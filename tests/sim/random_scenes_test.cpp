@@ -1,4 +1,4 @@
-#include "tests/sim/random_scenes.h"
+#include "tests/sim/scene_findings.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,7 @@
 
 #include "data/parallel.h"
 #include "tests/sim/random_layer_scenes.h"
-#include "tests/sim/random_scenes.h"
+#include "tests/sim/scene_findings.h"
 
 namespace {
 
