@@ -140,8 +140,8 @@ struct Concluded {
 Concluded conclude(const Task& task, Found found, const std::vector<double>& best,
                    std::vector<KnownError>& held, const std::vector<Alone>& alone);
 
-/// The answer of the search's own mesh, as if nothing finer were there. What `about`, an answer of cells of no
-/// size, says of errors of the mesh and of the step is by how much it may be wrong, but corrects nothing.
+/// The answer of the search's own mesh, as if nothing finer were there. What `about`, an answer of cells of
+/// no size, says of errors of the mesh and of the step is by how much it may be wrong, but corrects nothing.
 /// Empty where the estimate diverges.
 std::optional<Concluded> conclude_on_own_mesh(const Task& task, const Found& about,
                                               const std::vector<double>& best,
