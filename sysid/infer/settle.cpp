@@ -19,6 +19,25 @@ std::vector<Motion> motions_in(const std::vector<ReplayResult>& results) {
   return motions;
 }
 
+/// Whether all recordings tell that cells of the search's own size explain them better than cells of no size
+/// do: how far they are from these along the error of the mesh, of which the own mesh is two deviations
+/// (kUnsure of solve_at) to the low side.
+bool ask_for_own_mesh(const Found& found, const std::vector<KnownError>& held,
+                      const MotionLikelihood& likelihood,
+                      const std::vector<MotionLikelihood::Nuisance>& fitted) {
+  constexpr double kNearer = -1;  // than cells of no size: past the middle
+  constexpr double kSure = 2;     // standard deviations
+  const std::vector<KnownError> errors = errors_about(found, held);
+  const auto of_mesh = std::find_if(errors.begin(), errors.end(),
+                                    [](const KnownError& error) { return error.name == "double_mesh"; });
+  if (of_mesh == errors.end()) return false;
+  const auto e = static_cast<std::size_t>(of_mesh - errors.begin());
+  const double size = std::sqrt(static_cast<double>(fitted.size()));  // of a shared error, in each recording
+  return std::all_of(fitted.begin(), fitted.end(), [&](const MotionLikelihood::Nuisance& nuisance) {
+    return size * (nuisance.errors[static_cast<Eigen::Index>(e)] + kSure * likelihood.spread_of(e)) < kNearer;
+  });
+}
+
 }  // namespace
 
 Settled settle(const Task& task, Found& found, const std::vector<double>& best,
@@ -36,7 +55,10 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   MotionLikelihood likelihood = likelihood_about(
       task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
   const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
-  const double of_mode = likelihood.deviance(motions_in(*simulated)),
+  const std::vector<Motion> at_mode = motions_in(*simulated);
+  std::vector<MotionLikelihood::Nuisance> fitted;
+  const double of_mode = likelihood.deviance(
+                   [&](std::size_t r, double) -> const Motion& { return at_mode[r]; }, fitted),
                fall = std::isnan(of_mode) ? INFINITY : std::max(0.0, of_mode - of_points.minCoeff());
 
   // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
@@ -64,7 +86,8 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
       mode_on_own.push_back(found.emulator.models[r].model.on_its_mesh(own[r].motion));
     const bool by_extrapolation_alone =
         better > -kFails && !(likelihood.deviance(mode_on_own) - on_own_mesh < kUnlikely);
-    if (better > kFails || by_extrapolation_alone) return Settled::on_own_mesh;
+    if (better > kFails || by_extrapolation_alone || ask_for_own_mesh(found, held, likelihood, fitted))
+      return Settled::on_own_mesh;
   }
   // Of values that are as good as equally likely, those whose motion is nearest.
   if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes) &&
