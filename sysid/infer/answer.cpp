@@ -315,6 +315,7 @@ Answer find_answer(GridResults& results, std::vector<Replay>& replays, const Gri
     answer.misfits.push_back(there.look.likelihood.of_recording(r).misfit());
   const MotionLikelihood at_fit =
       likelihood_about(task, there, answer.fit.replays, answer.values, answer.fit.motions, held);
+  answer.contradicted = contradicted_stiffnesses(task, at_fit, errors_about(there, held));
   answer.residuals = left_residuals(at_fit);
   answer.open_information =
       open_information(at_fit, spreads_over(ranges, extent_of(there.look.posterior.axes)));

@@ -46,6 +46,7 @@ struct Answer {
   std::vector<SolverCheck> checks;              ///< of the estimate; empty without them
   std::vector<std::optional<double>> horizons;  ///< of each recording [s]
   std::vector<std::string> warnings;
+  std::vector<std::string> contradicted;  ///< what was held and the recordings contradict; mostly none
 };
 
 /// From a finished search to its answer, by the motions that it kept (`grid.rollouts`), which are simulated

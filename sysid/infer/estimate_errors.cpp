@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "data/text.h"
 #include "sysid/infer/held.h"
 #include "sysid/infer/verdict.h"
 #include "sysid/infer/weight_scale.h"
@@ -13,6 +14,8 @@ namespace {
 
 constexpr double kUnsure =
     2;  // over the last step to cells of no size: an error of first order ends at a share of 2
+
+constexpr double kFarBetter = 0.25;  // of the standard deviation assumed of what is held
 
 bool all_finite(const std::vector<ReplayResult>& results) {
   return std::all_of(results.begin(), results.end(),
@@ -72,7 +75,6 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
 
 void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const std::vector<KnownError>& errors,
                   std::vector<std::string>& warnings) {
-  constexpr double kFarBetter = 0.25;  // of the standard deviation assumed
   for (std::size_t e = 0; e < errors.size(); ++e)
     for (const HeldParameter& held : held_parameters(task.grid, task.replays))
       if (errors[e].name == held.name && likelihood.spread_of(e) < kFarBetter)
@@ -81,6 +83,29 @@ void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const st
                                 ? " is told by the recordings far better than was stated"
                                 : " was not measured, and the recordings tell it") +
                            ": search it as well");
+}
+
+std::vector<std::string> contradicted_stiffnesses(const Task& task, const MotionLikelihood& likelihood,
+                                                  const std::vector<KnownError>& errors) {
+  constexpr double kAnother = 0.25;  // of the standard deviation assumed
+  constexpr double kSure = 2;        // standard deviations of what the recordings tell
+  std::vector<std::string> texts;
+  for (const HeldParameter& held : held_parameters(task.grid, task.replays)) {
+    if (!is_stiffness(held.name) || task.grid.deviations.contains(held.name)) continue;
+    const auto error = std::find_if(errors.begin(), errors.end(),
+                                    [&](const KnownError& each) { return each.name == held.name; });
+    if (error == errors.end()) continue;
+    const auto e = static_cast<std::size_t>(error - errors.begin());
+    const double asked = likelihood.asked_of(e), spread = likelihood.spread_of(e);
+    if (!(std::abs(asked) > std::max(kAnother, kSure * spread) && spread < kFarBetter)) continue;
+    const double here = std::sqrt(held.values[0] * held.values[1]), factor = held.values[1] / here;
+    const std::string unit = held.name == "young" ? " N/m" : " N m";  // of sheets alone
+    texts.push_back(held.name + " was held at " + data::format_short(here) + unit +
+                    ", which was not measured, and the recordings ask for about " +
+                    data::format_short(here * std::pow(factor, asked)) + unit +
+                    ": what else they tell hangs on it. Search it too (" + option_of(held.name) + ")");
+  }
+  return texts;
 }
 
 std::vector<KnownError> errors_at_draws(const Task& task, const Emulator& emulator, const Estimate& estimate,

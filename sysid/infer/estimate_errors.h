@@ -50,6 +50,11 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
 void warn_of_held(const Task& task, const MotionLikelihood& likelihood, const std::vector<KnownError>& errors,
                   std::vector<std::string>& warnings);
 
+/// Names a stiffness that was held without a measurement where the recordings tell that it is another. How
+/// the motion changes with it was seen at one estimate: a ridge of it and friction leads away from there.
+std::vector<std::string> contradicted_stiffnesses(const Task& task, const MotionLikelihood& likelihood,
+                                                  const std::vector<KnownError>& errors);
+
 /// What the emulator misses at some draws of a posterior, and what half the step of time changes there other
 /// than at the estimate: errors of which any mixture is as likely.
 std::vector<KnownError> errors_at_draws(const Task& task, const Emulator& emulator, const Estimate& estimate,

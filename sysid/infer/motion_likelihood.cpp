@@ -31,6 +31,7 @@ MotionLikelihood::MotionLikelihood(const std::vector<Replay>& replays,
       if (error.corrects) add(recording.correction, 1, shifts);
       // Errors are independent between the likelihoods of recordings: the mean of so many has the size asked.
       const double size = error.shared ? std::sqrt(static_cast<double>(replays.size())) : 1;
+      recording.sizes.push_back(size);
       add(recording.errors.emplace_back(), size, shifts);
       recording.bends.emplace_back();
       if (!error.bend.empty())
@@ -192,6 +193,13 @@ double MotionLikelihood::spread_of(std::size_t error) const {
   for (const Recording& recording : recordings_)
     spread = std::min(spread, recording.likelihood->known_spread()[static_cast<Eigen::Index>(error)]);
   return spread;
+}
+
+double MotionLikelihood::asked_of(std::size_t error) const {
+  double sum = 0;
+  for (const Recording& recording : recordings_)
+    sum += recording.nuisance.errors[static_cast<Eigen::Index>(error)] * recording.sizes[error];
+  return sum / static_cast<double>(recordings_.size());
 }
 
 double MotionLikelihood::deviance(const MotionAtClock& motions, std::vector<Nuisance>& fitted) const {

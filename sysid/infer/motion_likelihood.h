@@ -48,6 +48,9 @@ class MotionLikelihood {
   /// deviations.
   double spread_of(std::size_t error) const;
 
+  /// How many standard deviations of a known error the reference asks for, on average over the recordings.
+  double asked_of(std::size_t error) const;
+
   const ResidualLikelihood& of_recording(std::size_t r) const { return *recordings_[r].likelihood; }
 
   /// What the likelihood of a recording is linear in, about its reference.
@@ -70,6 +73,7 @@ class MotionLikelihood {
     // While the likelihood is made: one standard deviation of each known error, and its square where it
     // bends.
     std::vector<SheetShifts> errors, bends;
+    std::vector<double> sizes;  ///< of each known error, standard deviations
     SheetShifts correction;
     /// Of each keyframe: the correction, all errors and the bends there are.
     std::vector<SheetShapes> shapes;

@@ -198,7 +198,7 @@ std::string contradiction_in(const Answer& answer, const std::vector<Replay>& re
   return contradiction_text(*answer.agreement, in_own_coordinates(ranges), names);
 }
 
-// Empty where the answer can be used. `contradiction`: of the recordings.
+// Empty where the answer can be used. `contradiction`: of the recordings, or of what was held.
 std::string reason_unusable(const Summary& summary, const CandidateResult& best,
                             const std::string& contradiction) {
   if (best.status != CandidateStatus::ok)
@@ -411,8 +411,13 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   if (asked.repeatability) summary.settings["repeatability_m"] = data::format_number(*asked.repeatability);
   summary.settings["searched"] = searched_text(asked.ranges.empty() ? settings.axes : asked.ranges);
   summary.settings["horizon"] = asked.horizon ? "yes" : "no";
-  const std::string contradiction =
+  std::string contradiction =
       contradiction_in(answer, replays, asked.ranges.empty() ? settings.axes : asked.ranges);
+  for (const std::string& text : answer.contradicted)
+    if (contradiction.empty())
+      contradiction = text;
+    else
+      summary.warnings.push_back(text);
   const std::string reason = reason_unusable(summary, estimate, contradiction);
   if (!contradiction.empty() && reason != contradiction) summary.warnings.push_back(contradiction);
   if (!reason.empty()) {

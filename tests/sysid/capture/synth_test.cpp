@@ -170,12 +170,14 @@ struct LiftSearch {
   GridSettings grid;
   GridResults results;
 
-  LiftSearch() {
+  explicit LiftSearch(const std::string& axis = "bending=5e-5:8e-4:5:log", double bending_over_truth = 1) {
     SynthRecording synthetic = make(short_lift());
     save_synthetic(synthetic, folder / "lift");
     replays = {make_replay(data::load_recording(folder / "lift"), {})};
     grid.base.material = stiff_towel();
-    grid.axes = {parse_axis("bending", "5e-5:8e-4:5:log")};
+    grid.base.material.bending_rigidity *= bending_over_truth;
+    const std::size_t name = axis.find('=');
+    grid.axes = {parse_axis(axis.substr(0, name), axis.substr(name + 1))};
     grid.fixed = {parse_hold("friction=0.3").axis};
     grid.rollouts = folder / "motions";
     ResultsStore store(folder / "run", grid.axes, {"lift"}, fingerprint(replays, grid), Existing::refuse);
@@ -219,6 +221,23 @@ TEST(Answer, IsThatOfTheSearchsOwnMeshWhereThatExplainsMore) {
   EXPECT_LT((*bending.interval95)[1] / (*bending.interval95)[0], 1.5);
   EXPECT_TRUE(std::any_of(answer.checks.begin(), answer.checks.end(),
                           [](const SolverCheck& check) { return check.what == "double_mesh"; }));
+}
+
+TEST(Answer, SaysThatAStiffnessWasHeldAtAValueThatTheRecordingContradicts) {
+  for (const double factor : {1.0, 2.0}) {
+    LiftSearch search("young=20:80:3:log", factor);
+    const Answer answer = find_answer(search.results, search.replays, search.grid, {});
+    const Summary summary = summarize(search.results, answer, search.replays, search.grid, {});
+    if (factor == 1) {
+      EXPECT_TRUE(answer.contradicted.empty()) << answer.contradicted.front();
+      continue;
+    }
+    ASSERT_EQ(answer.contradicted.size(), 1u);
+    EXPECT_EQ(answer.contradicted[0].rfind("bending was held at 0.0004 N m", 0), 0u)
+        << answer.contradicted[0];
+    EXPECT_EQ(summary.exit_code, 3);
+    EXPECT_EQ(summary.warnings.front(), answer.contradicted[0]);
+  }
 }
 
 }  // namespace
