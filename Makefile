@@ -30,7 +30,7 @@ help:  ## This list
 
 demo: configure  ## Packages, build, then the main job on depth frames it makes itself: $(DEMO)/tuned.json, $(DEMO)/run/report.html
 	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
-	$(sysid) synth --asset examples/towel.json --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
+	$(sysid) synth --asset examples/towel.json --mesh sheet:0.3x0.3:0.01 --hold bending=1.5e-4 --raw --resolution 320x240 --force -o $(DEMO)/recording
 	$(sysid) segment $(DEMO)/recording/camera1 --trajectory $(DEMO)/recording/gripper.tum --times rate:10 --force -o $(DEMO)/segmented
 	$(sysid) import $(DEMO)/segmented/frames --trajectory $(DEMO)/recording/gripper.tum --times rate:10 \
 	  --mesh sheet:0.3x0.3:0.02 --grasp corner:1,1 --tool-at patch --heading -135 --table-z 0 --crop-z 0.008: \

@@ -69,8 +69,10 @@ Geometry parse(const std::string& path) {
   if (extension == ".stl") return parse_stl(read_file(path), path);
   if (extension == ".tet") return parse_tet(read_file(path), path);
   if (extension == ".pcd") return {parse_pcd(read_file(path), path), {}, {}};
-  throw InputError(path + ": ending \"" + extension +
-                   "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet");
+  const bool is_like_a_specification = path.find(':') != std::string::npos;
+  throw InputError(
+      path + ": ending \"" + extension + "\" is not known, expected .ply, .obj, .vtk, .stl, .pcd or .tet" +
+      (is_like_a_specification ? ", or a mesh made on the spot, such as sheet:0.4x0.4:0.02" : ""));
 }
 
 void check_geometry(const Geometry& geometry, const std::string& path) {

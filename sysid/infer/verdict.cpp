@@ -100,10 +100,11 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
       // So may what draws are cut off at.
       const double first = coordinate_of(range, range.values.front()),
                    last = coordinate_of(range, range.values.back());
-      const bool below = open(false) || posterior.quantile(k, 0.025) <= first,
-                 above = open(true) || posterior.quantile(k, 0.975) >= last;
-      // The most likely values of all parameters together may lie beyond what is likely of one by itself.
       const double mode = posterior.estimate[static_cast<Eigen::Index>(k)];
+      const RangeEdge edge = edge_of(range, mode);
+      const bool below = open(false) || posterior.quantile(k, 0.025) <= first || edge == RangeEdge::low,
+                 above = open(true) || posterior.quantile(k, 0.975) >= last || edge == RangeEdge::high;
+      // The most likely values of all parameters together may lie beyond what is likely of one by itself.
       const double low = std::min(mode, posterior.quantile(k, 0.025)),
                    high = std::max(mode, posterior.quantile(k, 0.975));
       finding.interval95 = {below ? range.values.front() : value_of(looked, low),
@@ -116,7 +117,7 @@ std::vector<ParameterFinding> findings_of(const GridResults& results, const std:
                              : above                                        ? Identifiable::lower_bound
                                                                             : Identifiable::yes;
       // Where every value is likely, a wider range would tell no more.
-      if (!(below && above)) finding.edge = edge_of(range, mode);
+      if (!(below && above)) finding.edge = edge;
       finding.note = note_of(finding, below, above);
     } else {
       finding.interval95 = {estimate, estimate};

@@ -57,6 +57,21 @@ void replace_mesh(data::Recording& recording, const std::string& mesh) {
     throw data::InputError("--mesh: found " + mesh + ", expected " +
                            (was_solid ? "a solid as box:0.1x0.03x0.03:0.01 or a file of tetrahedra"
                                       : "a sheet as sheet:0.4x0.4:0.02 or a file of triangles"));
+  const auto size_of = [](const data::TriangleMesh& each) -> Eigen::Vector3d {
+    return (each.vertices.colwise().maxCoeff() - each.vertices.colwise().minCoeff()).transpose();
+  };
+  const Eigen::Vector3d was = size_of(own), is = size_of(recording.mesh);
+  constexpr double kOther =
+      0.25;  // of the largest side: cells of another size and a new measurement stay below
+  if ((was - is).cwiseAbs().maxCoeff() > kOther * was.maxCoeff()) {
+    const auto text = [](const Eigen::Vector3d& size) {
+      return data::format_short(size.x()) + " x " + data::format_short(size.y()) + " x " +
+             data::format_short(size.z()) + " m";
+    };
+    throw data::InputError("--mesh: found " + mesh + ", " + text(is) +
+                           ", expected about the size of the object in " + recording.source + ", " +
+                           text(was));
+  }
   const auto moved = [&](data::Selection& select, const char* field) {
     if (!select.vertices.empty())
       select.vertices = same_place(select.vertices, own, recording.mesh, recording.source, field);

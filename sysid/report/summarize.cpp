@@ -139,7 +139,9 @@ std::vector<std::string> warnings_of_grasps(const std::vector<Replay>& replays) 
   return warnings;
 }
 
+/// `best`: the estimate on the search's own mesh; `fit`: as it is registered in the answer.
 std::vector<std::string> warnings_of(const Summary& summary, const CandidateResult& best,
+                                     const CandidateResult& fit,
                                      const std::vector<CandidateResult>& candidates,
                                      const std::vector<Replay>& replays, const GridSettings& settings) {
   std::vector<std::string> warnings;
@@ -163,9 +165,9 @@ std::vector<std::string> warnings_of(const Summary& summary, const CandidateResu
     if (replay.recording.camera)
       for (const std::string& warning : replay.recording.camera->warnings)
         warnings.push_back(replay.recording.name + ": calibration of its camera: " + warning);
-  for (std::size_t r = 0; r < best.recordings.size(); ++r)
+  for (std::size_t r = 0; r < fit.recordings.size(); ++r)
     for (const RegistrationParameter& parameter : registration_parameters) {
-      if (!is_at_bound(best.recordings[r].bounds_hit, parameter)) continue;
+      if (!is_at_bound(fit.recordings[r].bounds_hit, parameter)) continue;
       const auto count =
           std::count_if(candidates.begin(), candidates.end(), [&](const CandidateResult& candidate) {
             return r < candidate.recordings.size() &&
@@ -396,7 +398,8 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   for (const SummaryRecording& recording : summary.recordings)
     if (const std::string warning = warning_of_misfit(recording, object); !warning.empty())
       summary.warnings.push_back(warning);
-  for (const std::string& warning : warnings_of(summary, estimate, results.candidates, replays, settings))
+  for (const std::string& warning :
+       warnings_of(summary, estimate, answer.fit.score, results.candidates, replays, settings))
     summary.warnings.push_back(warning);
   summary.warnings.insert(summary.warnings.end(), answer.warnings.begin(), answer.warnings.end());
   summary.solver_check = answer.checks;
