@@ -1,0 +1,260 @@
+#include "tests/prototype/row_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <utility>
+
+#include "sim/newton/active_set.h"
+#include "sim/step/feasible_positions.h"
+
+namespace flash::sim {
+
+using data::Points;
+
+namespace {
+
+constexpr int most_portions = 20, portion_iterations = 5;  ///< as in Solver
+constexpr int most_updates = 30;          ///< of multipliers in a step, by the augmented Lagrangian
+constexpr double enough_progress = 0.25;  ///< of the violation by an update, without which the penalty grows
+constexpr double penalty_growth = 4;
+constexpr double greatest_growth = 1e4;
+constexpr double row_stiffness = 1e4;  ///< of a row against its own penalty: it makes dependent rows solvable
+constexpr int linear_problems = 6;     ///< an iteration, as in Solver
+constexpr double least_length = 1.0 / 8;
+constexpr int remembered = 5;          ///< shortfalls, the worst of which an iteration has to undercut
+constexpr double gap_tolerance = 1e-9;  ///< of obstacles, as in Solver [m]
+
+/// The friction of all touches, and nothing of what presses them.
+std::vector<TouchStiffness> friction_of_layers(const StepProblem& problem, const Iterate& iterate) {
+  std::vector<TouchStiffness> all;
+  for (const LayerTouch& touch : iterate.layers.touches) {
+    LayerTouch rubbing = touch;
+    rubbing.stiffness = 0;
+    all.push_back({touch, stiffness_of(rubbing, problem.layers->friction(), problem.layers->time_step())});
+  }
+  return all;
+}
+
+}  // namespace
+
+RowSolver::RowSolver(const Sheet& sheet, RowMethod method, const SolverSettings& settings)
+    : method_(method), w_(make_sheet_plan(sheet), settings), matrix_(w_.plan) {
+  w_.layers = std::make_unique<LayerMemory>(sheet);
+}
+
+StepReport RowSolver::step(Environment& environment) {
+  update_holds(environment, environment.state.time + w_.settings.time_step);
+  const SelfContact contact = *environment.self_contact;
+  thickness_ = contact.thickness;
+  environment.self_contact->thickness = row_reach * thickness_;
+  const StepReport report = advance(environment, w_.settings.time_step, w_.settings.halvings);
+  environment.self_contact = contact;
+  return report;
+}
+
+StepReport RowSolver::advance(Environment& environment, double h, int halvings) {
+  const State start = environment.state;
+  const PairMultipliers multipliers = multipliers_;
+  StepReport report;
+  if (try_step(environment, h, report)) return report;
+  w_.refactor = true;
+  if (halvings <= 0) return report;
+  const double end = std::exchange(environment.state, start).time;
+  multipliers_ = multipliers;
+  const StepReport first = advance(environment, 0.5 * h, halvings - 1);
+  StepReport parts = joined(first, advance(environment, 0.5 * h, first.converged ? halvings - 1 : 0));
+  environment.state.time = end;
+  add_work(report, parts);
+  return parts;
+}
+
+bool RowSolver::try_step(Environment& environment, double h, StepReport& report) {
+  StepProblem problem(*w_.plan, environment, h, {.speed = w_.settings.exit_speed}, w_.layers.get());
+  problem.layers = std::make_unique<RowLayers>(*problem.layers, multipliers_);
+  multipliers_.penalty = environment.self_contact->pressure / thickness_;
+  ElasticEnergy elastic_at_start;
+  Points force = Points::Zero(environment.state.positions.rows(), 3);
+  for (const BodyLaw& law : problem.laws)
+    elastic_at_start += add_elastic_gradient(*w_.plan, law, environment.state.positions, force);
+
+  bool free = start_search(problem);
+  for (int portion = 0; !free && portion < most_portions; ++portion) {
+    balance(problem, portion_iterations, report);
+    free = carry_on(problem, w_, report);
+  }
+  balance(problem, w_.settings.max_iterations, report);
+
+  report.residual = problem.relative_residual(w_.now);
+  report_contacts(problem, w_.now, report);
+  // Rows store no energy.
+  w_.now.incremental_potential -= w_.now.elastic.layers;
+  w_.now.elastic.layers = 0;
+  const bool energy_is_sound = account_for_energy(problem, elastic_at_start, w_.now, report);
+  report.converged = free && energy_is_sound && report.complementarity <= gap_tolerance &&
+                     shortfall(problem, w_.now) <= 1;
+  update_multipliers(w_.now.layers, multipliers_);
+
+  environment.state.time += h;
+  environment.state.velocities = (w_.now.positions - environment.state.positions) / h;
+  environment.state.bristles = bristles_at_end(problem.contacts, w_.now.contacts, w_.now.positions);
+  environment.state.pair_bristles = problem.layers->bristles_at_end(w_.now.layers);
+  environment.state.positions = w_.now.positions;
+  return report.converged;
+}
+
+bool RowSolver::start_search(const StepProblem& problem) {
+  constexpr int most_cuts = 8;
+  const State& start = problem.contacts.environment.state;
+  double part = 1, share = 0;
+  for (int cut = 0; cut <= most_cuts && share < 1; ++cut) {
+    if (cut == most_cuts) part = 0;
+    w_.now.positions = start.positions + part * problem.contacts.time_step * start.velocities;
+    w_.now.contacts = begin_step(problem.contacts, w_.now.positions);
+    project_to_feasible(problem.contacts, w_.now.contacts, w_.now.positions);
+    share = problem.layers->free_share(start.positions, w_.now.positions);
+    part *= share;
+  }
+  if (share < 1) w_.now.positions = start.positions;
+  problem.evaluate(w_.now);
+  return share == 1;
+}
+
+double RowSolver::shortfall(const StepProblem& problem, const Iterate& iterate) const {
+  const double rows = row_violation(iterate.layers, multipliers_) / (row_tolerance * thickness_);
+  const double tolerance = w_.settings.tolerance;
+  const double balance = problem.balanced(iterate, tolerance)
+                             ? 0
+                             : std::max(problem.relative_residual(iterate) / tolerance, 1 + 1e-9);
+  return std::max(rows, balance);
+}
+
+void RowSolver::balance(const StepProblem& problem, int most_iterations, StepReport& report) {
+  if (method_ == RowMethod::augmented)
+    augment(problem, most_iterations, report);
+  else
+    iterate_with_rows(problem, most_iterations, report);
+}
+
+void RowSolver::augment(const StepProblem& problem, int most_iterations, StepReport& report) {
+  const double greatest = greatest_growth * multipliers_.penalty;
+  double before = 1e300;
+  for (int update = 0; update < most_updates; ++update) {
+    iterate_to_balance(problem, most_iterations, w_, report);
+    const double violation = row_violation(w_.now.layers, multipliers_);
+    if (violation <= row_tolerance * thickness_ || !problem.balanced(w_.now, w_.settings.tolerance)) return;
+    update_multipliers(w_.now.layers, multipliers_);
+    if (violation > enough_progress * before)
+      multipliers_.penalty = std::min(greatest, penalty_growth * multipliers_.penalty);
+    before = violation;
+    problem.evaluate(w_.now);
+  }
+}
+
+bool RowSolver::factorize(const StepProblem& problem) {
+  problem.potential.assemble(w_.now.positions, Curvature::positive, false, w_.values);
+  for (const BodyLaw& law : problem.laws)
+    add_bending_stand_in(law.bending, problem.potential.effective_rigidity(law), w_.values);
+  add_slip_stiffness(w_.now.contacts, w_.values);
+  for (const TouchStiffness& layer : friction_of_layers(problem, w_.now))
+    for (int k = 0; k < 4; ++k)
+      Eigen::Map<Eigen::Matrix3d>(w_.values.data() + 9L * layer.touch.vertices[k]) +=
+          layer.touch.weights[k] * layer.touch.weights[k] * matrix3d(layer.stiffness);
+  restrict_matrix(w_.plan->pattern, w_.now.contacts, w_.values);
+  return matrix_.factorize(w_.values);
+}
+
+void RowSolver::assemble(const StepProblem& problem, bool positive) {
+  bool sparse = true;
+  std::vector<ScaledBending> bending;
+  for (const BodyLaw& law : problem.laws) {
+    if (law.solid != nullptr) continue;
+    sparse = sparse && !law.bends_at_hinges();
+    bending.push_back({law.bending, problem.potential.effective_rigidity(law)});
+  }
+  problem.potential.assemble(w_.now.positions, positive ? Curvature::positive : Curvature::exact, sparse,
+                             w_.values);
+  add_slip_stiffness(w_.now.contacts, w_.values);
+  if (!positive) add_surface_curvature(w_.now.contacts, w_.values);
+  std::vector<ContactRow> rows;
+  for (const LayerTouch& touch : w_.now.layers.touches) {
+    if (!(touch.stiffness > 0)) continue;
+    const double p = multipliers_.of(key_of(touch.kind, touch.vertices));
+    const double pressed = pressure_of(touch, multipliers_.penalty);
+    rows.push_back({touch, touch.normal - problem.layers->friction() * touch.slip_direction,
+                    (pressed - p) / multipliers_.penalty, 1 / (row_stiffness * touch.stiffness)});
+  }
+  matrix_.assign(w_.values, sparse, bending, friction_of_layers(problem, w_.now), std::move(rows));
+}
+
+void RowSolver::solve_rows(const StepProblem& problem, StepReport& report) {
+  const Linearization iterate{problem.contacts, w_.now.positions, w_.now.force, w_.now.residual};
+  w_.linear = w_.now.contacts;
+  w_.gradient = w_.now.residual;
+  w_.refactor = false;
+  for (int solved = 0; solved < linear_problems; ++solved) {
+    w_.force = w_.now.force;
+    const int solves = matrix_.solve(w_.linear, friction_couplings(problem.contacts, w_.linear), w_.gradient,
+                                     w_.direction, forces_, w_.force);
+    report.solves += solves;
+    w_.refactor = w_.refactor || solves > w_.settings.stale_factor_solves;
+    if (solved + 1 == linear_problems ||
+        !exchange_contacts(iterate, w_.direction, w_.force, w_.gradient, w_.linear))
+      return;
+  }
+}
+
+void RowSolver::iterate_with_rows(const StepProblem& problem, int most_iterations, StepReport& report) {
+  w_.trial.contacts = w_.now.contacts;
+  bool positive = false, first = true;
+  std::deque<double> shortfalls = {shortfall(problem, w_.now)};
+  for (int k = 0; k < most_iterations && (first || shortfalls.back() > 1); ++k) {
+    first = false;
+    ++report.iterations;
+    if (w_.refactor || positive) {
+      if (!factorize(problem)) return;
+      ++report.factorizations;
+    }
+    assemble(problem, positive);
+    solve_rows(problem, report);
+
+    // Pressures go from what the rows have to what the linear problem gives them; those that do not press to 0.
+    const PairMultipliers from = multipliers_;
+    std::vector<std::pair<double, double>> pressures;
+    long row = 0;
+    for (const LayerTouch& touch : w_.now.layers.touches) {
+      const double pressed = pressure_of(touch, multipliers_.penalty);
+      const double to = touch.stiffness > 0 ? pressed * (1 + forces_[row++] / touch.normal_force) : 0;
+      pressures.emplace_back(from.of(key_of(touch.kind, touch.vertices)), to);
+    }
+    const double worst = *std::max_element(shortfalls.begin(), shortfalls.end());
+    double length = 1, reached = 0;
+    for (int cut = 0;; ++cut) {
+      w_.trial.positions = w_.now.positions + length * w_.direction;
+      project_to_feasible(problem.contacts, w_.linear, w_.trial.positions);
+      const double share = problem.layers->free_share(w_.now.positions, w_.trial.positions);
+      if (share < 1 && cut < 30) {
+        length *= share;
+        continue;
+      }
+      multipliers_.pressure.clear();
+      for (std::size_t t = 0; t < pressures.size(); ++t) {
+        const LayerTouch& touch = w_.now.layers.touches[t];
+        const auto [before, after] = pressures[t];
+        multipliers_.pressure[key_of(touch.kind, touch.vertices)] = before + length * (after - before);
+      }
+      problem.evaluate(w_.trial);
+      reached = shortfall(problem, w_.trial);
+      if (reached < worst || length <= least_length) break;
+      length *= 0.5;
+    }
+    positive = !(reached < worst) && !positive;
+    problem.layers->carry_duals(w_.now.layers, length, w_.trial.layers);
+    std::swap(w_.now, w_.trial);
+    shortfalls.push_back(reached);
+    if (shortfalls.size() > remembered) shortfalls.pop_front();
+    if (!std::isfinite(reached)) return;
+  }
+}
+
+}  // namespace flash::sim
