@@ -20,7 +20,7 @@ double pressure_of(const LayerTouch& touch, double penalty) {
 double row_violation(const LayerContact& contact, const PairMultipliers& multipliers) {
   double worst = 0;
   for (const LayerTouch& touch : contact.touches) {
-    if (norm(touch.couple) > 0) continue;
+    if (touch.stiffness > 0 && !is_row(touch)) continue;
     const double wrong = pressure_of(touch, multipliers.penalty) - multipliers.of(key_of(touch.kind, touch.vertices));
     worst = std::max(worst, std::abs(wrong) / multipliers.penalty);
   }
@@ -30,8 +30,8 @@ double row_violation(const LayerContact& contact, const PairMultipliers& multipl
 void update_multipliers(const LayerContact& contact, PairMultipliers& multipliers) {
   multipliers.pressure.clear();
   for (const LayerTouch& touch : contact.touches)
-    if (const double p = pressure_of(touch, multipliers.penalty); p > 0)
-      multipliers.pressure[key_of(touch.kind, touch.vertices)] = p;
+    if (is_row(touch))
+      multipliers.pressure[key_of(touch.kind, touch.vertices)] = pressure_of(touch, multipliers.penalty);
 }
 
 }  // namespace flash::sim

@@ -61,8 +61,11 @@ class RowLayers : public LayerStep {
 /// What a touch of RowLayers presses with, as above [Pa].
 double pressure_of(const LayerTouch& touch, double penalty);
 
-/// How much nearer than t features are, or how much farther where they press [m]. Edges that are nearly
-/// parallel do not count: faces beside them have rows of their own.
+/// Whether a touch is a row. Edges that are nearly parallel, whose area fades, have the penalty alone: faces
+/// beside them have rows.
+inline bool is_row(const LayerTouch& touch) { return touch.stiffness > 0 && norm(touch.couple) == 0; }
+
+/// How much nearer than t the features of a row are, or how much farther where they press [m].
 double row_violation(const LayerContact& contact, const PairMultipliers& multipliers);
 
 /// Makes what each touch presses with its multiplier (Uzawa), and those of all other pairs zero.

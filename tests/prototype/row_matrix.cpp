@@ -15,7 +15,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr int most_directions = 200;    ///< of GMRES, which keeps all of them
-constexpr double linear_share = 1e-2;   ///< of the first residual, to which it is solved
+const double linear_share = std::getenv("LIN") ? atof(std::getenv("LIN")) : 1e-2;   ///< of the first residual, to which it is solved
 
 using Operator = std::function<VectorXd(const VectorXd&)>;
 

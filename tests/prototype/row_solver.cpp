@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <numeric>
 #include <utility>
 
 #include "sim/newton/active_set.h"
@@ -19,18 +20,17 @@ constexpr int most_updates = 30;          ///< of multipliers in a step, by the 
 constexpr double enough_progress = 0.25;  ///< of the violation by an update, without which the penalty grows
 constexpr double penalty_growth = 4;
 constexpr double greatest_growth = 1e4;
-constexpr double row_stiffness = 1e4;  ///< of a row against its own penalty: it makes dependent rows solvable
 constexpr int linear_problems = 6;     ///< an iteration, as in Solver
 constexpr double least_length = 1.0 / 8;
 constexpr int remembered = 5;          ///< shortfalls, the worst of which an iteration has to undercut
 constexpr double gap_tolerance = 1e-9;  ///< of obstacles, as in Solver [m]
 
-/// The friction of all touches, and nothing of what presses them.
-std::vector<TouchStiffness> friction_of_layers(const StepProblem& problem, const Iterate& iterate) {
+/// The stiffness of all touches but what presses rows.
+std::vector<TouchStiffness> stiffness_beside_rows(const StepProblem& problem, const Iterate& iterate) {
   std::vector<TouchStiffness> all;
   for (const LayerTouch& touch : iterate.layers.touches) {
     LayerTouch rubbing = touch;
-    rubbing.stiffness = 0;
+    if (is_row(touch)) rubbing.stiffness = 0;
     all.push_back({touch, stiffness_of(rubbing, problem.layers->friction(), problem.layers->time_step())});
   }
   return all;
@@ -72,11 +72,7 @@ StepReport RowSolver::advance(Environment& environment, double h, int halvings) 
 bool RowSolver::try_step(Environment& environment, double h, StepReport& report) {
   StepProblem problem(*w_.plan, environment, h, {.speed = w_.settings.exit_speed}, w_.layers.get());
   problem.layers = std::make_unique<RowLayers>(*problem.layers, multipliers_);
-  multipliers_.penalty = environment.self_contact->pressure / thickness_;
-  ElasticEnergy elastic_at_start;
-  Points force = Points::Zero(environment.state.positions.rows(), 3);
-  for (const BodyLaw& law : problem.laws)
-    elastic_at_start += add_elastic_gradient(*w_.plan, law, environment.state.positions, force);
+  multipliers_.penalty = first_penalty(problem);
 
   bool free = start_search(problem);
   for (int portion = 0; !free && portion < most_portions; ++portion) {
@@ -87,11 +83,7 @@ bool RowSolver::try_step(Environment& environment, double h, StepReport& report)
 
   report.residual = problem.relative_residual(w_.now);
   report_contacts(problem, w_.now, report);
-  // Rows store no energy.
-  w_.now.incremental_potential -= w_.now.elastic.layers;
-  w_.now.elastic.layers = 0;
-  const bool energy_is_sound = account_for_energy(problem, elastic_at_start, w_.now, report);
-  report.converged = free && energy_is_sound && report.complementarity <= gap_tolerance &&
+  report.converged = free && report.complementarity <= gap_tolerance &&
                      shortfall(problem, w_.now) <= 1;
   update_multipliers(w_.now.layers, multipliers_);
 
@@ -101,6 +93,14 @@ bool RowSolver::try_step(Environment& environment, double h, StepReport& report)
   environment.state.pair_bristles = problem.layers->bristles_at_end(w_.now.layers);
   environment.state.positions = w_.now.positions;
   return report.converged;
+}
+
+double RowSolver::first_penalty(const StepProblem& problem) const {
+  const double stiffness = problem.contacts.environment.self_contact->pressure / thickness_;
+  if (method_ == RowMethod::augmented) return stiffness;
+  const std::vector<double>& area = w_.layers->surface.vertex_area;
+  const double h = problem.contacts.time_step;
+  return problem.potential.mass().sum() / std::accumulate(area.begin(), area.end(), 0.0) / (h * h);
 }
 
 bool RowSolver::start_search(const StepProblem& problem) {
@@ -142,6 +142,8 @@ void RowSolver::augment(const StepProblem& problem, int most_iterations, StepRep
   for (int update = 0; update < most_updates; ++update) {
     iterate_to_balance(problem, most_iterations, w_, report);
     const double violation = row_violation(w_.now.layers, multipliers_);
+    if (std::getenv("TRACE"))
+      std::printf("  update %d it %d kappa %.1e viol %.2e res %.2e touches %zu balanced %d\n", update, report.iterations, multipliers_.penalty, violation/thickness_, problem.relative_residual(w_.now), w_.now.layers.touches.size(), problem.balanced(w_.now, w_.settings.tolerance));
     if (violation <= row_tolerance * thickness_ || !problem.balanced(w_.now, w_.settings.tolerance)) return;
     update_multipliers(w_.now.layers, multipliers_);
     if (violation > enough_progress * before)
@@ -156,7 +158,7 @@ bool RowSolver::factorize(const StepProblem& problem) {
   for (const BodyLaw& law : problem.laws)
     add_bending_stand_in(law.bending, problem.potential.effective_rigidity(law), w_.values);
   add_slip_stiffness(w_.now.contacts, w_.values);
-  for (const TouchStiffness& layer : friction_of_layers(problem, w_.now))
+  for (const TouchStiffness& layer : stiffness_beside_rows(problem, w_.now))
     for (int k = 0; k < 4; ++k)
       Eigen::Map<Eigen::Matrix3d>(w_.values.data() + 9L * layer.touch.vertices[k]) +=
           layer.touch.weights[k] * layer.touch.weights[k] * matrix3d(layer.stiffness);
@@ -176,15 +178,16 @@ void RowSolver::assemble(const StepProblem& problem, bool positive) {
                              w_.values);
   add_slip_stiffness(w_.now.contacts, w_.values);
   if (!positive) add_surface_curvature(w_.now.contacts, w_.values);
+  const double row_stiffness = problem.contacts.environment.self_contact->pressure / thickness_;
   std::vector<ContactRow> rows;
   for (const LayerTouch& touch : w_.now.layers.touches) {
-    if (!(touch.stiffness > 0)) continue;
+    if (!is_row(touch)) continue;
     const double p = multipliers_.of(key_of(touch.kind, touch.vertices));
     const double pressed = pressure_of(touch, multipliers_.penalty);
     rows.push_back({touch, touch.normal - problem.layers->friction() * touch.slip_direction,
-                    (pressed - p) / multipliers_.penalty, 1 / (row_stiffness * touch.stiffness)});
+                    (pressed - p) / multipliers_.penalty, multipliers_.penalty / (row_stiffness * touch.stiffness)});
   }
-  matrix_.assign(w_.values, sparse, bending, friction_of_layers(problem, w_.now), std::move(rows));
+  matrix_.assign(w_.values, sparse, bending, stiffness_beside_rows(problem, w_.now), std::move(rows));
 }
 
 void RowSolver::solve_rows(const StepProblem& problem, StepReport& report) {
@@ -224,17 +227,18 @@ void RowSolver::iterate_with_rows(const StepProblem& problem, int most_iteration
     long row = 0;
     for (const LayerTouch& touch : w_.now.layers.touches) {
       const double pressed = pressure_of(touch, multipliers_.penalty);
-      const double to = touch.stiffness > 0 ? pressed * (1 + forces_[row++] / touch.normal_force) : 0;
+      const double to = is_row(touch) ? pressed * (1 + forces_[row++] / touch.normal_force) : 0;
       pressures.emplace_back(from.of(key_of(touch.kind, touch.vertices)), to);
     }
     const double worst = *std::max_element(shortfalls.begin(), shortfalls.end());
+    constexpr int most_cuts = 20;
     double length = 1, reached = 0;
     for (int cut = 0;; ++cut) {
       w_.trial.positions = w_.now.positions + length * w_.direction;
       project_to_feasible(problem.contacts, w_.linear, w_.trial.positions);
       const double share = problem.layers->free_share(w_.now.positions, w_.trial.positions);
-      if (share < 1 && cut < 30) {
-        length *= share;
+      if (share < 1) {
+        length = cut < most_cuts ? length * share : 0;
         continue;
       }
       multipliers_.pressure.clear();
@@ -245,9 +249,11 @@ void RowSolver::iterate_with_rows(const StepProblem& problem, int most_iteration
       }
       problem.evaluate(w_.trial);
       reached = shortfall(problem, w_.trial);
-      if (reached < worst || length <= least_length) break;
+      if (!std::getenv("LS") || reached < worst || length <= least_length) break;
       length *= 0.5;
     }
+    if (std::getenv("TRACE"))
+      std::printf("  k %d solves %d rows %ld length %.3g short %.3g -> %.3g (res %.2e viol %.2e) resn %.3g\n", k, report.solves, row, length, shortfalls.back(), reached, problem.relative_residual(w_.trial), row_violation(w_.trial.layers, multipliers_)/thickness_, problem.relative_residual(w_.now));
     positive = !(reached < worst) && !positive;
     problem.layers->carry_duals(w_.now.layers, length, w_.trial.layers);
     std::swap(w_.now, w_.trial);

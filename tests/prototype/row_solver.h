@@ -28,6 +28,7 @@ class RowSolver {
  private:
   StepReport advance(Environment& environment, double h, int halvings);
   bool try_step(Environment& environment, double h, StepReport& report);
+  double first_penalty(const StepProblem& problem) const;
   bool start_search(const StepProblem& problem);
   void balance(const StepProblem& problem, int most_iterations, StepReport& report);
   void augment(const StepProblem& problem, int most_iterations, StepReport& report);
