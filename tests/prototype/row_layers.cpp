@@ -21,7 +21,8 @@ double row_violation(const LayerContact& contact, const PairMultipliers& multipl
   double worst = 0;
   for (const LayerTouch& touch : contact.touches) {
     if (touch.stiffness > 0 && !is_row(touch)) continue;
-    const double wrong = pressure_of(touch, multipliers.penalty) - multipliers.of(key_of(touch.kind, touch.vertices));
+    const double wrong =
+        pressure_of(touch, multipliers.penalty) - multipliers.of(key_of(touch.kind, touch.vertices));
     worst = std::max(worst, std::abs(wrong) / multipliers.penalty);
   }
   return worst;

@@ -30,7 +30,7 @@ inline PairKey key_of(PairKind kind, const std::array<int, 4>& vertices) {
 
 /// Multipliers of the rows d >= t, one a pair, as pressures on the area that the pair stands for.
 struct PairMultipliers {
-  double penalty = 0;                                     ///< kappa [Pa/m]
+  double penalty = 0;                                      ///< kappa [Pa/m]
   std::unordered_map<PairKey, double, PairHash> pressure;  ///< p [Pa]; none: 0
 
   double of(const PairKey& key) const {

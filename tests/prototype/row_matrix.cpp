@@ -14,8 +14,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int most_directions = 200;    ///< of GMRES, which keeps all of them
-const double linear_share = std::getenv("LIN") ? atof(std::getenv("LIN")) : 1e-2;   ///< of the first residual, to which it is solved
+constexpr int most_directions = 200;   ///< of GMRES, which keeps all of them
+constexpr double linear_share = 1e-2;  ///< of the first residual, to which it is solved
 
 using Operator = std::function<VectorXd(const VectorXd&)>;
 
@@ -59,7 +59,8 @@ VectorXd gmres(const Operator& matrix, const Operator& precondition, const Vecto
 
 /// Applies the matrices of the constraints to their vertices: what they leave free, with `couplings` where
 /// there are any.
-void restrict_to_free(const ContactSet& contacts, const std::vector<Matrix3d>& couplings, Eigen::Ref<VectorXd> x) {
+void restrict_to_free(const ContactSet& contacts, const std::vector<Matrix3d>& couplings,
+                      Eigen::Ref<VectorXd> x) {
   for (std::size_t k = 0; k < contacts.constraints.size(); ++k) {
     const VertexConstraint& constraint = contacts.constraints[k];
     if (constraint.freedom == Freedom::free) continue;
@@ -82,8 +83,9 @@ bool RowMatrix::factorize(const BlockValues<double>& positive) {
   return factor_.factorize(positive);
 }
 
-void RowMatrix::assign(const BlockValues<double>& blocks, bool sparse, const std::vector<ScaledBending>& bending,
-                       const std::vector<TouchStiffness>& friction, std::vector<ContactRow> rows) {
+void RowMatrix::assign(const BlockValues<double>& blocks, bool sparse,
+                       const std::vector<ScaledBending>& bending, const std::vector<TouchStiffness>& friction,
+                       std::vector<ContactRow> rows) {
   std::vector<ScalarPart> scalar_parts;
   for (const auto& [operator_of_body, rigidity] : bending)
     scalar_parts.push_back({&operator_of_body.elimination_stiffness, rigidity});
@@ -138,13 +140,14 @@ VectorXd RowMatrix::parting(const VectorXd& motion) const {
   VectorXd parts = VectorXd::Zero(static_cast<long>(rows_.size()));
   for (std::size_t r = 0; r < rows_.size(); ++r)
     for (std::size_t k = 0; k < 4; ++k)
-      parts[static_cast<long>(r)] += rows_[r].touch.weights[k] *
-                                     vector3d(rows_[r].touch.normal).dot(motion.segment<3>(3L * rows_[r].touch.vertices[k]));
+      parts[static_cast<long>(r)] +=
+          rows_[r].touch.weights[k] *
+          vector3d(rows_[r].touch.normal).dot(motion.segment<3>(3L * rows_[r].touch.vertices[k]));
   return parts;
 }
 
-int RowMatrix::solve(const ContactSet& contacts, const std::vector<Matrix3d>& couplings, const Points& gradient,
-                     Points& direction, VectorXd& forces, Points& force) {
+int RowMatrix::solve(const ContactSet& contacts, const std::vector<Matrix3d>& couplings,
+                     const Points& gradient, Points& direction, VectorXd& forces, Points& force) {
   const long size = 3L * gradient.rows(), rows = static_cast<long>(rows_.size());
   VectorXd gaps(rows), compliance(rows), schur(rows);
   for (long r = 0; r < rows; ++r) {

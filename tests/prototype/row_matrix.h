@@ -8,8 +8,8 @@
 
 namespace flash::sim {
 
-/// A row of the linear problem: the vertices of a touch are to part by `gap` less `compliance` times the force
-/// that it adds.
+/// A row of the linear problem: the vertices of a touch are to part by `gap` less `compliance` times the
+/// force that it adds.
 struct ContactRow {
   const LayerTouch& touch;
   Vector3<double> push;  ///< what a newton of the row does to the first feature: n less its friction
@@ -17,8 +17,8 @@ struct ContactRow {
   double compliance;     ///< [m/N]
 };
 
-/// The linear problem of an iteration with rows on multipliers, in the motion u of the vertices and the forces
-/// q that the rows add:
+/// The linear problem of an iteration with rows on multipliers, in the motion u of the vertices and the
+/// forces q that the rows add:
 ///
 ///   P A u - P F q = -P gradient,   G u + E q = gap
 ///
@@ -35,7 +35,8 @@ class RowMatrix {
   void assign(const BlockValues<double>& blocks, bool sparse, const std::vector<ScaledBending>& bending,
               const std::vector<TouchStiffness>& friction, std::vector<ContactRow> rows);
 
-  /// Solves to a share of the first residual, as NewtonMatrix::solve_coupled. Fills in the forces of the rows.
+  /// Solves to a share of the first residual, as NewtonMatrix::solve_coupled. Fills in the forces of the
+  /// rows.
   int solve(const ContactSet& contacts, const std::vector<Eigen::Matrix3d>& couplings,
             const data::Points& gradient, data::Points& direction, Eigen::VectorXd& forces,
             data::Points& force);

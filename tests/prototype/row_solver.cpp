@@ -1,8 +1,6 @@
 #include "tests/prototype/row_solver.h"
 
 #include <algorithm>
-#include <cmath>
-#include <deque>
 #include <numeric>
 #include <utility>
 
@@ -20,10 +18,10 @@ constexpr int most_updates = 30;          ///< of multipliers in a step, by the 
 constexpr double enough_progress = 0.25;  ///< of the violation by an update, without which the penalty grows
 constexpr double penalty_growth = 4;
 constexpr double greatest_growth = 1e4;
-constexpr int linear_problems = 6;     ///< an iteration, as in Solver
-constexpr double least_length = 1.0 / 8;
-constexpr int remembered = 5;          ///< shortfalls, the worst of which an iteration has to undercut
-constexpr double gap_tolerance = 1e-9;  ///< of obstacles, as in Solver [m]
+constexpr double crushed_share = 1e-6;          ///< of the thickness, as in Solver
+constexpr int linear_problems = 6;              ///< an iteration, as in Solver
+constexpr double start_tolerance_share = 1e-3;  ///< of the tolerance, for the start of a search, as in Solver
+constexpr double gap_tolerance = 1e-9;          ///< of obstacles, as in Solver [m]
 
 /// The stiffness of all touches but what presses rows.
 std::vector<TouchStiffness> stiffness_beside_rows(const StepProblem& problem, const Iterate& iterate) {
@@ -59,7 +57,8 @@ StepReport RowSolver::advance(Environment& environment, double h, int halvings) 
   StepReport report;
   if (try_step(environment, h, report)) return report;
   w_.refactor = true;
-  if (halvings <= 0) return report;
+  // Shorter steps do not help layers that are crushed, as in Solver.
+  if (halvings <= 0 || report.layer_distance < crushed_share * thickness_) return report;
   const double end = std::exchange(environment.state, start).time;
   multipliers_ = multipliers;
   const StepReport first = advance(environment, 0.5 * h, halvings - 1);
@@ -83,8 +82,7 @@ bool RowSolver::try_step(Environment& environment, double h, StepReport& report)
 
   report.residual = problem.relative_residual(w_.now);
   report_contacts(problem, w_.now, report);
-  report.converged = free && report.complementarity <= gap_tolerance &&
-                     shortfall(problem, w_.now) <= 1;
+  report.converged = free && report.complementarity <= gap_tolerance && solved(problem);
   update_multipliers(w_.now.layers, multipliers_);
 
   environment.state.time += h;
@@ -120,13 +118,9 @@ bool RowSolver::start_search(const StepProblem& problem) {
   return share == 1;
 }
 
-double RowSolver::shortfall(const StepProblem& problem, const Iterate& iterate) const {
-  const double rows = row_violation(iterate.layers, multipliers_) / (row_tolerance * thickness_);
-  const double tolerance = w_.settings.tolerance;
-  const double balance = problem.balanced(iterate, tolerance)
-                             ? 0
-                             : std::max(problem.relative_residual(iterate) / tolerance, 1 + 1e-9);
-  return std::max(rows, balance);
+bool RowSolver::solved(const StepProblem& problem, double share) const {
+  return problem.balanced(w_.now, share * w_.settings.tolerance) &&
+         row_violation(w_.now.layers, multipliers_) <= row_tolerance * thickness_;
 }
 
 void RowSolver::balance(const StepProblem& problem, int most_iterations, StepReport& report) {
@@ -142,9 +136,7 @@ void RowSolver::augment(const StepProblem& problem, int most_iterations, StepRep
   for (int update = 0; update < most_updates; ++update) {
     iterate_to_balance(problem, most_iterations, w_, report);
     const double violation = row_violation(w_.now.layers, multipliers_);
-    if (std::getenv("TRACE"))
-      std::printf("  update %d it %d kappa %.1e viol %.2e res %.2e touches %zu balanced %d\n", update, report.iterations, multipliers_.penalty, violation/thickness_, problem.relative_residual(w_.now), w_.now.layers.touches.size(), problem.balanced(w_.now, w_.settings.tolerance));
-    if (violation <= row_tolerance * thickness_ || !problem.balanced(w_.now, w_.settings.tolerance)) return;
+    if (solved(problem) || !problem.balanced(w_.now, w_.settings.tolerance)) return;
     update_multipliers(w_.now.layers, multipliers_);
     if (violation > enough_progress * before)
       multipliers_.penalty = std::min(greatest, penalty_growth * multipliers_.penalty);
@@ -166,7 +158,7 @@ bool RowSolver::factorize(const StepProblem& problem) {
   return matrix_.factorize(w_.values);
 }
 
-void RowSolver::assemble(const StepProblem& problem, bool positive) {
+void RowSolver::assemble(const StepProblem& problem) {
   bool sparse = true;
   std::vector<ScaledBending> bending;
   for (const BodyLaw& law : problem.laws) {
@@ -174,10 +166,9 @@ void RowSolver::assemble(const StepProblem& problem, bool positive) {
     sparse = sparse && !law.bends_at_hinges();
     bending.push_back({law.bending, problem.potential.effective_rigidity(law)});
   }
-  problem.potential.assemble(w_.now.positions, positive ? Curvature::positive : Curvature::exact, sparse,
-                             w_.values);
+  problem.potential.assemble(w_.now.positions, Curvature::exact, sparse, w_.values);
   add_slip_stiffness(w_.now.contacts, w_.values);
-  if (!positive) add_surface_curvature(w_.now.contacts, w_.values);
+  add_surface_curvature(w_.now.contacts, w_.values);
   const double row_stiffness = problem.contacts.environment.self_contact->pressure / thickness_;
   std::vector<ContactRow> rows;
   for (const LayerTouch& touch : w_.now.layers.touches) {
@@ -185,7 +176,8 @@ void RowSolver::assemble(const StepProblem& problem, bool positive) {
     const double p = multipliers_.of(key_of(touch.kind, touch.vertices));
     const double pressed = pressure_of(touch, multipliers_.penalty);
     rows.push_back({touch, touch.normal - problem.layers->friction() * touch.slip_direction,
-                    (pressed - p) / multipliers_.penalty, multipliers_.penalty / (row_stiffness * touch.stiffness)});
+                    (pressed - p) / multipliers_.penalty,
+                    multipliers_.penalty / (row_stiffness * touch.stiffness)});
   }
   matrix_.assign(w_.values, sparse, bending, stiffness_beside_rows(problem, w_.now), std::move(rows));
 }
@@ -207,59 +199,49 @@ void RowSolver::solve_rows(const StepProblem& problem, StepReport& report) {
   }
 }
 
+double RowSolver::move(const StepProblem& problem) {
+  constexpr int most_cuts = 20;
+  double length = 1;
+  for (int cut = 0;; ++cut) {
+    w_.trial.positions = w_.now.positions + length * w_.direction;
+    project_to_feasible(problem.contacts, w_.linear, w_.trial.positions);
+    const double share = problem.layers->free_share(w_.now.positions, w_.trial.positions);
+    if (share == 1) break;
+    length *= share;
+    if (cut < most_cuts) continue;
+    w_.trial.positions = w_.now.positions;
+    break;
+  }
+  // Multipliers go on as far as the vertices do; those that do not press go to zero.
+  PairMultipliers next{multipliers_.penalty, {}};
+  long row = 0;
+  for (const LayerTouch& touch : w_.now.layers.touches) {
+    const PairKey key = key_of(touch.kind, touch.vertices);
+    const double from = multipliers_.of(key), pressed = pressure_of(touch, multipliers_.penalty);
+    const double to = is_row(touch) ? pressed * (1 + forces_[row++] / touch.normal_force) : 0;
+    next.pressure[key] = from + length * (to - from);
+  }
+  multipliers_ = std::move(next);
+  problem.evaluate(w_.trial);
+  return length;
+}
+
 void RowSolver::iterate_with_rows(const StepProblem& problem, int most_iterations, StepReport& report) {
   w_.trial.contacts = w_.now.contacts;
-  bool positive = false, first = true;
-  std::deque<double> shortfalls = {shortfall(problem, w_.now)};
-  for (int k = 0; k < most_iterations && (first || shortfalls.back() > 1); ++k) {
-    first = false;
+  double share = start_tolerance_share;
+  for (int k = 0; k < most_iterations && !solved(problem, share); ++k) {
+    share = 1;
     ++report.iterations;
-    if (w_.refactor || positive) {
+    if (w_.refactor) {
       if (!factorize(problem)) return;
       ++report.factorizations;
     }
-    assemble(problem, positive);
+    assemble(problem);
     solve_rows(problem, report);
-
-    // Pressures go from what the rows have to what the linear problem gives them; those that do not press to 0.
-    const PairMultipliers from = multipliers_;
-    std::vector<std::pair<double, double>> pressures;
-    long row = 0;
-    for (const LayerTouch& touch : w_.now.layers.touches) {
-      const double pressed = pressure_of(touch, multipliers_.penalty);
-      const double to = is_row(touch) ? pressed * (1 + forces_[row++] / touch.normal_force) : 0;
-      pressures.emplace_back(from.of(key_of(touch.kind, touch.vertices)), to);
-    }
-    const double worst = *std::max_element(shortfalls.begin(), shortfalls.end());
-    constexpr int most_cuts = 20;
-    double length = 1, reached = 0;
-    for (int cut = 0;; ++cut) {
-      w_.trial.positions = w_.now.positions + length * w_.direction;
-      project_to_feasible(problem.contacts, w_.linear, w_.trial.positions);
-      const double share = problem.layers->free_share(w_.now.positions, w_.trial.positions);
-      if (share < 1) {
-        length = cut < most_cuts ? length * share : 0;
-        continue;
-      }
-      multipliers_.pressure.clear();
-      for (std::size_t t = 0; t < pressures.size(); ++t) {
-        const LayerTouch& touch = w_.now.layers.touches[t];
-        const auto [before, after] = pressures[t];
-        multipliers_.pressure[key_of(touch.kind, touch.vertices)] = before + length * (after - before);
-      }
-      problem.evaluate(w_.trial);
-      reached = shortfall(problem, w_.trial);
-      if (!std::getenv("LS") || reached < worst || length <= least_length) break;
-      length *= 0.5;
-    }
-    if (std::getenv("TRACE"))
-      std::printf("  k %d solves %d rows %ld length %.3g short %.3g -> %.3g (res %.2e viol %.2e) resn %.3g\n", k, report.solves, row, length, shortfalls.back(), reached, problem.relative_residual(w_.trial), row_violation(w_.trial.layers, multipliers_)/thickness_, problem.relative_residual(w_.now));
-    positive = !(reached < worst) && !positive;
+    const double length = move(problem);
     problem.layers->carry_duals(w_.now.layers, length, w_.trial.layers);
     std::swap(w_.now, w_.trial);
-    shortfalls.push_back(reached);
-    if (shortfalls.size() > remembered) shortfalls.pop_front();
-    if (!std::isfinite(reached)) return;
+    if (!w_.now.residual.allFinite()) return;
   }
 }
 
