@@ -18,8 +18,9 @@ constexpr int most_updates = 30;          ///< of multipliers in a step, by the 
 constexpr double enough_progress = 0.25;  ///< of the violation by an update, without which the penalty grows
 constexpr double penalty_growth = 4;
 constexpr double greatest_growth = 1e4;
-constexpr double crushed_share = 1e-6;          ///< of the thickness, as in Solver
-constexpr int linear_problems = 6;              ///< an iteration, as in Solver
+constexpr double crushed_share = 1e-6;  ///< of the thickness, as in Solver
+constexpr double kept_share = 0.5;  ///< of the thickness, below which no iteration with rows takes features
+constexpr int linear_problems = 6;  ///< an iteration, as in Solver
 constexpr double start_tolerance_share = 1e-3;  ///< of the tolerance, for the start of a search, as in Solver
 constexpr double gap_tolerance = 1e-9;          ///< of obstacles, as in Solver [m]
 
@@ -201,29 +202,31 @@ void RowSolver::solve_rows(const StepProblem& problem, StepReport& report) {
 
 double RowSolver::move(const StepProblem& problem) {
   constexpr int most_cuts = 20;
+  const PairMultipliers from = multipliers_;
+  const double least = std::min(kept_share * thickness_, w_.now.layers.closest);
   double length = 1;
   for (int cut = 0;; ++cut) {
+    if (cut == most_cuts) length = 0;
     w_.trial.positions = w_.now.positions + length * w_.direction;
     project_to_feasible(problem.contacts, w_.linear, w_.trial.positions);
     const double share = problem.layers->free_share(w_.now.positions, w_.trial.positions);
-    if (share == 1) break;
-    length *= share;
-    if (cut < most_cuts) continue;
-    w_.trial.positions = w_.now.positions;
-    break;
+    if (share < 1 && cut < most_cuts) {
+      length *= share;
+      continue;
+    }
+    // Multipliers go on as far as the vertices do; those that do not press go to zero.
+    multipliers_.pressure.clear();
+    long row = 0;
+    for (const LayerTouch& touch : w_.now.layers.touches) {
+      const PairKey key = key_of(touch.kind, touch.vertices);
+      const double before = from.of(key), pressed = pressure_of(touch, from.penalty);
+      const double after = is_row(touch) ? pressed * (1 + forces_[row++] / touch.normal_force) : 0;
+      multipliers_.pressure[key] = before + length * (after - before);
+    }
+    problem.evaluate(w_.trial);
+    if (w_.trial.layers.closest >= least || cut >= most_cuts) return length;
+    length *= 0.5;
   }
-  // Multipliers go on as far as the vertices do; those that do not press go to zero.
-  PairMultipliers next{multipliers_.penalty, {}};
-  long row = 0;
-  for (const LayerTouch& touch : w_.now.layers.touches) {
-    const PairKey key = key_of(touch.kind, touch.vertices);
-    const double from = multipliers_.of(key), pressed = pressure_of(touch, multipliers_.penalty);
-    const double to = is_row(touch) ? pressed * (1 + forces_[row++] / touch.normal_force) : 0;
-    next.pressure[key] = from + length * (to - from);
-  }
-  multipliers_ = std::move(next);
-  problem.evaluate(w_.trial);
-  return length;
 }
 
 void RowSolver::iterate_with_rows(const StepProblem& problem, int most_iterations, StepReport& report) {
