@@ -21,7 +21,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 
 .DEFAULT_GOAL := demo
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
-.PHONY: grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-metrics scene-batch silicone reference fuzz sanitize
+.PHONY: grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
 .PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
@@ -122,6 +122,10 @@ deep-starts: configure-test  ## Simulate SCENES random sheets that start across 
 self-contact: configure-test  ## Say what sheets do that meet themselves and each other, on six scenes
 	cmake --build $(BUILD) -j $(JOBS) --target self_contact_study
 	$(BUILD)/tests/self_contact_study
+
+contact-methods: configure-test  ## Put multipliers and an augmented Lagrangian between layers beside the barrier, on eight scenes
+	cmake --build $(BUILD) -j $(JOBS) --target contact_methods_study
+	$(BUILD)/tests/contact_methods_study
 
 contact-metrics: build packages-test  ## Say how far a sheet sinks and creeps under the published method's inexact metric, beside the full and the exact one
 	$(PYTHON) tests/validation/contact_metrics.py --sim $(BUILD)/bin/flash-sim --out $(BUILD)/contact_metrics

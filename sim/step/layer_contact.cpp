@@ -4,7 +4,6 @@
 #include <cmath>
 #include <tuple>
 
-#include "sim/law/layer_law.h"
 #include "sim/law/vertex_contact.h"
 #include "sim/step/moving_obstacles.h"
 
@@ -158,8 +157,8 @@ void LayerStep::add_forces(const Points& positions, LayerContact& contact, Point
     if (!may_come_near(pair.kind, x, pair.thickness)) continue;
     const NearestPoints nearest = nearest_points(pair.kind, x);
     contact.closest = std::min(contact.closest, nearest.distance);
-    const LayerResponse response = layer_response(pair.thickness, settings_.pressure, nearest.distance);
-    if (response.force == 0) continue;
+    const LayerResponse response = this->response(pair, nearest.distance);
+    if (response.force == 0 && response.energy == 0) continue;
     const Crossing crossing = pair.kind == PairKind::edge_edge ? crossing_of(x) : Crossing{};
     const double area = pair.area * crossing.factor;
     LayerTouch touch{.kind = pair.kind,
@@ -188,6 +187,10 @@ void LayerStep::add_forces(const Points& positions, LayerContact& contact, Point
     }
     contact.touches.push_back(touch);
   }
+}
+
+LayerResponse LayerStep::response(const CandidatePair& pair, double distance) const {
+  return layer_response(pair.thickness, settings_.pressure, distance);
 }
 
 double LayerStep::energy(const Points& positions) {

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "sim/law/feature_pair.h"
+#include "sim/law/layer_law.h"
 #include "sim/law/symmetric3.h"
 #include "sim/pairs/candidate_pairs.h"
 #include "sim/scene/environment.h"
@@ -64,6 +65,8 @@ class LayerStep {
   /// that holds carry whole; pairs of them alone do not count.
   LayerStep(LayerMemory& memory, const Environment& environment, double time_step,
             const std::vector<bool>& carried);
+  LayerStep(const LayerStep&) = default;
+  virtual ~LayerStep() = default;
 
   /// Whether there are other pairs than in the last step.
   bool has_other_pairs() const { return other_pairs_; }
@@ -103,6 +106,10 @@ class LayerStep {
   double friction() const { return settings_.friction; }
   double thickness() const { return settings_.thickness; }
   double time_step() const { return time_step_; }
+
+ protected:
+  /// What presses the features of a pair apart at a `distance`: the barrier (layer_response).
+  virtual LayerResponse response(const CandidatePair& pair, double distance) const;
 
  private:
   /// Whether the pairs of `candidates` are all that matter on the way between two positions.

@@ -115,6 +115,28 @@ LayerScene thrown(const SelfContact& contact, double speed) {
   return scene;
 }
 
+LayerScene fold(const SelfContact& contact) {
+  LayerScene scene = scene_of(square(0.2, 16, 16), contact);
+  Environment& environment = scene.environment;
+  const Points& rest = scene.sheet.rest.vertices;
+  const double right = rest.col(0).maxCoeff();
+  std::vector<int> edge;
+  for (int i = 0; i < rest.rows(); ++i)
+    if (rest(i, 0) > right - 1e-9) edge.push_back(i);
+  data::Trajectory path;
+  for (int k = 0; k <= 100; ++k) {
+    const double angle = std::numbers::pi * k / 100;
+    path.times.push_back(0.01 * k);
+    path.poses.push_back(
+        Isometry3d(Eigen::Translation3d(right - 0.1 * (1 - std::cos(angle)) * 0.9, 0,
+                                        0.1 * std::sin(angle) + (k > 50 ? 2e-3 * (k - 50) / 50 : 0))));
+  }
+  environment.obstacles = {{.shape = Plane{}}};
+  environment.holds = {gripped(environment, edge, path)};
+  environment.holds[0].to = 1.0;
+  return scene;
+}
+
 LayerScene folded_twice_and_pressed(const SelfContact& contact, double plate_height) {
   constexpr double side = 0.16, inner = 0.004, outer = 0.012, seconds = 0.7, thick = 0.01;
   LayerScene scene = scene_of(square(side, 12, 12), contact);

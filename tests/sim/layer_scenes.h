@@ -30,6 +30,10 @@ LayerScene block_on_incline(double slope, const SelfContact& contact, bool sheet
 /// A sheet bent to a U whose legs fly at each other at `speed` [m/s].
 LayerScene thrown(const SelfContact& contact, double speed);
 
+/// A sheet on a plane whose one end is carried over and laid down on the other in a second, in steps of 10
+/// ms, and let go.
+LayerScene fold(const SelfContact& contact);
+
 /// A sheet folded in two, then in two across, on a plane. In 0.7 s a plate comes down to
 /// the height of `plate_height` [m].
 LayerScene folded_twice_and_pressed(const SelfContact& contact, double plate_height);

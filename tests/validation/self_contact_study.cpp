@@ -8,7 +8,6 @@
 #include <numbers>
 #include <string>
 
-#include "data/procedural_mesh.h"
 #include "sim/newton/solver.h"
 #include "sim/pairs/intersection.h"
 #include "tests/sim/layer_scenes.h"
@@ -20,22 +19,6 @@ using data::Points;
 using Eigen::Vector3d;
 
 constexpr double h = 0.01;  // [s]
-
-Sheet square_sheet(double side, int cells,
-                   data::DiagonalPattern pattern = data::DiagonalPattern::alternating) {
-  return make_sheet(data::rectangle(
-      {.width = side, .height = side, .cells_x = cells, .cells_y = cells, .pattern = pattern}));
-}
-
-Environment world_of(const Sheet& sheet, const SelfContact& settings) {
-  Environment world;
-  world.materials.assign(sheet.bodies.size(),
-                         data::SheetMaterial{.bending_model = data::BendingModel::hinge});
-  world.state.positions = sheet.rest.vertices;
-  world.state.velocities = Points::Zero(sheet.rest.vertices.rows(), 3);
-  world.self_contact = settings;
-  return world;
-}
 
 struct Study {
   std::string name;
@@ -113,35 +96,9 @@ Study study_of(const char* name, LayerScene scene, int steps) {
   return {name, std::move(scene.sheet), std::move(scene.environment), steps};
 }
 
-/// A strip whose one end is carried over and laid down on the other in a second, and let go.
-Study fold(const SelfContact& settings) {
-  Study study{"fold", square_sheet(0.2, 16), {}, 200};
-  study.world = world_of(study.sheet, settings);
-  study.world.obstacles.push_back({.shape = Plane{}});
-  std::vector<int> edge;
-  for (int i = 0; i < study.sheet.rest.vertices.rows(); ++i)
-    if (study.sheet.rest.vertices(i, 0) > study.sheet.rest.vertices.col(0).maxCoeff() - 1e-9)
-      edge.push_back(i);
-  const double right = study.sheet.rest.vertices.col(0).maxCoeff();
-  data::Trajectory path;
-  for (int k = 0; k <= 100; ++k) {
-    const double angle = std::numbers::pi * k / 100;
-    path.times.push_back(0.01 * k);
-    path.poses.push_back(
-        Eigen::Isometry3d(Eigen::Translation3d(right - 0.1 * (1 - std::cos(angle)) * 0.9, 0,
-                                               0.1 * std::sin(angle) + (k > 50 ? 2e-3 * (k - 50) / 50 : 0))));
-  }
-  Schedule schedule = *make_schedule({&path, 1}, 0.0, h, 100);
-  study.world.schedule = std::make_shared<const Schedule>(schedule);
-  study.world.holds.push_back({.name = "gripper", .vertices = edge, .frame = 0, .to = 1.0});
-  return study;
-}
-
 /// A folded sheet that a plate presses.
 Study pressed(const SelfContact& settings) {
-  Study study = fold(settings);
-  study.name = "pressed";
-  study.steps = 250;
+  Study study = study_of("pressed", fold(settings), 250);
   data::Trajectory path{{0, 1.2, 2.2, 2.5},
                         {Eigen::Isometry3d(Eigen::Translation3d(-0.05, 0, 0.2)),
                          Eigen::Isometry3d(Eigen::Translation3d(-0.05, 0, 0.06)),
@@ -233,7 +190,7 @@ int main(int argc, char** argv) {
       study_of("two sheets", pile(2, settings, 0.2, 12), 200),
       study_of("ten sheets, 10 s", pile(10, settings, 0.2, 12), 1000),
       study_of("incline 0.299, holds", tilted(0.299), 200),
-      fold(settings),
+      study_of("fold", fold(settings), 200),
       pressed(settings),
       study_of("folded twice, pressed", folded_twice_and_pressed(settings, 0.006), 120),
       study_of("thrown at 2 m/s", thrown(settings, 2), 60),
