@@ -50,8 +50,10 @@ void add_dataset_options(CLI::App& verb, DatasetChoice& choice) {
       "What three angles of a pose are: xyz and the like about fixed axes, XYZ about turning ones "
       "(KUKA: ZYX, Staubli: XYZ, Kawasaki: ZYZ), rotvec");
   add_robot_options(group, choice);
-  group.add_option("--camera", choice.camera,
-                   "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain, JSON, npz");
+  group
+      .add_option("--camera", choice.camera,
+                  "Intrinsics in place of the dataset's: camera_info, OpenCV, camchain, JSON, npz")
+      ->type_name("FILE");
   group.add_option("--depth-scale", choice.depth_scale, "Metres per count of the depth pictures")
       ->check(number_between(1e-9, 10))
       ->capture_default_str();

@@ -251,6 +251,7 @@ void add_synth_verb(CLI::App& app, Action& action) {
       ->capture_default_str();
   verb->add_option("--camera", options->cameras,
                    "Position x,y,z of a camera [m], aimed at the sheet; repeat for more")
+      ->type_name("X,Y,Z")
       ->allow_extra_args(false);
   verb->add_option("--resolution", options->resolution, "Width and height of the pictures [px]")
       ->capture_default_str();

@@ -188,6 +188,18 @@ def check_names(options, folder):
         shutil.rmtree(path)
 
 
+def check_help(options, folder):
+    """What an option takes: of one name, in each program its own."""
+    expected = [([options.sysid, "synth"], {"--camera": "X,Y,Z", "--asset": "FILE", "--like": "PATH"})]
+    if options.calib:
+        expected += [([options.calib, "handeye"], {"--camera": "FILE", "--poses": "PATH", "--ros": "FILE", "--report": "FILE"}),
+                     ([options.calib, "register"], {"--cameras": "FOLDER"})]
+    for words, values in expected:
+        text = program.must(*words, "--help").stdout
+        for option, value in values.items():
+            yield re.search(f"{option} {value}(,| |$)", text, re.MULTILINE), f"{words[1]} --help: not {option} {value}"
+
+
 def check_places(options, folder):
     """Places that cannot be written are found before the work begins, which is seen by what it would say."""
     (folder / "plain").write_text("mine")
@@ -357,7 +369,7 @@ def main():
     parser.add_argument("--calib", type=pathlib.Path, help="the program flash-calib")
     parser.add_argument("--only", default="", help="checks whose name has this")
     options = parser.parse_args()
-    checks = [check_config, check_values, check_device, check_names, check_places, check_calibration, check_guess,
+    checks = [check_config, check_values, check_device, check_names, check_help, check_places, check_calibration, check_guess,
               check_kills, check_digits, check_set_up, check_early_signals]
     done, failed = 0, 0
     with tempfile.TemporaryDirectory() as temporary:
