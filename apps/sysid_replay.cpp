@@ -18,6 +18,7 @@
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/overlay.h"
 #include "sysid/report/overlay_image.h"
+#include "sysid/report/settings_texts.h"
 
 namespace flash {
 namespace {
@@ -165,13 +166,17 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   sysid::check_job({replay}, 1, sysid::estimate_batch({replay}, 1, options.every_step));
   data::check_folder_free(options.out, options.common.force);
   for (const std::string& notice : notices) say(options.common, notice);
+  sysid::GridSettings grid;
+  grid.base = base;
+  grid.score = score_settings(options.replay);
+  for (const std::string& line : sysid::unlike_the_search(asset, sysid::settings_texts({replay}, grid), axes))
+    warn(line);
 
   const sysid::ReplayCandidate candidate = sysid::make_candidate(base, axes, values);
   sysid::ReplayResult motion;
   sysid::run(replay, {candidate}, options.every_step ? every_step(replay) : scored_steps(replay),
              [&](std::size_t, sysid::ReplayResult result) { motion = std::move(result); });
-  const sysid::CandidateResult result =
-      sysid::score_motions({replay}, {motion}, score_settings(options.replay));
+  const sysid::CandidateResult result = sysid::score_motions({replay}, {motion}, grid.score);
   if (result.status == sysid::CandidateStatus::diverged)
     throw std::runtime_error(recording.name + ": the simulation diverged; lower --time-step");
 

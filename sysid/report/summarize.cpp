@@ -1,12 +1,9 @@
 #include "sysid/report/summarize.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <filesystem>
 
 #include "data/asset.h"
-#include "data/procedural_mesh.h"
 #include "data/recording_digest.h"
 #include "data/text.h"
 #include "sysid/emulate/candidate_lines.h"
@@ -14,6 +11,7 @@
 #include "sysid/observe/registration_parameter.h"
 #include "sysid/replay/half_cell.h"
 #include "sysid/replay/recorded_grasp.h"
+#include "sysid/report/settings_texts.h"
 
 namespace flash::sysid {
 namespace {
@@ -223,26 +221,6 @@ std::string reason_unusable(const Summary& summary, const CandidateResult& best,
   return "";
 }
 
-/// What was observed, of which the score is a mean: "cloud, contour".
-std::string observed_terms(const std::vector<Replay>& replays, const Objective& objective) {
-  std::array<double, 5> weights = {};
-  for (const Replay& replay : replays)
-    for (const Observation& observation : replay.observations) {
-      const std::array<double, 5> of_frame = term_weights(observation, objective);
-      for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = std::max(weights[k], of_frame[k]);
-    }
-  constexpr std::array<const char*, 5> kNames = {"cloud", "contour", "markers", "force", "unseen cloth"};
-  std::string terms;
-  for (std::size_t k = 0; k < weights.size(); ++k)
-    if (weights[k] > 0) terms += (terms.empty() ? "" : ", ") + std::string(kNames[k]);
-  return terms;
-}
-
-std::string sigmas_of(const Objective& objective) {
-  return "cloud " + mm(objective.cloud_sigma) + ", contour " + mm(objective.contour_sigma) + ", markers " +
-         mm(objective.marker_sigma) + ", force " + data::format_short(objective.force_sigma) + " N";
-}
-
 /// "bending 5e-05 to 0.002, friction 0.15 to 0.6".
 std::string searched_text(const std::vector<Axis>& axes) {
   std::string text;
@@ -251,57 +229,6 @@ std::string searched_text(const std::vector<Axis>& axes) {
       text += (text.empty() ? "" : ", ") + axis.name + " " + data::format_short(axis.values.front()) +
               " to " + data::format_short(axis.values.back());
   return text;
-}
-
-/// Of the grasps as they were simulated, each once: "clamp".
-std::string grasp_shapes(const std::vector<Replay>& replays) {
-  std::string shapes;
-  for (const Replay& replay : replays)
-    for (const data::RecordedGrasp& grasp : replay.recording.grasps) {
-      const std::string shape = data::to_string(shape_of(grasp, replay.settings));
-      if (shapes.find(shape) == std::string::npos) shapes += (shapes.empty() ? "" : ", ") + shape;
-    }
-  return shapes;
-}
-
-void add_settings(Summary& summary, const std::vector<Replay>& replays, const GridSettings& settings) {
-  const Replay& replay = replays.front();
-  auto& texts = summary.settings;
-  texts["mesh"] = replay.recording.mesh_spec + " (" +
-                  data::format_count(static_cast<std::size_t>(replay.sheet().rest.vertices.rows())) +
-                  " vertices)";
-  texts["object_mesh"] = data::is_made_on_the_spot(replay.object_mesh)
-                             ? replay.object_mesh
-                             : std::filesystem::absolute(replay.object_mesh).lexically_normal().string();
-  if (const auto& solid = settings.base.solid) {
-    texts["element_type"] = "TETRAHEDRON";
-    texts["element_order"] = replay.settings.element_order == data::ElementOrder::quadratic ? "2" : "1";
-    texts["constitutive"] = data::to_string(solid->constitutive);
-  } else {
-    texts["constitutive"] = data::to_string(settings.base.material.constitutive);
-    texts["bending_model"] = data::to_string(settings.base.material.bending_model);
-  }
-  texts["time_step_s"] = data::format_number(replay.settings.solver.time_step);
-  texts["max_iterations"] = std::to_string(replay.settings.solver.max_iterations);
-  texts["tolerance"] = data::format_number(replay.settings.solver.tolerance);
-  if (const auto& layers = replay.settings.self_contact) {
-    texts["self_contact_m"] = data::format_number(layers->thickness);
-    texts["layer_friction"] = layers->friction < 0 ? "friction" : data::format_number(layers->friction);
-  }
-  if (settings.base.thickness) texts["thickness_m"] = data::format_number(*settings.base.thickness);
-  const Robust& robust = settings.score.objective.robust;
-  texts["distance"] =
-      robust.kind == RobustKind::trimmed
-          ? "mean without the largest " + data::format_short(100 * robust.trim_fraction) + " %"
-      : robust.kind == RobustKind::huber ? "Huber, " + data::format_short(1000 * robust.huber_delta) + " mm"
-                                         : "mean";
-  texts["observed"] = observed_terms(replays, settings.score.objective);
-  texts["sigmas"] = sigmas_of(settings.score.objective);
-  if (const std::string shapes = grasp_shapes(replays); !shapes.empty()) {
-    texts["grasp_shape"] = shapes;
-    texts["grasp_within"] = replay.settings.grasp_within ? mm(*replay.settings.grasp_within) : "as recorded";
-    texts["clamp_slopes"] = replay.settings.clamp_slopes ? "yes" : "no";
-  }
 }
 
 std::optional<MarkerFit> markers_of(const Fit& fit, std::size_t r, double noise) {
@@ -349,7 +276,7 @@ Summary summarize(const GridResults& results, const Answer& answer, const std::v
   summary.candidates = static_cast<int>(results.candidates.size());
   for (const CandidateResult& candidate : results.candidates)
     summary.unconverged += candidate.status != CandidateStatus::ok;
-  add_settings(summary, replays, settings);
+  summary.settings = settings_texts(replays, settings);
   if (answer.best < 0) {
     summary.exit_code = 3;
     summary.best_score = INFINITY;

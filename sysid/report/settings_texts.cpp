@@ -1,0 +1,155 @@
+#include "sysid/report/settings_texts.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "data/procedural_mesh.h"
+#include "data/text.h"
+#include "sysid/replay/recorded_grasp.h"
+
+namespace flash::sysid {
+namespace {
+
+std::string mm(double metres) { return data::format_short(std::round(1e5 * metres) / 100) + " mm"; }
+
+/// What was observed, of which the score is a mean: "cloud, contour".
+std::string observed_terms(const std::vector<Replay>& replays, const Objective& objective) {
+  std::array<double, 5> weights = {};
+  for (const Replay& replay : replays)
+    for (const Observation& observation : replay.observations) {
+      const std::array<double, 5> of_frame = term_weights(observation, objective);
+      for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = std::max(weights[k], of_frame[k]);
+    }
+  constexpr std::array<const char*, 5> kNames = {"cloud", "contour", "markers", "force", "unseen cloth"};
+  std::string terms;
+  for (std::size_t k = 0; k < weights.size(); ++k)
+    if (weights[k] > 0) terms += (terms.empty() ? "" : ", ") + std::string(kNames[k]);
+  return terms;
+}
+
+std::string sigmas_of(const Objective& objective) {
+  return "cloud " + mm(objective.cloud_sigma) + ", contour " + mm(objective.contour_sigma) + ", markers " +
+         mm(objective.marker_sigma) + ", force " + data::format_short(objective.force_sigma) + " N";
+}
+
+/// Of the grasps as they were simulated, each once: "clamp".
+std::string grasp_shapes(const std::vector<Replay>& replays) {
+  std::string shapes;
+  for (const Replay& replay : replays)
+    for (const data::RecordedGrasp& grasp : replay.recording.grasps) {
+      const std::string shape = data::to_string(shape_of(grasp, replay.settings));
+      if (shapes.find(shape) == std::string::npos) shapes += (shapes.empty() ? "" : ", ") + shape;
+    }
+  return shapes;
+}
+
+bool describes_recording(const std::string& name) {
+  const auto& known = known_parameters();
+  return std::any_of(known.begin(), known.end(),
+                     [&](const ParameterInfo& info) { return info.name == name && !info.material; });
+}
+
+/// Values that the search told or held of what describes a recording.
+std::map<std::string, double> values_of_recording(const nlohmann::json& identification) {
+  std::map<std::string, double> values;
+  const auto take = [&](const std::string& name, const nlohmann::json& value) {
+    if (value.is_number() && describes_recording(name)) values[name] = value.get<double>();
+  };
+  const nlohmann::json estimate = identification.value("estimate", nlohmann::json()),
+                       held = identification.value("fixed", nlohmann::json());
+  for (const auto& [name, value] : estimate.items()) take(name, value);
+  for (const auto& [name, fixed] : held.items())
+    if (fixed.is_object()) take(name, fixed.value("value", nlohmann::json()));
+  return values;
+}
+
+}  // namespace
+
+std::map<std::string, std::string> settings_texts(const std::vector<Replay>& replays,
+                                                  const GridSettings& settings) {
+  const Replay& replay = replays.front();
+  std::map<std::string, std::string> texts;
+  texts["mesh"] = replay.recording.mesh_spec + " (" +
+                  data::format_count(static_cast<std::size_t>(replay.sheet().rest.vertices.rows())) +
+                  " vertices)";
+  texts["object_mesh"] = data::is_made_on_the_spot(replay.object_mesh)
+                             ? replay.object_mesh
+                             : std::filesystem::absolute(replay.object_mesh).lexically_normal().string();
+  if (const auto& solid = settings.base.solid) {
+    texts["element_type"] = "TETRAHEDRON";
+    texts["element_order"] = replay.settings.element_order == data::ElementOrder::quadratic ? "2" : "1";
+    texts["constitutive"] = data::to_string(solid->constitutive);
+  } else {
+    texts["constitutive"] = data::to_string(settings.base.material.constitutive);
+    texts["bending_model"] = data::to_string(settings.base.material.bending_model);
+  }
+  texts["time_step_s"] = data::format_number(replay.settings.solver.time_step);
+  texts["max_iterations"] = std::to_string(replay.settings.solver.max_iterations);
+  texts["tolerance"] = data::format_number(replay.settings.solver.tolerance);
+  if (const auto& layers = replay.settings.self_contact) {
+    texts["self_contact_m"] = data::format_number(layers->thickness);
+    texts["layer_friction"] = layers->friction < 0 ? "friction" : data::format_number(layers->friction);
+  }
+  if (settings.base.thickness) texts["thickness_m"] = data::format_number(*settings.base.thickness);
+  const Robust& robust = settings.score.objective.robust;
+  texts["distance"] =
+      robust.kind == RobustKind::trimmed
+          ? "mean without the largest " + data::format_short(100 * robust.trim_fraction) + " %"
+      : robust.kind == RobustKind::huber ? "Huber, " + data::format_short(1000 * robust.huber_delta) + " mm"
+                                         : "mean";
+  texts["observed"] = observed_terms(replays, settings.score.objective);
+  texts["sigmas"] = sigmas_of(settings.score.objective);
+  if (const std::string shapes = grasp_shapes(replays); !shapes.empty()) {
+    texts["grasp_shape"] = shapes;
+    texts["grasp_within"] = replay.settings.grasp_within ? mm(*replay.settings.grasp_within) : "as recorded";
+    texts["clamp_slopes"] = replay.settings.clamp_slopes ? "yes" : "no";
+  }
+  return texts;
+}
+
+std::vector<std::string> unlike_the_search(const data::Asset& asset,
+                                           const std::map<std::string, std::string>& settings,
+                                           const std::vector<Axis>& held) {
+  const nlohmann::json identification = nlohmann::json::parse(asset.identification, nullptr, false);
+  if (!identification.is_object()) return {};
+  const nlohmann::json search = identification.value("solver", nlohmann::json());
+  if (!search.is_object() || !search.contains("mesh")) return {};
+  const auto searched = [&](const char* name) {
+    const bool said = search.contains(name) && search[name].is_string();
+    return said ? search[name].get<std::string>() : "none";
+  };
+  const auto here = [&](const char* name) {
+    const auto found = settings.find(name);
+    return found == settings.end() ? "none" : found->second;
+  };
+  std::vector<std::string> lines;
+  const auto differs = [&](const std::string& option, const std::string& found, const std::string& had) {
+    if (found != had)
+      lines.push_back(option + ": found " + found + ", the search behind the asset had " + had);
+  };
+  constexpr std::array<std::pair<const char*, const char*>, 10> kOptions = {
+      {{"grasp_shape", "--grasp-shape"},
+       {"grasp_within", "--grasp-within"},
+       {"clamp_slopes", "--clamp-slopes"},
+       {"time_step_s", "--time-step"},
+       {"max_iterations", "--iterations"},
+       {"tolerance", "--tolerance"},
+       {"self_contact_m", "--self-contact"},
+       {"layer_friction", "--layer-friction"},
+       {"distance", "--distance"},
+       {"sigmas", "--sigma"}}};
+  if (here("object_mesh") == searched("object_mesh")) differs("--mesh", here("mesh"), searched("mesh"));
+  for (const auto& [name, option] : kOptions) differs(option, here(name), searched(name));
+  for (const auto& [name, value] : values_of_recording(identification)) {
+    const auto hold =
+        std::find_if(held.begin(), held.end(), [&](const Axis& axis) { return axis.name == name; });
+    differs("--hold " + name, hold == held.end() ? "none" : data::format_short(hold->values.front()),
+            data::format_short(value));
+  }
+  return lines;
+}
+
+}  // namespace flash::sysid
