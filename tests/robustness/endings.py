@@ -116,6 +116,8 @@ def refusals(sim, sysid, calib):
         ([*grid, "--start-yaw", "a"], ["--start-yaw", "\"a\" is not a number"]),
         ([*grid, "--bending", "1e-4,2e-4", "--hold", "foo=1"], ["--hold foo", "unknown parameter"]),
         ([*grid, "--bending", "1e-5:1e-3:3", "--grasp-depth", "0.01:0.03:2"], ["--grasp-depth", "pinch"]),
+        *[([*words, "--from", "3"], ["--from, --to", "no keyframe between", "0 to 0.6 s"]) for words in (
+            [*grid, "--bending", "1e-4,2e-4"], [sysid, "replay", "recording", "--asset", "asset.json", "-o", "out"])],
         *([] if calib is None else [
             *[([calib, verb, ".", "--depth-scale", scale, "--target", "chessboard:9x6:0.025"],
                ["--depth-scale", f'found "{scale}"', "from 1e-09 to 10"])
@@ -332,22 +334,56 @@ def check_killed_replay(options, folder):
 def check_fit(options, folder):
     """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
     recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
-    program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "5e-5,1e-4,2e-4", "--no-solver-check",
-                 "--no-horizon", "--quiet", "-o", run)
-    line = [options.sysid, "fit", recording, "--start", run, "--no-solver-check", "--no-horizon", "--quiet"]
+    mesh = ["--mesh", "sheet:0.2x0.2:0.04"]  # that of the recording has cells of 0.05
+    program.must(options.sysid, "grid", recording, "--asset", asset, "--bending", "1e-5:1e-3:5:log", *mesh,
+                 "--no-solver-check", "--no-horizon", "--no-plan", "--quiet", "-o", run)
+    line = [options.sysid, "fit", recording, "--start", run, "--no-solver-check", "--no-horizon", "--no-plan", "--quiet"]
     done = program.call(*line, "--hold", "poisson", "-o", folder / "fitted")
-    yield done.returncode in (0, 3) and "bending" in done.stdout, f"fit: exit code {done.returncode}: {done.stderr}{done.stdout}"
+    told = [words for words in done.stdout.splitlines() if words.startswith("bending")]
+    yield done.returncode == 0 and len(told) == 1, f"fit: exit code {done.returncode}: {done.stderr}{done.stdout}"
+    yield told and "(95 %: " in told[0], f"fit: prints no interval: {done.stdout}"
+    yield "not those of the search" not in done.stderr and "the search had" not in done.stderr, f"fit: {done.stderr}"
     fit = json.loads((folder / "fitted" / "summary.json").read_text())
     yield fit["fixed"]["poisson"]["value"] == 0.3, f"fit: held at {fit['fixed']}"
-    for verb, more in (("report", ["-o", folder / "fitted.html"]), ("export", ["--asset", asset, "-o", folder / "fitted.json"])):
-        done = program.call(options.sysid, verb, folder / "fitted", *more, "--quiet")
-        yield done.returncode == fit["exit_code"] * (verb == "export"), f"{verb} of a fit: {done.returncode}: {done.stderr}"
-    yield "not those of the search" not in done.stderr and "the search had" not in done.stderr, f"fit: {done.stderr}"
+    yield mesh[1] in fit["settings"]["mesh"], f"fit: on the mesh {fit['settings']['mesh']}, not that of the search"
+    program.must(options.sysid, "report", folder / "fitted", "--quiet", "-o", folder / "fitted.html")
     done = program.call(*line, "--from", "0.2", "--time-step", "0.02", "-o", folder / "later")
     yield ("recording recording keyframes: not those of the search" in done.stderr and
            "time_step_s: found 0.02, the search had 0.01" in done.stderr, f"fit --from: {done.stderr}")
+    done = program.call(*line, "--hold", "poisson", "--distance", "huber", "--huber", "1e-4", "-o", folder / "huber")
+    yield done.returncode in (0, 3), f"fit --distance huber: exit code {done.returncode}: {done.stderr}"
+    huber = json.loads((folder / "huber" / "summary.json").read_text())
+    yield huber["best"]["score"] != fit["best"]["score"], f"fit --distance huber: scores as without, {fit['best']['score']}"
     done = program.call(*line, "--hold", "poison", "-o", folder / "other")
     yield done.returncode == REFUSED and 'did you mean "poisson"' in done.stderr, f"fit --hold poison: {done.stderr}"
+
+
+def check_tuned(options, folder):
+    """A tuned asset has the score that a replay with the search's options gives. Of other options it is said that they are
+    others. What cannot be used is reported all the same, and exported with the exit code of the search."""
+    recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"  # of check_fit
+    tuned = folder / "tuned.json"
+    program.must(options.sysid, "export", run, "--asset", asset, "--quiet", "-o", tuned)
+    score = json.loads(tuned.read_text())["identification"]["score_m"]
+    replay = [options.sysid, "replay", recording, "--asset", tuned, "--json", "--force", "-o", folder / "of_tuned"]
+    mesh = ["--mesh", "sheet:0.2x0.2:0.04"]
+    done = program.must(*replay, *mesh)
+    found = json.loads(done.stdout)["score"]
+    yield abs(found - score) <= 1e-9, f"replay of the tuned asset: score {found}, the asset has {score}"
+    yield "behind the asset" not in done.stderr, f"replay as searched: {done.stderr}"
+    done = program.must(*replay)
+    yield ("--mesh: found sheet:0.2x0.2:0.05 (25 vertices), the search behind the asset had sheet:0.2x0.2:0.04" in done.stderr,
+           f"replay on another mesh: {done.stderr}")
+    done = program.must(*replay, *mesh, "--grasp-shape", "point", "--time-step", "0.005")
+    for words in ("--grasp-shape: found point, the search behind the asset had clamp",
+                  "--time-step: found 0.005, the search behind the asset had 0.01"):
+        yield words in done.stderr, f"replay, {words}: {done.stderr}"
+    done = program.call(options.sysid, "grid", recording, "--asset", asset, "--bending", "1e-4,1.1e-4", "--no-solver-check",
+                        "--no-horizon", "--no-plan", "--quiet", "-o", folder / "untold")
+    yield done.returncode == 3, f"grid over 10 % of D: exit code {done.returncode}"
+    for verb, code in (("report", 0), ("export", 3)):
+        done = program.call(options.sysid, verb, folder / "untold", "--quiet", "-o", folder / f"untold_{verb}")
+        yield done.returncode == code, f"{verb} of what cannot be used: exit code {done.returncode}, expected {code}: {done.stderr}"
 
 
 def main():
@@ -362,7 +398,8 @@ def main():
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
         for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume,
-                      check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay, check_fit):
+                      check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay, check_fit,
+                      check_tuned):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds
