@@ -11,7 +11,7 @@ def fields_by_schema(text):
     """Of the row of a table that starts with the schema, or of the section that names it."""
     fields = {}
     for section in re.split(r"(?m)^(?=## )", text):
-        for schema in re.findall(r'"schema": "(flash-[a-z-]+/\d+)"', section):
+        for schema in re.findall(r'(?:"schema": "|`)(flash-[a-z-]+/\d+)["`]', section):
             fields.setdefault(schema, set()).update(names_in(section))
     for line in text.splitlines():
         if match := re.match(r"\| `(flash-[a-z-]+/\d+)` \|", line):
