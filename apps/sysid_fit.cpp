@@ -13,7 +13,7 @@
 #include "sysid/emulate/fingerprint.h"
 #include "sysid/emulate/search_memory.h"
 #include "sysid/replay/half_cell.h"
-#include "sysid/report/search_folder.h"
+#include "sysid/report/fit_start.h"
 
 namespace flash {
 namespace {
@@ -35,69 +35,6 @@ struct FitOptions {
   std::string rollouts;
   std::string out;
 };
-
-// What the search looked for, and where it goes on.
-struct Start {
-  sysid::GridSettings grid;
-  std::vector<double> values;
-  sysid::Extent around;
-};
-
-// "friction=0.3", or a name alone: where the search found the parameter, or held it.
-sysid::Hold hold_of(const std::string& text, const sysid::Summary& found) {
-  if (text.find('=') != std::string::npos) return sysid::parse_hold(text);
-  sysid::check_parameter("--hold " + text, text);
-  const auto value = found.best.find(text);
-  if (value == found.best.end())
-    throw data::InputError("--hold " + text + ": the search neither found nor held it, expected " + text +
-                           "=value");
-  const auto fixed = found.fixed.find(text);
-  if (fixed == found.fixed.end()) return {{text, {value->second}, false}};
-  return {{text, {value->second}, false}, fixed->second.source == "measured", fixed->second.deviation};
-}
-
-// What the search held stays held, unless it is said otherwise, and what it found is where the fit begins.
-Start start_of(const FitOptions& options, const sysid::SearchFolder& search) {
-  const sysid::Summary& found = search.summary;
-  std::vector<sysid::Hold> holds;
-  const auto is_held = [&](const std::string& name) {
-    return std::any_of(holds.begin(), holds.end(),
-                       [&](const sysid::Hold& hold) { return hold.axis.name == name; });
-  };
-  for (const std::string& text : options.holds) {
-    sysid::Hold hold = hold_of(text, found);
-    if (is_held(hold.axis.name))
-      throw data::InputError("--hold " + hold.axis.name + ": given twice, expected one value");
-    holds.push_back(std::move(hold));
-  }
-  for (const auto& [name, fixed] : found.fixed)
-    if (!is_held(name) && (fixed.source == "measured" || fixed.deviation))
-      holds.push_back({{name, {fixed.value}, false}, fixed.source == "measured", fixed.deviation});
-  Start start;
-  for (const sysid::Axis& axis : search.results.axes) {
-    if (is_held(axis.name)) continue;
-    if (axis.values.size() == 1) {
-      holds.push_back({axis, false});
-      continue;
-    }
-    const auto finding =
-        std::find_if(found.parameters.begin(), found.parameters.end(),
-                     [&](const sysid::ParameterFinding& each) { return each.name == axis.name; });
-    start.grid.axes.push_back(axis);
-    start.values.push_back(finding->estimate.value_or(found.best.at(axis.name)));
-    start.around.push_back(
-        finding->interval95.value_or(std::array{finding->values.front(), finding->values.back()}));
-  }
-  if (start.grid.axes.empty()) throw data::InputError("--hold: no parameter is left to fit");
-  add_holds(holds, start.grid);
-  for (std::size_t k = start.values.size(); k < start.grid.axes.size(); ++k) {
-    const double value = start.grid.axes[k].values.front();
-    start.values.push_back(value);
-    start.around.push_back({value, value});
-  }
-  start.grid.score = score_settings(options.replay);
-  return start;
-}
 
 // Axes of one value, and constants.
 std::vector<sysid::Axis> held_axes(const sysid::GridSettings& grid) {
@@ -158,8 +95,9 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
       load_asset_for(options.asset.empty() ? found.summary.asset : options.asset, recordings.front());
   for (const data::Recording& recording : recordings) check_kind(asset, recording);
   check_options(options.replay, asset);
-  Start start = start_of(options, found);
+  sysid::FitStart start = sysid::fit_start(found, options.holds);
   sysid::GridSettings& grid = start.grid;
+  grid.score = score_settings(options.replay);
   const int threads = thread_count(options.common);
   grid.threads = threads;
   sysid::ReplaySettings replay = replay_settings(verb, options.replay, threads);

@@ -56,7 +56,7 @@ sysid::GridSettings grid_settings(const GridOptions& options, const sysid::Mater
   for (const auto& [name, text] : options.axes) settings.axes.push_back(parse_searched(name, text));
   if (settings.axes.empty())
     throw data::InputError("no parameter to search; add one, as --bending 1e-6:1e-3:8:log");
-  add_holds(parse_holds(options.holds), settings);
+  sysid::add_holds(parse_holds(options.holds), settings);
   std::vector<sysid::Axis> all = settings.axes;
   all.insert(all.end(), settings.fixed.begin(), settings.fixed.end());
   sysid::check_axes(all, base);

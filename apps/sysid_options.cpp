@@ -251,13 +251,6 @@ std::vector<sysid::Axis> parse_values(const std::vector<std::string>& texts) {
   return axes_of(holds);
 }
 
-void add_holds(const std::vector<sysid::Hold>& holds, sysid::GridSettings& settings) {
-  for (const sysid::Hold& hold : holds) {
-    (hold.measured ? settings.fixed : settings.axes).push_back(hold.axis);
-    if (hold.deviation) settings.deviations[hold.axis.name] = *hold.deviation;
-  }
-}
-
 sysid::Axis parse_searched(const std::string& name, const std::string& specification) {
   sysid::Axis axis = sysid::parse_axis(name, specification);
   if (axis.values.size() < 2)

@@ -62,8 +62,6 @@ std::vector<sysid::Hold> parse_holds(const std::vector<std::string>& texts);
 std::vector<sysid::Axis> axes_of(const std::vector<sysid::Hold>& holds);
 /// Of values alone. Throws data::InputError where a standard deviation is given.
 std::vector<sysid::Axis> parse_values(const std::vector<std::string>& texts);
-/// A value that was measured becomes a constant, another an axis of one value.
-void add_holds(const std::vector<sysid::Hold>& holds, sysid::GridSettings& settings);
 /// Of a range that is searched. Throws data::InputError where it is one value, which --hold holds.
 sysid::Axis parse_searched(const std::string& name, const std::string& specification);
 

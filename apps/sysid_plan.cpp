@@ -19,10 +19,9 @@
 #include "sysid/design/rank_experiments.h"
 #include "sysid/design/usual_ranges.h"
 #include "sysid/design/virtual_experiment.h"
-#include "sysid/infer/posterior.h"
 #include "sysid/replay/memory_estimate.h"
 #include "sysid/report/parameter_label.h"
-#include "sysid/report/search_folder.h"
+#include "sysid/report/plan_start.h"
 
 namespace flash {
 namespace {
@@ -44,35 +43,6 @@ std::vector<sysid::Axis> axes_of(const PlanOptions& options, const sysid::Materi
   std::vector<sysid::Axis> axes;
   for (const auto& [name, text] : options.axes) axes.push_back(parse_searched(name, text));
   return axes.empty() ? sysid::usual_ranges(base) : axes;
-}
-
-// What the posterior and the misfits of a search make of the settings.
-void take_search(const std::string& folder, sysid::PlanSettings& settings) {
-  const sysid::SearchFolder found = sysid::load_search_folder(folder);
-  const sysid::Summary& summary = found.summary;
-  if (summary.samples.rows() < 2 || summary.recordings.empty())
-    throw data::InputError(folder + ": found no posterior, expected a search that came to an estimate");
-  if (summary.exit_code == exit_unusable)
-    warn(folder + " is a search that cannot be used: " + summary.warnings.front());
-  settings.grid.axes = sysid::in_own_coordinates(found.results.axes);
-  settings.at.clear();
-  std::vector<sysid::Axis> searched;
-  for (const sysid::Axis& axis : settings.grid.axes) {
-    settings.at.push_back(axis.values.size() > 1 ? summary.best.at(axis.name) : axis.values.front());
-    if (axis.values.size() > 1) searched.push_back(axis);
-  }
-  for (const auto& [name, fixed] : summary.fixed)
-    if (fixed.source == "measured") settings.grid.fixed.push_back({name, {fixed.value}, false});
-  for (const auto& [name, fixed] : summary.fixed)
-    if (fixed.deviation) settings.grid.deviations[name] = *fixed.deviation;
-  std::vector<sysid::Misfit> misfits;
-  double duration = 0;
-  for (const sysid::SummaryRecording& recording : summary.recordings) {
-    misfits.push_back(recording.misfit);
-    duration += sysid::duration_of(recording) / static_cast<double>(summary.recordings.size());
-  }
-  settings.known = {sysid::covariance_of_draws(searched, summary.samples), sysid::expected_misfit(misfits),
-                    duration};
 }
 
 // The parameters that a plan tells of.
@@ -145,7 +115,13 @@ int run_plan(const CLI::App& verb, const PlanOptions& options) {
     settings.grid.axes = axes_of(options, settings.grid.base);
     settings.at = sysid::values_in_range(settings.grid.base, settings.grid.axes);
   } else {
-    take_search(options.run, settings);
+    const sysid::SearchFolder found = sysid::load_search_folder(options.run);
+    if (found.summary.samples.rows() < 2 || found.summary.recordings.empty())
+      throw data::InputError(options.run +
+                             ": found no posterior, expected a search that came to an estimate");
+    if (found.summary.exit_code == exit_unusable)
+      warn(options.run + " is a search that cannot be used: " + found.summary.warnings.front());
+    sysid::start_plan(found, settings);
   }
   data::check_file_free(options.out, options.common.force);
   // Refused before anything is simulated.

@@ -49,40 +49,10 @@ std::vector<int> some_frames(const sysid::Overlay& overlay) {
   return frames;
 }
 
-Eigen::AlignedBox3d bounds_of(const sysid::Overlay& overlay, const std::vector<int>& frames) {
-  Eigen::AlignedBox3d bounds;
-  for (const int k : frames)
-    for (const data::Points* points : {&overlay.frames[static_cast<std::size_t>(k)].vertices,
-                                       &overlay.frames[static_cast<std::size_t>(k)].cloud})
-      for (Eigen::Index i = 0; i < points->rows(); ++i) bounds.extend(points->row(i).transpose());
-  return bounds;
-}
-
 std::string numbered(const std::string& folder, const char* format, int k) {
   char name[32];
   std::snprintf(name, sizeof name, format, k);
   return (fs::path(folder) / name).string();
-}
-
-// A column a frame, from the side above, from the front below.
-data::Picture draw_sequence(const sysid::Overlay& overlay, const std::vector<int>& frames,
-                            const Eigen::AlignedBox3d& bounds) {
-  sysid::OverlayImageSettings small;
-  small.panel_width = 300;
-  small.panel_height = 280;
-  small.point_radius = 0.8;
-  data::Picture sequence(small.panel_width * static_cast<int>(frames.size()), 2 * small.panel_height,
-                         {255, 255, 255});
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const sysid::OverlayFrame& frame = overlay.frames[static_cast<std::size_t>(frames[i])];
-    const data::Picture picture =
-        sysid::draw_overlay({frame.vertices, overlay.triangles}, frame.cloud, bounds, small);
-    for (int v = 0; v < picture.height; ++v)
-      for (int u = 0; u < picture.width; ++u)
-        sequence.at(static_cast<int>(i) * small.panel_width + u % small.panel_width,
-                    v + (u < small.panel_width ? 0 : small.panel_height)) = picture.at(u, v);
-  }
-  return sequence;
 }
 
 // What a former replay left, killed or whole, the table first; no other folder is searched for it.
@@ -109,7 +79,7 @@ void end_half_written(const std::string& folder) {
 }
 
 void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, const std::string& folder) {
-  const Eigen::AlignedBox3d bounds = bounds_of(overlay, frames);
+  const Eigen::AlignedBox3d bounds = sysid::bounds_of(overlay, frames);
   for (const int k : frames) {
     end_half_written(folder);
     const sysid::OverlayFrame& frame = overlay.frames[static_cast<std::size_t>(k)];
@@ -117,7 +87,8 @@ void draw_frames(const sysid::Overlay& overlay, const std::vector<int>& frames, 
                    numbered(folder, "%03d.png", k));
   }
   if (frames.size() > 1)
-    data::save_png(draw_sequence(overlay, frames, bounds), (fs::path(folder) / "sequence.png").string());
+    data::save_png(sysid::draw_sequence(overlay, frames, bounds),
+                   (fs::path(folder) / "sequence.png").string());
 }
 
 nlohmann::ordered_json result_json(const sysid::CandidateResult& result, const sysid::ReplayResult& motion) {

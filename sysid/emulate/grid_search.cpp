@@ -14,6 +14,13 @@
 
 namespace flash::sysid {
 
+void add_holds(const std::vector<Hold>& holds, GridSettings& settings) {
+  for (const Hold& hold : holds) {
+    (hold.measured ? settings.fixed : settings.axes).push_back(hold.axis);
+    if (hold.deviation) settings.deviations[hold.axis.name] = *hold.deviation;
+  }
+}
+
 ReplayCandidate candidate_at(const std::vector<double>& values, const GridSettings& grid) {
   std::vector<Axis> axes = grid.axes;
   axes.insert(axes.end(), grid.fixed.begin(), grid.fixed.end());

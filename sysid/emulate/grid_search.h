@@ -30,6 +30,9 @@ struct GridSettings {
   std::string rollouts;  ///< folder that keeps the motions (MotionStore); empty: none are kept
 };
 
+/// A value that was measured becomes a constant, another an axis of one value.
+void add_holds(const std::vector<Hold>& holds, GridSettings& settings);
+
 struct Progress {
   int done = 0;  ///< candidates with a result, those of an earlier run included
   int total = 0;

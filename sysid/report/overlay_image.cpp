@@ -150,4 +150,33 @@ data::Picture draw_overlay(const data::TriangleMesh& simulated, const data::Poin
   return picture;
 }
 
+Eigen::AlignedBox3d bounds_of(const Overlay& overlay, const std::vector<int>& frames) {
+  Eigen::AlignedBox3d bounds;
+  for (const int k : frames)
+    for (const data::Points* points : {&overlay.frames[static_cast<std::size_t>(k)].vertices,
+                                       &overlay.frames[static_cast<std::size_t>(k)].cloud})
+      for (Eigen::Index i = 0; i < points->rows(); ++i) bounds.extend(points->row(i).transpose());
+  return bounds;
+}
+
+data::Picture draw_sequence(const Overlay& overlay, const std::vector<int>& frames,
+                            const Eigen::AlignedBox3d& bounds) {
+  OverlayImageSettings small;
+  small.panel_width = 300;
+  small.panel_height = 280;
+  small.point_radius = 0.8;
+  data::Picture sequence(small.panel_width * static_cast<int>(frames.size()), 2 * small.panel_height,
+                         {255, 255, 255});
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const OverlayFrame& frame = overlay.frames[static_cast<std::size_t>(frames[i])];
+    const data::Picture picture =
+        draw_overlay({frame.vertices, overlay.triangles}, frame.cloud, bounds, small);
+    for (int v = 0; v < picture.height; ++v)
+      for (int u = 0; u < picture.width; ++u)
+        sequence.at(static_cast<int>(i) * small.panel_width + u % small.panel_width,
+                    v + (u < small.panel_width ? 0 : small.panel_height)) = picture.at(u, v);
+  }
+  return sequence;
+}
+
 }  // namespace flash::sysid

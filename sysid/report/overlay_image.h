@@ -1,8 +1,10 @@
 #pragma once
 #include <Eigen/Geometry>
+#include <vector>
 
 #include "data/mesh.h"
 #include "data/picture.h"
+#include "sysid/report/overlay.h"
 
 namespace flash::sysid {
 
@@ -19,5 +21,12 @@ struct OverlayImageSettings {
 /// pictures of a motion keeps them comparable. The bar in the corner is 100 mm long.
 data::Picture draw_overlay(const data::TriangleMesh& simulated, const data::Points& observed,
                            const Eigen::AlignedBox3d& bounds, const OverlayImageSettings& settings = {});
+
+/// Of what is simulated and observed in frames of an overlay, named by their index.
+Eigen::AlignedBox3d bounds_of(const Overlay& overlay, const std::vector<int>& frames);
+
+/// Small pictures side by side, a column a frame: from the side above, from the front below.
+data::Picture draw_sequence(const Overlay& overlay, const std::vector<int>& frames,
+                            const Eigen::AlignedBox3d& bounds);
 
 }  // namespace flash::sysid

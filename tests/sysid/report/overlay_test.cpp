@@ -75,6 +75,38 @@ TEST(OverlayImage, AFoldedSheetIsLitToo) {
   EXPECT_EQ(count(picture, 0, 400, is_black), 0);
 }
 
+// Two frames, a square that faces the side view, then one that faces the front.
+TEST(OverlayImage, ASequenceHasAColumnAFrameAndTheSideViewAbove) {
+  data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
+  const data::Points flat = square.vertices;
+  Overlay overlay{"lift", square.triangles, {}};
+  for (const int across : {1, 0}) {
+    OverlayFrame& frame = overlay.frames.emplace_back();
+    frame.vertices = flat;
+    frame.vertices.col(2) = flat.col(across);
+    frame.vertices.col(across).setZero();
+    frame.cloud = data::Points(0, 3);
+  }
+  overlay.frames.insert(overlay.frames.begin() + 1, overlay.frames[0]);  // which is not drawn
+  overlay.frames[1].vertices *= 100;
+  const Eigen::AlignedBox3d bounds = bounds_of(overlay, {0, 2});
+  EXPECT_LT((bounds.max() - Eigen::Vector3d::Constant(0.2)).norm(), 1e-15);
+  EXPECT_LT(bounds.min().norm(), 1e-15);
+  const data::Picture picture = draw_sequence(overlay, {0, 2}, bounds);
+  ASSERT_EQ(picture.width % 2, 0);
+  const auto reds = [&](bool second, bool below) {
+    int found = 0;
+    for (int v = 0; v < picture.height / 2; ++v)
+      for (int u = 0; u < picture.width / 2; ++u)
+        found +=
+            is_red(picture.at(u + (second ? picture.width / 2 : 0), v + (below ? picture.height / 2 : 0)));
+    return found;
+  };
+  // From above the horizon by 0.2 rad an edge is seen as a line, a face as a face.
+  EXPECT_GT(reds(false, false), 10 * reds(false, true));
+  EXPECT_GT(reds(true, true), 10 * reds(true, false));
+}
+
 TEST(OverlayImage, PointsBehindTheSurfaceArePale) {
   data::TriangleMesh square = data::parse_mesh_spec("sheet:0.2x0.2:0.1");
   square.vertices.col(2) = square.vertices.col(1).eval();
