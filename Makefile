@@ -23,7 +23,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
 .PHONY: grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
-.PHONY: install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
+.PHONY: device-checks install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -152,6 +152,10 @@ reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them
 	$(PYTHON) tests/reference/run.py --sim $(BUILD)/bin/flash-sim --scenes $(REFERENCE)/scenes --jobs $(JOBS) \
 	  --out $(BUILD)/reference
 	$(PYTHON) $(REFERENCE)/compare.py $(BUILD)/reference --all
+
+device-checks: configure-test  ## On a machine with a CUDA device: its tests, compute-sanitizer on scenes that move, times; PART=tests, sanitizers or times
+	cmake --build $(BUILD) -j $(JOBS) --target sim_tests sysid_tests flash-sim
+	scripts/device-checks $(BUILD) $(PART)
 
 fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s under address and undefined-behaviour sanitizers
 	cmake --preset fuzz
