@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "calib/calibrate/plausibility.h"
+#include "data/chi_square.h"
 
 namespace flash::calib {
 namespace {
@@ -43,10 +44,9 @@ Eigen::Isometry3d joint_pose(const CellMember& member, const Cell& cell) {
 }
 
 std::string misplaced(const CellMember& member, const Cell& cell, double times) {
-  constexpr double kChiSquare95 = 12.592;  // six degrees of freedom
   if (member.covariance.isZero()) return {};
   const Vector6d away = motion_between(member.poses.X, joint_pose(member, cell));
-  if (away.dot(member.covariance.ldlt().solve(away)) < times * times * kChiSquare95) return {};
+  if (away.dot(member.covariance.ldlt().solve(away)) < times * times * data::chi_square_95_of_6) return {};
   const Vector6d sd = member.covariance.diagonal().cwiseSqrt();
   return formatted(
       "the recordings contradict each other: solved together %s of %s is %.1f mm and %.2f deg from where "

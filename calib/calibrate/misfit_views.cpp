@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "calib/uncertainty/motion_in_time.h"
+#include "data/chi_square.h"
 #include "data/median.h"
 
 namespace flash::calib {
@@ -41,8 +42,7 @@ bool drop_worst(Calibration& result, std::vector<Observation>& observations, dou
   const std::vector<double> squared = squared_corrections(result.refined);
   const auto worst = static_cast<std::size_t>(
       std::distance(squared.begin(), std::max_element(squared.begin(), squared.end())));
-  constexpr double kMedianOfChiSquare6 = 5.348;
-  const double usual = std::max(data::median(squared) / kMedianOfChiSquare6, 1e-12);
+  const double usual = std::max(data::median(squared) / data::chi_square_50_of_6, 1e-12);
   // The corrections of few views share twelve unknowns with their own noise levels.
   surprise *= std::pow(1 + 8 / std::max(1.0, 6 * static_cast<double>(squared.size()) - 12), 2);
   // Corrections far inside the corner noise say nothing.

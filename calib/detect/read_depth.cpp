@@ -10,6 +10,8 @@
 namespace flash::calib {
 namespace {
 
+/// Of an even number the middle of two: the ratio is printed to be typed as --depth-scale (data::median takes
+/// one).
 double median_of(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   const std::size_t half = values.size() / 2;

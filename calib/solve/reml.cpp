@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "data/chi_square.h"
+
 namespace flash::calib {
 namespace {
 
@@ -227,7 +229,6 @@ Eigen::MatrixXd adjusted_covariance(const LinearModel& model, const VarianceComp
 }
 
 double tail_growth(double dof) {
-  constexpr double kChiSquare99 = 16.812;  // six degrees of freedom
   // Of F(6, dof): its regularised incomplete beta function is a polynomial.
   const auto beyond = [dof](double f) {
     const double x = dof / (dof + 6 * f), a = 0.5 * dof, y = 1 - x;
@@ -238,7 +239,7 @@ double tail_growth(double dof) {
     const double middle = std::sqrt(low * high);
     (beyond(middle) > 0.01 ? low : high) = middle;
   }
-  return 6 * low / kChiSquare99 * (dof - 2) / dof;
+  return 6 * low / data::chi_square_99_of_6 * (dof - 2) / dof;
 }
 
 }  // namespace flash::calib

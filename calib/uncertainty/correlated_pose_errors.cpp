@@ -8,6 +8,7 @@
 
 #include "calib/solve/linearization.h"
 #include "calib/uncertainty/pose_information.h"
+#include "data/chi_square.h"
 
 namespace flash::calib {
 namespace {
@@ -19,7 +20,7 @@ constexpr double kSizes[] = {1e-4, 2e-4, 4e-4, 8e-4, 1.6e-3, 3.2e-3, 6.4e-3};
 constexpr double kUsualSize = 0.1 * M_PI / 180, kSizeSpread = 1;  // of its logarithm
 constexpr double kOdds = 1;  // of errors that are smooth against errors that are not, before any view is seen
 // Chi-square with 3 degrees of freedom: a size, its reach, and the share of what is independent.
-constexpr double kOnceInTwenty = 7.815;
+constexpr double kOnceInTwenty = data::chi_square_95_of_3;
 constexpr std::size_t kEnough = 30;  // poses from which sizes are estimated
 
 using Columns = Eigen::Matrix<double, kOwn, 3>;

@@ -5,12 +5,12 @@
 #include <limits>
 
 #include "calib/solve/linearization.h"
+#include "data/chi_square.h"
 
 namespace flash::calib {
 namespace {
 
 constexpr double kUsualError = 0.1 * M_PI / 180;  // of arms in use, shared by neighbouring views
-constexpr double kOnceInHundred = 16.812;         // chi-square, 6 degrees of freedom
 
 /// A robot whose errors were taken to be larger than they are beside a motion has smaller ones by steps of
 /// this factor, down to a tenth.
@@ -30,7 +30,7 @@ bool beyond_usual(const Bundle& bundle, const Vector6d& motion) {
   for (const BundleView& view : bundle.views)
     distance += predicted_pose(bundle, view).translation().norm() / static_cast<double>(bundle.views.size());
   const double turn = motion.tail<3>().norm(), shift = motion.head<3>().norm() / distance;
-  return turn * turn + shift * shift > kOnceInHundred * 2 * kUsualError * kUsualError;
+  return turn * turn + shift * shift > data::chi_square_99_of_6 * 2 * kUsualError * kUsualError;
 }
 
 bool MotionInTime::applies(const Bundle& bundle, const BundleSettings& settings) {

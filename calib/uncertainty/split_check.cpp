@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "calib/solve/linearization.h"
+#include "data/chi_square.h"
 #include "data/parallel.h"
 
 namespace flash::calib {
@@ -101,8 +102,10 @@ std::vector<SplitCheck> check_systematic(const Refinement& refined, const Bundle
 }
 
 double split_inflation(const std::vector<SplitCheck>& checks, const SplitCheck** worst) {
-  // Chi-square with 6 degrees of freedom at 0.95, at 1 - 0.05 / 4 for four splits, and at 1 - 0.05 / 5.
-  const double limit = checks.size() > 4 ? 16.812 : checks.size() > 1 ? 16.245 : 12.592;
+  // Once in twenty by any: of one split, of four, of five.
+  const double limit = checks.size() > 4   ? data::chi_square_99_of_6
+                       : checks.size() > 1 ? data::chi_square_9875_of_6
+                                           : data::chi_square_95_of_6;
   const auto largest = std::max_element(
       checks.begin(), checks.end(), [](const auto& a, const auto& b) { return a.chi_square < b.chi_square; });
   if (largest == checks.end() || largest->chi_square <= limit) return 1;

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include "calib/solve/linearization.h"
+#include "data/chi_square.h"
 
 namespace flash::calib {
 namespace {
@@ -79,10 +80,9 @@ SizedRefinement refine_sizes(Refinement refined, const RefineSettings& settings)
       size.wanted = {free->bundle.scales[target],
                      result.systematic.caution[target] * std::sqrt(free->covariance(column, column))};
     if (!size.far_off()) continue;
-    constexpr double kChiSquare95 = 12.592;  // 6 degrees of freedom
     const Vector6d apart = motion_between(bundle.cameras.front(), free->bundle.cameras.front());
     const Matrix6d covariance = result.systematic.covariance.topLeftCorner<6, 6>();
-    result.disputed = result.disputed || apart.dot(covariance.ldlt().solve(apart)) > kChiSquare95;
+    result.disputed = result.disputed || apart.dot(covariance.ldlt().solve(apart)) > data::chi_square_95_of_6;
   }
   return result;
 }

@@ -9,6 +9,7 @@
 #include <numeric>
 #include <utility>
 
+#include "data/chi_square.h"
 #include "sysid/infer/discrepancy_prior.h"
 #include "sysid/infer/local_noise.h"
 
@@ -25,7 +26,7 @@ constexpr double kLeastFreedom = 0.1;                // of the rows
 constexpr int kFew = 12;        // rows of one keyframe and channel that are too few to tell noise from misfit
 constexpr double kVague = 100;  // of what is not known, over the residuals
 // Chi-square with 3 degrees of freedom: a size and two reaches.
-constexpr double kOnceInTwenty = 7.815;
+constexpr double kOnceInTwenty = data::chi_square_95_of_3;
 constexpr std::size_t kDraws = 32;  // of size and reaches
 
 /// Row of (keyframe, channel) blocks, `modes` long each.

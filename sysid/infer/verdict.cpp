@@ -6,12 +6,13 @@
 #include <limits>
 #include <map>
 
+#include "data/chi_square.h"
 #include "data/text.h"
 
 namespace flash::sysid {
 namespace {
 
-constexpr double kExcluded = 3.841459;  // deviance over the least: chi^2 of one degree of freedom, 95 %
+constexpr double kExcluded = data::chi_square_95_of_1;  // deviance over the least
 constexpr double kLeastBits = 1;
 
 /// What is usual, 5 to 95 % of woven and knitted fabrics, paper and film, as coordinates of an axis: bending
