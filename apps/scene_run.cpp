@@ -232,18 +232,23 @@ std::string collapse_warning(const SceneBody& in, int number, const Collapse& wo
 
 constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
 
-/// Of bodies that a mesh comes through between their vertices, at the end of a run.
-std::vector<std::string> coming_through_warnings(const std::vector<SceneBody>& bodies) {
-  constexpr double told = 1e-3;  // [m]
+constexpr double told_coming_through = 1e-3;  ///< of an obstacle between vertices [m]
+
+/// Of bodies that an obstacle came through between their vertices; `deepest`: of each, at any time of the
+/// run.
+std::vector<std::string> coming_through_warnings(const std::vector<SceneBody>& bodies,
+                                                 const std::vector<ComingThrough>& deepest) {
   std::vector<std::string> warnings;
-  for (const SceneBody& body : bodies) {
-    const ComingThrough deepest = deepest_between_vertices(body.sheet, body.environment);
-    if (deepest.depth <= told) continue;
+  for (std::size_t b = 0; b < bodies.size(); ++b) {
+    if (deepest[b].obstacle < 0) continue;
+    const SceneBody& body = bodies[b];
+    const double at_end = deepest_between_vertices(body.sheet, body.environment, told_coming_through).depth;
     warnings.push_back(
-        body.name + ": " + body.environment.obstacles[static_cast<std::size_t>(deepest.obstacle)].name +
-        " comes through between its vertices by " + data::format_short(1e3 * deepest.depth) +
-        " mm at the end: contact is that of vertices; take smaller cells, or give the obstacle a "
-        "margin");
+        body.name + ": " + body.environment.obstacles[static_cast<std::size_t>(deepest[b].obstacle)].name +
+        " comes through between its vertices by " + data::format_short(1e3 * deepest[b].depth) + " mm at " +
+        data::format_short(deepest[b].time) + " s" +
+        (at_end > 0 ? ", by " + data::format_short(1e3 * at_end) + " mm at the end" : "") +
+        ": contact is that of vertices; take smaller cells, or give a mesh a margin");
   }
   return warnings;
 }
@@ -351,6 +356,7 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   double inside_at_end = 0;  // depth at the start of the last step [m]
   std::string holder;
   std::vector<HoldWatch> watches(bodies.size());
+  std::vector<ComingThrough> deepest(bodies.size());          // at any time
   std::map<std::pair<std::size_t, int>, Collapse> collapses;  // of solids
   const auto see_collapse = [&](std::size_t b, double time) {
     for (const auto& [number, material] : bodies[b].environment.solids) {
@@ -392,6 +398,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
       for (std::size_t b = 0; b < reports.size(); ++b) {
         const StepReport& report = reports[b];
         watches[b].see(bodies[b].environment);
+        const ComingThrough through =
+            deepest_between_vertices(bodies[b].sheet, bodies[b].environment, told_coming_through);
+        if (through.depth > deepest[b].depth) deepest[b] = through;
         see_collapse(b, time);
         converged = converged && report.converged;
         halved = halved || report.substeps > 1;
@@ -437,7 +446,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   for (std::size_t b = 0; b < bodies.size() && !summary.interrupted && summary.steps > 0; ++b)
     for (const std::string& warning : hold_warnings(watches[b], bodies[b].environment))
       summary.warnings.push_back(bodies[b].name + ": " + warning);
-  for (const std::string& warning : coming_through_warnings(bodies)) summary.warnings.push_back(warning);
+  for (const std::string& warning : coming_through_warnings(bodies, deepest))
+    summary.warnings.push_back(warning);
   if (!scene.rest_motion && !summary.interrupted)
     for (const std::string& warning : keyframe_warnings(scene, summary.steps))
       summary.warnings.push_back(warning);

@@ -4,15 +4,17 @@
 
 namespace flash::sim {
 
-/// How far the triangles of a closed mesh come through the surface of what meets it.
+/// How far the triangles of a closed mesh, or of a sheet, are inside an obstacle.
 struct ComingThrough {
   double depth = 0;  ///< [m]; 0: nowhere
   int obstacle = -1;
+  double time = 0;  ///< [s]
 };
 
-/// Contact is that of vertices, so that an edge or a corner of a mesh may come through a triangle between
-/// them. The deepest in a mesh of the middles of all triangles and of their edges, where the environment
-/// stands.
-ComingThrough deepest_between_vertices(const Sheet& sheet, const Environment& environment);
+/// Contact is that of vertices, so that an edge or a corner of an obstacle, and what is thinner than a cell,
+/// may come through a triangle between them. The deepest place of all triangles where the environment stands,
+/// if it is deeper than `from` [m], to a tenth of that: in a mesh of the middles of triangles and of their
+/// edges alone. Triangles of which a vertex is as deep itself, or held by the obstacle's frame, do not count.
+ComingThrough deepest_between_vertices(const Sheet& sheet, const Environment& environment, double from);
 
 }  // namespace flash::sim

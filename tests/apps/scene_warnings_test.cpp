@@ -92,6 +92,19 @@ TEST_F(SceneRunTest, ASheetThatIsLeftInsideIsSaid) {
   EXPECT_EQ(whole.warnings[0].find("still inside"), std::string::npos) << whole.warnings[0];
 }
 
+TEST_F(SceneRunTest, AnObstacleThatPassesBetweenVerticesIsSaidThoughItIsGoneAtTheEnd) {
+  const data::Scene scene =
+      data::load_scene(write("scene.json", R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 40,
+      "gravity": [0, 0, -9.81], "objects": {"cloth": {"asset": "cloth.json",
+        "start": {"T_base_object": [-0.05, -0.05, 0.01, 0, 0, 0, 1]}}},
+      "obstacles": {"rod": {"shape": "capsule", "axis": [1, 0, 0], "point": [0, 0, -0.004], "half_length": 0.5, "radius": 0.004}}})"));
+  const SceneSummary summary = run_scene(scene, {}, out());
+  EXPECT_EQ(summary.penetration_max, 0);
+  ASSERT_EQ(summary.warnings.size(), 1u);
+  EXPECT_NE(summary.warnings[0].find("cloth: rod comes through between its vertices by "), std::string::npos)
+      << summary.warnings[0];
+}
+
 TEST_F(SceneRunTest, HoldsThatNeverActOrContestAVertexAreWarnedOf) {
   const std::string head = R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 10, "gravity": [0, 0, 0],
   "keyframes": [], "objects": {"cloth": {"asset": "cloth.json")";
