@@ -4,7 +4,10 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
+
+#include "data/median.h"
 
 namespace flash::sysid {
 namespace {
@@ -117,6 +120,12 @@ Eigen::VectorXd ResidualLikelihood::known_spread() const {
   return variances.segment(free_, known_.cols() - free_).cwiseSqrt();
 }
 
+Eigen::VectorXd ResidualLikelihood::curvature_of(const Eigen::VectorXd& left) const {
+  std::vector<double> sizes(left.cwiseAbs().begin(), left.cwiseAbs().end());
+  const double window = std::max(limit_, data::median(std::move(sizes)));
+  return left.unaryExpr([&](double y) { return std::abs(y) <= window ? limit_ / window : 0.0; });
+}
+
 ResidualLikelihood::ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd& residuals,
                                        std::optional<double> repeatability, std::optional<double> limit)
     : weights_(rows.weights), free_(rows.free.cols()), known_(residuals.size(), free_ + rows.known.cols()) {
@@ -134,9 +143,7 @@ ResidualLikelihood::ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd&
   if (rates.cols() == 0) return;
   for (int round = 0; round < kRounds; ++round) {
     const Fit here = fit(residuals);
-    const Eigen::VectorXd bent =
-        here.left.unaryExpr([&](double y) { return std::abs(y) <= limit_ ? 1.0 : 0.0; })
-            .cwiseProduct(weights_);
+    const Eigen::VectorXd bent = curvature_of(here.left).cwiseProduct(weights_);
     const Eigen::MatrixXd root = inverse_root(rates.transpose() * weigh(rates, bent));
     if (root.cols() == 0) {  // nothing moves with the parameters
       spread_ = std::max(model.residual_size(), misfit_.noise);

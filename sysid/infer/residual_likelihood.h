@@ -53,6 +53,9 @@ class ResidualLikelihood {
   const Misfit& misfit() const { return misfit_; }
 
  private:
+  /// By how much rho'' / 2 is of each row on average, where `left` is left of rows: 1 below the limit and 0
+  /// beyond it, or, where half are beyond, the density of rows about 0 by the nearer half (Powell 1991).
+  Eigen::VectorXd curvature_of(const Eigen::VectorXd& left) const;
   /// (spread^2 weights^-1 + K K^T)^-1 times columns.
   Eigen::MatrixXd weigh(const Eigen::MatrixXd& columns, const Eigen::VectorXd& weights) const;
 

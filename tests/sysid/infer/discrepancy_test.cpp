@@ -293,5 +293,24 @@ TEST(ResidualLikelihood, FreeErrorsCostNothingWithinTheirBoundsAndEndThere) {
   EXPECT_GT(likelihood.deviance(y + 1.1 * rows.free.col(0)), none + 2 * static_cast<double>(y.size()));
 }
 
+// At the root of a strip both rates and misfit vanish: the few rows that a misfit leaves below the limit are
+// there, and tell nothing of how rho bends where the parameters move the rows.
+TEST(ResidualLikelihood, TheSpreadOfRowsThatAMisfitTakesBeyondTheLimitIsNotThatOfTheFewBelow) {
+  ObservedRows rows = strip_rows(9, 40);
+  rows.rates = lifted(rows);
+  const Eigen::Index count = rows.weights.size();
+  std::mt19937 random(3);
+  Eigen::VectorXd y = 1e-5 * normal(random, count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    y[i] += 3e-2 * rows.places(i, 0) *
+            std::cos(40 * rows.places(i, 0) + 0.5 * rows.keyframe[static_cast<std::size_t>(i)]);
+  const double limit = 2e-5, size = std::sqrt(y.squaredNorm() / static_cast<double>(count));
+  const ResidualLikelihood likelihood(rows, y, {}, limit);
+  // Where all rows err together, the slope is n limit |rate| at most, and the bend, by the half of the rows
+  // that is nearest, about n limit / size rate^2.
+  EXPECT_LT(likelihood.spread(), 1.5 * std::sqrt(2 * static_cast<double>(count) * limit * size));
+  EXPECT_GT(likelihood.spread(), likelihood.misfit().noise);
+}
+
 }  // namespace
 }  // namespace flash::sysid
