@@ -18,6 +18,7 @@
 #include "data/error.h"
 #include "data/memory_limit.h"
 #include "data/mesh_io.h"
+#include "data/seams.h"
 #include "data/text.h"
 #include "data/worst.h"
 #include "sim/newton/solver.h"
@@ -206,6 +207,18 @@ std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) 
                            ", from " + data::format_short(locking_poissons_ratio) +
                            " on: bent, they are stiffer than their E says, the more the coarser; take "
                            "\"element_order\": 2 in the asset (docs/theory.md)");
+  return warnings;
+}
+
+/// Of sheets with vertices in one place that are not joined.
+std::vector<std::string> seam_warnings(const std::vector<SceneBody>& bodies) {
+  std::vector<std::string> warnings;
+  for (const SceneBody& object : bodies)
+    for (const Body& body : object.sheet.bodies) {
+      if (body.is_solid()) continue;
+      const std::string seams = data::seam_warning(body_alone(object.sheet, body).rest);
+      if (!seams.empty()) warnings.push_back((body.name.empty() ? object.name : body.name) + ": " + seams);
+    }
   return warnings;
 }
 
@@ -430,7 +443,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   }
   write_tables();
   if (nearest < no_layers) summary.layer_distance_min = nearest;
-  summary.warnings = locking_warnings(bodies);
+  summary.warnings = seam_warnings(bodies);
+  for (const std::string& warning : locking_warnings(bodies)) summary.warnings.push_back(warning);
   for (const auto& [solid, worst] : collapses)
     if (worst.elements > 0)
       summary.warnings.push_back(collapse_warning(bodies[solid.first], solid.second, worst));

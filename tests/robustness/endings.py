@@ -357,6 +357,18 @@ def check_killed_replay(options, folder):
     yield not left, f"replay --force keeps {left}"
 
 
+def check_seams(options, folder):
+    """A sheet of two halves that are not joined is warned of, and the warning is no matter of --quiet."""
+    grid = [(0.05 * i, 0.05 * j) for j in (0, 1, 2, 2, 3, 4) for i in range(5)]  # the third row twice
+    corners = [(5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5) for j in (0, 1, 3, 4) for i in range(4)]
+    (folder / "seam.obj").write_text("".join("v %g %g 0\n" % place for place in grid) +
+                                     "".join("f %d %d %d %d\n" % tuple(v + 1 for v in face) for face in corners))
+    done = program.call(options.sysid, "replay", folder / "recording", "--asset", folder / "asset.json", "--mesh",
+                        folder / "seam.obj", "--quiet", "-o", folder / "seam")
+    yield ("seam.obj: 10 of its 30 vertices share a place with another and are not joined: the mesh falls into 2 parts"
+           in done.stderr and done.stderr.startswith("flash-sysid: warning: ")), f"replay of a seam: {done.stderr}"
+
+
 def check_fit(options, folder):
     """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
     recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
@@ -424,8 +436,8 @@ def main():
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
         for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_two_runs, check_defaults,
-                      check_resume, check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay, check_fit,
-                      check_tuned):
+                      check_resume, check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay,
+                      check_seams, check_fit, check_tuned):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds
