@@ -74,6 +74,16 @@ Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sc
   return stepper_of(std::make_shared<ProjectiveSolver>(body.sheet, settings));
 }
 
+/// Of what a method refuses, which knows no files.
+template <class Function>
+auto naming(const data::Scene& scene, const Function& function) {
+  try {
+    return function();
+  } catch (const data::InputError& error) {
+    throw data::InputError(scene.source + ": " + error.what());
+  }
+}
+
 data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
   data::TriangleMesh mesh;
   Eigen::Index vertices = 0, triangles = 0;
@@ -316,7 +326,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   const std::string size = data::format_count(vertices_of(bodies)) + " vertices";
   begins("setting up " + size);
   std::vector<Stepper> steppers;
-  for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
+  for (const SceneBody& body : bodies)
+    steppers.push_back(naming(scene, [&] { return make_stepper(scene.solver, scene.time_step, body); }));
 
   const std::set<int> frames = frames_to_write(scene, steps);
   const auto path_of = [&](const char* folder, int step, const char* ending) {
@@ -388,7 +399,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     begins("solving the first step of " + size);
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
       std::vector<std::future<void>> pending;
-      const auto advance = [&](std::size_t b) { reports[b] = steppers[b].step(bodies[b].environment); };
+      const auto advance = [&](std::size_t b) {
+        reports[b] = naming(scene, [&] { return steppers[b].step(bodies[b].environment); });
+      };
       for (std::size_t b = 0; b < bodies.size(); ++b)
         if (run.threads > 1 && b + 1 < bodies.size())
           pending.push_back(std::async(std::launch::async, advance, b));

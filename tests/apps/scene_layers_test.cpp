@@ -63,6 +63,7 @@ TEST_F(SceneRunTest, StartThatPassesThroughItselfIsRefused) {
   } catch (const data::InputError& error) {
     const std::string text = error.what();
     EXPECT_NE(text.find(" of lower passing through triangle "), std::string::npos) << text;
+    EXPECT_TRUE(text.starts_with(path + ": self_contact: start: ")) << text;
     EXPECT_NE(text.find(" of upper"), std::string::npos) << text;
   }
   EXPECT_FALSE(fs::exists(out()));
