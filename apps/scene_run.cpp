@@ -18,6 +18,7 @@
 #include "data/error.h"
 #include "data/memory_limit.h"
 #include "data/mesh_io.h"
+#include "data/seams.h"
 #include "data/text.h"
 #include "data/worst.h"
 #include "sim/newton/solver.h"
@@ -71,6 +72,16 @@ Stepper make_stepper(const data::SceneSolver& solver, double time_step, const Sc
   settings.constraints.max_force = solver.max_force;
   settings.constraints.linear.solver = dual_solver_from_name(solver.constraint_linear_solver);
   return stepper_of(std::make_shared<ProjectiveSolver>(body.sheet, settings));
+}
+
+/// Of what a method refuses, which knows no files.
+template <class Function>
+auto naming(const data::Scene& scene, const Function& function) {
+  try {
+    return function();
+  } catch (const data::InputError& error) {
+    throw data::InputError(scene.source + ": " + error.what());
+  }
 }
 
 data::TriangleMesh merged(const std::vector<SceneBody>& bodies) {
@@ -209,6 +220,18 @@ std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) 
   return warnings;
 }
 
+/// Of sheets with vertices in one place that are not joined.
+std::vector<std::string> seam_warnings(const std::vector<SceneBody>& bodies) {
+  std::vector<std::string> warnings;
+  for (const SceneBody& object : bodies)
+    for (const Body& body : object.sheet.bodies) {
+      if (body.is_solid()) continue;
+      const std::string seams = data::seam_warning(body_alone(object.sheet, body).rest);
+      if (!seams.empty()) warnings.push_back((body.name.empty() ? object.name : body.name) + ": " + seams);
+    }
+  return warnings;
+}
+
 /// The most tetrahedra of a solid that have collapsed at the end of a step.
 struct Collapse {
   int elements = 0;
@@ -308,7 +331,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   const std::string size = data::format_count(vertices_of(bodies)) + " vertices";
   begins("setting up " + size);
   std::vector<Stepper> steppers;
-  for (const SceneBody& body : bodies) steppers.push_back(make_stepper(scene.solver, scene.time_step, body));
+  for (const SceneBody& body : bodies)
+    steppers.push_back(naming(scene, [&] { return make_stepper(scene.solver, scene.time_step, body); }));
 
   const std::set<int> frames = frames_to_write(scene, steps);
   const auto path_of = [&](const char* folder, int step, const char* ending) {
@@ -381,7 +405,9 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     begins("solving the first step of " + size);
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {
       std::vector<std::future<void>> pending;
-      const auto advance = [&](std::size_t b) { reports[b] = steppers[b].step(bodies[b].environment); };
+      const auto advance = [&](std::size_t b) {
+        reports[b] = naming(scene, [&] { return steppers[b].step(bodies[b].environment); });
+      };
       for (std::size_t b = 0; b < bodies.size(); ++b)
         if (run.threads > 1 && b + 1 < bodies.size())
           pending.push_back(std::async(std::launch::async, advance, b));
@@ -439,7 +465,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
   }
   write_tables();
   if (nearest < no_layers) summary.layer_distance_min = nearest;
-  summary.warnings = locking_warnings(bodies);
+  summary.warnings = seam_warnings(bodies);
+  for (const std::string& warning : locking_warnings(bodies)) summary.warnings.push_back(warning);
   for (const auto& [solid, worst] : collapses)
     if (worst.elements > 0)
       summary.warnings.push_back(collapse_warning(bodies[solid.first], solid.second, worst));

@@ -19,6 +19,7 @@
 #include "apps/scene_run.h"
 #include "apps/sim_verbs.h"
 #include "data/error.h"
+#include "data/folder_lock.h"
 #include "data/message_line.h"
 #include "data/scene.h"
 #include "data/text.h"
@@ -133,6 +134,8 @@ int run(const RunOptions& options) {
   };
   begin("reading " + options.scene);
   const data::Scene scene = data::load_scene(options.scene);
+  const data::RunFolder folder(options.out);
+  data::check_folder_free(options.out, options.force);  // a run that has just ended may have filled it
   ProgressLine progress(!options.quiet);
   sim::SceneRun settings;
   settings.steps = steps_to_run(options, scene);

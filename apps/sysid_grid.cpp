@@ -96,6 +96,7 @@ std::vector<sysid::Replay> make_replays(const std::vector<data::Recording>& reco
   std::vector<sysid::Replay> replays;
   for (const data::Recording& recording : recordings) {
     replays.push_back(sysid::make_replay(recording, settings));
+    warn_of_seams(replays.back().recording);
     if (!options.verbose) continue;
     for (const std::string& notice : recording.notices) say(options, recording.name + ": " + notice);
     for (const std::string& notice : replays.back().notices) say(options, recording.name + ": " + notice);

@@ -17,6 +17,7 @@
 #include "data/error.h"
 #include "data/message_line.h"
 #include "data/recording_digest.h"
+#include "data/seams.h"
 #include "data/text.h"
 #include "sim/scene/sheet.h"
 #include "sysid/report/recording_names.h"
@@ -272,6 +273,12 @@ void warn_of_camera(const data::Recording& recording) {
   if (!recording.camera) return;
   for (const std::string& warning : recording.camera->warnings)
     warn(recording.name + ": calibration of its camera: " + warning);
+}
+
+void warn_of_seams(const data::Recording& recording) {
+  if (recording.is_solid()) return;
+  const std::string seams = data::seam_warning(recording.mesh);
+  if (!seams.empty()) warn(recording.name + ": " + recording.mesh_spec + ": " + seams);
 }
 
 int thread_count(const CommonOptions& options) {

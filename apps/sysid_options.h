@@ -72,6 +72,9 @@ void warn(const std::string& line);
 /// What is known to be wrong with the calibration behind the recording's camera.
 void warn_of_camera(const data::Recording& recording);
 
+/// Where vertices of its sheet share a place and are not joined.
+void warn_of_seams(const data::Recording& recording);
+
 int thread_count(const CommonOptions& options);
 
 /// Throws data::InputError where --device wants a CUDA device that cannot simulate what the options ask for.

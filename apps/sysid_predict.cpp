@@ -222,6 +222,7 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   const std::string text = data::format_json(prediction_json(prediction, options, recording));
   if (!options.out.empty()) data::write_atomically(options.out, text);
   warn_of_camera(recording);
+  warn_of_seams(replay.recording);
   for (const sysid::RegistrationParameter& parameter : sysid::registration_parameters)
     if (sysid::is_at_bound(prediction.fit.bounds_hit, parameter))
       warn(sysid::at_bound_text(parameter, recording.nuisance));

@@ -170,6 +170,7 @@ int run_replay(const CLI::App& verb, const ReplayVerbOptions& options) {
   draw_frames(overlay, frames, options.out);
 
   warn_of_camera(recording);
+  warn_of_seams(replay.recording);
   if (motion.penetration_max > 5e-3)
     warn("the gripper takes the sheet up to " + data::format_short(1e3 * motion.penetration_max) +
          " mm below the table: is the table's height right?");

@@ -89,17 +89,19 @@ void read_weave(const JsonObject& props, Asset& asset) {
       throw props.error(key, "constitutive TRI_STVK, the only one that is woven");
   if (props.has("warp_direction") && !bends && !stretches)
     throw props.error("warp_direction", "bending_model plate or constitutive TRI_STVK, which may be woven");
-  asset.weave.bending_ratio = props.positive("bending_ratio", 1);
-  asset.weave.twisting_ratio = props.positive("twisting_ratio", 1);
   const auto within = [&](const char* key, double low, double high) {
     const double ratio = props.positive(key, 1);
     if (ratio < low || ratio > high)
       throw props.error(key, "a number from " + format_short(low) + " to " + format_short(high));
     return ratio;
   };
+  asset.weave.bending_ratio = within("bending_ratio", 0.01, 100);
+  asset.weave.twisting_ratio = within("twisting_ratio", 1e-3, 100);
   asset.weave.young_ratio = within("young_ratio", 0.01, 100);
   asset.weave.shear_ratio = within("shear_ratio", 1e-3, 100);
-  asset.weave.warp_direction = props.number("warp_direction", 0) * std::numbers::pi / 180;
+  const double warp = props.number("warp_direction", 0);
+  if (!(std::abs(warp) <= 360)) throw props.error("warp_direction", "an angle from -360 to 360 degrees");
+  asset.weave.warp_direction = warp * std::numbers::pi / 180;
 }
 
 void read_yield(const JsonObject& props, Asset& asset) {

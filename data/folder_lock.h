@@ -1,5 +1,7 @@
 #pragma once
+#include <filesystem>
 #include <string>
+#include <vector>
 
 namespace flash::data {
 
@@ -15,6 +17,22 @@ class FolderLock {
 
  private:
   int descriptor_ = -1;
+};
+
+/// While it lives, no other run writes into `folder`: for runs that fill a folder of their own. Makes the
+/// folder; at its end, those it made go again where they are empty. Throws InputError, "out: another run is
+/// writing to it; ...", where one holds it already. File systems without locks have none; then nothing is
+/// held.
+class RunFolder {
+ public:
+  explicit RunFolder(const std::string& folder);
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+
+ private:
+  int descriptor_ = -1;
+  std::vector<std::filesystem::path> made_;  ///< the innermost first
 };
 
 }  // namespace flash::data

@@ -32,8 +32,21 @@ void check_points(const Points& points, const std::string& source) {
                      " points are not finite; first at index " + std::to_string(first));
 }
 
+/// Far below where areas and volumes overflow, far above what is simulated.
+constexpr double largest_coordinate = 1e12;
+
+void check_size(const Points& points, const std::string& source) {
+  for (Eigen::Index i = 0; i < points.rows(); ++i)
+    if (const double largest = points.row(i).cwiseAbs().maxCoeff(); largest > largest_coordinate)
+      throw input_error(source, "vertex " + std::to_string(i),
+                        "found a coordinate of " + format_short(largest) + ", expected at most " +
+                            format_short(largest_coordinate));
+}
+
 template <class Rows>
 void check_indices(const Rows& rows, Eigen::Index vertices, const char* what, const std::string& source) {
+  if (vertices == 0 && rows.rows() > 0)
+    throw InputError(source + ": found no vertices, expected those that its elements name");
   for (Eigen::Index i = 0; i < rows.rows(); ++i)
     for (Eigen::Index k = 0; k < rows.cols(); ++k)
       if (rows(i, k) < 0 || rows(i, k) >= vertices)
@@ -101,6 +114,7 @@ void check_triangle_mesh(const TriangleMesh& mesh, const std::string& source) {
   check_points(mesh.vertices, source);
   check_indices(mesh.triangles, mesh.vertices.rows(), "triangle", source);
   if (mesh.triangles.rows() == 0) throw InputError(source + ": found no triangles");
+  check_size(mesh.vertices, source);
   std::map<std::array<int, 3>, Eigen::Index> seen;
   std::map<std::array<int, 2>, Eigen::Index> sides;  // by the direction in which their triangle runs
   std::vector<bool> used(static_cast<std::size_t>(mesh.vertices.rows()), false);
@@ -148,6 +162,7 @@ void check_tet_mesh(const TetMesh& mesh, const std::string& source) {
   check_points(mesh.vertices, source);
   check_indices(mesh.tetrahedra, mesh.vertices.rows(), "tetrahedron", source);
   if (mesh.tetrahedra.rows() == 0) throw InputError(source + ": found no tetrahedra");
+  check_size(mesh.vertices, source);
   std::vector<bool> used(static_cast<std::size_t>(mesh.vertices.rows()), false);
   for (Eigen::Index i = 0; i < mesh.tetrahedra.rows(); ++i) {
     const Eigen::Vector4i t = mesh.tetrahedra.row(i);

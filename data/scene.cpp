@@ -224,10 +224,16 @@ std::vector<int> read_vertices(const JsonObject& object) {
   return vertices;
 }
 
+std::string read_name(const JsonObject& object, const std::string& fallback) {
+  const std::string name = object.string("name", fallback);
+  if (name.empty()) throw object.error("name", "a name");
+  return name;
+}
+
 SceneFixed read_fixed(const JsonObject& object) {
   object.expect_fields({"name", "vertices", "axes", "positions", "over"});
   SceneFixed fixed;
-  fixed.name = object.string("name", fixed.name);
+  fixed.name = read_name(object, fixed.name);
   fixed.over = object.not_negative("over", fixed.over);
   fixed.all = object.raw("vertices") == "all";
   if (!fixed.all) fixed.vertices = read_vertices(object);
@@ -254,7 +260,7 @@ SceneFixed read_fixed(const JsonObject& object) {
 ScenePrescribed read_prescribed(const JsonObject& object) {
   object.expect_fields({"name", "vertices", "trajectory", "keyframes", "from", "to"});
   ScenePrescribed prescribed;
-  prescribed.name = object.string("name", prescribed.name);
+  prescribed.name = read_name(object, prescribed.name);
   prescribed.vertices = read_vertices(object);
   prescribed.trajectory = read_trajectory(object);
   if (prescribed.trajectory.times.empty()) throw object.error("trajectory", "a trajectory, or keyframes");
@@ -374,6 +380,7 @@ void read_self_contact(const JsonObject& file, Scene& scene) {
 void check_names(const JsonObject& file, const Scene& scene) {
   std::set<std::string> names;
   const auto add = [&](const char* list, const std::string& name) {
+    if (name.empty()) throw input_error(file.source(), list, "found the name \"\", expected a name for each");
     if (!names.insert(name).second)
       throw input_error(file.source(), std::string(list) + "." + name,
                         "found a name that another body has, expected names that differ");

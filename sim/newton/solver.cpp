@@ -206,18 +206,19 @@ void check_apart(const Sheet& sheet, PairSurface& surface, const Environment& en
       x[k] = {at[0], at[1], at[2]};
     }
     const double distance = nearest_points(pair.kind, x).distance;
-    if (!(distance < least && distance < pair.thickness)) continue;
+    if (distance >= least) continue;
     const auto name_of = [&](int vertex) {
       const Body& body = sheet.bodies[static_cast<std::size_t>(body_of(sheet, vertex))];
       return "vertex " + std::to_string(vertex - body.first_vertex) +
              (body.name.empty() ? "" : " of " + body.name);
     };
-    throw data::input_error("self_contact", "start",
-                            "found the surface at " + name_of(pair.vertices[0]) + " " +
-                                data::format_short(distance) + " m from that at " +
-                                name_of(pair.vertices[pair.kind == PairKind::vertex_face ? 1 : 2]) +
-                                ", expected at least " + data::format_short(least) +
-                                " m: layers in one place cannot part; start them a thickness apart");
+    throw data::input_error(
+        "self_contact", "start",
+        "found the surface at " + name_of(pair.vertices[0]) + " " + data::format_short(distance) +
+            " m from that at " + name_of(pair.vertices[pair.kind == PairKind::vertex_face ? 1 : 2]) +
+            ", expected at least " + data::format_short(least) + " m: layers in one place cannot part; " +
+            (pair.thickness < least ? "join the vertices there (flash-sim mesh)"
+                                    : "start them a thickness apart"));
   }
 }
 

@@ -48,6 +48,21 @@ void check_use(const data::Recording& recording, const TrackImportSettings& sett
         settings.tracks + ", expected two or more");
 }
 
+/// The user knows the options, not files that are gone.
+std::string in_words_of_options(std::string what, const fs::path& folder, const std::string& mesh_file,
+                                const TrackImportSettings& settings) {
+  const auto replace = [&](const std::string& gone, const std::string& known) {
+    for (std::size_t at = 0; (at = what.find(gone, at)) != std::string::npos; at += known.size())
+      what.replace(at, gone.size(), known);
+  };
+  replace((folder / "tracks.csv").string(), settings.tracks);
+  replace((folder / "placed.csv").string(), settings.placed);
+  if (!mesh_file.empty()) replace((folder / mesh_file).string(), settings.mesh_spec);
+  if (what.starts_with(folder.string())) what = "import: " + what.substr(folder.string().size() + 1);
+  replace((folder / "").string(), "");
+  return what;
+}
+
 }  // namespace
 
 data::Recording import_tracks(const TrackImportSettings& settings) {
@@ -91,10 +106,7 @@ data::Recording import_tracks(const TrackImportSettings& settings) {
   try {
     check_use(data::load_recording(staged_json), settings);
   } catch (const data::InputError& error) {
-    // The user knows the options, not a file that is gone.
-    std::string what = error.what();
-    if (what.starts_with(folder.string())) what = "import: " + what.substr(folder.string().size() + 1);
-    throw data::InputError(what);
+    throw data::InputError(in_words_of_options(error.what(), folder, mesh_file, settings));
   }
   if (!settings.asset.empty()) {
     json["object"]["asset"] = data::relative_path(settings.asset, (out / "recording.json").string());

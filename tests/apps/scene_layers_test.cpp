@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/mesh_io.h"
+#include "data/procedural_mesh.h"
 #include "data/scene.h"
 #include "tests/apps/scene_run_fixture.h"
 
@@ -61,6 +63,7 @@ TEST_F(SceneRunTest, StartThatPassesThroughItselfIsRefused) {
   } catch (const data::InputError& error) {
     const std::string text = error.what();
     EXPECT_NE(text.find(" of lower passing through triangle "), std::string::npos) << text;
+    EXPECT_TRUE(text.starts_with(path + ": self_contact: start: ")) << text;
     EXPECT_NE(text.find(" of upper"), std::string::npos) << text;
   }
   EXPECT_FALSE(fs::exists(out()));
@@ -84,6 +87,41 @@ TEST_F(SceneRunTest, LayersThatStartInOnePlaceAreRefused) {
   EXPECT_FALSE(fs::exists(out()));
   // What holds carry whole has no say in it.
   EXPECT_EQ(run_scene(scene(R"(, "fixed": [{"vertices": "all"}])"), {}, out()).unconverged_steps, 0);
+}
+
+TEST_F(SceneRunTest, ASheetWithASeamThatIsNotJoinedIsWarnedOfOrRefused) {
+  // Two halves of the cloth, each with the vertices between them.
+  data::TriangleMesh mesh = data::parse_mesh_spec("sheet:0.1x0.1:0.02", "", "");
+  const Eigen::Index vertices = mesh.vertices.rows();
+  mesh.vertices.conservativeResize(vertices + 6, 3);
+  for (int k = 0; k < 6; ++k) mesh.vertices.row(vertices + k) = mesh.vertices.row(18 + k);
+  for (auto t : mesh.triangles.rowwise())
+    if (t.minCoeff() >= 18)
+      for (int& vertex : t)
+        if (vertex < 24) vertex += static_cast<int>(vertices) - 18;
+  data::save_triangle_mesh(mesh, (folder_ / "seam.obj").string());
+  std::string asset = data::read_file((folder_ / "cloth.json").string());
+  write("cloth.json", asset.replace(asset.find("sheet:0.1x0.1:0.02"), 18, "seam.obj"));
+  const auto run = [&](const char* contact) {
+    return run_scene(data::load_scene(write("scene.json", std::string(R"({"schema": "flash-scene/1",
+      "timestep": 0.01, "steps": 1, "gravity": [0, 0, -9.81], "objects": {"cloth": "cloth.json"})") +
+                                                              contact + "}")),
+                     {}, out());
+  };
+  const std::vector<std::string> warnings = run("").warnings;
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0],
+            "cloth: 12 of its 42 vertices share a place with another and are not joined: the mesh falls into "
+            "2 parts; flash-sim mesh makes one that is joined");
+  try {
+    run(R"(, "self_contact": {})");
+    FAIL() << "it has to be refused";
+  } catch (const data::InputError& error) {
+    const std::string text = error.what();
+    EXPECT_NE(text.find("found the surface at vertex "), std::string::npos) << text;
+    EXPECT_NE(text.find(" 0 m from that at "), std::string::npos) << text;
+    EXPECT_NE(text.find("join the vertices there (flash-sim mesh)"), std::string::npos) << text;
+  }
 }
 
 TEST_F(SceneRunTest, AnObjectWhollyInsideASolidIsRefused) {

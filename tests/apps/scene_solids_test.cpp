@@ -134,9 +134,10 @@ TEST_F(SceneRunTest, SolidsThatCannotBeAreNamed) {
   EXPECT_NE(message(box_scene("0.3", "newton", R"(, "start": {"mesh": "start.ply"})"))
                 .find("objects.box.start: turns tetrahedron 0 of "),
             std::string::npos);
-  EXPECT_EQ(
-      message(box_scene("0.3", "projective", "")),
-      "solver.type projective: box is a solid (element_type TETRAHEDRON), which type newton simulates alone");
+  EXPECT_EQ(message(box_scene("0.3", "projective", "")),
+            (folder_ / "scene.json").string() +
+                ": solver.type projective: box is a solid (element_type TETRAHEDRON), which type newton "
+                "simulates alone");
   EXPECT_FALSE(fs::exists(fs::path(out()) / "log.csv"));
 }
 

@@ -31,7 +31,8 @@ TEST_F(SceneRunTest, BadInputIsNamed) {
   EXPECT_NE(message(R"({"schema": "flash-scene/1", "timestep": 0.01, "gravity": [0, 0, -9.81], "objects":
     {"cloth": "cloth.json"}, "end_effectors": {"hand": {"keyframes": [{"t": 0, "translation": [0, 0, 1]}],
     "grasps": [{"from": 0}]}}})")
-                .find("the nearest is 0.99 m away"),
+                .find("scene.json: end effector hand: grasps: no vertex of cloth within 0.01 m of its box at "
+                      "0 s; the nearest is 0.99 m away"),
             std::string::npos);
 }
 

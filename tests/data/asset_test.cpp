@@ -232,6 +232,15 @@ TEST(Asset, SheetsMayBeWoven) {
   EXPECT_NE(
       error(kFlash, {{"bending_ratio", 2}, {"bending_model", "hinge"}}).find("expected bending_model plate"),
       std::string::npos);
+  for (const char* key : {"bending_ratio", "twisting_ratio"})
+    for (const double ratio : {1e308, 1e-300, 101.0})
+      EXPECT_NE(error(kFlash, {{key, ratio}}).find(", expected a number from 0.0"), std::string::npos)
+          << ratio;
+  EXPECT_NE(
+      error(kFlash, {{"warp_direction", 1e308}})
+          .find("towel.json: mechanical_props.warp_direction: found 1e+308, expected an angle from -360"),
+      std::string::npos);
+  EXPECT_EQ(error(kFlash, {{"warp_direction", -360}, {"bending_ratio", 100}, {"twisting_ratio", 0.001}}), "");
   EXPECT_NE(error(kPublished, {{"warp_direction", 10}}).find("flash-asset/1"), std::string::npos);
 }
 
@@ -288,6 +297,9 @@ TEST(Asset, MembranesMayBeWoven) {
     EXPECT_NE(error({{"constitutive", "TRI_COROTATED"}, {key, 0.5}})
                   .find("expected constitutive TRI_STVK, the only"),
               std::string::npos);
+    for (const double ratio : {1e308, 1e-300})
+      EXPECT_NE(error({{"constitutive", "TRI_STVK"}, {key, ratio}}).find(", expected a number from 0.0"),
+                std::string::npos);
     EXPECT_NE(error({{"constitutive", "TRI_STVK"}, {key, -1}}).find("found -1, expected a number above 0"),
               std::string::npos);
   }

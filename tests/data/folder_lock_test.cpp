@@ -5,8 +5,11 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <optional>
 
+#include "data/error.h"
 #include "tests/data/temporary_folder.h"
 
 namespace flash::data {
@@ -28,6 +31,27 @@ TEST(FolderLock, HoldsTheFolderOfItsFileUntilItEnds) {
   lock.reset();
   EXPECT_TRUE(is_free(folder / "new"));
   const FolderLock nothing("");
+}
+
+TEST(RunFolder, IsHeldByOneRunAtATime) {
+  const TemporaryFolder folder;
+  const std::string out = folder / "some/out";
+  {
+    const RunFolder first(out);
+    try {
+      const RunFolder second(out);
+      FAIL() << "two runs hold one folder";
+    } catch (const InputError& e) {
+      EXPECT_EQ(e.what(), out + ": another run is writing to it; wait for it, or name another folder");
+    }
+    EXPECT_TRUE(std::filesystem::exists(out));  // the refused run takes nothing away
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder / "some"));  // nothing was written
+  {
+    const RunFolder again(out);
+    std::ofstream(out + "/log.csv") << "step\n";
+  }
+  EXPECT_TRUE(std::filesystem::exists(out + "/log.csv"));
 }
 
 }  // namespace

@@ -241,6 +241,9 @@ TEST(MeshIo, BrokenMeshesAreNamed) {
   EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 x\n"), ": line 2: found \"x\", expected a coordinate");
   EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 4\n"),
             ": triangle 0: found vertex index 3, expected 0 to 2");
+  EXPECT_EQ(message("a.obj", "f 1 2 3\n"), ": found no vertices, expected those that its elements name");
+  EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1e300 0 0\nv 0 1 0\nf 1 2 3\n"),
+            ": vertex 1: found a coordinate of 1e+300, expected at most 1e+12");
   EXPECT_EQ(message("a.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 99999999999\n"),
             ": line 4: found \"99999999999\", expected a vertex index from 1");
   EXPECT_EQ(message("a.vtk", "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\n"),
@@ -261,6 +264,8 @@ TEST(MeshIo, BrokenTetrahedraAreNamed) {
             ": line 6: found \"0\", expected a vertex index from 1");
   EXPECT_EQ(message("a.tet", corners + "t 1 2 3 6\n"),
             ": tetrahedron 0: found vertex index 5, expected 0 to 4");
+  EXPECT_EQ(message("a.tet", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 -1e300\nt 1 2 3 4\n"),
+            ": vertex 3: found a coordinate of 1e+300, expected at most 1e+12");
   EXPECT_EQ(message("a.tet", corners), ": found no tetrahedra");
   EXPECT_EQ(message("a.tet", corners + "t 1 2 3 4\n"), ": vertex 4: belongs to no tetrahedron");
   EXPECT_EQ(message("a.tet", corners + "v 0.5 0.5 0\nt 1 2 3 4\nt 1 2 3 6\n"),

@@ -264,6 +264,10 @@ TEST_F(SceneFiles, WrongFieldsAreNamed) {
       "friction[0].b: found \"rail\", expected one object, and one obstacle or end effector that collides");
   EXPECT_EQ(changed(kFlash, "/friction/1", {{"a", "flag"}, {"b", "table"}, {"friction", 1}}),
             "friction[1].b: found \"table\", expected each pair once");
+  EXPECT_EQ(changed(kFlash, "/objects/cloth/fixed/0/name", ""),
+            "objects.cloth.fixed[0].name: found \"\", expected a name");
+  EXPECT_EQ(changed(kFlash, "/obstacles/", {{"shape", "plane"}, {"normal", {0, 0, 1}}, {"point", {0, 0, 0}}}),
+            "obstacles: found the name \"\", expected a name for each");
   EXPECT_EQ(
       changed(kFlash, "/obstacles/left", {{"shape", "plane"}, {"point", {0, 0, 0}}, {"normal", {0, 0, 1}}}),
       "end_effectors.left: found a name that another body has, expected names that differ");

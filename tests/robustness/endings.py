@@ -220,6 +220,32 @@ def check_signals(options, folder):
     yield process.returncode == 128 + signal.SIGTERM, f"a second signal: exit code {process.returncode}"
 
 
+def check_two_runs(options, folder):
+    """Into the folder of a run that is going on no other run writes, whenever it starts."""
+    out = folder / "shared"
+    first = started([options.sim, "run", "long.json", "--quiet", "-o", out], folder, signal.SIGTERM)
+    while first.poll() is None and not (out / "frames" / "000002.ply").exists():
+        time.sleep(0.01)
+    second = program.call(options.sim, "run", folder / "short.json", "--quiet", "--force", "-o", out)
+    yield second.returncode == REFUSED, f"--force beside a run: exit code {second.returncode}: {second.stderr}"
+    yield (second.stderr == f"flash-sim: {out}: another run is writing to it; wait for it, or name another folder\n",
+           f"--force beside a run: {second.stderr}")
+    first.send_signal(signal.SIGTERM)
+    text = first.communicate()[1]
+    rows = len((out / "log.csv").read_text().splitlines()) - 1
+    frames = sorted(path.name for path in (out / "frames").iterdir())
+    yield f"stopped after {rows:,} of 100,000 steps" in text, f"the run beside --force: {text}"
+    yield frames == [f"{k:06d}.ply" for k in range(rows + 1)], f"frames of the run beside --force: {frames}"
+    both = folder / "at_once"
+    words = list(map(str, [options.sim, "run", "long.json", "--steps", "20", "--quiet", "-o", both]))
+    runs = [subprocess.Popen(words, cwd=folder, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [run.communicate()[1] for run in runs]
+    codes = sorted(run.returncode for run in runs)
+    yield codes == [0, REFUSED], f"two runs at once: exit codes {codes}: {said}"
+    yield sum(text.count("another run is writing") for text in said) == 1, f"two runs at once: {said}"
+    yield len(list((both / "frames").iterdir())) == 21, "two runs at once: frames"
+
+
 def check_defaults(options, folder):
     done = program.must(options.sim, "run", folder / "default.json", "-o", folder / "by_default")
     yield "100 steps are run, the default" in done.stderr, f"the default is not said: {done.stderr}"
@@ -331,6 +357,18 @@ def check_killed_replay(options, folder):
     yield not left, f"replay --force keeps {left}"
 
 
+def check_seams(options, folder):
+    """A sheet of two halves that are not joined is warned of, and the warning is no matter of --quiet."""
+    grid = [(0.05 * i, 0.05 * j) for j in (0, 1, 2, 2, 3, 4) for i in range(5)]  # the third row twice
+    corners = [(5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5) for j in (0, 1, 3, 4) for i in range(4)]
+    (folder / "seam.obj").write_text("".join("v %g %g 0\n" % place for place in grid) +
+                                     "".join("f %d %d %d %d\n" % tuple(v + 1 for v in face) for face in corners))
+    done = program.call(options.sysid, "replay", folder / "recording", "--asset", folder / "asset.json", "--mesh",
+                        folder / "seam.obj", "--quiet", "-o", folder / "seam")
+    yield ("seam.obj: 10 of its 30 vertices share a place with another and are not joined: the mesh falls into 2 parts"
+           in done.stderr and done.stderr.startswith("flash-sysid: warning: ")), f"replay of a seam: {done.stderr}"
+
+
 def check_fit(options, folder):
     """The guide's own line after the guide's own grid: a frozen parameter need not have been searched."""
     recording, asset, run = folder / "recording", folder / "asset.json", folder / "run"
@@ -397,9 +435,9 @@ def main():
         folder = pathlib.Path(temporary)
         write_inputs(folder)
         program.synthesize(options.sysid, folder)
-        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_defaults, check_resume,
-                      check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay, check_fit,
-                      check_tuned):
+        for check in (check_refusals, check_accepted, check_lost_results, check_signals, check_two_runs, check_defaults,
+                      check_resume, check_order, check_file_limit, check_collapse, check_fixed, check_killed_replay,
+                      check_seams, check_fit, check_tuned):
             for holds, complaint in check(options, folder):
                 done += 1
                 failed += not holds

@@ -65,7 +65,12 @@ TEST_F(TrackImport, LeavesNothingBehindWhereItFails) {
   settings_.clamp.max.x() = 0;
   settings_.on_support = {"bass"};
   EXPECT_NE(message().find("did you mean \"base\"?"), std::string::npos);
+  EXPECT_EQ(message(), "import: recording.json: markers.on_support: found marker \"bass\", expected one of " +
+                           settings_.tracks + " (did you mean \"base\"?)");
   settings_.on_support = {"base"};
+  settings_.placed = folder_.write("places.csv", "marker,x,y,z\nbase,5,0,0\ntop,0,0,0\n");
+  EXPECT_EQ(message(), "import: recording.json: markers.placed: found marker \"top\", expected one of " +
+                           settings_.tracks + " (did you mean \"tip\"?)");
   settings_.mesh_spec = folder_ / "missing.vtk";
   EXPECT_NE(message().find("--mesh: found"), std::string::npos);
 }
