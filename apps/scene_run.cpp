@@ -399,8 +399,8 @@ SceneSummary run_scene(const data::Scene& scene, const SceneRun& run, const std:
     if (frames.count(0)) write_frame(0, at_start);
   };
   try {
-    if (steps == 0) begin_writing();
     if (run.progress && !run.progress(0, steps)) summary.interrupted = steps > 0;
+    if (steps == 0) begin_writing();
     bool done = false;
     begins("solving the first step of " + size);
     for (int step = 1; step <= steps && !summary.interrupted && !done; ++step) {

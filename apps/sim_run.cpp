@@ -128,14 +128,19 @@ int run(const RunOptions& options) {
     throw data::InputError("--device cuda: scenes run on the CPU alone; use --device cpu or auto");
   namespace fs = std::filesystem;
   data::check_folder_free(options.out, options.force);
+  std::optional<data::RunFolder> folder;
+  const auto hold_folder = [&] {
+    if (folder) return;
+    folder.emplace(options.out);
+    data::check_folder_free(options.out, options.force);  // a run that has just ended may have filled it
+  };
+  if (fs::exists(options.out)) hold_folder();  // else at the first step: until then a signal leaves nothing
   std::optional<SaidWhenSlow> phase;
   const auto begin = [&](const std::string& what) {
     if (!options.quiet) phase.emplace(what + " ...");
   };
   begin("reading " + options.scene);
   const data::Scene scene = data::load_scene(options.scene);
-  const data::RunFolder folder(options.out);
-  data::check_folder_free(options.out, options.force);  // a run that has just ended may have filled it
   ProgressLine progress(!options.quiet);
   sim::SceneRun settings;
   settings.steps = steps_to_run(options, scene);
@@ -149,6 +154,7 @@ int run(const RunOptions& options) {
   settings.progress = [&](int done, int steps) {
     phase.reset();
     const std::atomic<bool>& stop = stop_on_signals();  // until the first step there is nothing to keep
+    hold_folder();
     progress.show(done, steps);
     return !stop;
   };
