@@ -55,7 +55,8 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   MotionLikelihood likelihood = likelihood_about(
       task, found, on_model, mode, motions_at(found.emulator, mode, found.emulator.share), held);
   const Eigen::VectorXd of_points = deviance_over(found.emulator, found.axes, likelihood, task.grid);
-  const std::vector<Motion> at_mode = motions_in(*simulated);
+  const std::vector<ReplayResult> mode_there = *simulated;
+  const std::vector<Motion> at_mode = motions_in(mode_there);
   std::vector<MotionLikelihood::Nuisance> fitted;
   const double of_mode = likelihood.deviance(
                    [&](std::size_t r, double) -> const Motion& { return at_mode[r]; }, fitted),
@@ -64,7 +65,7 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
   // Where the search's best is beyond the emulator's grid, both are moved alike to cells of no size.
   std::vector<KnownError> errors = held;
   errors.push_back({{{-1, std::make_shared<const Motions>(Motions{task.replays, own})},
-                     {1, std::make_shared<const Motions>(Motions{on_model, std::move(*simulated)})}},
+                     {1, std::make_shared<const Motions>(Motions{on_model, mode_there})}},
                     true,
                     true});
   const MotionLikelihood on_own = likelihood_about(task, found, task.replays, mode, own, std::move(errors));
@@ -89,12 +90,18 @@ Settled settle(const Task& task, Found& found, const std::vector<double>& best,
     if (better > kFails || by_extrapolation_alone || ask_for_own_mesh(found, held, likelihood, fitted))
       return Settled::on_own_mesh;
   }
-  // Of values that are as good as equally likely, those whose motion is nearest.
+  // Of values that are as good as equally likely, those whose motion is nearest, on the search's mesh and on
+  // that of the answer.
   if (fall_to_best > -kLikely && !reaches_beyond(at_best, found.axes) &&
       kFarther * score_motions(task.replays, of_best, task.grid.score).score <
           score_motions(task.replays, own, task.grid.score).score) {
-    set_estimate(found.look.posterior, found.axes, best);
-    return Settled::by_emulator;
+    std::vector<ReplayResult> on_own_mesh;
+    const auto best_there = simulate_at(task, found.emulator, best, false, on_own_mesh);
+    if (best_there && kFarther * score_motions(on_model, *best_there, task.grid.score).score <
+                          score_motions(on_model, mode_there, task.grid.score).score) {
+      set_estimate(found.look.posterior, found.axes, best);
+      return Settled::by_emulator;
+    }
   }
   const double share_of_points = 1 - std::exp(-0.5 * std::max(fall, fall_to_best));
   if (!(share_of_points > 0)) return Settled::by_emulator;

@@ -143,11 +143,12 @@ std::vector<std::string> unlike_the_search(const data::Asset& asset,
        {"sigmas", "--sigma"}}};
   if (here("object_mesh") == searched("object_mesh")) differs("--mesh", here("mesh"), searched("mesh"));
   for (const auto& [name, option] : kOptions) differs(option, here(name), searched(name));
-  for (const auto& [name, value] : values_of_recording(identification)) {
+  for (const auto& of_recording : values_of_recording(identification)) {
+    const std::string& name = of_recording.first;
     const auto hold =
         std::find_if(held.begin(), held.end(), [&](const Axis& axis) { return axis.name == name; });
     differs("--hold " + name, hold == held.end() ? "none" : data::format_short(hold->values.front()),
-            data::format_short(value));
+            data::format_short(of_recording.second));
   }
   return lines;
 }

@@ -20,8 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double weight = 0.2 * 0.01 * 9.81;  // of the cloth in cloth.json [N]
-
 /// How often edges of the triangles of one mesh pass through triangles of the other.
 int passing(const data::TriangleMesh& edges, const data::TriangleMesh& faces) {
   int count = 0;

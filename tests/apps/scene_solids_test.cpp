@@ -18,8 +18,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double weight = 0.2 * 0.01 * 9.81;  // of the cloth in cloth.json [N]
-
 /// A box of tetrahedra on a table, from files.
 std::string box_scene(const std::string& poisson, const std::string& solver, const std::string& start) {
   return R"({"schema": "flash-scene/1", "timestep": 0.01, "steps": 20, "gravity": [0, 0, -9.81],
