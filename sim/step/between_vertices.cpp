@@ -26,9 +26,10 @@ double depth_in_mesh(const SurfaceMesh& mesh, const Corners& corners) {
 
 /// Raises `deepest` to the depth of a triangle in a convex obstacle, if that is larger by more than
 /// `tolerance`. The distance to a convex set is convex: over the triangle it is no less than its tangent at
-/// the centre. Where that leaves room, the triangle is quartered.
+/// the centre. Where that leaves room, the triangle is quartered, `levels` times at most: rounding ends it
+/// too.
 void look_for_deeper(const MovingObstacle<double>& obstacle, const Corners& corners, double tolerance,
-                     double& deepest) {
+                     int levels, double& deepest) {
   const auto& [a, b, c] = corners;
   const Eigen::Vector3d centre = (a + b + c) / 3;
   const SurfaceGap<double> gap = gap_to(obstacle, vector3(centre));
@@ -36,11 +37,11 @@ void look_for_deeper(const MovingObstacle<double>& obstacle, const Corners& corn
   double bound = -gap.distance;
   for (const Eigen::Vector3d& corner : corners)
     bound = std::max(bound, -gap.distance - vector3d(gap.normal).dot(corner - centre));
-  if (bound <= deepest + tolerance) return;
+  if (levels == 0 || !(bound > deepest + tolerance)) return;
   const Eigen::Vector3d ab = (a + b) / 2, bc = (b + c) / 2, ca = (c + a) / 2;
   for (const Corners& part :
        {Corners{a, ab, ca}, Corners{ab, b, bc}, Corners{ca, bc, c}, Corners{ab, bc, ca}})
-    look_for_deeper(obstacle, part, tolerance, deepest);
+    look_for_deeper(obstacle, part, tolerance, levels - 1, deepest);
 }
 
 /// The vertices that a frame holds, to which its obstacles are none.
@@ -55,6 +56,7 @@ std::vector<bool> held_by(const Environment& environment, int frame) {
 }  // namespace
 
 ComingThrough deepest_between_vertices(const Sheet& sheet, const Environment& environment, double from) {
+  constexpr int kLevels = 24;  // from kilometres to a tenth of a millimetre
   const double time = environment.state.time;
   ComingThrough found{from, -1, time};
   const data::Triangles triangles = visible_triangles(sheet);
@@ -79,7 +81,7 @@ ComingThrough deepest_between_vertices(const Sheet& sheet, const Environment& en
       else if (std::none_of(corners.begin(), corners.end(), [&](const Eigen::Vector3d& corner) {
                  return -gap_to(obstacles[k], vector3(corner)).distance > from;
                }))
-        look_for_deeper(obstacles[k], corners, 0.1 * from, depth);
+        look_for_deeper(obstacles[k], corners, 0.1 * from, kLevels, depth);
       if (depth > found.depth) found = {depth, static_cast<int>(k), time};
     }
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "tests/sim/lot.h"
 #include "tests/sim/obstacle_depth.h"
@@ -43,6 +44,18 @@ TEST(BetweenVertices, WhatIsLessDeepThanAskedForIsNotTold) {
   const Pair pair(corners, {Cylinder{Vector3d(0, 0, 0), Vector3d(1, 0, 0), 0.008}});
   EXPECT_EQ(deepest_between_vertices(pair.sheet, pair.environment, from).obstacle, -1);
   EXPECT_EQ(deepest_between_vertices(pair.sheet, pair.environment, from).depth, 0);
+}
+
+TEST(BetweenVertices, PositionsThatAreNowhereOrFarAwayEndTheLook) {
+  for (const double place : {std::nan(""), std::numeric_limits<double>::infinity(), 1e12}) {
+    const data::Points corners =
+        (data::Points(3, 3) << -place, -place, 0.003, place, -place, 0.003, 0, place, 0.003).finished();
+    for (const Obstacle& obstacle : {Obstacle{Capsule{Vector3d(0, 0, 0), Vector3d(1, 0, 0), 0.5, 0.008}},
+                                     Obstacle{Box{.half_extents = {0.01, 0.01, 0.01}}}}) {
+      const Pair pair(corners, obstacle);
+      EXPECT_LT(deepest_between_vertices(pair.sheet, pair.environment, from).depth, 0.0101);
+    }
+  }
 }
 
 TEST(BetweenVertices, IsThatOfAllPlacesOfATriangle) {
