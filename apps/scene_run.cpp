@@ -14,11 +14,11 @@
 #include "apps/contact_tables.h"
 #include "apps/csv_text.h"
 #include "apps/hold_watch.h"
+#include "apps/scene_warnings.h"
 #include "data/atomic_file.h"
 #include "data/error.h"
 #include "data/memory_limit.h"
 #include "data/mesh_io.h"
-#include "data/seams.h"
 #include "data/text.h"
 #include "data/worst.h"
 #include "sim/newton/solver.h"
@@ -205,76 +205,7 @@ struct Deepest {
   }
 };
 
-/// Of bodies whose mesh is stiffer than their material.
-std::vector<std::string> locking_warnings(const std::vector<SceneBody>& bodies) {
-  std::vector<std::string> warnings;
-  for (const SceneBody& body : bodies)
-    for (const auto& [number, solid] : body.environment.solids)
-      if (solid.poissons_ratio >= locking_poissons_ratio &&
-          !is_quadratic(body.sheet, body.sheet.bodies[static_cast<std::size_t>(number)]))
-        warnings.push_back(body.name +
-                           ": linear tetrahedra lock at nu = " + data::format_short(solid.poissons_ratio) +
-                           ", from " + data::format_short(locking_poissons_ratio) +
-                           " on: bent, they are stiffer than their E says, the more the coarser; take "
-                           "\"element_order\": 2 in the asset (docs/theory.md)");
-  return warnings;
-}
-
-/// Of sheets with vertices in one place that are not joined.
-std::vector<std::string> seam_warnings(const std::vector<SceneBody>& bodies) {
-  std::vector<std::string> warnings;
-  for (const SceneBody& object : bodies)
-    for (const Body& body : object.sheet.bodies) {
-      if (body.is_solid()) continue;
-      const std::string seams = data::seam_warning(body_alone(object.sheet, body).rest);
-      if (!seams.empty()) warnings.push_back((body.name.empty() ? object.name : body.name) + ": " + seams);
-    }
-  return warnings;
-}
-
-/// The most tetrahedra of a solid that have collapsed at the end of a step.
-struct Collapse {
-  int elements = 0;
-  double time = 0;  ///< [s]
-};
-
-std::string collapse_warning(const SceneBody& in, int number, const Collapse& worst) {
-  const Body& body = in.sheet.bodies[static_cast<std::size_t>(number)];
-  const data::Constitutive law = in.environment.solids.at(number).constitutive;
-  const bool rests_at_a_point = law == data::Constitutive::tet_neohookean;
-  return (body.name.empty() ? in.name : body.name) + ": " + std::to_string(worst.elements) + " of " +
-         std::to_string(body.tetrahedron_count) + " tetrahedra have less than " +
-         data::format_short(collapsed_volume_share) + " of their rest volume at " +
-         data::format_short(worst.time) + " s, and " +
-         std::to_string(count_collapsed(in.sheet, body, in.environment.state.positions)) +
-         " at the end: the solid is pressed farther than its law carries" +
-         (rests_at_a_point ? "; TET_NEOHOOKEAN stays where it has come to a point" : "") +
-         (law == data::Constitutive::tet_neohookean_log ? "" : "; take TET_NEOHOOKEAN_LOG") +
-         ", or press it less (docs/theory.md, Solids)";
-}
-
 constexpr double told_depth = 1e-4;  ///< of vertices inside an obstacle [m]
-
-constexpr double told_coming_through = 1e-3;  ///< of an obstacle between vertices [m]
-
-/// Of bodies that an obstacle came through between their vertices; `deepest`: of each, at any time of the
-/// run.
-std::vector<std::string> coming_through_warnings(const std::vector<SceneBody>& bodies,
-                                                 const std::vector<ComingThrough>& deepest) {
-  std::vector<std::string> warnings;
-  for (std::size_t b = 0; b < bodies.size(); ++b) {
-    if (deepest[b].obstacle < 0) continue;
-    const SceneBody& body = bodies[b];
-    const double at_end = deepest_between_vertices(body.sheet, body.environment, told_coming_through).depth;
-    warnings.push_back(
-        body.name + ": " + body.environment.obstacles[static_cast<std::size_t>(deepest[b].obstacle)].name +
-        " comes through between its vertices by " + data::format_short(1e3 * deepest[b].depth) + " mm at " +
-        data::format_short(deepest[b].time) + " s" +
-        (at_end > 0 ? ", by " + data::format_short(1e3 * at_end) + " mm at the end" : "") +
-        ": contact is that of vertices; take smaller cells, or give a mesh a margin");
-  }
-  return warnings;
-}
 
 std::set<int> frames_to_write(const data::Scene& scene, int steps) {
   std::set<int> frames;
@@ -285,17 +216,6 @@ std::set<int> frames_to_write(const data::Scene& scene, int steps) {
     if (k >= 0 && k <= steps) frames.insert(int(k));
   }
   return frames;
-}
-
-/// Keyframes after the last step, which are not written.
-std::vector<std::string> keyframe_warnings(const data::Scene& scene, int steps) {
-  const double end = (steps + 0.5) * scene.time_step;
-  const auto late = std::count_if(scene.keyframe_times.begin(), scene.keyframe_times.end(),
-                                  [&](double t) { return t > end; });
-  if (late == 0) return {};
-  return {"keyframes: " + std::to_string(late) + " of " + std::to_string(scene.keyframe_times.size()) +
-          " lie after the end at " + data::format_short(steps * scene.time_step) +
-          " s and are not written: is the duration right?"};
 }
 
 /// Takes away all velocity; returns the largest there was [m/s].
