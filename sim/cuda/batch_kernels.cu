@@ -125,10 +125,10 @@ __global__ void __launch_bounds__(block_threads, resident_blocks_each)
         {batch.restrictions + static_cast<long>(batch.restrictions_each) * e, batch.restriction_counts[e],
          batch.restriction_of + static_cast<long>(batch.restrictions_each) * e},
         tolerance};
-    const int solves = conjugate_gradients<parts>(
+    const LinearEnd end = conjugate_gradients<parts>(
         batch.fronts, batch.sheet, problem, linear_vectors(batch), result_of(batch, e),
         batch.changes + 3L * batch.sheet.size * e, chip, reinterpret_cast<char*>(chip + linear_partials));
-    if (team_rank() == 0) batch.solves[e] = solves;
+    if (team_rank() == 0) batch.solves[e] = end.solves;
   }
 }
 

@@ -21,7 +21,17 @@ struct LinearProblem {
   const float* gradient;
   Restrictions restrictions;
   float tolerance;
+  bool goes_on = false;  ///< from the direction that is there, that of a problem with other contacts
 };
+
+/// How a linear problem went.
+struct LinearEnd {
+  int solves;            ///< with the factor
+  float first_residual;  ///< norm of that at the start
+};
+
+/// Share of the first residual that a linear problem is solved to, as on the CPU.
+inline constexpr float linear_share = 0.1f;
 
 /// Memory of a team, three numbers a vertex but where said.
 struct LinearVectors {
@@ -111,13 +121,12 @@ __device__ inline Numbers3 free_part(const Restrictions& restrictions, int verte
 inline constexpr int linear_partials = 2 * seats;
 
 /// `direction` = the solution over the free directions, `change` = matrix * direction. Stops as the CPU does:
-/// at a tenth of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
-/// Returns the number of solves with the factor, to all threads. `partial`, `chip`: on chip, linear_partials
-/// and solve_memory.
+/// at a share of the residual, at the tolerance, where the matrix curves down, after `most` iterations.
+/// `partial`, `chip`: on chip, linear_partials and solve_memory. What it returns all threads get.
 template <int parts>
-__device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
-                                   const LinearProblem& problem, const LinearVectors& v, float* direction,
-                                   float* change, float* partial, char* chip) {
+__device__ LinearEnd conjugate_gradients(const FrontTables& fronts, const SheetTables& sheet,
+                                         const LinearProblem& problem, const LinearVectors& v,
+                                         float* direction, float* change, float* partial, char* chip) {
   constexpr int most = 20;
   const int size = sheet.size;
   float *residual = v.residual, *preconditioned = v.solved + 3 * size;
@@ -138,7 +147,9 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
       [&](int i) {
         const int at = restrictions.count == 0 ? -1 : restrictions.of_place[i];
         const float* correction = at < 0 ? nullptr : restrictions.list[at].correction;
-        const Numbers3 start = at < 0 ? Numbers3{} : Numbers3{correction[0], correction[1], correction[2]};
+        Numbers3 start = at < 0 ? Numbers3{} : Numbers3{correction[0], correction[1], correction[2]};
+        if (problem.goes_on)
+          start = scaled_sum(start, 1, free_part(restrictions, i, numbers_at(direction, i)));
         return NumbersPair{numbers_at(problem.gradient, i), start};
       },
       [&](int i, const NumbersPair& from) {
@@ -196,7 +207,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
         });
   };
   float norm = take_residual(starts_elsewhere ? 1.0f : 0.0f), previous = 0;
-  const float target = fmaxf(0.1f * norm, problem.tolerance);
+  const float first_residual = norm, target = fmaxf(linear_share * norm, problem.tolerance);
   int iteration = 0;
   while (norm > target && iteration < most) {
     ++iteration;
@@ -233,7 +244,7 @@ __device__ int conjugate_gradients(const FrontTables& fronts, const SheetTables&
     norm = take_residual(step);
   }
   synchronize_team();
-  return iteration;
+  return {iteration, first_residual};
 }
 
 }  // namespace flash::sim::cuda

@@ -207,14 +207,13 @@ inline __device__ void add_hinge_blocks(const SheetTables& tables, const HingeMa
   }
 }
 
-/// Leaves of a block what moves in the free directions of both its vertices; on the diagonal stands a mean
-/// stiffness in the others.
+/// Leaves of a block what moves in the free directions of both its vertices; on the diagonal the others stay
+/// among themselves (restrict_matrix of sim/newton/active_set.h).
 inline __device__ void restrict_block(const SheetTables& tables, const Restrictions& restrictions, int b,
                                       Block& block) {
   const int row = restrictions.of_place[tables.block_rows[b]],
             column = restrictions.of_place[tables.block_columns[b]];
   if (row < 0 && column < 0) return;
-  const float mean = (block.numbers[0] + block.numbers[4] + block.numbers[8]) / 3;
   const auto product = [](const float* left, const float* right) {
     Block result;
 #pragma unroll
@@ -223,12 +222,16 @@ inline __device__ void restrict_block(const SheetTables& tables, const Restricti
                           left[6 + e % 3] * right[e / 3 * 3 + 2];
     return result;
   };
+  const Block whole = block;
   if (row >= 0) block = product(restrictions.list[row].free, block.numbers);
   if (column >= 0) block = product(block.numbers, restrictions.list[column].free);
   if (b >= tables.size) return;
-  const float* free = restrictions.list[row].free;
+  float held[9];
 #pragma unroll
-  for (int e = 0; e < 9; ++e) block.numbers[e] += mean * ((e % 4 == 0 ? 1.0f : 0.0f) - free[e]);
+  for (int e = 0; e < 9; ++e) held[e] = (e % 4 == 0 ? 1.0f : 0.0f) - restrictions.list[row].free[e];
+  const Block among_held = product(product(held, whole.numbers).numbers, held);
+#pragma unroll
+  for (int e = 0; e < 9; ++e) block.numbers[e] += among_held.numbers[e];
 }
 
 /// The same with bending or the stand-in for it, as blocks of the pattern: what is factorized. `chip`: nine

@@ -141,14 +141,17 @@ __device__ inline LinearWork linear_work(const Work& w, const StepProblem& step)
           chip + linear_partial_bytes};
 }
 
-/// Solves the linear problem. Returns the number of solves with the factor.
-__device__ __noinline__ int find_direction(const Work& w, const StepProblem& step) {
-  const LinearWork own = linear_work(w, step);
+/// Solves the linear problem. `enough`: residual that is small enough for one that goes on from the last
+/// direction, 0 for one that does not.
+__device__ __noinline__ LinearEnd find_direction(const Work& w, const StepProblem& step, float enough) {
+  LinearWork own = linear_work(w, step);
+  own.problem.goes_on = enough > 0;
+  own.problem.tolerance = fmaxf(own.problem.tolerance, enough);
   return conjugate_gradients<half_parts>(w.replay.fronts, w.replay.sheet, own.problem, own.vectors,
                                          w.memory.direction, w.memory.change, own.partial, own.chip);
 }
 
-/// The same where friction follows the normal forces.
+/// The same where friction follows the normal forces. Returns the number of solves with the factor.
 __device__ __noinline__ int find_coupled_direction(const Work& w, const StepProblem& step) {
   const LinearWork own = linear_work(w, step);
   return generalized_residuals<half_parts>(w.replay.fronts, w.replay.sheet, own.problem, own.vectors,
@@ -172,13 +175,16 @@ __device__ void linear_step(Work& w, StepProblem& step, bool stuck, bool coupled
   synchronize_team();
   count_phase(m, ReplayPhase::rest);
   bool refactor = false;
+  float enough = 0;
   for (int solved = 1;; ++solved) {
     restrict_by(w, w.linear, coupled, step);
     count_phase(m, ReplayPhase::contact);
-    const int solves = coupled ? find_coupled_direction(w, step) : find_direction(w, step);
+    const LinearEnd end =
+        coupled ? LinearEnd{find_coupled_direction(w, step), 0} : find_direction(w, step, enough);
     count_phase(m, ReplayPhase::directions);
-    stats.solves += solves;
-    refactor = refactor || solves > w.replay.stale_factor_solves;
+    stats.solves += end.solves;
+    refactor = refactor || end.solves > w.replay.stale_factor_solves;
+    if (solved == 1) enough = linear_share * end.first_residual;
     // What holds in the last one has to be what its direction was found with.
     if (!touches || solved == linear_problems) break;
     const bool changed =

@@ -30,8 +30,8 @@ void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, Bl
   for (const VertexConstraint& c : contacts.constraints) {
     if (c.freedom == Freedom::free) continue;
     auto own = block(values, c.vertex);
-    const Matrix3d free = matrix3d(c.free);
-    own = free * own * free + own.trace() / 3 * (Matrix3d::Identity() - free);
+    const Matrix3d free = matrix3d(c.free), held = Matrix3d::Identity() - free;
+    own = free * own * free + held * own * held;
   }
   for (size_t k = 0; k < pattern.pairs.size(); ++k) {
     const auto [row, column] = pattern.pairs[k];

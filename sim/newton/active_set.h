@@ -11,7 +11,9 @@ void add_slip_stiffness(const ContactSet& contacts, BlockValues<double>& values)
 /// turns as they slide.
 void add_surface_curvature(const ContactSet& contacts, BlockValues<double>& values);
 
-/// P B P + (I - P) scaled to its neighbours: the matrix of the free directions.
+/// P B P + Q B Q, with the blocks on the diagonal in Q = I - P alone: the matrix of the free directions. A
+/// factor outlives its contacts. What they let go then finds its own stiffness there: with that of the
+/// membrane, a thousand times that of bending, conjugate gradients took up to half as many iterations more.
 void restrict_matrix(const BlockPattern& pattern, const ContactSet& contacts, BlockValues<double>& values);
 
 /// The iterate about which a problem is linear.

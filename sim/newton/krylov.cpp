@@ -9,17 +9,7 @@
 namespace flash::sim {
 namespace {
 
-constexpr double enough = 0.1;       ///< share of the first residual: a direction needs a digit or two
 constexpr int most_directions = 40;  ///< of GMRES, which keeps all of them
-
-template <typename Scalar>
-void apply(const std::vector<VertexMatrix<Scalar>>& matrices, OrderedVector<Scalar>& x) {
-  for (const VertexMatrix<Scalar>& matrix : matrices) {
-    auto own = x.template segment<4>(4L * matrix.position);
-    own = (matrix.columns.col(0) * own[0] + matrix.columns.col(1) * own[1] + matrix.columns.col(2) * own[2])
-              .eval();
-  }
-}
 
 void precondition(BlockCholesky<float>& factor, const OrderedVector<float>& residual, OrderedVector<float>&,
                   OrderedVector<float>& result) {
@@ -53,6 +43,7 @@ KrylovSolution<Scalar> conjugate_gradients(const RestrictedProblem<Scalar>& prob
   apply(problem.free, residual);
   const auto norm_of = [&](const Vector& v) { return std::sqrt(kernels.dot(size, v.data(), v.data())); };
   Scalar norm = norm_of(residual), previous = 0;
+  solution.first_residual = norm;
   const Scalar target = std::max(Scalar(enough) * norm, static_cast<Scalar>(problem.tolerance));
   while (norm > target && solution.solves < problem.most_solves) {
     const bool first = solution.solves++ == 0;

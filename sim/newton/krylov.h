@@ -29,15 +29,29 @@ struct RestrictedProblem {
   BlockCholesky<float>& preconditioner;    ///< factor of a positive definite matrix near P A P
   std::vector<VertexMatrix<Scalar>> free;  ///< P
   OrderedVector<Scalar> right;             ///< b
-  OrderedVector<Scalar> start;             ///< x, zero in the free directions
-  double tolerance;                        ///< residual that is small enough; so is a tenth of the first
+  OrderedVector<Scalar> start;             ///< x, as it has to be but in the free directions
+  double tolerance;                        ///< residual that is small enough; so is `enough` of the first
   int most_solves = 20;                    ///< iterations of conjugate gradients
 };
+
+/// x <- M x, by the matrices of some vertices.
+template <typename Scalar>
+void apply(const std::vector<VertexMatrix<Scalar>>& matrices, OrderedVector<Scalar>& x) {
+  for (const VertexMatrix<Scalar>& matrix : matrices) {
+    auto own = x.template segment<4>(4L * matrix.position);
+    own = (matrix.columns.col(0) * own[0] + matrix.columns.col(1) * own[1] + matrix.columns.col(2) * own[2])
+              .eval();
+  }
+}
+
+/// Share of the first residual that conjugate gradients solve to: a direction needs a digit or two.
+inline constexpr double enough = 0.1;
 
 template <typename Scalar>
 struct KrylovSolution {
   OrderedVector<Scalar> x, image;  ///< x and A x
   int solves = 0;                  ///< with the preconditioner
+  double first_residual = 0;       ///< norm of that at the start
 };
 
 /// Conjugate gradients for a symmetric A; they stop where it curves down (Steihaug 1983).

@@ -103,7 +103,7 @@ void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWor
   assemble_matrix(problem, stuck, coupled, w);
   const Linearization iterate{problem.contacts, w.now.positions, w.now.force, w.now.residual};
   const double lightest = *std::min_element(problem.force_scales.begin(), problem.force_scales.end());
-  const double enough = linear_tolerance * std::min(w.settings.tolerance * lightest, w.now.residual.norm());
+  const double small = linear_tolerance * std::min(w.settings.tolerance * lightest, w.now.residual.norm());
   w.linear = w.now.contacts;
   w.gradient = w.now.residual;
   w.refactor = false;
@@ -111,8 +111,8 @@ void linear_step(const StepProblem& problem, bool stuck, bool coupled, NewtonWor
     w.force = w.now.force;
     const int solves = coupled
                            ? w.matrix.solve_coupled(w.linear, friction_couplings(problem.contacts, w.linear),
-                                                    w.gradient, enough, w.direction, w.force)
-                           : w.matrix.solve(w.linear, w.gradient, enough, w.direction, w.force);
+                                                    w.gradient, small, w.direction, w.force)
+                           : w.matrix.solve(w.linear, w.gradient, small, solved > 0, w.direction, w.force);
     report.solves += solves;
     w.refactor = w.refactor || solves > w.settings.stale_factor_solves;
     // What holds in the last one has to be what its direction was found with.

@@ -109,6 +109,17 @@ RestrictedProblem<Scalar> NewtonMatrix::restricted(SheetProduct<Scalar>& product
 }
 
 template <typename Scalar>
+void NewtonMatrix::start_from(const Points& direction, RestrictedProblem<Scalar>& problem) const {
+  using Vector = OrderedVector<Scalar>;
+  Vector free = Vector::Zero(problem.start.size());
+  for (int i = 0; i < direction.rows(); ++i)
+    free.template segment<3>(4L * plan_->symbolic->position[i]) =
+        direction.row(i).transpose().template cast<Scalar>();
+  flash::sim::apply(problem.free, free);
+  problem.start += free;
+}
+
+template <typename Scalar>
 int NewtonMatrix::take(const KrylovSolution<Scalar>& solution, Points& direction, Points& force) const {
   const std::vector<int>& position = plan_->symbolic->position;
   direction.resize(force.rows(), 3);
@@ -119,11 +130,19 @@ int NewtonMatrix::take(const KrylovSolution<Scalar>& solution, Points& direction
   return solution.solves;
 }
 
-int NewtonMatrix::solve(const ContactSet& contacts, const Points& gradient, double tolerance,
+int NewtonMatrix::solve(const ContactSet& contacts, const Points& gradient, double tolerance, bool goes_on,
                         Points& direction, Points& force) {
   return with_product([&](auto& product) {
-    const auto problem = restricted(product, contacts, gradient, tolerance);
-    return take(conjugate_gradients(problem, *plan_->kernels), direction, force);
+    auto problem = restricted(product, contacts, gradient, tolerance);
+    // Where layers press, the matrix curves down so often that what leads down with other contacts may not do
+    // so with these.
+    if (goes_on && !layered_) {
+      start_from(direction, problem);
+      problem.tolerance = std::max(tolerance, enough * first_residual_);
+    }
+    const auto solution = conjugate_gradients(problem, *plan_->kernels);
+    if (!goes_on) first_residual_ = solution.first_residual;
+    return take(solution, direction, force);
   });
 }
 

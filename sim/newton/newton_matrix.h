@@ -40,9 +40,11 @@ class NewtonMatrix {
               double least_eigenvalue, const std::vector<TouchStiffness>& layers = {});
 
   /// Sets `direction` to the solution of matrix * direction = -gradient over the free directions, and to the
-  /// constraints' corrections in the others. It is solved to a residual of `tolerance` [N] or a tenth of the
-  /// first. Adds to `force` what the direction changes. Returns the number of solves with the factor.
-  int solve(const ContactSet& contacts, const data::Points& gradient, double tolerance,
+  /// constraints' corrections in the others. It is solved to a residual of `tolerance` [N] or a share of the
+  /// first. `goes_on`: from `direction` as it is, that of the last problem, which had other contacts, and to
+  /// what was enough for that one; but for layers that touch. Adds to `force` what the direction changes.
+  /// Returns the number of solves with the factor.
+  int solve(const ContactSet& contacts, const data::Points& gradient, double tolerance, bool goes_on,
             data::Points& direction, data::Points& force);
 
   /// Solves likewise where friction grows with the normal forces. The matrix is L A P with the free
@@ -56,6 +58,9 @@ class NewtonMatrix {
   template <typename Scalar>
   RestrictedProblem<Scalar> restricted(SheetProduct<Scalar>& product, const ContactSet& contacts,
                                        const data::Points& gradient, double tolerance);
+  /// Starts a problem from a direction, as far as it may move freely.
+  template <typename Scalar>
+  void start_from(const data::Points& direction, RestrictedProblem<Scalar>& problem) const;
   template <typename Scalar>
   int take(const KrylovSolution<Scalar>& solution, data::Points& direction, data::Points& force) const;
 
@@ -67,8 +72,9 @@ class NewtonMatrix {
 
   std::shared_ptr<const SheetPlan> plan_;
   BlockCholesky<float> factor_;
-  bool single_ = true;    ///< whether single precision does
-  bool layered_ = false;  ///< whether layers touch, whose pairs the preconditioner does not know
+  bool single_ = true;         ///< whether single precision does
+  double first_residual_ = 0;  ///< of the last problem that did not go on [N]
+  bool layered_ = false;       ///< whether layers touch, whose pairs the preconditioner does not know
   SheetProduct<float> single_product_;
   SheetProduct<double> double_product_;
 };

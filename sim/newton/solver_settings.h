@@ -7,7 +7,7 @@ struct SolverSettings {
   double time_step = 0.01;      ///< h [s]
   int max_iterations = 60;      ///< Newton iterations a step
   double tolerance = 1e-3;      ///< on the relative residual |r| / |M g|
-  int stale_factor_solves = 5;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
+  int stale_factor_solves = 4;  ///< solves by a factor of an earlier iterate, beyond which it is renewed
   double exit_speed = 1.0;  ///< greatest speed at which vertices leave an obstacle that they start in [m/s]
   int halvings = 8;  ///< a step that cannot be solved is repeated in two halves, each so again, so often
   const std::atomic<bool>* stop = nullptr;  ///< once set, a batch ends before its next step

@@ -266,7 +266,7 @@ Direction processors_direction(const Bench& bench, int e, const ContactSet& cont
                 numbers_of(bench.materials[e]).inertia_density * bench.plan->sheet.vertex_area.minCoeff());
   Direction result;
   result.change = Points::Zero(bench.plan->pattern.size, 3);
-  result.solves = matrix.solve(contacts, random_points(bench.plan->pattern.size, 100 + e), tolerance,
+  result.solves = matrix.solve(contacts, random_points(bench.plan->pattern.size, 100 + e), tolerance, false,
                                result.direction, result.change);
   return result;
 }
