@@ -23,7 +23,7 @@ sources = git ls-files '*.h' '*.cpp' '*.cu' '*.cuh'
 .PHONY: help demo configure build test validate routes coverage agreement other-simulators plan-promise answer-time size-study use-study
 .PHONY: grasp-shapes few-views-study knock-study locking drape self-contact contact-counts contact-methods contact-metrics scene-batch silicone reference fuzz sanitize
 .PHONY: sanitize-threads configure-test format check-format check-includes tidy
-.PHONY: device-checks install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
+.PHONY: device-checks device-answers install clean bench random-scenes deep-starts packages-build packages-test packages-bench packages-check
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 24
@@ -153,8 +153,14 @@ reference: build packages-test  ## Run the scenes in $(REFERENCE) and judge them
 	  --out $(BUILD)/reference
 	$(PYTHON) $(REFERENCE)/compare.py $(BUILD)/reference --all
 
+device-answers: configure-test  ## On a machine with a CUDA device: whether recorded lifts have the same answers by it and by the processor
+	cmake --build $(BUILD) -j $(JOBS) --target flash-sysid
+	$(PYTHON) tests/validation/device_answers.py --sysid $(sysid) --data $(DATA) --out $(BUILD)/device_answers
+
 device-checks: configure-test  ## On a machine with a CUDA device: its tests, compute-sanitizer on scenes that move, times; PART=tests, sanitizers or times
 	cmake --build $(BUILD) -j $(JOBS) --target sim_tests sysid_tests flash-sim
+	cmake -G Ninja -S . -B $(BUILD)-racecheck -DCMAKE_BUILD_TYPE=Release -DFLASH_CUDA=ON -DFLASH_RACECHECK=ON
+	cmake --build $(BUILD)-racecheck -j $(JOBS) --target sim_tests
 	scripts/device-checks $(BUILD) $(PART)
 
 fuzz: packages-build packages-check  ## Fuzz each loader for $(FUZZ_SECONDS) s under address and undefined-behaviour sanitizers

@@ -10,6 +10,12 @@ __device__ inline unsigned chip_address(const void* on_chip) {
   return static_cast<unsigned>(__cvta_generic_to_shared(on_chip));
 }
 
+// Devices before 8.0 have no copies in the background. racecheck takes those that a block has waited for to be
+// under way still when another block of its team writes to the same place behind a barrier.
+#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800 || defined(FLASH_RACECHECK)
+#define FLASH_PLAIN_COPIES
+#endif
+
 /// How the second-level cache is to treat what is read.
 using CachePolicy = unsigned long long;
 
@@ -26,7 +32,7 @@ __device__ inline CachePolicy leaves_first() {
 /// not 16.
 __device__ inline void copy_to_chip(unsigned to, const void* from, int bytes,
                                     [[maybe_unused]] CachePolicy policy) {
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+#if defined(FLASH_PLAIN_COPIES)
   *static_cast<int4*>(__cvta_shared_to_generic(to)) =
       bytes > 0 ? *static_cast<const int4*>(from) : int4{0, 0, 0, 0};
 #else
@@ -40,7 +46,7 @@ __device__ inline void copy_to_chip(unsigned to, const void* from, int bytes,
 template <int bytes>
 __device__ inline void copy_to_chip(unsigned to, const void* from) {
   static_assert(bytes == 4 || bytes == 8 || bytes == 16);
-#if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800
+#if defined(FLASH_PLAIN_COPIES)
   char* chip = static_cast<char*>(__cvta_shared_to_generic(to));
   for (int k = 0; k < bytes; k += 4)
     *reinterpret_cast<int*>(chip + k) = *reinterpret_cast<const int*>(static_cast<const char*>(from) + k);

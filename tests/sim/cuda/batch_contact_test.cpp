@@ -156,9 +156,10 @@ struct Trajectory {
   std::vector<Vector3d> forces;  ///< of the first hold, where there is one
 };
 
-Trajectory by_processor(const Scene& scene, double tolerance) {
+Trajectory by_processor(const Scene& scene, double tolerance, int stale_factor_solves = 0) {
   Environment environment = scene.environment;
-  Solver solver(scene.plan, {.time_step = time_step, .tolerance = tolerance, .stale_factor_solves = 0});
+  Solver solver(scene.plan,
+                {.time_step = time_step, .tolerance = tolerance, .stale_factor_solves = stale_factor_solves});
   Trajectory trajectory;
   for (int k = 0; k < scene.steps; ++k) {
     const StepReport report = solver.step(environment);
@@ -226,10 +227,10 @@ std::size_t common_steps(const Trajectory& a, const Trajectory& b) {
   return count;
 }
 
-/// Largest distance of a vertex in common steps, as a share of the sheet's size.
-double distance(const Scene& scene, const Trajectory& a, const Trajectory& b) {
+/// Largest distance of a vertex in the first `steps`, as a share of the sheet's size.
+double distance(const Scene& scene, const Trajectory& a, const Trajectory& b, std::size_t steps) {
   double largest = 0;
-  for (std::size_t k = 0; k < common_steps(a, b); ++k) {
+  for (std::size_t k = 0; k < steps; ++k) {
     const double own = (a.positions[k] - b.positions[k]).rowwise().norm().maxCoeff();
     largest = own <= largest ? largest : own;
   }
@@ -241,6 +242,18 @@ double distance(const Scene& scene, const Trajectory& a, const Trajectory& b) {
 double drift(const Scene& scene, double tolerance) {
   const double time = scene.steps * settings_of(scene.steps, tolerance).time_step;
   return tolerance * 9.81 * time * time / size_of(*scene.plan);
+}
+
+/// Steps in which the processor finds one solution, whatever its factors are. A sheet that buckles or folds
+/// has several, each as good, and rounding decides which one a solver comes to.
+std::size_t steps_of_one_solution(const Scene& scene, double tolerance, const Trajectory& processor) {
+  std::size_t count = processor.steps.size();
+  for (const int stale_factor_solves : {1, 2, 3, 4, 5}) {
+    const Trajectory other = by_processor(scene, tolerance, stale_factor_solves);
+    count = std::min(count, common_steps(other, processor));
+    while (count > 0 && distance(scene, other, processor, count) > drift(scene, tolerance)) --count;
+  }
+  return count;
 }
 
 TEST(BatchContact, TrajectoriesAreThoseOfTheProcessorAndCloserAsTheToleranceFalls) {
@@ -257,15 +270,17 @@ TEST(BatchContact, TrajectoriesAreThoseOfTheProcessorAndCloserAsTheToleranceFall
       // Where the processor solves a step the device does.
       for (std::size_t k = 0; k < device.steps.size(); ++k)
         unconverged += processor.steps[k].converged && !device.steps[k].converged;
-      for (std::size_t k = 0; k < common_steps(device, processor); ++k)
+      const std::size_t steps =
+          std::min(common_steps(device, processor), steps_of_one_solution(scene, tolerance, processor));
+      for (std::size_t k = 0; k < steps; ++k)
         EXPECT_NEAR(device.steps[k].penetration_max, processor.steps[k].penetration_max, 1e-6);
       EXPECT_EQ(unconverged, 0);
-      soon_apart += common_steps(device, processor) < 5;
-      EXPECT_LE(distance(scene, device, processor), drift(scene, tolerance));
+      soon_apart += steps < 5;
+      EXPECT_LE(distance(scene, device, processor, steps), drift(scene, tolerance));
       // Each is within the residual of its step; what a hold carries beyond is of the positions.
       ASSERT_EQ(device.forces.size(), processor.forces.size());
       const double weight = weight_of(scene);
-      for (std::size_t k = 0; k < std::min(device.forces.size(), common_steps(device, processor)); ++k)
+      for (std::size_t k = 0; k < std::min(device.forces.size(), steps); ++k)
         EXPECT_LE((device.forces[k] - processor.forces[k]).norm(),
                   100 * tolerance * weight + 1e-2 * processor.forces[k].norm());
     }
