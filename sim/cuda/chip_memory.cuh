@@ -10,8 +10,8 @@ __device__ inline unsigned chip_address(const void* on_chip) {
   return static_cast<unsigned>(__cvta_generic_to_shared(on_chip));
 }
 
-// Devices before 8.0 have no copies in the background. racecheck takes those that a block has waited for to be
-// under way still when another block of its team writes to the same place behind a barrier.
+// Devices before 8.0 have no copies in the background. racecheck takes those that a block has waited for to
+// be under way still when another block of its team writes to the same place behind a barrier.
 #if defined(__CUDA_ARCH__) && __CUDA_ARCH__ < 800 || defined(FLASH_RACECHECK)
 #define FLASH_PLAIN_COPIES
 #endif

@@ -41,8 +41,8 @@ __device__ inline int team_warps() { return block_warps * team_blocks(); }
 __device__ inline int team_rank() { return 32 * team_warp() + lane(); }
 __device__ inline int team_size() { return block_threads * team_blocks(); }
 
-/// A barrier for the team, behind which each thread sees what the others wrote. racecheck takes no notice of a
-/// cluster's barrier: with FLASH_RACECHECK barriers of the block stand around it.
+/// A barrier for the team, behind which each thread sees what the others wrote. racecheck takes no notice of
+/// a cluster's barrier: with FLASH_RACECHECK barriers of the block stand around it.
 __device__ inline void synchronize_team() {
   if (team_blocks() == 1) {
     __syncthreads();
