@@ -29,7 +29,7 @@ struct RestrictedProblem {
   BlockCholesky<float>& preconditioner;    ///< factor of a positive definite matrix near P A P
   std::vector<VertexMatrix<Scalar>> free;  ///< P
   OrderedVector<Scalar> right;             ///< b
-  OrderedVector<Scalar> start;             ///< x, as it has to be but in the free directions
+  OrderedVector<Scalar> start;             ///< x to begin with; what is not free stays
   double tolerance;                        ///< residual that is small enough; so is `enough` of the first
   int most_solves = 20;                    ///< iterations of conjugate gradients
 };
