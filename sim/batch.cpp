@@ -14,6 +14,7 @@
 #include "sim/device_batch.h"
 #include "sim/device_error.h"
 #include "sim/step/resultants.h"
+#include "sim/zeroed_numbers.h"
 
 namespace flash::sim {
 
@@ -38,7 +39,8 @@ struct Batch::Storage {
   std::vector<std::optional<ProjectiveSolver>> projective_solvers;  ///< likewise
   int step = 0;
   std::ptrdiff_t vertices = 0, holds = 0, bodies = 0, obstacles = 0;
-  std::vector<double> positions, velocities, kept, hold_forces;
+  std::vector<double> positions, velocities, hold_forces;
+  ZeroedNumbers kept;
   std::vector<StepStats> stats;
   std::vector<std::vector<ContactForce>> contacts;
   std::vector<double> body_resultants, obstacle_resultants;
@@ -77,9 +79,7 @@ struct Batch::Storage {
       std::copy(taken.stats.begin(), taken.stats.end(), stats.begin() + place);
       std::copy(taken.hold_forces.begin(), taken.hold_forces.end(), hold_forces.begin() + 3 * place * holds);
     };
-    results.kept = [&](int e, int index, const Points& x) {
-      std::copy(x.data(), x.data() + x.size(), kept_at(e, index));
-    };
+    results.kept_at = [&](int e, int index) { return kept_at(e, index); };
     results.timed = [&](std::span<const double> ticks) {
       const std::scoped_lock lock(of_ticks);
       phase_ticks.resize(ticks.size());
@@ -175,8 +175,8 @@ void check(const SheetPlan& plan, const std::vector<Environment>& environments,
 }
 
 /// A view of densely stored numbers, the last index fastest.
-View<double> dense(const std::vector<double>& numbers, std::vector<std::ptrdiff_t> shape) {
-  View<double> view{numbers.data(), std::move(shape), {}};
+View<double> dense(const double* numbers, std::vector<std::ptrdiff_t> shape) {
+  View<double> view{numbers, std::move(shape), {}};
   view.strides.resize(view.shape.size());
   std::ptrdiff_t stride = 1;
   for (std::size_t k = view.shape.size(); k-- > 0; stride *= view.shape[k]) view.strides[k] = stride;
@@ -201,7 +201,7 @@ Batch::Batch(std::shared_ptr<const SheetPlan> plan, std::vector<Environment> env
   s.projective_solvers.resize(count);
   s.positions.resize(numbers);
   s.velocities.resize(numbers);
-  s.kept.resize(numbers * s.settings.kept_steps.size());
+  s.kept = ZeroedNumbers(numbers * s.settings.kept_steps.size());
   s.stats.resize(count * s.steps());
   s.hold_forces.resize(3 * s.holds * s.stats.size());
   s.contacts.resize(count);
@@ -261,20 +261,22 @@ void Batch::advance(int steps, const std::function<void(int)>& finished) {
 
 const State& Batch::state(int environment) const { return storage_->environments[environment].state; }
 
-View<double> Batch::positions() const { return dense(storage_->positions, {size(), storage_->vertices, 3}); }
+View<double> Batch::positions() const {
+  return dense(storage_->positions.data(), {size(), storage_->vertices, 3});
+}
 
 View<double> Batch::velocities() const {
-  return dense(storage_->velocities, {size(), storage_->vertices, 3});
+  return dense(storage_->velocities.data(), {size(), storage_->vertices, 3});
 }
 
 View<double> Batch::kept_positions() const {
   const Storage& s = *storage_;
-  return dense(s.kept, {size(), std::ssize(s.settings.kept_steps), s.vertices, 3});
+  return dense(s.kept.data(), {size(), std::ssize(s.settings.kept_steps), s.vertices, 3});
 }
 
 View<double> Batch::hold_forces() const {
   const Storage& s = *storage_;
-  return dense(s.hold_forces, {size(), s.steps(), s.holds, 3});
+  return dense(s.hold_forces.data(), {size(), s.steps(), s.holds, 3});
 }
 
 std::span<const StepStats> Batch::stats(int environment) const {
@@ -287,11 +289,11 @@ std::span<const ContactForce> Batch::contacts(int environment) const {
 }
 
 View<double> Batch::body_resultants() const {
-  return dense(storage_->body_resultants, {size(), storage_->bodies, 6});
+  return dense(storage_->body_resultants.data(), {size(), storage_->bodies, 6});
 }
 
 View<double> Batch::obstacle_resultants() const {
-  return dense(storage_->obstacle_resultants, {size(), storage_->obstacles, 6});
+  return dense(storage_->obstacle_resultants.data(), {size(), storage_->obstacles, 6});
 }
 
 std::vector<PhaseShare> Batch::phases() const {
@@ -314,9 +316,9 @@ void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t
                        const std::function<void(std::size_t, const Batch&, int)>& finished) {
   if (at_once <= 0) throw std::invalid_argument("batch: at least one environment has to run at once");
   for (std::size_t first = 0; first < count; first += at_once) {
-    std::vector<Environment> environments;
-    for (std::size_t i = first; i < std::min(count, first + at_once); ++i)
-      environments.push_back(environment_of(i));
+    std::vector<Environment> environments(std::min(count - first, static_cast<std::size_t>(at_once)));
+    data::for_each_in_parallel(environments.size(), settings.threads,
+                               [&](std::size_t e) { environments[e] = environment_of(first + e); });
     Batch batch(plan, std::move(environments), settings);
     try {
       batch.advance(settings.steps - settings.first_step, [&](int e) { finished(first + e, batch, e); });

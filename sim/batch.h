@@ -104,8 +104,9 @@ class Batch {
 };
 
 /// Replays any number of environments whole, in batches of at most `at_once`, so that memory holds those
-/// alone. `environment_of` makes number i just before its batch. `finished` gets i, its batch and its place
-/// there, on the thread that simulated it. Throws as Batch does; a DeviceError goes by the numbers i.
+/// alone. `environment_of` makes number i just before its batch, on any thread. `finished` gets i, its batch
+/// and its place there, on the thread that simulated it. Throws as Batch does; a DeviceError goes by the
+/// numbers i.
 void replay_in_batches(const std::shared_ptr<const SheetPlan>& plan, std::size_t count, int at_once,
                        const BatchSettings& settings,
                        const std::function<Environment(std::size_t)>& environment_of,

@@ -150,65 +150,80 @@ cuda::ReplaySettings settings_of(const BatchSettings& settings, int first, int c
   return own;
 }
 
-/// Runs a group, whose environments advance.
-void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, const BatchSettings& settings,
-         std::vector<Environment>& environments, const DeviceResults& results) {
-  const double h = time_step_of(settings);
-  const cuda::ReplaySettings own = settings_of(settings, group.first, group.count);
-  std::vector<std::vector<HeldVertices>> held;
+/// Environments of a group as the device takes them; `held`: what their holds have at its end.
+std::vector<cuda::ReplayEnvironment> replay_environments(const Group& group, const BatchSettings& settings,
+                                                         const std::vector<Environment>& environments,
+                                                         std::vector<std::vector<HeldVertices>>& held) {
+  const std::size_t count = group.environments.size();
+  const auto at = [&](std::size_t k) -> const Environment& {
+    return environments[static_cast<std::size_t>(group.environments[k])];
+  };
+  std::vector<std::shared_ptr<const cuda::HoldMotion>> motions(count);
+  held.resize(count);
+  data::for_each_in_parallel(count, settings.threads, [&](std::size_t k) {
+    Environment moved = at(k);
+    motions[k] = std::make_shared<const cuda::HoldMotion>(
+        cuda::motion_of_holds(moved, time_step_of(settings), group.count));
+    held[k] = std::move(moved.state.held);
+  });
   std::vector<cuda::ReplayEnvironment> replays;
-  for (const int e : group.environments) {
-    Environment moved = environments[static_cast<std::size_t>(e)];
-    auto motion = std::make_shared<const cuda::HoldMotion>(cuda::motion_of_holds(moved, h, group.count));
+  for (std::size_t k = 0; k < count; ++k) {
     // Most environments of a batch are held alike.
-    if (!replays.empty() && replays.back().holds != nullptr && *replays.back().holds == *motion)
-      motion = replays.back().holds;
-    replays.push_back(cuda::replay_environment(environments[static_cast<std::size_t>(e)], motion));
-    held.push_back(std::move(moved.state.held));
+    if (k > 0 && *motions[k] == *motions[k - 1]) motions[k] = motions[k - 1];
+    replays.push_back(cuda::replay_environment(at(k), motions[k]));
   }
-  cuda::BatchReplay replay(plan, replays, own);
-  replays.clear();
+  return replays;
+}
+
+/// Takes what a replay has of environment e, which is its `in_replay`th, to the state at the end of the
+/// group.
+void take_results(const cuda::BatchReplay& replay, const Group& group, const BatchSettings& settings, int e,
+                  int in_replay, Environment& environment, const DeviceResults& results) {
+  State& state = environment.state;
+  std::vector<StepStats> stats;
+  for (const cuda::ReplayStep& step : replay.stats(in_replay)) {
+    stats.push_back({step.residual, step.penetration_max, step.iterations, step.solves, step.factorizations,
+                     step.substeps, step.converged});
+    state.time += time_step_of(settings);
+  }
+  results.stepped({e, group.first, group.count, stats, replay.hold_forces(in_replay)});
+  const std::vector<int>& kept = settings.kept_steps;
+  const auto first = std::upper_bound(kept.begin(), kept.end(), group.first);
+  if (first != kept.end() && *first <= group.first + group.count)
+    replay.read_kept_positions(in_replay, results.kept_at(e, static_cast<int>(first - kept.begin())));
+  state.positions = replay.positions(in_replay);
+  state.velocities = replay.velocities(in_replay);
+  state.bristles = replay.bristles(in_replay);
+}
+
+/// Runs a group, whose environments advance; `end`: the step at which they finish. Results are taken, and
+/// used, by many threads: a search for scores may work on the device too.
+void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, int end,
+         const BatchSettings& settings, std::vector<Environment>& environments, const DeviceResults& results,
+         Failures& failures) {
+  std::vector<std::vector<HeldVertices>> held;
+  cuda::BatchReplay replay(plan, replay_environments(group, settings, environments, held),
+                           settings_of(settings, group.first, group.count));
   replay.advance(group.count);
   replay.synchronize(settings.solver.stop);
   if (settings.solver.stop != nullptr && *settings.solver.stop) throw data::Stopped();
   results.timed(replay.phase_ticks());
-
-  const auto kept_begin =
-      std::upper_bound(settings.kept_steps.begin(), settings.kept_steps.end(), group.first);
-  const int kept_first = static_cast<int>(kept_begin - settings.kept_steps.begin());
   data::for_each_in_parallel(group.environments.size(), settings.threads, [&](std::size_t k) {
-    const int e = group.environments[k], in_replay = static_cast<int>(k);
-    State& state = environments[static_cast<std::size_t>(e)].state;
-    std::vector<StepStats> stats;
-    for (const cuda::ReplayStep& step : replay.stats(in_replay)) {
-      stats.push_back({step.residual, step.penetration_max, step.iterations, step.solves, step.factorizations,
-                       step.substeps, step.converged});
-      state.time += h;
-    }
-    results.stepped({e, group.first, group.count, stats, replay.hold_forces(in_replay)});
-    for (std::size_t index = 0; index < own.kept_steps.size(); ++index)
-      results.kept(e, kept_first + static_cast<int>(index),
-                   replay.kept_positions(in_replay, static_cast<int>(index)));
-    state.positions = replay.positions(in_replay);
-    state.velocities = replay.velocities(in_replay);
-    state.bristles = replay.bristles(in_replay);
-    state.held = std::move(held[k]);
-  });
-}
-
-/// Hands over environments at their end. A search for scores may work on the device too.
-void finish(const std::vector<int>& environments, const BatchSettings& settings, const DeviceResults& results,
-            Failures& failures) {
-  data::for_each_in_parallel(environments.size(), settings.threads, [&](std::size_t k) {
+    const int e = group.environments[k];
+    Environment& environment = environments[static_cast<std::size_t>(e)];
     try {
-      results.finished(environments[k]);
+      take_results(replay, group, settings, e, static_cast<int>(k), environment, results);
+      environment.state.held = std::move(held[k]);
+      if (group.first + group.count == end) results.finished(e);
+    } catch (const cuda::DeviceError& error) {
+      failures.add(error.what(), {e});
     } catch (const DeviceError& error) {
-      failures.add(error.why(), {environments[k]});
+      failures.add(error.why(), {e});
     }
   });
 }
 
-/// Runs a group in parts that fit into the device's memory; `end`: the step at which environments finish.
+/// Runs a group in parts that fit into the device's memory.
 void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& group, int end,
                   const BatchSettings& settings, std::vector<Environment>& environments,
                   const DeviceResults& results, Failures& failures) {
@@ -219,7 +234,7 @@ void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& gro
     const Group wave = {group.first, group.count, {from, from + static_cast<std::ptrdiff_t>(count)}};
     begin += count;
     try {
-      run(plan, wave, settings, environments, results);
+      run(plan, wave, end, settings, environments, results, failures);
     } catch (const cuda::OutOfMemory& error) {
       if (count == 1) {
         failures.add(error.what(), wave.environments);
@@ -227,12 +242,9 @@ void run_in_waves(const std::shared_ptr<const SheetPlan>& plan, const Group& gro
       }
       begin -= count;
       at_once = (count + 1) / 2;
-      continue;
     } catch (const cuda::DeviceError& error) {
       failures.add(error.what(), wave.environments);
-      continue;
     }
-    if (group.first + group.count == end) finish(wave.environments, settings, results, failures);
   }
 }
 

@@ -26,7 +26,8 @@ struct DeviceSteps {
 /// What takes the results; called on several threads, for different environments.
 struct DeviceResults {
   std::function<void(const DeviceSteps&)> stepped;
-  std::function<void(int environment, int index, const data::Points& positions)> kept;
+  /// Where the positions of a kept step go, vertices x 3; those of later ones follow.
+  std::function<double*(int environment, int index)> kept_at;
   std::function<void(int environment)> finished;             ///< its state is that at the end
   std::function<void(std::span<const double> ticks)> timed;  ///< ticks of processors in each phase of a step
 };

@@ -468,8 +468,16 @@ Points BatchReplay::kept_positions(int environment, int index) const {
   m.wait();
   const std::size_t place =
       static_cast<std::size_t>(environment) * m.settings.kept_steps.size() + static_cast<std::size_t>(index);
-  const std::vector<double> numbers = m.kept.read(place * 3 * m.size(), 3 * m.size());
-  return Eigen::Map<const Points>(numbers.data(), m.layout.size, 3);
+  Points positions(m.layout.size, 3);
+  m.kept.read(place * 3 * m.size(), 3 * m.size(), positions.data());
+  return positions;
+}
+
+void BatchReplay::read_kept_positions(int environment, double* to) const {
+  const Memory& m = *memory_;
+  m.wait();
+  const std::size_t each = m.settings.kept_steps.size() * 3 * m.size();
+  m.kept.read(static_cast<std::size_t>(environment) * each, each, to);
 }
 
 std::vector<double> BatchReplay::hold_forces(int environment) const {

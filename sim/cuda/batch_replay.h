@@ -104,6 +104,8 @@ class BatchReplay {
   data::Points velocities(int environment) const;  ///< [m/s]
   data::Points bristles(int environment) const;    ///< as in State
   data::Points kept_positions(int environment, int index) const;
+  /// Those of all kept steps: kept steps x vertices x 3.
+  void read_kept_positions(int environment, double* to) const;
   /// Forces of the holds on the sheet, mean over each step: steps from first_step on x holds x 3 [N].
   std::vector<double> hold_forces(int environment) const;
   std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on

@@ -48,9 +48,12 @@ class DeviceArray {
   void write(size_t first, const Number* numbers, size_t count) {
     if (count > 0) copy_to_end(data_ + first, numbers, count * sizeof(Number), cudaMemcpyHostToDevice);
   }
+  void read(size_t first, size_t count, Number* to) const {
+    if (count > 0) copy_to_end(to, data_ + first, count * sizeof(Number), cudaMemcpyDeviceToHost);
+  }
   std::vector<Number> read(size_t first, size_t count) const {
     std::vector<Number> numbers(count);
-    if (count > 0) copy_to_end(numbers.data(), data_ + first, count * sizeof(Number), cudaMemcpyDeviceToHost);
+    read(first, count, numbers.data());
     return numbers;
   }
 

@@ -62,7 +62,7 @@ Taken take(const std::shared_ptr<const SheetPlan>& plan, std::vector<Environment
   std::mutex mutex;
   DeviceResults results;
   results.stepped = [](const DeviceSteps&) {};
-  results.kept = [](int, int, const data::Points&) {};
+  results.kept_at = [](int, int) -> double* { return nullptr; };
   results.timed = [&](std::span<const double>) {
     const std::scoped_lock lock(mutex);
     ++taken.waves;
