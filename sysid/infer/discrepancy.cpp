@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "data/chi_square.h"
+#include "data/parallel.h"
 #include "sysid/infer/discrepancy_prior.h"
 #include "sysid/infer/local_noise.h"
 
@@ -54,7 +55,7 @@ double diagonal_deviance(double squares, const Eigen::VectorXd& gains, const Eig
 }  // namespace
 
 DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals,
-                                   std::optional<double> repeatability)
+                                   std::optional<double> repeatability, int threads)
     : rows_(std::move(rows)), keyframes_(static_cast<int>(rows_.times.size())) {
   for (Eigen::MatrixXd* columns : {&rows_.known, &rows_.free, &rows_.rates})
     if (columns->rows() == 0) columns->resize(residuals.size(), 0);
@@ -81,7 +82,9 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
   if (repeatability)
     explained_ = std::sqrt(
         std::max(0.0, M_PI / 4 * *repeatability * *repeatability - 0.5 * misfit_.noise * misfit_.noise));
-  for (const Shape& shape : shapes()) fields_.push_back(field(shape));
+  const std::vector<Shape> all = shapes();
+  fields_.resize(all.size());
+  data::for_each_in_parallel(all.size(), threads, [&](std::size_t f) { fields_[f] = field(all[f]); });
   sizes_ = {explained_};
   priors_ = {0};
   const double first = kFirstSize * noise_, last = std::max(left_, 2 * first);
@@ -168,29 +171,44 @@ DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
   chosen.resize(std::min<std::size_t>(static_cast<std::size_t>(enough - chosen.begin()),
                                       static_cast<std::size_t>(kCoordinates / channels_)));
 
-  const auto per_channel = static_cast<Eigen::Index>(chosen.size());
-  const Eigen::Index stacked = block(keyframes_, 0, channels_, modes_);
-  Eigen::MatrixXd design = Eigen::MatrixXd::Zero(per_channel * channels_, stacked);
-  for (int channel = 0; channel < channels_; ++channel)
-    for (Eigen::Index c = 0; c < per_channel; ++c) {
-      const Coordinate& at = chosen[static_cast<std::size_t>(c)];
-      for (int k = 0; k < keyframes_; ++k)
-        design(channel * per_channel + c, block(k, channel, channels_, modes_) + at.mode) =
-            std::sqrt(at.variance) * times.eigenvectors()(k, at.time);
-    }
+  // Coordinate c acts on the one mode of each keyframe that it is made of, by shares(k, c).
+  const auto per_channel = static_cast<Eigen::Index>(chosen.size()), all = per_channel * channels_;
+  std::vector<Eigen::Index> mode_of;
+  Eigen::MatrixXd shares(keyframes_, per_channel);
+  for (const Coordinate& at : chosen) {
+    shares.col(static_cast<Eigen::Index>(mode_of.size())) =
+        std::sqrt(at.variance) * times.eigenvectors().col(at.time);
+    mode_of.push_back(at.mode);
+  }
   // Information of the coordinates, in units of 1 / sigma^2; what errors of known shape explain taken out.
-  Eigen::MatrixXd weighed(design.rows(), stacked);
-  for (Eigen::Index first = 0; first < stacked; first += modes_)
-    weighed.middleCols(first, modes_).noalias() =
-        design.middleCols(first, modes_) * modes_modes_.middleCols(first, modes_);
+  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all), to_known(all, known_.cols());
+  for (int channel = 0; channel < channels_; ++channel) {
+    const Eigen::Index first = channel * per_channel;
+    auto own = information.block(first, first, per_channel, per_channel);
+    to_known.middleRows(first, per_channel).setZero();
+    for (int k = 0; k < keyframes_; ++k) {
+      const Eigen::Index at = block(k, channel, channels_, modes_);
+      const Eigen::MatrixXd of_keyframe = modes_modes_.middleCols(at, modes_)(mode_of, mode_of);
+      const auto share = shares.row(k).transpose();
+      own += (share * share.transpose()).cwiseProduct(of_keyframe);
+      to_known.middleRows(first, per_channel) +=
+          share.asDiagonal() * modes_known_.middleRows(at, modes_)(mode_of, Eigen::all);
+    }
+  }
   const double precision = 1 / (noise_ * noise_);
-  const Eigen::MatrixXd to_known = design * modes_known_;
-  const Eigen::MatrixXd information =
-      precision * (weighed * design.transpose() - to_known * inverse_known_ * to_known.transpose());
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-  Field field{shape, {}, {}, eigen.eigenvalues().cwiseMax(0.0)};
-  field.modes = eigen.eigenvectors().transpose() * design;
-  field.known = -precision * (eigen.eigenvectors().transpose() * to_known * inverse_known_);
+  information -= to_known * inverse_known_ * to_known.transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(precision * information);
+  const Eigen::MatrixXd turned = eigen.eigenvectors().transpose();
+  Field field{shape,
+              Eigen::MatrixXd::Zero(all, block(keyframes_, 0, channels_, modes_)),
+              {},
+              eigen.eigenvalues().cwiseMax(0.0)};
+  for (int channel = 0; channel < channels_; ++channel)
+    for (int k = 0; k < keyframes_; ++k)
+      for (Eigen::Index c = 0; c < per_channel; ++c)
+        field.modes.col(block(k, channel, channels_, modes_) + mode_of[static_cast<std::size_t>(c)]) +=
+            shares(k, c) * turned.col(channel * per_channel + c);
+  field.known = -precision * (turned * to_known * inverse_known_);
   return field;
 }
 

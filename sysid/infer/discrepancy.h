@@ -61,7 +61,7 @@ class DiscrepancyModel {
   /// distance d between two trials [m]. Each trial differs from what both have in common by `explained`,
   /// pi / 2 d^2 = noise^2 + 2 explained^2, and tau is no less.
   DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& residuals,
-                   std::optional<double> repeatability = {});
+                   std::optional<double> repeatability = {}, int threads = 1);
 
   double noise() const { return noise_; }  ///< sigma: what is rough in the discrepancy counts as noise [m]
   /// Of the residuals, without what free errors and the parameters explain [m].

@@ -100,7 +100,7 @@ void MotionLikelihood::linearize(Recording& recording, const Motion& motion,
   const Eigen::VectorXd left = residuals + recording.registered * at.registration + rows.known * at.errors;
   recording.linear.rows = rows;
   recording.linear.residuals = left;
-  recording.likelihood.emplace(std::move(rows), left, repeatability, limit);
+  recording.likelihood.emplace(std::move(rows), left, repeatability, limit, replay.settings.threads);
 }
 
 Eigen::VectorXd MotionLikelihood::away(std::size_t r, const Motion& reference, const Motion& motion) const {

@@ -127,13 +127,14 @@ Eigen::VectorXd ResidualLikelihood::curvature_of(const Eigen::VectorXd& left) co
 }
 
 ResidualLikelihood::ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd& residuals,
-                                       std::optional<double> repeatability, std::optional<double> limit)
+                                       std::optional<double> repeatability, std::optional<double> limit,
+                                       int threads)
     : weights_(rows.weights), free_(rows.free.cols()), known_(residuals.size(), free_ + rows.known.cols()) {
   if (free_ > 0) known_.leftCols(free_) = rows.free;
   if (rows.known.cols() > 0) known_.rightCols(rows.known.cols()) = rows.known;
   priors_ = Eigen::VectorXd::Ones(known_.cols());
   priors_.head(free_).setConstant(kFree);
-  const DiscrepancyModel model(std::move(rows), residuals, repeatability);
+  const DiscrepancyModel model(std::move(rows), residuals, repeatability, threads);
   misfit_ = model.misfit();
   misfit_.worth = misfit_.keyframes;
   limit_ = limit.value_or(kEfficient * misfit_.noise);

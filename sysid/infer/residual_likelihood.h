@@ -25,7 +25,8 @@ class ResidualLikelihood {
  public:
   /// `limit`: where rho turns [m]; by the noise without it.
   ResidualLikelihood(ObservedRows rows, const Eigen::VectorXd& residuals,
-                     std::optional<double> repeatability = {}, std::optional<double> limit = {});
+                     std::optional<double> repeatability = {}, std::optional<double> limit = {},
+                     int threads = 1);
 
   Eigen::Index rows() const { return weights_.size(); }
 

@@ -75,6 +75,18 @@ TEST(Discrepancy, ItsMeanSquareIsTheMeanVarianceOfRowsBeyondNoise) {
   }
 }
 
+TEST(Discrepancy, IsTheSameOnAnyThreads) {
+  ObservedRows rows = strip_rows(9, 40);
+  for (std::size_t i = 0; i < rows.channel.size(); ++i) rows.channel[i] = i % 5 == 0;
+  rows.rates = lifted(rows);
+  std::mt19937 random(3);
+  const Eigen::VectorXd y = kNoise * normal(random, rows.weights.size()) + 0.01 * rows.rates;
+  const DiscrepancyModel one(rows, y), four(rows, y, {}, 4);
+  for (std::size_t shape = 0; shape < one.shapes().size(); ++shape)
+    EXPECT_EQ(one.deviance_at(y, shape, 2e-3), four.deviance_at(y, shape, 2e-3));
+  EXPECT_EQ(one.misfit().size, four.misfit().size);
+}
+
 TEST(Discrepancy, LikelihoodIsThatOfTheDenseCovariance) {
   ObservedRows rows = strip_rows(3, 47);  // of which all coordinates are kept
   std::mt19937 random(1);
