@@ -30,7 +30,7 @@ constexpr std::uintmax_t kLargestFile = 1'000'000'000;  // [bytes]
 /// Beside the file that it becomes by take_place(); else it is removed.
 class TemporaryFile {
  public:
-  TemporaryFile(const std::string& path, std::string_view contents) : path_(path) {
+  TemporaryFile(const std::string& path, std::string_view contents, Sync sync) : path_(path) {
     const std::filesystem::file_status there = std::filesystem::status(path);
     if (std::filesystem::exists(there) && !std::filesystem::is_regular_file(there) &&
         !std::filesystem::is_directory(there))
@@ -43,7 +43,7 @@ class TemporaryFile {
     const Descriptor file{::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)};
     if (file.number < 0) throw_errno(path);
     name_ = name;
-    if (const int error = write(file.number, contents); error != 0) {
+    if (const int error = write(file.number, contents, sync); error != 0) {
       remove();
       errno = error;
       throw_errno(path);
@@ -67,14 +67,14 @@ class TemporaryFile {
   };
 
   /// 0, or errno of what went wrong.
-  static int write(int descriptor, std::string_view contents) {
+  static int write(int descriptor, std::string_view contents, Sync sync) {
     while (!contents.empty()) {
       const ssize_t written = ::write(descriptor, contents.data(), contents.size());
       if (written < 0 && errno == EINTR) continue;
       if (written < 0) return errno;
       contents.remove_prefix(static_cast<std::size_t>(written));
     }
-    return ::fsync(descriptor) == 0 ? 0 : errno;
+    return sync == Sync::later || ::fsync(descriptor) == 0 ? 0 : errno;
   }
 
   void remove() {
@@ -87,14 +87,14 @@ class TemporaryFile {
 
 }  // namespace
 
-void write_atomically(const std::string& path, std::string_view contents) {
-  TemporaryFile(path, contents).take_place();
+void write_atomically(const std::string& path, std::string_view contents, Sync sync) {
+  TemporaryFile(path, contents, sync).take_place();
 }
 
 void write_together(const std::vector<FileText>& files) {
   std::list<TemporaryFile> temporary;
   for (const FileText& file : files)
-    if (!file.path.empty()) temporary.emplace_back(file.path, file.text);
+    if (!file.path.empty()) temporary.emplace_back(file.path, file.text, Sync::now);
   for (TemporaryFile& file : temporary) file.take_place();
 }
 

@@ -5,10 +5,14 @@
 
 namespace flash::data {
 
+/// Whether a file is on the disk once it is written, or when the system takes it there: a power cut before
+/// may leave anything of it.
+enum class Sync { now, later };
+
 /// Writes `contents` to a temporary file beside `path`, syncs it and renames it: readers see the old file or
 /// the new one, never half. Missing folders are made. Throws std::system_error naming the path, and
 /// InputError where a device, a pipe or a socket is there.
-void write_atomically(const std::string& path, std::string_view contents);
+void write_atomically(const std::string& path, std::string_view contents, Sync sync = Sync::now);
 
 /// A file that is to be.
 struct FileText {

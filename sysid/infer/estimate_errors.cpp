@@ -33,7 +33,52 @@ std::vector<WantedMotion> wanted_at(const Task& task, const Emulator& emulator,
   return wanted;
 }
 
+/// What a search holds that was not measured.
+std::vector<HeldParameter> held_of(const Task& task) {
+  std::vector<HeldParameter> all = held_parameters(task.grid, task.replays);
+  if (spread_of_scale(task.grid, task.replays) > 0)  // the posterior takes it in without an approximation
+    std::erase_if(all, [](const HeldParameter& held) { return held.name.ends_with("density"); });
+  return all;
+}
+
+void add_wanted(const Task& task, const std::vector<HeldParameter>& all, const std::vector<double>& values,
+                std::vector<WantedMotion>& wanted) {
+  for (const HeldParameter& held : all)
+    for (const double value : held.values)
+      for (const Replay& replay : task.replays)
+        wanted.push_back({&replay, candidate_with(values, task.grid, held.name, value)});
+}
+
+std::vector<std::vector<double>> draws_of(const Posterior& posterior) {
+  const Eigen::MatrixXd samples = samples_of(posterior);
+  std::vector<std::vector<double>> draws;
+  for (int draw = 0; draw < emulator_draws; ++draw) {
+    const Eigen::VectorXd row =
+        samples.row((2 * draw + 1) * samples.rows() / (2 * emulator_draws)).transpose();
+    draws.emplace_back(row.begin(), row.end());
+  }
+  return draws;
+}
+
+constexpr const char* half_step_name = "half_step";
+
 }  // namespace
+
+void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior& posterior,
+                    const std::vector<FinerSettings>& finer, bool with_held) {
+  const std::vector<double> values = posterior.values();
+  const ReplayCandidate candidate = candidate_at(values, task.grid);
+  std::vector<WantedMotion> wanted = wanted_at(task, emulator, candidate);
+  const std::vector<Replay>* of_draws = &task.replays;
+  for (const FinerSettings& each : finer) {
+    for (const Replay& replay : each.replays) wanted.push_back({&replay, candidate});
+    if (each.what == half_step_name) of_draws = &each.replays;
+  }
+  if (with_held) add_wanted(task, held_of(task), values, wanted);
+  for (const std::vector<double>& draw : draws_of(posterior))
+    for (const Replay& replay : *of_draws) wanted.push_back({&replay, candidate_at(draw, task.grid)});
+  task.store.prepare(wanted);
+}
 
 std::vector<Replay> replays_of(const Emulator& emulator) {
   std::vector<Replay> replays;
@@ -45,14 +90,9 @@ std::vector<KnownError> errors_of_held(const Task& task, const std::vector<doubl
                                        const std::vector<ReplayResult>& here) {
   std::vector<KnownError> errors;
   const auto middle = std::make_shared<const Motions>(Motions{task.replays, here});
-  std::vector<HeldParameter> all = held_parameters(task.grid, task.replays);
-  if (spread_of_scale(task.grid, task.replays) > 0)  // the posterior takes it in without an approximation
-    std::erase_if(all, [](const HeldParameter& held) { return held.name.ends_with("density"); });
+  const std::vector<HeldParameter> all = held_of(task);
   std::vector<WantedMotion> wanted;
-  for (const HeldParameter& held : all)
-    for (const double value : held.values)
-      for (const Replay& replay : task.replays)
-        wanted.push_back({&replay, candidate_with(values, task.grid, held.name, value)});
+  add_wanted(task, all, values, wanted);
   task.store.prepare(wanted);
   for (const HeldParameter& held : all) {
     std::array<std::vector<ReplayResult>, 2> ends;
@@ -111,23 +151,13 @@ std::vector<std::string> contradicted_stiffnesses(const Task& task, const Motion
 std::vector<KnownError> errors_at_draws(const Task& task, const Emulator& emulator, const Estimate& estimate,
                                         const Posterior& posterior) {
   std::vector<KnownError> errors;
-  const Eigen::MatrixXd samples = samples_of(posterior);
   const std::vector<Replay> on_model = replays_of(emulator);
   const double share = 1 / std::sqrt(static_cast<double>(emulator_draws));
   const auto half_step = std::find_if(estimate.errors.begin(), estimate.errors.end(),
-                                      [](const KnownError& error) { return error.name == "half_step"; });
+                                      [](const KnownError& error) { return error.name == half_step_name; });
   const bool halved = half_step != estimate.errors.end();
   const std::vector<Replay>& replays = halved ? half_step->terms[1].motions->replays : task.replays;
-  std::vector<std::vector<double>> draws;
-  std::vector<WantedMotion> wanted;
-  for (int draw = 0; draw < emulator_draws; ++draw) {
-    const Eigen::VectorXd row =
-        samples.row((2 * draw + 1) * samples.rows() / (2 * emulator_draws)).transpose();
-    draws.emplace_back(row.begin(), row.end());
-    for (const Replay& replay : replays) wanted.push_back({&replay, candidate_at(draws.back(), task.grid)});
-  }
-  task.store.prepare(wanted);
-  for (const std::vector<double>& values : draws) {
+  for (const std::vector<double>& values : draws_of(posterior)) {
     const ReplayCandidate candidate = candidate_at(values, task.grid);
     Motions simulated{replays, {}};
     for (const Replay& replay : replays) {
@@ -180,17 +210,11 @@ std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emu
 }
 
 std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
-                                 const std::vector<double>& values) {
+                                 const std::vector<double>& values, std::vector<FinerSettings> finer) {
   Estimate estimate;
   const ReplayCandidate candidate = candidate_at(values, task.grid);
   const std::vector<Replay> on_model = replays_of(emulator);
   const std::vector<ReplayResult> model = motions_at(emulator, values, emulator.share);
-  std::vector<FinerSettings> finer_steps;
-  if (task.settings.solver_check) finer_steps = finer_settings(task.replays);
-  std::vector<WantedMotion> wanted = wanted_at(task, emulator, candidate);
-  for (const FinerSettings& finer : finer_steps)
-    for (const Replay& replay : finer.replays) wanted.push_back({&replay, candidate});
-  task.store.prepare(wanted);
   auto simulated = simulate_at(task, emulator, values, true, estimate.motions);
   if (!simulated) return std::nullopt;
   const auto add_error = [&](const std::string& name, Motions from, Motions to, bool corrects,
@@ -203,10 +227,10 @@ std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
   if (emulator.share != own_mesh)
     add_error("double_mesh", {on_model, motions_at(emulator, values, finer_mesh)}, {on_model, model}, false,
               kUnsure);
-  for (FinerSolution& finer : finer_solutions(std::move(finer_steps), candidate, task.store)) {
+  for (FinerSolution& each : finer_solutions(std::move(finer), candidate, task.store)) {
     for (std::size_t r = 0; r < task.replays.size(); ++r) task.tell_motion();
-    add_error(finer.what, {task.replays, estimate.motions},
-              {std::move(finer.replays), std::move(finer.motions)}, true);
+    add_error(each.what, {task.replays, estimate.motions}, {std::move(each.replays), std::move(each.motions)},
+              true);
   }
   return estimate;
 }

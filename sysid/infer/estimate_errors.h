@@ -6,6 +6,7 @@
 #include "sysid/infer/adaptive_design.h"
 #include "sysid/infer/answer.h"
 #include "sysid/infer/motion_likelihood.h"
+#include "sysid/infer/solver_check.h"
 
 namespace flash::sysid {
 
@@ -41,6 +42,11 @@ struct Estimate {
 
 std::vector<Replay> replays_of(const Emulator& emulator);
 
+/// Simulates side by side what solve_at, errors_at_draws and, `with_held`, errors_of_held ask for about a
+/// posterior.
+void simulate_ahead(const Task& task, const Emulator& emulator, const Posterior& posterior,
+                    const std::vector<FinerSettings>& finer, bool with_held);
+
 /// By what is held and not measured, about an estimate: how the motion changes with it, and how that bends.
 /// What diverges is left out.
 std::vector<KnownError> errors_of_held(const Task& task, const std::vector<double>& values,
@@ -66,8 +72,8 @@ std::optional<std::vector<ReplayResult>> simulate_at(const Task& task, const Emu
                                                      const std::vector<double>& values, bool finer,
                                                      std::vector<ReplayResult>& own);
 
-/// Simulates the estimate, on finer meshes and steps too. Empty where a motion diverged.
+/// Simulates the estimate, on finer meshes and under `finer` settings too. Empty where a motion diverged.
 std::optional<Estimate> solve_at(const Task& task, const Emulator& emulator,
-                                 const std::vector<double>& values);
+                                 const std::vector<double>& values, std::vector<FinerSettings> finer);
 
 }  // namespace flash::sysid

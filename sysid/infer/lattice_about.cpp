@@ -35,7 +35,10 @@ std::optional<Found> look_with(const Task& task, Emulator emulator, const std::v
     return narrow(emulator, start, values, axes, task.grid, task.settings.repeatability, errors, task.told);
   };
   const Look first = look(extent, at);
-  std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values());
+  std::vector<FinerSettings> finer;
+  if (task.settings.solver_check) finer = finer_settings(task.replays);
+  simulate_ahead(task, emulator, first.posterior, finer, held.empty());
+  std::optional<Estimate> estimate = solve_at(task, emulator, first.posterior.values(), std::move(finer));
   if (!estimate) return std::nullopt;
   if (held.empty()) held = errors_of_held(task, first.posterior.values(), estimate->motions);
   errors = estimate->errors;

@@ -7,6 +7,7 @@
 #include <map>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "data/atomic_file.h"
 #include "data/error.h"
@@ -24,6 +25,8 @@ constexpr std::size_t kDigest = 64;  // hexadecimal digits of a SHA-256
 /// Numbers as the bytes they are.
 class Bytes {
  public:
+  Bytes() = default;
+  Bytes(std::string text, std::size_t room) : text_(std::move(text)) { text_.reserve(text_.size() + room); }
   template <class Number>
   void add(Number number) {
     static_assert(std::is_arithmetic_v<Number>);
@@ -41,6 +44,7 @@ class Bytes {
     text_ += text;
   }
   const std::string& text() const { return text_; }
+  void overwrite(std::size_t at, const std::string& text) { text_.replace(at, text.size(), text); }
 
  private:
   std::string text_;
@@ -145,7 +149,12 @@ std::string key_of(const Replay& replay, const sim::Environment& world, const st
 
 void save(const ReplayResult& result, const std::vector<int>& kept, const std::string& key,
           const std::string& path) {
-  Bytes bytes;
+  // A motion is megabytes: they are written once, behind room for their sum.
+  const std::size_t sum_at = kMagic.size() + kDigest, header = sum_at + kDigest;
+  std::size_t numbers = 3 * result.motion.forces.size() + 16;
+  for (const int step : kept)
+    numbers += static_cast<std::size_t>(result.motion.positions[static_cast<std::size_t>(step)].size()) + 2;
+  Bytes bytes(std::string(kMagic) + key + std::string(kDigest, ' '), numbers * sizeof(double));
   for (const double value : {result.motion.start, result.motion.step, result.residual_max,
                              result.penetration_max, result.unconverged_share})
     bytes.add(value);
@@ -156,7 +165,8 @@ void save(const ReplayResult& result, const std::vector<int>& kept, const std::s
   for (Eigen::Index i = 0; i < forces.rows(); ++i)
     forces.row(i) = result.motion.forces[static_cast<std::size_t>(i)].transpose();
   bytes.add_matrix(forces);
-  data::write_atomically(path, std::string(kMagic) + key + data::sha256(bytes.text()) + bytes.text());
+  bytes.overwrite(sum_at, data::sha256(std::string_view(bytes.text()).substr(header)));
+  data::write_atomically(path, bytes.text(), data::Sync::later);
 }
 
 ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std::string& key,
@@ -194,12 +204,13 @@ MotionStore::MotionStore(const std::string& folder) : folder_(folder) {
   std::filesystem::create_directories(folder);
 }
 
+std::string MotionStore::path_of(const std::string& key) const {
+  return (std::filesystem::path(folder_) / (key + ".rollout")).string();
+}
+
 void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
                       const std::function<void(std::size_t, ReplayResult)>& finished) const {
   const std::vector<int> kept = scored_steps(replay);
-  const auto path_of = [&](const std::string& key) {
-    return (std::filesystem::path(folder_) / (key + ".rollout")).string();
-  };
   std::vector<std::string> wanted(candidates.size());
   data::for_each_in_parallel(candidates.size(), replay.settings.threads, [&](std::size_t i) {
     std::string key = key_of(replay, make_environment(replay, candidates[i]), kept);
@@ -235,16 +246,17 @@ ReplayResult MotionStore::run(const Replay& replay, const ReplayCandidate& candi
 
 void MotionStore::prepare(const std::vector<WantedMotion>& wanted) const {
   std::map<const Replay*, std::vector<ReplayCandidate>> batches;
-  for (const WantedMotion& motion : wanted) batches[motion.replay].push_back(motion.candidate);
-  std::vector<const Replay*> single;
-  for (const auto& [replay, candidates] : batches)
-    if (candidates.size() == 1)
-      single.push_back(replay);
-    else
-      run(*replay, candidates, [](std::size_t, const ReplayResult&) {});
-  if (single.empty()) return;
-  data::for_each_in_parallel(single.size(), single.front()->settings.threads,
-                             [&](std::size_t k) { run(*single[k], batches.at(single[k]).front()); });
+  for (const WantedMotion& motion : wanted) {
+    const Replay& replay = *motion.replay;
+    const std::string key = key_of(replay, make_environment(replay, motion.candidate), scored_steps(replay));
+    if (!std::filesystem::exists(path_of(key))) batches[motion.replay].push_back(motion.candidate);
+  }
+  if (batches.empty()) return;
+  const std::vector<std::pair<const Replay*, std::vector<ReplayCandidate>>> all(batches.begin(),
+                                                                                batches.end());
+  data::for_each_in_parallel(all.size(), all.front().first->settings.threads, [&](std::size_t k) {
+    run(*all[k].first, all[k].second, [](std::size_t, const ReplayResult&) {});
+  });
 }
 
 }  // namespace flash::sysid

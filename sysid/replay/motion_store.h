@@ -16,7 +16,7 @@ struct WantedMotion {
 /// motion is kept at the steps around its keyframes only, in double precision, in a file of its own named by
 /// the SHA-256 of everything that decides it (sheet, start, grippers, table, solver, material). Files are
 /// written whole or not at all, with this name and the SHA-256 of their numbers; several programs may share a
-/// folder.
+/// folder. Nothing waits for the disk: what a power cut leaves of the last ones is told by their sums.
 class MotionStore {
  public:
   /// Creates the folder. Throws std::runtime_error where it cannot.
@@ -32,10 +32,12 @@ class MotionStore {
   ReplayResult run(const Replay& replay, const ReplayCandidate& candidate) const;
 
   /// Simulates what the folder lacks of motions that are asked for next: those of a replay as a batch, and
-  /// replays of which one motion is wanted side by side.
+  /// replays side by side.
   void prepare(const std::vector<WantedMotion>& wanted) const;
 
  private:
+  std::string path_of(const std::string& key) const;
+
   std::string folder_;
 };
 

@@ -85,6 +85,27 @@ TEST(MotionStore, AnotherMotionIsAnotherFileAndAnotherNoiseIsNot) {
   EXPECT_EQ(files_in(folder / "rollouts"), 5);
 }
 
+TEST(MotionStore, WhatIsPreparedIsThereOnceAndBitForBitThatOfARun) {
+  const data::TemporaryFolder folder;
+  const Replay replay = recorded(folder, "corner_lift", 1), dragged = recorded(folder, "drag", 1);
+  const MotionStore prepared(folder / "prepared"), run(folder / "run");
+  const ReplayCandidate here{towel(), {}};
+  ReplayCandidate there = here;
+  there.material.friction += 0.1;
+  prepared.run(replay, here);
+  const std::vector<WantedMotion> wanted = {
+      {&replay, here}, {&replay, there}, {&dragged, here}, {&replay, there}};
+  prepared.prepare(wanted);
+  EXPECT_EQ(files_in(folder / "prepared"), 3);
+  prepared.prepare(wanted);
+  EXPECT_EQ(files_in(folder / "prepared"), 3);
+  for (const WantedMotion& each : wanted) run.run(*each.replay, each.candidate);
+  EXPECT_EQ(files_in(folder / "run"), 3);
+  for (const auto& file : std::filesystem::directory_iterator(folder / "run"))
+    EXPECT_EQ(data::read_file(file.path()),
+              data::read_file(folder / ("prepared/" + file.path().filename().string())));
+}
+
 TEST(MotionStore, AFileThatIsNotAsItWasWrittenIsNamed) {
   const data::TemporaryFolder folder;
   const Replay replay = recorded(folder, "corner_lift", 1);
