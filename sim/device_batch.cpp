@@ -175,25 +175,51 @@ std::vector<cuda::ReplayEnvironment> replay_environments(const Group& group, con
   return replays;
 }
 
-/// Takes what a replay has of environment e, which is its `in_replay`th, to the state at the end of the
-/// group.
-void take_results(const cuda::BatchReplay& replay, const Group& group, const BatchSettings& settings, int e,
-                  int in_replay, Environment& environment, const DeviceResults& results) {
-  State& state = environment.state;
+/// Readers of a replay that no thread uses at the moment.
+class IdleReaders {
+ public:
+  explicit IdleReaders(const cuda::BatchReplay& replay) : replay_(replay) {}
+
+  std::unique_ptr<cuda::ReplayReader> take() {
+    {
+      const std::scoped_lock lock(mutex_);
+      if (!idle_.empty()) {
+        auto reader = std::move(idle_.back());
+        idle_.pop_back();
+        return reader;
+      }
+    }
+    return std::make_unique<cuda::ReplayReader>(replay_);
+  }
+  void give_back(std::unique_ptr<cuda::ReplayReader> reader) {
+    const std::scoped_lock lock(mutex_);
+    idle_.push_back(std::move(reader));
+  }
+
+ private:
+  const cuda::BatchReplay& replay_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<cuda::ReplayReader>> idle_;
+};
+
+/// Takes what a reader has of environment e, its `in_replay`th, to the state at the end of the group.
+void take_results(cuda::ReplayReader& reader, const Group& group, const BatchSettings& settings, int e,
+                  int in_replay, State& state, const DeviceResults& results) {
+  const std::vector<int>& kept = settings.kept_steps;
+  const auto first = std::upper_bound(kept.begin(), kept.end(), group.first);
+  const bool keeps = first != kept.end() && *first <= group.first + group.count;
+  cuda::ReplayResult result =
+      reader.read(in_replay, keeps ? results.kept_at(e, static_cast<int>(first - kept.begin())) : nullptr);
   std::vector<StepStats> stats;
-  for (const cuda::ReplayStep& step : replay.stats(in_replay)) {
+  for (const cuda::ReplayStep& step : result.stats) {
     stats.push_back({step.residual, step.penetration_max, step.iterations, step.solves, step.factorizations,
                      step.substeps, step.converged});
     state.time += time_step_of(settings);
   }
-  results.stepped({e, group.first, group.count, stats, replay.hold_forces(in_replay)});
-  const std::vector<int>& kept = settings.kept_steps;
-  const auto first = std::upper_bound(kept.begin(), kept.end(), group.first);
-  if (first != kept.end() && *first <= group.first + group.count)
-    replay.read_kept_positions(in_replay, results.kept_at(e, static_cast<int>(first - kept.begin())));
-  state.positions = replay.positions(in_replay);
-  state.velocities = replay.velocities(in_replay);
-  state.bristles = replay.bristles(in_replay);
+  results.stepped({e, group.first, group.count, stats, result.hold_forces});
+  state.positions = std::move(result.positions);
+  state.velocities = std::move(result.velocities);
+  state.bristles = std::move(result.bristles);
 }
 
 /// Runs a group, whose environments advance; `end`: the step at which they finish. Results are taken, and
@@ -208,12 +234,15 @@ void run(const std::shared_ptr<const SheetPlan>& plan, const Group& group, int e
   replay.synchronize(settings.solver.stop);
   if (settings.solver.stop != nullptr && *settings.solver.stop) throw data::Stopped();
   results.timed(replay.phase_ticks());
+  IdleReaders readers(replay);
   data::for_each_in_parallel(group.environments.size(), settings.threads, [&](std::size_t k) {
     const int e = group.environments[k];
-    Environment& environment = environments[static_cast<std::size_t>(e)];
+    State& state = environments[static_cast<std::size_t>(e)].state;
     try {
-      take_results(replay, group, settings, e, static_cast<int>(k), environment, results);
-      environment.state.held = std::move(held[k]);
+      auto reader = readers.take();
+      take_results(*reader, group, settings, e, static_cast<int>(k), state, results);
+      readers.give_back(std::move(reader));
+      state.held = std::move(held[k]);
       if (group.first + group.count == end) results.finished(e);
     } catch (const cuda::DeviceError& error) {
       failures.add(error.what(), {e});

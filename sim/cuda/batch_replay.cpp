@@ -1,18 +1,19 @@
 #include "sim/cuda/batch_replay.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>
-#include <functional>
-#include <map>
+#include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <thread>
-#include <tuple>
 
+#include "sim/cuda/device_arena.h"
 #include "sim/cuda/device_plan.h"
 #include "sim/cuda/devices.h"
+#include "sim/cuda/flat_motions.h"
 #include "sim/cuda/layout/team_stages.h"
+#include "sim/cuda/pinned_array.h"
 #include "sim/cuda/projective_replay.h"
 #include "sim/cuda/replay_kernel.h"
 #include "sim/cuda/team_memory.h"
@@ -97,63 +98,18 @@ ReplayMaterial material_of(const SheetPlan& plan, const ReplayEnvironment& envir
           stand_beside(environment.obstacles)};
 }
 
-/// Poses of a schedule's frames at the start of a replay and after each step.
-std::vector<FramePose> frame_poses(const ReplayEnvironment& environment, double time_step, int steps,
-                                   int frames) {
-  std::vector<FramePose> poses;
-  for (int k = 0; k <= steps; ++k)
-    for (int f = 0; f < frames; ++f) {
-      FramePose pose{frame_of(Eigen::Isometry3d::Identity()), {}};
-      if (environment.schedule != nullptr && f < std::ssize(environment.schedule->frames)) {
-        const Eigen::Isometry3d from = pose_at(*environment.schedule, f, environment.time + k * time_step),
-                                to =
-                                    pose_at(*environment.schedule, f, environment.time + (k + 1) * time_step);
-        const Eigen::AngleAxisd turn(to.linear() * from.linear().transpose());
-        pose = {frame_of(from), vector3(Eigen::Vector3d(turn.angle() * turn.axis()))};
-      }
-      poses.push_back(pose);
-    }
-  return poses;
+std::vector<ReplayStep> steps_of(std::span<const ReplayStats> stats) {
+  std::vector<ReplayStep> steps;
+  for (const ReplayStats& s : stats)
+    steps.push_back(
+        {s.residual, s.penetration, s.iterations, s.solves, s.factorizations, s.substeps, s.converged != 0});
+  return steps;
 }
 
-/// What environments with the same motion share.
-using MotionKey = std::tuple<const HoldMotion*, const Schedule*, double>;
-
-MotionKey motion_of(const ReplayEnvironment& e) { return {e.holds.get(), e.schedule.get(), e.time}; }
-
-/// Motions one after the other, each once.
-struct FlatMotions {
-  std::vector<int> starts;
-  std::vector<HeldPlace> holds;
-  std::vector<FramePose> poses;
-  std::map<MotionKey, int> motions;
-  int frames = 0;  ///< of the schedules, at most
-  int most = 0;    ///< held in one step
-
-  void add(const ReplayEnvironment& environment, double time_step, int steps,
-           const std::vector<int>& position) {
-    if (!motions.emplace(motion_of(environment), static_cast<int>(motions.size())).second) return;
-    const std::vector<FramePose> own = frame_poses(environment, time_step, steps, frames);
-    poses.insert(poses.end(), own.begin(), own.end());
-    const HoldMotion* motion = environment.holds.get();
-    std::vector<int> held_in(position.size(), -1);
-    for (int k = 0; k < steps; ++k) {
-      starts.push_back(static_cast<int>(holds.size()));
-      if (motion == nullptr) continue;
-      for (const HeldVertex& held : (*motion)[k]) {
-        require(held.vertex >= 0 && held.vertex < std::ssize(position) && held_in[held.vertex] != k,
-                "a vertex that is not there or is held twice");
-        held_in[held.vertex] = k;
-        holds.push_back({position[held.vertex],
-                         int{held.axes[0]} | 2 * int{held.axes[1]} | 4 * int{held.axes[2]},
-                         {held.target.x(), held.target.y(), held.target.z()},
-                         {held.holds[0], held.holds[1], held.holds[2]}});
-      }
-      most = std::max(most, static_cast<int>(holds.size()) - starts.back());
-    }
-    starts.push_back(static_cast<int>(holds.size()));
-  }
-};
+/// `points`: by order of elimination, which `order` has the vertices of.
+void put_points(const Point* points, const std::vector<int>& order, Eigen::Ref<Points> to) {
+  for (std::size_t i = 0; i < order.size(); ++i) to.row(order[i]) << points[i].x, points[i].y, points[i].z;
+}
 
 }  // namespace
 
@@ -310,8 +266,9 @@ struct BatchReplay::Memory {
     numbers.frames = flat.frames;
     std::vector<ReplayMaterial> all;
     for (const ReplayEnvironment& e : environments) {
-      flat.add(e, settings.time_step, settings.steps - settings.first_step, front_plan.position);
-      all.push_back(material_of(sheet, e, flat.motions.at(motion_of(e))));
+      const int motion =
+          flat.add(e, settings.time_step, settings.steps - settings.first_step, front_plan.position);
+      all.push_back(material_of(sheet, e, motion));
     }
     poses = DeviceArray<FramePose>(flat.poses);
     materials = DeviceArray<ReplayMaterial>(all);
@@ -418,9 +375,8 @@ struct BatchReplay::Memory {
   /// A part of an array with a point for each vertex.
   Points points(const DeviceArray<Point>& array, std::size_t part) const {
     wait();
-    const std::vector<Point> all = array.read(part * size(), size());
     Points result(layout.size, 3);
-    for (int i = 0; i < layout.size; ++i) result.row(layout.order[i]) << all[i].x, all[i].y, all[i].z;
+    put_points(array.read(part * size(), size()).data(), layout.order, result);
     return result;
   }
 };
@@ -473,13 +429,6 @@ Points BatchReplay::kept_positions(int environment, int index) const {
   return positions;
 }
 
-void BatchReplay::read_kept_positions(int environment, double* to) const {
-  const Memory& m = *memory_;
-  m.wait();
-  const std::size_t each = m.settings.kept_steps.size() * 3 * m.size();
-  m.kept.read(static_cast<std::size_t>(environment) * each, each, to);
-}
-
 std::vector<double> BatchReplay::hold_forces(int environment) const {
   const Memory& m = *memory_;
   m.wait();
@@ -506,11 +455,85 @@ std::vector<ReplayStep> BatchReplay::stats(int environment) const {
   const Memory& m = *memory_;
   m.wait();
   const auto each = static_cast<std::size_t>(m.numbers.stats_each);
-  std::vector<ReplayStep> steps;
-  for (const ReplayStats& s : m.stats.read(static_cast<std::size_t>(environment) * each, each))
-    steps.push_back(
-        {s.residual, s.penetration, s.iterations, s.solves, s.factorizations, s.substeps, s.converged != 0});
-  return steps;
+  return steps_of(m.stats.read(static_cast<std::size_t>(environment) * each, each));
+}
+
+/// Where numbers of one environment stand on the host.
+struct ReplayReader::Memory {
+  /// Environments of which so many are read sooner than memory is pinned.
+  static constexpr int few = 256;
+
+  const BatchReplay::Memory& replay;
+  std::size_t steps, holds, vertices, kept_steps, obstacles;
+  std::optional<PinnedArray<Point>> pinned;
+  std::vector<Point> pageable;
+  Point* points = nullptr;  ///< positions, velocities and bristles
+  ReplayStats* stats = nullptr;
+  double *forces = nullptr, *kept = nullptr;
+
+  explicit Memory(const BatchReplay::Memory& of)
+      : replay(of),
+        steps(static_cast<std::size_t>(of.numbers.stats_each)),
+        holds(static_cast<std::size_t>(of.numbers.hold_count)),
+        vertices(of.size()),
+        kept_steps(of.settings.kept_steps.size()),
+        obstacles(static_cast<std::size_t>(of.numbers.most_obstacles_each)) {
+    const std::size_t size = lay_out(nullptr) / sizeof(Point) + 1;
+    if (of.count > few)
+      pinned.emplace(size);
+    else
+      pageable.resize(size);
+    lay_out(reinterpret_cast<char*>(pinned ? pinned->data() : pageable.data()));
+  }
+
+  /// Returns the bytes that it takes.
+  std::size_t lay_out(char* begin) {
+    DeviceArena arena(begin);
+    points = arena.take<Point>((2 + obstacles) * vertices);
+    stats = arena.take<ReplayStats>(steps);
+    forces = arena.take<double>(3 * steps * holds);
+    kept = arena.take<double>(3 * kept_steps * vertices);
+    return arena.used();
+  }
+};
+
+ReplayReader::ReplayReader(const BatchReplay& replay)
+    : memory_((replay.memory_->wait(), std::make_unique<Memory>(*replay.memory_))) {}
+ReplayReader::~ReplayReader() = default;
+
+ReplayResult ReplayReader::read(int environment, double* kept) {
+  Memory& m = *memory_;
+  const BatchReplay::Memory& replay = m.replay;
+  use_device(replay.device);
+  const auto e = static_cast<std::size_t>(environment);
+  const auto fetch = [e](const auto& array, std::size_t each, auto* to) {
+    if (each > 0)
+      check(cudaMemcpyAsync(to, array.data() + e * each, each * sizeof(*to), cudaMemcpyDeviceToHost,
+                            cudaStreamPerThread));
+  };
+  fetch(replay.stats, m.steps, m.stats);
+  fetch(replay.hold_forces, 3 * m.steps * m.holds, m.forces);
+  fetch(replay.kept, 3 * m.kept_steps * m.vertices, m.kept);
+  fetch(replay.positions, m.vertices, m.points);
+  fetch(replay.velocities, m.vertices, m.points + m.vertices);
+  fetch(replay.bristles, m.obstacles * m.vertices, m.points + 2 * m.vertices);
+  check(cudaStreamSynchronize(cudaStreamPerThread));
+
+  ReplayResult result;
+  result.stats = steps_of({m.stats, m.steps});
+  result.hold_forces.assign(m.forces, m.forces + 3 * m.steps * m.holds);
+  std::copy(m.kept, m.kept + 3 * m.kept_steps * m.vertices, kept);
+  const auto size = static_cast<Eigen::Index>(m.vertices);
+  result.positions.resize(size, 3);
+  result.velocities.resize(size, 3);
+  result.bristles.resize(replay.obstacle_counts[e] * size, 3);
+  const std::vector<int>& order = replay.layout.order;
+  put_points(m.points, order, result.positions);
+  put_points(m.points + m.vertices, order, result.velocities);
+  for (int k = 0; k < replay.obstacle_counts[e]; ++k)
+    put_points(m.points + (2 + static_cast<std::size_t>(k)) * m.vertices, order,
+               result.bristles.middleRows(k * size, size));
+  return result;
 }
 
 }  // namespace flash::sim::cuda

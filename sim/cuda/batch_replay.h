@@ -104,13 +104,34 @@ class BatchReplay {
   data::Points velocities(int environment) const;  ///< [m/s]
   data::Points bristles(int environment) const;    ///< as in State
   data::Points kept_positions(int environment, int index) const;
-  /// Those of all kept steps: kept steps x vertices x 3.
-  void read_kept_positions(int environment, double* to) const;
   /// Forces of the holds on the sheet, mean over each step: steps from first_step on x holds x 3 [N].
   std::vector<double> hold_forces(int environment) const;
   std::vector<ReplayStep> stats(int environment) const;  ///< a step each, from first_step on
   /// Ticks that the teams' first processors spent in each ReplayPhase.
   std::vector<double> phase_ticks() const;
+
+ private:
+  friend class ReplayReader;
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
+
+/// All that a replay has of one environment but for its kept steps, each as BatchReplay has it.
+struct ReplayResult {
+  std::vector<ReplayStep> stats;
+  std::vector<double> hold_forces;
+  data::Points positions, velocities, bristles;
+};
+
+/// Reads the environments of a replay that has ended, which outlives it. Many threads read best with a reader
+/// each: it has memory that the device writes to by itself, and waits once an environment.
+class ReplayReader {
+ public:
+  explicit ReplayReader(const BatchReplay& replay);
+  ~ReplayReader();
+
+  /// `kept`: where positions go, kept steps x vertices x 3 [m].
+  ReplayResult read(int environment, double* kept);
 
  private:
   struct Memory;

@@ -1,11 +1,13 @@
 #include "sim/cuda/surface_feet.h"
 
 #include <array>
+#include <optional>
 #include <stdexcept>
 
 #include "sim/cuda/device_array.h"
 #include "sim/cuda/devices.h"
 #include "sim/cuda/feet_kernels.h"
+#include "sim/cuda/pinned_array.h"
 
 namespace flash::sim::cuda {
 namespace {
@@ -40,10 +42,6 @@ struct CloudSet {
   }
 };
 
-struct PinnedEnd {
-  void operator()(void* memory) const { cudaFreeHost(memory); }
-};
-
 }  // namespace
 
 struct SurfaceFeet::Memory {
@@ -56,7 +54,7 @@ struct SurfaceFeet::Memory {
   DeviceArray<SurfaceTime> times;
   DeviceArray<double> placed, boxes;
   DeviceArray<SurfaceFoot> feet;
-  std::unique_ptr<SurfaceFoot, PinnedEnd> feet_read;  // on the host
+  std::optional<PinnedArray<SurfaceFoot>> feet_read;  // on the host
   FeetNumbers numbers{};
 
   Memory(int used, const data::Triangles& mesh, Eigen::Index mesh_vertices, const std::vector<int>& order,
@@ -77,9 +75,7 @@ struct SurfaceFeet::Memory {
       most = std::max(most, sets.emplace_back(each).points.size());
     }
     feet = DeviceArray<SurfaceFoot>(most);
-    SurfaceFoot* read = nullptr;
-    check(cudaMallocHost(&read, std::max<std::size_t>(most, 1) * sizeof(SurfaceFoot)));
-    feet_read.reset(read);
+    feet_read.emplace(most);
     steps = DeviceArray<Place>(clouds * steps_each * vertices);
     times = DeviceArray<SurfaceTime>(clouds);
     placed = DeviceArray<double>(9 * slots * clouds);
@@ -144,10 +140,10 @@ std::vector<std::span<const SurfaceFoot>> SurfaceFeet::find(std::size_t set,
   check(cudaMemcpyAsync(m.times.data(), placed.data(), placed.size() * sizeof(SurfaceTime),
                         cudaMemcpyHostToDevice, cudaStreamPerThread));
   place_and_search(numbers, cudaStreamPerThread);
-  copy_to_end(m.feet_read.get(), m.feet.data(), clouds.points.size() * sizeof(SurfaceFoot),
+  copy_to_end(m.feet_read->data(), m.feet.data(), clouds.points.size() * sizeof(SurfaceFoot),
               cudaMemcpyDeviceToHost);
   std::vector<std::span<const SurfaceFoot>> feet;
-  const SurfaceFoot* at = m.feet_read.get();
+  const SurfaceFoot* at = m.feet_read->data();
   for (const std::size_t size : clouds.sizes) {
     feet.emplace_back(at, size);
     at += size;
