@@ -15,6 +15,7 @@
 #include "sim/cuda/device_error.h"
 #include "sim/cuda/devices.h"
 #include "sim/cuda/hold_motion.h"
+#include "sim/cuda/replay_reader.h"
 #include "sim/device_error.h"
 #endif
 

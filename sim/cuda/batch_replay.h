@@ -75,6 +75,8 @@ struct ReplayStep {
   bool converged = false;
 };
 
+struct ReplayMemory;
+
 /// Replays of many environments of one sheet on the device, each step to the tolerance that the CPU's Solver
 /// has. A team, one processor or several, takes an environment through up to `restart_interval` steps and
 /// then another one that waits. So none waits for the others, and what an environment gets depends on its own
@@ -112,30 +114,7 @@ class BatchReplay {
 
  private:
   friend class ReplayReader;
-  struct Memory;
-  std::unique_ptr<Memory> memory_;
-};
-
-/// All that a replay has of one environment but for its kept steps, each as BatchReplay has it.
-struct ReplayResult {
-  std::vector<ReplayStep> stats;
-  std::vector<double> hold_forces;
-  data::Points positions, velocities, bristles;
-};
-
-/// Reads the environments of a replay that has ended, which outlives it. Many threads read best with a reader
-/// each: it has memory that the device writes to by itself, and waits once an environment.
-class ReplayReader {
- public:
-  explicit ReplayReader(const BatchReplay& replay);
-  ~ReplayReader();
-
-  /// `kept`: where positions go, kept steps x vertices x 3 [m].
-  ReplayResult read(int environment, double* kept);
-
- private:
-  struct Memory;
-  std::unique_ptr<Memory> memory_;
+  std::unique_ptr<ReplayMemory> memory_;
 };
 
 }  // namespace flash::sim::cuda
