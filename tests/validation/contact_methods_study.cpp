@@ -1,4 +1,4 @@
-// Prints how three methods keep layers apart on the same scenes, as docs/performance.md says: the barrier of
+// Prints how three methods keep layers apart on the same scenes, as docs/experiments.md says: the barrier of
 // the library, and two prototypes with hard rows.
 
 #include <algorithm>
