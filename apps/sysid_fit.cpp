@@ -113,6 +113,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
   if (replay.self_contact) sysid::on_half_the_cell(replays);  // refused before anything is simulated
   std::vector<std::string> notices;
   grid.base = material_base(asset, replays.front().sheet(), notices, held_axes(grid));
+  place_candidates(options.common, {sysid::candidate_at(start.values, grid)}, replays);
   // One store of motions for the search and what goes on from it.
   grid.rollouts =
       options.rollouts.empty() ? (fs::path(options.start) / "motions").string() : options.rollouts;

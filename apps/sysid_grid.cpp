@@ -126,6 +126,10 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
       options, material_base(asset, replays.front().sheet(), notices, axes_of(parse_holds(options.holds))),
       threads);
   if (simulated.self_contact) sysid::on_half_the_cell(replays);  // refused before anything is simulated
+  std::vector<sysid::ReplayCandidate> candidates;
+  for (const std::vector<double>& values : sysid::cartesian_product(settings.axes))
+    candidates.push_back(sysid::candidate_at(values, settings));
+  place_candidates(options.common, candidates, replays);
   sysid::check_grasp_axes(settings.axes, replays);
   sysid::check_grasp_axes(settings.fixed, replays);
   if (!options.no_solver_check)  // which halves the step

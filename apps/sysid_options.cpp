@@ -302,6 +302,19 @@ void place_simulation(const CommonOptions& options, const data::Asset& asset,
   settings.cuda_devices = choice.cuda_devices;
 }
 
+void place_candidates(const CommonOptions& options, const std::vector<sysid::ReplayCandidate>& candidates,
+                      std::vector<sysid::Replay>& replays) {
+  if (replays.front().settings.device != sim::Device::cuda) return;
+  const std::string why = sysid::why_not_on_device(replays.front(), candidates);
+  if (why.empty()) return;
+  if (options.device != "auto")
+    throw data::InputError("--device " + options.device + ": " + why + "; use --device cpu or auto");
+  for (sysid::Replay& replay : replays) {
+    replay.settings.device = sim::Device::cpu;
+    replay.settings.cuda_devices.clear();
+  }
+}
+
 void require_cpu(const CommonOptions& options) {
   if (options.device.starts_with("cuda"))
     throw data::InputError("--device " + options.device +

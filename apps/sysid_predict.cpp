@@ -177,11 +177,13 @@ int run_predict(const CLI::App& verb, const PredictOptions& options) {
   place_simulation(options.common, asset, simulated);
   const bool own_mesh = simulated.mesh.empty();
   if (own_mesh) simulated.mesh = sysid::mesh_of(found.summary);
-  const sysid::Replay replay = sysid::make_replay(recording, simulated);
+  std::vector<sysid::Replay> replays = {sysid::make_replay(recording, simulated)};
+  const sysid::Replay& replay = replays.front();
   if (own_mesh) check_size(replay, recording, options.run);
   warn_of_other_settings(found.summary, options.replay);
   std::vector<std::string> notices;
   found.grid.base = material_base(asset, replay.sheet(), notices, found.grid.fixed);
+  place_candidates(options.common, {sysid::candidate_at(found.values.front(), found.grid)}, replays);
   sysid::check_grasp_axes(found.grid.axes, {replay});
   found.grid.score = score_settings(options.replay);
   sysid::check_job({replay}, static_cast<double>(found.values.size()),

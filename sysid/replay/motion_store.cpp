@@ -5,6 +5,7 @@
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -169,18 +170,17 @@ void save(const ReplayResult& result, const std::vector<int>& kept, const std::s
   data::write_atomically(path, bytes.text(), data::Sync::later);
 }
 
-ReplayResult load(const Replay& replay, const std::vector<int>& kept, const std::string& key,
-                  const std::string& path) {
+/// Empty where the file is not as it was written, as a power cut may leave it: then it is simulated again.
+std::optional<ReplayResult> load(const Replay& replay, const std::vector<int>& kept, const std::string& key,
+                                 const std::string& path) {
   const std::string text = data::read_file(path);
   const std::string_view whole = text;
   const std::size_t header = kMagic.size() + 2 * kDigest;
-  BytesReader bytes(whole.substr(std::min(header, whole.size())), path);
-  if (!whole.starts_with(kMagic) || whole.size() < header)
-    bytes.fail("header", "another", "that of a motion of flash-sysid, \"flash-rollout/4\"");
+  if (!whole.starts_with(kMagic) || whole.size() < header ||
+      data::sha256(whole.substr(header)) != whole.substr(kMagic.size() + kDigest, kDigest))
+    return std::nullopt;
+  BytesReader bytes(whole.substr(header), path);
   if (whole.substr(kMagic.size(), kDigest) != key) bytes.fail("key", "that of another motion", key);
-  const std::string_view kept_sum = whole.substr(kMagic.size() + kDigest, kDigest);
-  if (const std::string sum = data::sha256(whole.substr(header)); sum != kept_sum)
-    bytes.fail("SHA-256 of its numbers", sum, "the one it was written with");  // which may be any bytes
   ReplayResult result;
   for (double* value : {&result.motion.start, &result.motion.step, &result.residual_max,
                         &result.penetration_max, &result.unconverged_share})
@@ -214,8 +214,10 @@ void MotionStore::run(const Replay& replay, const std::vector<ReplayCandidate>& 
   std::vector<std::string> wanted(candidates.size());
   data::for_each_in_parallel(candidates.size(), replay.settings.threads, [&](std::size_t i) {
     std::string key = key_of(replay, make_environment(replay, candidates[i]), kept);
-    if (std::filesystem::exists(path_of(key)))
-      finished(i, load(replay, kept, key, path_of(key)));
+    std::optional<ReplayResult> found;
+    if (std::filesystem::exists(path_of(key))) found = load(replay, kept, key, path_of(key));
+    if (found)
+      finished(i, std::move(*found));
     else
       wanted[i] = std::move(key);
   });

@@ -16,15 +16,16 @@ struct WantedMotion {
 /// motion is kept at the steps around its keyframes only, in double precision, in a file of its own named by
 /// the SHA-256 of everything that decides it (sheet, start, grippers, table, solver, material). Files are
 /// written whole or not at all, with this name and the SHA-256 of their numbers; several programs may share a
-/// folder. Nothing waits for the disk: what a power cut leaves of the last ones is told by their sums.
+/// folder. Nothing waits for the disk: a file that a power cut left otherwise than it was written is
+/// simulated again.
 class MotionStore {
  public:
   /// Creates the folder. Throws std::runtime_error where it cannot.
   explicit MotionStore(const std::string& folder);
 
   /// The candidates' motions at the scored steps, from the folder where they are there, else simulated and
-  /// kept. `finished` as in sysid::run. Throws data::InputError naming a file that is not that
-  /// motion, or not as it was written.
+  /// kept. `finished` as in sysid::run. Throws data::InputError naming a file that is whole and
+  /// not that motion.
   void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates,
            const std::function<void(std::size_t, ReplayResult)>& finished) const;
 

@@ -9,6 +9,7 @@
 #include "data/scene.h"
 #include "data/text.h"
 #include "data/worst.h"
+#include "sim/device_batch.h"
 #include "sim/scene/solid.h"
 #include "sysid/replay/recorded_grasp.h"
 
@@ -271,6 +272,17 @@ sim::Environment make_environment(const Replay& replay, const ReplayCandidate& c
   if (environment.self_contact && environment.self_contact->friction < 0)
     environment.self_contact->friction = sim::friction_of(environment, 0);
   return environment;
+}
+
+std::string why_not_on_device(const Replay& replay, const std::vector<ReplayCandidate>& candidates) {
+  if (candidates.empty()) return {};
+  // Candidates differ in their materials, and in places that no device minds.
+  sim::Environment environment = make_environment(replay, candidates.front());
+  for (const ReplayCandidate& candidate : candidates) {
+    environment.materials[0] = candidate.material;
+    if (std::string why = sim::why_not_on_device(environment); !why.empty()) return why;
+  }
+  return {};
 }
 
 std::vector<int> scored_steps(const Replay& replay) {

@@ -110,6 +110,9 @@ std::vector<int> scored_steps(const Replay& replay);
 /// All steps of a replay.
 std::vector<int> every_step(const Replay& replay);
 
+/// What a device cannot do yet of one of the candidates, in a line; empty where it can simulate all.
+std::string why_not_on_device(const Replay& replay, const std::vector<ReplayCandidate>& candidates);
+
 /// Simulates the candidates, replay.settings.envs of them at once. Only positions at the steps `kept` are
 /// held; others are empty. The thread that simulated a candidate calls `finished` with its number and result.
 void run(const Replay& replay, const std::vector<ReplayCandidate>& candidates, const std::vector<int>& kept,
