@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "sim/cuda/device_arena.h"
+#include "sim/cuda/device_error.h"
 #include "sim/cuda/pinned_array.h"
 #include "sim/cuda/replay_memory.h"
 
@@ -30,10 +31,11 @@ struct ReplayReader::Memory {
         kept_steps(of.settings.kept_steps.size()),
         obstacles(static_cast<std::size_t>(of.numbers.most_obstacles_each)) {
     const std::size_t size = lay_out(nullptr) / sizeof(Point) + 1;
-    if (of.count > few)
-      pinned.emplace(size);
-    else
-      pageable.resize(size);
+    try {
+      if (of.count > few) pinned.emplace(size);
+    } catch (const OutOfMemory&) {  // what a system lets be pinned is limited; other memory does as well
+    }
+    if (!pinned) pageable.resize(size);
     lay_out(reinterpret_cast<char*>(pinned ? pinned->data() : pageable.data()));
   }
 
