@@ -145,7 +145,7 @@ int run_fit(const CLI::App& verb, const FitOptions& options) {
                             options.resume         ? sysid::Existing::resume
                             : options.common.force ? sysid::Existing::replace
                                                    : sysid::Existing::refuse);
-  Search search{asset, std::move(replays), grid, asked, {}, replay.device, options.out, begin};
+  Search search{asset, std::move(replays), grid, asked, {}, options.out, begin};
   search.plan = !options.no_plan;
   return run_search(search, store, options.common);
 }

@@ -151,13 +151,13 @@ int run_grid(const CLI::App& verb, const GridOptions& options) {
           data::format_count(static_cast<std::size_t>(replays.front().sheet().rest.vertices.rows())) +
           " vertices, " + std::to_string(threads) + " threads, about " +
           data::format_count(static_cast<std::size_t>(std::ceil(memory.total() / 1e6))) +
-          " MB of memory, on the " + (simulated.device == sim::Device::cuda ? "CUDA device" : "CPU"));
+          " MB of memory, on the " +
+          (replays.front().settings.device == sim::Device::cuda ? "CUDA device" : "CPU"));
   sysid::AnswerSettings asked;
   if (options.repeatability > 0) asked.repeatability = options.repeatability;
   asked.horizon = !options.no_horizon;
   asked.solver_check = !options.no_solver_check;
-  Search search{asset,       std::move(replays), settings,    asked,
-                options.map, simulated.device,   options.out, begin};
+  Search search{asset, std::move(replays), settings, asked, options.map, options.out, begin};
   search.plan = !options.no_plan;
   return run_search(search, store, options.common);
 }

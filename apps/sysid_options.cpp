@@ -309,6 +309,7 @@ void place_candidates(const CommonOptions& options, const std::vector<sysid::Rep
   if (why.empty()) return;
   if (options.device != "auto")
     throw data::InputError("--device " + options.device + ": " + why + "; use --device cpu or auto");
+  say(options, "--device auto takes the CPU: " + why);
   for (sysid::Replay& replay : replays) {
     replay.settings.device = sim::Device::cpu;
     replay.settings.cuda_devices.clear();

@@ -84,8 +84,8 @@ void check_device(const CommonOptions& options, const sysid::ReplaySettings& set
 /// the CPU for them. Throws data::InputError for a CUDA device that is not there, and as check_device does.
 void place_simulation(const CommonOptions& options, const data::Asset& asset,
                       sysid::ReplaySettings& settings);
-/// Takes the CPU where --device auto found a device that cannot simulate what is asked for. Throws
-/// data::InputError where --device wants that device.
+/// Takes the CPU where --device auto found a device that cannot simulate what is asked for, and says so.
+/// Throws data::InputError where --device wants that device.
 void place_candidates(const CommonOptions& options, const std::vector<sysid::ReplayCandidate>& candidates,
                       std::vector<sysid::Replay>& replays);
 /// For verbs that no device simulates for yet. Throws data::InputError for cuda.

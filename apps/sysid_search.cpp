@@ -162,7 +162,7 @@ int conclude(Search& search, const sysid::ResultsStore& store, const CommonOptio
   sysid::Summary summary = sysid::summarize(results, answer, search.replays, search.settings, search.asked);
   summary.next_experiments = next_experiments(search, answer, options);
   summary.asset = fs::absolute(search.asset.source).lexically_normal().string();
-  summary.device = search.device == sim::Device::cuda ? "cuda" : "cpu";
+  summary.device = search.replays.front().settings.device == sim::Device::cuda ? "cuda" : "cpu";
   summary.wall_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - search.begin).count();
   const fs::path residuals = fs::path(search.out) / "residuals.csv";

@@ -19,7 +19,6 @@ struct Search {
   sysid::GridSettings settings;
   sysid::AnswerSettings asked;
   std::vector<std::string> map;  ///< the two parameters of the report's score map; empty: chosen
-  sim::Device device = sim::Device::cpu;
   std::string out;
   std::chrono::steady_clock::time_point begin = std::chrono::steady_clock::now();
   bool plan = true;  ///< say what to record next
