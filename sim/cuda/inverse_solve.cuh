@@ -6,53 +6,9 @@
 namespace flash::sim::cuda {
 
 // Products with A^-1 as sim/cuda/layout/inverse_tree.h divides them, three columns at a time, by tensor
-// cores: a warp has up to two rows of tiles of a node. Vectors are sums of two numbers of half precision, so
+// cores: a warp has one or two rows of tiles of a node. Vectors are sums of two numbers of half precision, so
 // that the tiles alone are rounded. Of each tile of D^-1 and twice of W 512 bytes are read, or 1,024 in
 // single precision; barriers: two a level down, one a level up.
-
-/// A vector of a solve, three numbers a slot: for each block of sixteen slots the high and the low parts of
-/// x, of y and of z, as a right factor has its columns.
-struct SplitVector {
-  __half* halves;
-
-  static constexpr int block_halves = 6 * inverse_tile;
-
-  /// Where a word of two slots is in its column, so that lanes read different banks.
-  __device__ static int word(int pair, int column) { return 8 * column + (pair ^ (column & 4)); }
-  __device__ static int place(int slot, int column) {
-    return slot / inverse_tile * block_halves + 2 * word(slot % inverse_tile / 2, column) + slot % 2;
-  }
-  __device__ void set(int slot, int c, float number) const {
-    const HalfPair pair(number);
-    halves[place(slot, 2 * c)] = pair.high;
-    halves[place(slot, 2 * c + 1)] = pair.low;
-  }
-  __device__ float at(int slot, int c) const {
-    return __half2float(halves[place(slot, 2 * c)]) + __half2float(halves[place(slot, 2 * c + 1)]);
-  }
-  /// A block as a right factor.
-  __device__ RightInputs block(int block) const {
-    const int g = lane() / 4, t = lane() % 4;
-    RightInputs right = {{0, 0}};
-    if (g >= 6) return right;
-    const unsigned* words = reinterpret_cast<const unsigned*>(halves + block * block_halves);
-    right.words[0] = words[word(t, g)];
-    right.words[1] = words[word(t + 4, g)];
-    return right;
-  }
-  /// Minus sixteen slots as a right factor.
-  __device__ RightInputs minus(const int* slots) const {
-    const int g = lane() / 4, t = lane() % 4;
-    RightInputs right = {{0, 0}};
-    if (g >= 6) return right;
-#pragma unroll
-    for (int k = 0; k < 2; ++k) {
-      const int2 pair = *reinterpret_cast<const int2*>(slots + 2 * t + 8 * k);
-      right.words[k] = word_of(halves[place(pair.x, g)], halves[place(pair.y, g)]) ^ 0x80008000u;
-    }
-    return right;
-  }
-};
 
 __device__ inline unsigned transposed_square(unsigned square) {
   unsigned turned;
@@ -60,60 +16,114 @@ __device__ inline unsigned transposed_square(unsigned square) {
   return turned;
 }
 
-/// What an environment's solves work on.
+/// What an environment's solves work on. Vectors and tables stand as `keeping` says.
+template <Keeping keeping>
 struct InverseWork {
-  const InverseTables& tables;
-  const uint4* tiles;    ///< in memory
-  const uint4* on_chip;  ///< the first so many of them
-  int on_chip_count;
-  const float* scale;
-  SplitVector right, solved;
-  float* passed;
+  SolveLayout places;
+  int begin;                 ///< bytes from the start of the memory on chip
+  char* memory;              ///< of the team, where it is not on chip
+  const uint4* tiles;        ///< in the device's memory
+  int tiles_at, near_tiles;  ///< on chip: the first so many of them
+
+  template <typename Number>
+  __device__ Number* at(int place) const {
+    if constexpr (keeping != Keeping::memory)
+      return reinterpret_cast<Number*>(shared_memory<char>() + begin + place);
+    else
+      return reinterpret_cast<Number*>(memory + place);
+  }
+  /// Writes a number for all blocks of the team.
+  template <typename Number>
+  __device__ void put(int place, const Number& number) const {
+    cuda::put<keeping>(at<Number>(place), number);
+  }
+  /// Of a solution: x, y and z of a slot, times SolveScale::to.
+  __device__ const Four<float>& solution(int slot) const { return at<Four<float>>(places.exchange)[slot]; }
+
+  // Vectors of a solve in halves.
+
+  __device__ void put_split(int place, float number) const {
+    const HalfPair pair(number);
+    put(place, pair.high);
+    put(place + low_part_bytes, pair.low);
+  }
+  __device__ float split_at(int place) const {
+    return __half2float(*at<__half>(place)) + __half2float(*at<__half>(place + low_part_bytes));
+  }
+  /// `place`: place_in_vector of a slot.
+  __device__ void set_right(int place, const Vector3<float>& b) const {
+    place += places.right;
+    put_split(place, b.x);
+    put_split(place + component_bytes, b.y);
+    put_split(place + 2 * component_bytes, b.z);
+  }
+  /// A block of the right-hand side as a right factor.
+  __device__ RightInputs right_block(int block) const {
+    const uint2 words = at<uint2>(places.right + block * vector_block_bytes)[lane()];
+    return {{words.x, words.y}};
+  }
+  /// Sixteen solved slots as a right factor; `row`: the first of them in InverseTree::below.
+  __device__ RightInputs solved_below(int row) const {
+    const int4 from = at<int4>(places.below + 4 * row)[lane() % 4];
+    const int column = places.solved + low_part_bytes * (lane() / 4);
+    const auto half = [&](int place) { return *at<__half>(column + place); };
+    return {{word_of(half(from.x), half(from.y)), word_of(half(from.z), half(from.w))}};
+  }
 };
 
-template <int parts, bool transposed>
-__device__ LeftTileHalf load_inverse_tile(const InverseWork& w, int tile, int part) {
-  const int at = (tile * parts + part) * 32 + lane();
-  const uint4 words = (tile < w.on_chip_count ? w.on_chip : w.tiles)[at];
-  if constexpr (transposed)
-    return {{transposed_square(words.x), transposed_square(words.z), transposed_square(words.y),
-             transposed_square(words.w)}};
-  return {{words.x, words.y, words.z, words.w}};
-}
+/// Sums of one or two rows of tiles with the same inputs.
+template <int parts, int rows>
+struct TileRows {
+  float sums[parts][rows][4] = {};
 
-/// Sums of two rows of tiles with the same inputs, in parts.
-template <int parts>
-struct TwoRows {
-  float sums[parts][2][4] = {};
-
-  /// Adds `count` products of tiles, from the first ones of both rows on, `step` tiles apart, with right(k).
-  /// All of what a few products read is on its way together; those beyond the last one are with zeros.
-  template <bool transposed, typename Right>
-  __device__ void add(const InverseWork& w, int first, int second, int step, int count, const Right& right) {
-    constexpr int together = 4 / parts;
-    for (int base = 0; base < count; base += together) {
-      LeftTileHalf left[together][parts][2];
-      RightInputs inputs[together];
+  template <bool transposed>
+  __device__ static LeftTileHalf left_of(const uint4& words) {
+    if constexpr (transposed)
+      return {{transposed_square(words.x), transposed_square(words.z), transposed_square(words.y),
+               transposed_square(words.w)}};
+    return {{words.x, words.y, words.z, words.w}};
+  }
+  /// Adds products with right(k) of the tiles from `tiles` on, `step` apart, and in the second row of those
+  /// `next` further: those from k = `base` on. All that they read is on its way together.
+  template <bool transposed, int count, typename Right>
+  __device__ void add_some(const uint4* tiles, int next, int step, int base, const Right& right) {
+    constexpr int words = 32 * parts;
+    uint4 left[count][parts][rows];
+    RightInputs inputs[count];
+    tiles += words * (base * step);
 #pragma unroll
-      for (int k = 0; k < together; ++k) {
-        const int at = min(base + k, count - 1);
+    for (int k = 0; k < count; ++k) {
 #pragma unroll
-        for (int part = 0; part < parts; ++part) {
-          left[k][part][0] = load_inverse_tile<parts, transposed>(w, first + at * step, part);
-          left[k][part][1] = load_inverse_tile<parts, transposed>(w, second + at * step, part);
-        }
-        inputs[k] = right(at);
-        if (base + k >= count) inputs[k] = {{0, 0}};
-      }
-#pragma unroll
-      for (int k = 0; k < together; ++k)
+      for (int row = 0; row < rows; ++row)
 #pragma unroll
         for (int part = 0; part < parts; ++part)
-#pragma unroll
-          for (int row = 0; row < 2; ++row) add_tile_product(sums[part][row], left[k][part][row], inputs[k]);
+          left[k][part][row] = tiles[words * (step * k + next * row) + 32 * part];
+      inputs[k] = right(base + k);
     }
+#pragma unroll
+    for (int k = 0; k < count; ++k)
+#pragma unroll
+      for (int part = 0; part < parts; ++part)
+#pragma unroll
+        for (int row = 0; row < rows; ++row)
+          add_tile_product(sums[part][row], left_of<transposed>(left[k][part][row]), inputs[k]);
   }
-  /// Of the lane's column in row 8 `half` + lane() / 4 of a row of tiles: the product with both parts.
+  /// All `count` of them.
+  template <bool transposed, typename Right>
+  __device__ void add(const uint4* tiles, int next, int step, int count, const Right& right) {
+    constexpr int together = 4 / parts;
+    int base = 0;
+    for (; base + together <= count; base += together)
+      add_some<transposed, together>(tiles, next, step, base, right);
+    if constexpr (together > 2) {
+      if (base + 2 <= count) {
+        add_some<transposed, 2>(tiles, next, step, base, right);
+        base += 2;
+      }
+    }
+    if (base < count) add_some<transposed, 1>(tiles, next, step, base, right);
+  }
+  /// Of the lane's component, lane() % 4, in row 8 `half` + lane() / 4 of a row of tiles: with both parts.
   __device__ float at(int row, int half) const {
     constexpr float per_low = 1 / low_scale;
     float sum = sums[0][row][2 * half] + sums[0][row][2 * half + 1];
@@ -122,68 +132,75 @@ struct TwoRows {
   }
 };
 
-/// Takes what was passed to the slots of a level off them.
-__device__ inline void gather_passed(const InverseWork& w, const InverseLevel& level) {
-  const InverseNode &first = w.tables.nodes[level.first_node],
-                    &last = w.tables.nodes[level.first_node + level.node_count - 1];
-  const int begin = inverse_tile * first.first_block,
-            count = inverse_tile * (last.first_block + last.column_tiles) - begin;
-  for (int k = team_rank(); k < 3 * count; k += team_size()) {
-    const int slot = begin + k / 3, c = k % 3;
-    const int start = w.tables.gather_starts[slot], end = w.tables.gather_starts[slot + 1];
-    if (start == end) continue;
-    float sum = 0;
-    for (int g = start; g < end; ++g) sum += w.passed[3 * w.tables.gathered[g] + c];
-    w.right.set(slot, c, w.right.at(slot, c) - sum);
-  }
+/// The products of a task. Tiles of W are on chip all, or read from memory; likewise those of D^-1.
+template <int parts, int rows, Keeping keeping>
+__device__ TileRows<parts, rows> products_of(const InverseWork<keeping>& w, const SolveTask& task) {
+  constexpr int words = 32 * parts;
+  const uint4* near = reinterpret_cast<const uint4*>(shared_memory<char>() + w.tiles_at) + lane();
+  const uint4* far = kept_whole(w.tiles + lane());
+  TileRows<parts, rows> sums;
+  const auto own = [&](int k) { return w.right_block(task.first_input + k); };
+  if (task.first_tile + rows * task.columns <= w.near_tiles)
+    sums.template add<false>(near + words * task.first_tile, task.columns, 1, task.columns, own);
+  else
+    sums.template add<false>(far + words * task.first_tile, task.columns, 1, task.columns, own);
+  const auto below = [&](int k) { return w.solved_below(task.first_below + inverse_tile * k); };
+  if (task.first_column + rows + task.columns * (task.below_tiles - 1) <= w.near_tiles)
+    sums.template add<true>(near + words * task.first_column, 1, task.columns, task.below_tiles, below);
+  else
+    sums.template add<true>(far + words * task.first_column, 1, task.columns, task.below_tiles, below);
+  return sums;
 }
 
-/// W b of a node for up to two rows of tiles.
-template <int parts>
-__device__ void pass_down(const InverseWork& w, const InverseTask& task) {
-  const InverseNode node = w.tables.nodes[task.node];
-  const int columns = node.column_tiles, first_W = node.first_tile + columns * columns;
-  const int row = first_W + task.first * columns, next = row + (task.count > 1 ? columns : 0);
-  TwoRows<parts> rows;
-  rows.template add<false>(w, row, next, 1, columns,
-                           [&](int k) { return w.right.block(node.first_block + k); });
-  const int c = lane() % 4;
-  if (c == 3) return;
+/// Passes W b of a task on; a lane has a component of four rows, of which the fourth is nothing.
+template <int parts, int rows, Keeping keeping>
+__device__ void pass_down(const InverseWork<keeping>& w, const SolveTask& task) {
+  const TileRows<parts, rows> sums = products_of<parts, rows>(w, task);
 #pragma unroll
-  for (int r = 0; r < 2; ++r)
+  for (int row = 0; row < rows; ++row)
 #pragma unroll
     for (int half = 0; half < 2; ++half)
-      if (r < task.count)
-        w.passed[3 * (node.first_below + inverse_tile * (task.first + r) + 8 * half + lane() / 4) + c] =
-            rows.at(r, half);
+      w.put(w.places.exchange + 16 * (task.first_result + inverse_tile * row + 8 * half) + 4 * lane(),
+            sums.at(row, half));
 }
 
-/// x = D^-1 b - W^T x_below for up to two blocks of a node, to `motion` too, times `back` and the scale.
-template <int parts>
-__device__ void pass_up(const InverseWork& w, const InverseTask& task, bool keep, float back, float* motion) {
-  const InverseNode node = w.tables.nodes[task.node];
-  const int columns = node.column_tiles, first_W = node.first_tile + columns * columns;
-  const int row = node.first_tile + task.first * columns, next = row + (task.count > 1 ? columns : 0);
-  TwoRows<parts> rows;
-  rows.template add<false>(w, row, next, 1, columns,
-                           [&](int k) { return w.right.block(node.first_block + k); });
-  const int column = first_W + task.first, beside = column + (task.count > 1 ? 1 : 0);
-  rows.template add<true>(w, column, beside, columns, node.below_tiles, [&](int k) {
-    return w.solved.minus(w.tables.below + node.first_below + inverse_tile * k);
-  });
+/// x = D^-1 b + W^T x_below of a task.
+template <int parts, int rows, Keeping keeping>
+__device__ void pass_up(const InverseWork<keeping>& w, const SolveTask& task, bool keep) {
+  const TileRows<parts, rows> sums = products_of<parts, rows>(w, task);
   const int c = lane() % 4;
-  if (c == 3) return;
 #pragma unroll
-  for (int r = 0; r < 2; ++r)
+  for (int row = 0; row < rows; ++row)
 #pragma unroll
     for (int half = 0; half < 2; ++half) {
-      if (r >= task.count) continue;
-      const int slot = inverse_tile * (node.first_block + task.first + r) + 8 * half + lane() / 4;
-      const float x = rows.at(r, half);
-      if (keep) w.solved.set(slot, c, x);
-      const int place = w.tables.place_at[slot];
-      if (place >= 0) motion[3 * place + c] = back * w.scale[slot] * x;
+      const int slot = task.first_result + inverse_tile * row + 8 * half;
+      const float x = sums.at(row, half);
+      w.put(w.places.exchange + 16 * slot + 4 * lane(), x);
+      if (keep && c < 3)
+        w.put_split(w.places.solved + place_in_vector(slot - w.places.first_upper) +
+                        place_in_vector(lane() / 4) + component_bytes * c,
+                    x);
     }
+}
+
+/// Adds what was passed to the slots of a level.
+template <Keeping keeping>
+__device__ void gather_passed(const InverseWork<keeping>& w, const SolveLevel& level) {
+  const int* starts = w.template at<int>(w.places.gather_starts) - w.places.first_upper;
+  const int* gathered = w.template at<int>(w.places.gathered);
+  const auto* passed = w.template at<Four<float>>(w.places.exchange);
+  for (int slot = level.first_slot + team_rank(); slot < level.end_slot; slot += team_size()) {
+    const int start = starts[slot], end = starts[slot + 1];
+    if (start == end) continue;
+    const int place = place_in_vector(slot), from = w.places.right + place;
+    Vector3<float> sum = {w.split_at(from), w.split_at(from + component_bytes),
+                          w.split_at(from + 2 * component_bytes)};
+    for (int g = start; g < end; ++g) {
+      const Four<float> own = passed[gathered[g]];
+      sum = sum + Vector3<float>{own.x, own.y, own.z};
+    }
+    w.set_right(place, sum);
+  }
 }
 
 /// A power of two that takes numbers up to `largest` to less than a 32nd, and one over it: solutions of the
@@ -200,34 +217,44 @@ struct SolveScale {
   }
 };
 
-/// motion = A^-1 b, zero where vertices are held. `largest`: of the scaled b; own(place) gives that of a
-/// vertex. The caller has synchronized what own reads; a barrier ends it.
-template <int parts, typename Own>
-__device__ void solve_inverse(const InverseWork& w, float largest, const Own& own, int size, float* motion) {
-  const SolveScale scale(largest);
-  for (int i = team_rank(); i < size; i += team_size()) {
-    const int slot = w.tables.slot_of[i];
-    const Vector3<float> b = own(i);
-    w.right.set(slot, 0, scale.to * b.x);
-    w.right.set(slot, 1, scale.to * b.y);
-    w.right.set(slot, 2, scale.to * b.z);
+template <int parts, Keeping keeping>
+__device__ inline void run_task(const InverseWork<keeping>& w, int index, bool down, bool keep) {
+  const SolveTask task = w.template at<SolveTask>(w.places.tasks)[index];
+  if (down) {
+    if (task.rows == 2)
+      pass_down<parts, 2>(w, task);
+    else
+      pass_down<parts, 1>(w, task);
+  } else {
+    if (task.rows == 2)
+      pass_up<parts, 2>(w, task, keep);
+    else
+      pass_up<parts, 1>(w, task, keep);
   }
+}
+
+/// Solves with the right-hand side that set_right has left; all threads. Barriers begin and end it. Then
+/// w.solution has the solution.
+template <int parts, Keeping keeping>
+__device__ __noinline__ void solve_inverse(const InverseWork<keeping>& work) {
+  const InverseWork<keeping> w = work;  // in registers
+  const auto* levels = w.template at<SolveLevel>(w.places.levels);
   synchronize_team();
-  for (int l = 0; l < w.tables.level_count; ++l) {
-    const InverseLevel level = w.tables.levels[l];
+  for (int l = 0; l < w.places.level_count; ++l) {
+    const SolveLevel level = levels[l];
     if (l > 0) {
       gather_passed(w, level);
       synchronize_team();
     }
     if (level.down_count == 0) continue;
     for (int t = team_warp(); t < level.down_count; t += team_warps())
-      pass_down<parts>(w, w.tables.tasks[level.first_down + t]);
+      run_task<parts>(w, level.first_down + t, true, false);
     synchronize_team();
   }
-  for (int l = w.tables.level_count - 1; l >= 0; --l) {
-    const InverseLevel level = w.tables.levels[l];
+  for (int l = w.places.level_count - 1; l >= 0; --l) {
+    const SolveLevel level = levels[l];
     for (int t = team_warp(); t < level.up_count; t += team_warps())
-      pass_up<parts>(w, w.tables.tasks[level.first_up + t], l > 0, scale.back, motion);
+      run_task<parts>(w, level.first_up + t, false, l > 0);
     synchronize_team();
   }
 }

@@ -1,79 +1,69 @@
 #pragma once
 #include "sim/cuda/contact.cuh"
-#include "sim/cuda/projective_numbers.h"
+#include "sim/cuda/projective_work.cuh"
+#include "sim/law/contact_newton.h"
 
 namespace flash::sim::cuda {
 
 // Contacts of an iterate of the projective method and their multipliers, as sim/oracle/projective_contact.h
-// and sim/oracle/constraint_newton.h have them, with the inertia metric W = H M^-1 H^T: a vertex feels its
-// own contacts alone. A thread has the vertices i, i + team_size(), ...; what it writes of them no other
-// thread reads, so that barriers are those of sums alone: one pair a trial length.
+// and sim/oracle/constraint_newton.h have them, with the inertia metric W = H M^-1 H^T. A vertex then feels
+// its own contacts alone, and is solved by itself: with a step length and as many iterations as it needs, by
+// the thread that owns it, and without a barrier.
 
-/// A vertex's contacts with the obstacles of a step, in memory.
+/// The contacts of vertices with the obstacles of a step, in memory.
 struct VertexContacts {
-  const ProjectiveMemory& memory;
   int size, obstacles;  ///< vertices, obstacles of the environment
+  int* touching_;
+  Four<float>*surfaces_, *forces_, *reactions;
+  float2* slips_;
 
-  __device__ int& touching(int obstacle, int i) const { return memory.touching[obstacle * size + i]; }
-  __device__ double* numbers(int which, int obstacle, int i) const {
-    return memory.contacts + (3L * which * obstacles + obstacle) * size + i;
-  }
-  __device__ Triple get(int which, int obstacle, int i) const {
-    const double* from = numbers(which, obstacle, i);
-    const long step = static_cast<long>(obstacles) * size;
-    return {from[0], from[step], from[2 * step]};
-  }
-  __device__ void set(int which, int obstacle, int i, const Triple& v) const {
-    double* to = numbers(which, obstacle, i);
-    const long step = static_cast<long>(obstacles) * size;
-    to[0] = v.x;
-    to[step] = v.y;
-    to[2 * step] = v.z;
-  }
-  __device__ Triple get(ContactNumber which, int obstacle, int i) const {
-    return get(static_cast<int>(which), obstacle, i);
-  }
-  __device__ void set(ContactNumber which, int obstacle, int i, const Triple& v) const {
-    set(static_cast<int>(which), obstacle, i, v);
-  }
-  /// Multipliers of a set.
-  __device__ Triple multiplier(int of_set, int obstacle, int i) const {
-    return get(static_cast<int>(ContactNumber::first_multiplier) + of_set, obstacle, i);
-  }
-  __device__ void set_multiplier(int of_set, int obstacle, int i, const Triple& v) const {
-    set(static_cast<int>(ContactNumber::first_multiplier) + of_set, obstacle, i, v);
-  }
+  __device__ VertexContacts(const ProjectiveMemory& m, int vertices, int obstacle_count)
+      : size(vertices),
+        obstacles(obstacle_count),
+        touching_(kept_whole(m.touching)),
+        surfaces_(kept_whole(m.surfaces)),
+        forces_(kept_whole(m.contact_forces)),
+        reactions(kept_whole(m.reactions)),
+        slips_(kept_whole(m.slips)) {}
+  __device__ int& touching(int obstacle, int i) const { return touching_[obstacle * size + i]; }
+  /// The normal and the distance.
+  __device__ Four<float>& surface(int obstacle, int i) const { return surfaces_[obstacle * size + i]; }
+  /// How far the vertex has slipped along the tangents since the start of the step [m].
+  __device__ float2& slip(int obstacle, int i) const { return slips_[obstacle * size + i]; }
+  /// Of the contact on the vertex [N].
+  __device__ Four<float>& force(int obstacle, int i) const { return forces_[obstacle * size + i]; }
 };
 
 /// Normal and tangents of a contact.
+template <typename Real>
 struct ContactDirections {
-  Triple rows[3];
+  Vector3<Real> rows[3];
 
   /// The tangents turned by an angle from those of Eigen's unitOrthogonal.
-  __device__ ContactDirections(const Triple& normal, double angle) {
-    constexpr double least = 1e-12;
-    Triple first;
-    if (fabs(normal.x) > least * fabs(normal.z) || fabs(normal.y) > least * fabs(normal.z)) {
-      const double inverse = 1 / sqrt(normal.x * normal.x + normal.y * normal.y);
+  __device__ ContactDirections(const Vector3<Real>& normal, double angle) {
+    constexpr Real least = sizeof(Real) == sizeof(float) ? Real(1e-5) : Real(1e-12);
+    Vector3<Real> first;
+    if (std::fabs(normal.x) > least * std::fabs(normal.z) ||
+        std::fabs(normal.y) > least * std::fabs(normal.z)) {
+      const Real inverse = 1 / std::sqrt(normal.x * normal.x + normal.y * normal.y);
       first = {-normal.y * inverse, normal.x * inverse, 0};
     } else {
-      const double inverse = 1 / sqrt(normal.y * normal.y + normal.z * normal.z);
+      const Real inverse = 1 / std::sqrt(normal.y * normal.y + normal.z * normal.z);
       first = {0, -normal.z * inverse, normal.y * inverse};
     }
-    const Triple second = cross(normal, first);
+    const Vector3<Real> second = cross(normal, first);
     rows[0] = normal;
-    if (angle == 0) {
-      rows[1] = first;
-      rows[2] = second;
-      return;
-    }
-    rows[1] = cos(angle) * first + sin(angle) * second;
-    rows[2] = cos(angle) * second - sin(angle) * first;
+    rows[1] = first;
+    rows[2] = second;
+    if (angle == 0) return;
+    const Real c = static_cast<Real>(cos(angle)), s = static_cast<Real>(sin(angle));
+    rows[1] = c * first + s * second;
+    rows[2] = c * second - s * first;
   }
-  __device__ Triple along(const Triple& v) const {
+  __device__ Vector3<Real> along(const Vector3<Real>& v) const {
     return {dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)};
   }
-  __device__ Triple force(const Triple& multiplier) const {
+  __device__ Vector3<Real> force(const Vector3<Real>& multiplier) const {
     return multiplier.x * rows[0] + multiplier.y * rows[1] + multiplier.z * rows[2];
   }
 };
@@ -81,151 +71,231 @@ struct ContactDirections {
 /// What find_contacts has seen.
 struct FoundContacts {
   bool any, lost;  ///< contacts; contacts of the last iterate that had a force and are none any more
-  double largest;  ///< free motion of a vertex [m]
 };
 
-/// The contacts at `positions` that the free motion may reach, with the multipliers that they had as the
-/// first set.
-__device__ __noinline__ FoundContacts find_contacts(const StepProblem& step, VertexContacts contacts,
-                                                    double tangent_angle, const Point* positions,
-                                                    const float* free_motion) {
-  constexpr double margin = 1e-6;
+/// The contacts at the iterate that the free motion may reach, which a solve has given. Those that are none
+/// any more lose their force.
+template <Keeping keeping>
+__device__ __noinline__ FoundContacts find_contacts(const ProjectiveWork<keeping>& w, const StepProblem& step,
+                                                    float back) {
+  constexpr float margin = 1e-6f;
+  const VertexContacts contacts(w.memory, step.size, step.obstacles.count);
+  const VertexPlaces<keeping> places = w.places;
+  const SolvedWay<keeping> way(w, back);
+  const double tangent_angle = w.numbers.multipliers.tangent_angle;
   FoundContacts found = {};
   for (int i = team_rank(); i < step.size; i += team_size()) {
-    const Triple free = way_at(free_motion, i);
-    const double way = norm(free);
-    found.largest = worse_of(found.largest, way);
-    if (step.held_axes[i] != 0) continue;
-    const Triple point = triple(positions[i]), start = triple(step.start[i]);
-    for (int k = 0; k < step.obstacles.count; ++k) {
-      const Triple force = contacts.get(ContactNumber::force, k, i);
+    const SolveVertex vertex = way.vertices[i];
+    if (vertex.scale == 0) continue;
+    const float reach = 2 * norm(way(vertex)) + margin;
+    const Triple point = places.place(i);
+    for (int k = 0; k < contacts.obstacles; ++k) {
       const SurfaceGap<double> gap = gap_to(step.obstacles.obstacles[k], point);
-      const bool touches = gap.distance < 2 * way + margin;
+      const bool touches = gap.distance < reach;
       contacts.touching(k, i) = touches ? 1 : 0;
       if (!touches) {
-        if (is_zero(force)) continue;
+        Four<float>& force = contacts.force(k, i);
+        if (force.x == 0 && force.y == 0 && force.z == 0) continue;
         found.lost = true;
-        contacts.set(ContactNumber::force, k, i, {0, 0, 0});
+        force = {0, 0, 0, 0};
         continue;
       }
       found.any = true;
-      const ContactDirections directions(gap.normal, tangent_angle);
-      Triple gaps = directions.along(point - start - gap.surface_moved);
-      gaps.x = gap.distance;
-      contacts.set(ContactNumber::normal, k, i, gap.normal);
-      contacts.set(ContactNumber::gap, k, i, gaps);
-      contacts.set_multiplier(0, k, i, directions.along(force));
+      const Vector3<float> normal = single(gap.normal);
+      const Vector3<float> moved = ContactDirections<float>(normal, tangent_angle)
+                                       .along(single(point - triple(step.start[i]) - gap.surface_moved));
+      contacts.surface(k, i) = {normal.x, normal.y, normal.z, static_cast<float>(gap.distance)};
+      contacts.slip(k, i) = {moved.y, moved.z};
     }
   }
   return found;
 }
 
-/// Forces of the contacts on a vertex.
-__device__ inline Triple contact_force(const VertexContacts& contacts, int i) {
-  Triple sum = {0, 0, 0};
+/// Sets the reaction on a vertex to the forces of its contacts.
+__device__ inline void set_reaction(const VertexContacts& contacts, int i) {
+  Vector3<float> sum = {0, 0, 0};
   for (int k = 0; k < contacts.obstacles; ++k)
-    if (contacts.touching(k, i) != 0) sum = sum + contacts.get(ContactNumber::force, k, i);
-  return sum;
+    if (contacts.touching(k, i) != 0) sum = sum + vector_of(contacts.force(k, i));
+  contacts.reactions[i] = {sum.x, sum.y, sum.z, 0};
 }
 
-/// What a vertex's multipliers are solved with.
-struct VertexLaw {
-  const StepProblem& step;
-  const VertexContacts& contacts;
-  const MultiplierSettings& settings;
-  double inverse_mass;
-  int i;
+/// The same of the thread's vertices, but for those that are held.
+template <Keeping keeping>
+__device__ void set_reactions(const ProjectiveWork<keeping>& w, const StepProblem& step) {
+  const VertexContacts contacts(w.memory, step.size, step.obstacles.count);
+  for (int i = team_rank(); i < step.size; i += team_size())
+    if (w.vertices[i].scale != 0) set_reaction(contacts, i);
+}
 
-  __device__ double friction(int k) const { return step.obstacles.obstacles[k].friction; }
-  __device__ ContactDirections directions(int k) const {
-    return {contacts.get(ContactNumber::normal, k, i), settings.tangent_angle};
+/// The laws of a contact of a vertex.
+template <typename Real>
+struct ContactLaw {
+  const MultiplierSettings& settings;
+  Real inverse_mass, h;
+
+  /// What a force of 1 N moves the vertex by in the step [m/N].
+  __device__ Real per_force() const { return h * h * inverse_mass; }
+  __device__ ContactRows<Real> rows(const Vector3<Real>& gap, const Vector3<Real>& multiplier,
+                                    Real friction) const {
+    const Real gaps[3] = {gap.x, gap.y, gap.z}, numbers[3] = {multiplier.x, multiplier.y, multiplier.z},
+               diagonal[3] = {inverse_mass, inverse_mass, inverse_mass};
+    return contact_rows(settings.kind, gaps, numbers, friction, diagonal, h);
   }
-  __device__ ContactRows rows(const Triple& gap, const Triple& multiplier, int k) const {
-    const double gaps[3] = {gap.x, gap.y, gap.z}, numbers[3] = {multiplier.x, multiplier.y, multiplier.z},
-                 diagonal[3] = {inverse_mass, inverse_mass, inverse_mass};
-    return contact_rows(settings.kind, gaps, numbers, friction(k), diagonal, step.h);
+  __device__ ContactViolation<Real> violation(const Vector3<Real>& gap, const Vector3<Real>& multiplier,
+                                              Real friction) const {
+    const Real gaps[3] = {gap.x, gap.y, gap.z}, numbers[3] = {multiplier.x, multiplier.y, multiplier.z},
+               diagonal[3] = {inverse_mass, inverse_mass, inverse_mass};
+    return contact_violation(gaps, numbers, friction, diagonal, h);
   }
-  __device__ ContactViolation violation(const Triple& gap, const Triple& multiplier, int k) const {
-    const double gaps[3] = {gap.x, gap.y, gap.z}, numbers[3] = {multiplier.x, multiplier.y, multiplier.z},
-                 diagonal[3] = {inverse_mass, inverse_mass, inverse_mass};
-    return contact_violation(gaps, numbers, friction(k), diagonal, step.h);
-  }
-  __device__ Triple projected(const Triple& multiplier, int k) const {
-    double numbers[3] = {multiplier.x, multiplier.y, multiplier.z};
-    project_multiplier(settings.max_force, friction(k), numbers);
+  __device__ Vector3<Real> projected(const Vector3<Real>& multiplier, Real friction) const {
+    Real numbers[3] = {multiplier.x, multiplier.y, multiplier.z};
+    project_multiplier(static_cast<Real>(settings.max_force), friction, numbers);
     return {numbers[0], numbers[1], numbers[2]};
   }
   /// The multipliers `length` of a change further; what slides follows its rim.
-  __device__ Triple trial(const Triple& multiplier, const double change[3], double length,
-                          const ContactRows& at, int k) const {
-    double numbers[3] = {multiplier.x + length * change[0], multiplier.y + length * change[1],
-                         multiplier.z + length * change[2]};
-    follow_rim(at, friction(k), numbers);
-    project_multiplier(settings.max_force, friction(k), numbers);
+  __device__ Vector3<Real> trial(const Vector3<Real>& multiplier, const Vector3<Real>& change, Real length,
+                                 const ContactRows<Real>& at, Real friction) const {
+    Real numbers[3] = {multiplier.x + length * change.x, multiplier.y + length * change.y,
+                       multiplier.z + length * change.z};
+    follow_rim(at, friction, numbers);
+    project_multiplier(static_cast<Real>(settings.max_force), friction, numbers);
     return {numbers[0], numbers[1], numbers[2]};
-  }
-  /// Forces of a set of multipliers.
-  __device__ Triple force(int of_set) const {
-    Triple sum = {0, 0, 0};
-    for (int k = 0; k < contacts.obstacles; ++k)
-      if (contacts.touching(k, i) != 0) sum = sum + directions(k).force(contacts.multiplier(of_set, k, i));
-    return sum;
-  }
-  /// The only obstacle that touches the vertex, -1 where none does, -2 where several do.
-  __device__ int only_obstacle() const {
-    int found = -1;
-    for (int k = 0; k < contacts.obstacles; ++k)
-      if (contacts.touching(k, i) != 0) found = found == -1 ? k : -2;
-    return found;
   }
 };
 
 /// Squared violations of a vertex summed, and the worst one.
+template <typename Real>
 struct VertexMerit {
-  double sum = 0, worst = 0;
+  Real sum = 0, worst = 0;
 
-  __device__ void add(const ContactViolation& v) {
+  __device__ void add(const ContactViolation<Real>& v) {
     sum += v.normal * v.normal + v.tangential * v.tangential;
     worst = worse_of(worse_of(worst, v.normal), v.tangential);
   }
 };
 
-/// Tries a step of the multipliers of a vertex that several obstacles touch, from a set of them to another
-/// one: their rows share its mass. By conjugate residuals, which take what repeats.
-__device__ __noinline__ VertexMerit try_together(const VertexLaw& law, int from, int to,
-                                                 double trial_length) {
+/// Newton's iteration on the multipliers of a vertex, from `now` on, to `tolerance` [m]: change(now) is a
+/// step, trial(now, step, length) where a part of it leads, and merit(multipliers) what they leave. Returns
+/// the best ones that were met.
+template <typename Real, typename Multipliers, typename Change, typename Trial, typename Merit>
+__device__ Multipliers iterate_multipliers(const MultiplierSettings& settings, Real tolerance,
+                                           Multipliers now, const Change& change, const Trial& trial,
+                                           const Merit& merit_of) {
+  const Real first = settings.damping > 0 ? static_cast<Real>(settings.damping) : Real(1),
+             last = settings.damping > 0 ? first : Real(0.125);
+  VertexMerit<Real> merit = merit_of(now);
+  Multipliers best = now;
+  Real best_worst = merit.worst;
+  for (int iteration = 0; merit.worst > tolerance && iteration < settings.iterations; ++iteration) {
+    const auto step = change(now);
+    Multipliers taken;
+    VertexMerit<Real> accepted;
+    for (Real length = first; length >= last; length *= Real(0.5)) {
+      const Multipliers tried = trial(now, step, length);
+      const VertexMerit<Real> of_trial = merit_of(tried);
+      if (length == first || of_trial.sum < accepted.sum) {
+        accepted = of_trial;
+        taken = tried;
+      }
+      if (accepted.sum < merit.sum) break;
+    }
+    merit = accepted;
+    now = taken;
+    if (merit.worst < best_worst) {
+      best_worst = merit.worst;
+      best = now;
+    }
+  }
+  return best;
+}
+
+/// The multipliers of a vertex's only contact. free_gap: with no force of it.
+__device__ inline Vector3<float> solve_alone(const ContactLaw<float>& law, const Vector3<float>& free_gap,
+                                             float friction, float tolerance,
+                                             const Vector3<float>& multiplier) {
+  struct Step {
+    ContactRows<float> rows;
+    Vector3<float> change;
+  };
+  const auto gap_at = [&](const Vector3<float>& m) { return free_gap + law.per_force() * m; };
+  return iterate_multipliers(
+      law.settings, tolerance, law.projected(multiplier, friction),
+      [&](const Vector3<float>& m) {
+        const ContactRows<float> rows = law.rows(gap_at(m), m, friction);
+        float change[3];
+        for (int r = 0; r < 3; ++r) change[r] = lone_change(rows.rows[r], law.inverse_mass, law.h);
+        turn_tangents(rows, -1, change + 1);
+        return Step{rows, {change[0], change[1], change[2]}};
+      },
+      [&](const Vector3<float>& m, const Step& step, float length) {
+        return law.trial(m, step.change, length, step.rows, friction);
+      },
+      [&](const Vector3<float>& m) {
+        VertexMerit<float> merit;
+        merit.add(law.violation(gap_at(m), m, friction));
+        return merit;
+      });
+}
+
+/// Contacts of a vertex that several obstacles touch: their forces move it together.
+struct ContactsTogether {
+  int count = 0;
+  int obstacles[most_obstacles];
+  double friction[most_obstacles];
+  Triple rows[most_obstacles][3];  ///< ContactDirections
+  Triple gaps[most_obstacles];     ///< that the free motion leaves without a force of theirs
+};
+
+struct MultipliersTogether {
+  Triple of[most_obstacles];
+};
+
+/// The steps of all rows together, by conjugate residuals, which take what repeats.
+struct StepTogether {
+  ContactRows<double> rows[most_obstacles];
+  Triple changes[most_obstacles];
+};
+
+__device__ inline Triple force_of(const ContactsTogether& c, const MultipliersTogether& m) {
+  Triple sum = {0, 0, 0};
+  for (int k = 0; k < c.count; ++k)
+    sum = sum + m.of[k].x * c.rows[k][0] + m.of[k].y * c.rows[k][1] + m.of[k].z * c.rows[k][2];
+  return sum;
+}
+
+/// The gap of a contact while a force acts on the vertex.
+__device__ inline Triple gap_under(const ContactLaw<double>& law, const ContactsTogether& c, int k,
+                                   const Triple& force) {
+  const Triple along = {dot(c.rows[k][0], force), dot(c.rows[k][1], force), dot(c.rows[k][2], force)};
+  return c.gaps[k] + law.per_force() * along;
+}
+
+__device__ __noinline__ void change_together(const ContactLaw<double>& law, const ContactsTogether& c,
+                                             const MultipliersTogether& now, StepTogether& step) {
   constexpr int most = 3 * most_obstacles, steps = 100;
   constexpr double tolerance = 1e-12, least = 1e-14;
   Triple axes[most];
   double scale[most], compliance[most], b[most], known[most] = {};
-  ContactRows rows[most_obstacles];
-  int which[most_obstacles], count = 0;
-  const double h2 = law.step.h * law.step.h;
-  const Triple force_before = law.force(from);
-  for (int k = 0; k < law.contacts.obstacles; ++k) {
-    if (law.contacts.touching(k, law.i) == 0) continue;
-    const ContactDirections d = law.directions(k);
-    const Triple gap =
-        law.contacts.get(ContactNumber::free_gap, k, law.i) + (h2 * law.inverse_mass) * d.along(force_before);
-    which[count] = k;
-    rows[count] = law.rows(gap, law.contacts.multiplier(from, k, law.i), k);
-    const double c = rows[count].cosine, s = rows[count].sine;
-    axes[3 * count] = d.rows[0];
-    axes[3 * count + 1] = c * d.rows[1] + s * d.rows[2];
-    axes[3 * count + 2] = c * d.rows[2] - s * d.rows[1];
-    ++count;
+  const double h2 = law.h * law.h;
+  const Triple force_before = force_of(c, now);
+  for (int k = 0; k < c.count; ++k) {
+    step.rows[k] = law.rows(gap_under(law, c, k, force_before), now.of[k], c.friction[k]);
+    const double cosine = step.rows[k].cosine, sine = step.rows[k].sine;
+    axes[3 * k] = c.rows[k][0];
+    axes[3 * k + 1] = cosine * c.rows[k][1] + sine * c.rows[k][2];
+    axes[3 * k + 2] = cosine * c.rows[k][2] - sine * c.rows[k][1];
   }
-  const int n = 3 * count;
+  const int n = 3 * c.count;
   Triple known_force = {0, 0, 0};
   for (int r = 0; r < n; ++r) {
-    const ConstraintRow& row = rows[r / 3].rows[r % 3];
+    const ConstraintRow<double>& row = step.rows[r / 3].rows[r % 3];
     compliance[r] = row.compliance;
     scale[r] = row.omega > least ? sqrt(row.omega) : 0;
     if (scale[r] == 0 && row.compliance > 0) known[r] = row.rhs / (h2 * row.compliance);
     known_force = known_force + known[r] * axes[r];
   }
   for (int r = 0; r < n; ++r)
-    b[r] = scale[r] > 0 ? rows[r / 3].rows[r % 3].rhs / (h2 * scale[r]) -
+    b[r] = scale[r] > 0 ? step.rows[r / 3].rows[r % 3].rhs / (h2 * scale[r]) -
                               scale[r] * law.inverse_mass * dot(axes[r], known_force)
                         : 0;
   const auto apply = [&](const double* x, double* y) {
@@ -240,25 +310,25 @@ __device__ __noinline__ VertexMerit try_together(const VertexLaw& law, int from,
     return sum;
   };
   // Preconditioned by the diagonal.
-  double x[most] = {}, z[most], p[most], Kz[most], Kp[most], q[most], P[most], r_[most];
+  double x[most] = {}, z[most], p[most], Kz[most], Kp[most], q[most], P[most], left[most];
   for (int r = 0; r < n; ++r) {
     const double diagonal = scale[r] * scale[r] * law.inverse_mass + compliance[r];
     P[r] = diagonal > 0 ? diagonal : 1;
-    r_[r] = b[r];
+    left[r] = b[r];
     p[r] = z[r] = b[r] / P[r];
   }
   apply(z, Kz);
   for (int r = 0; r < n; ++r) Kp[r] = Kz[r];
   double zKz = product(z, Kz);
   const double size = product(b, b);
-  for (int step = 0; step < steps && product(r_, r_) > tolerance * tolerance * size; ++step) {
+  for (int k = 0; k < steps && product(left, left) > tolerance * tolerance * size; ++k) {
     for (int r = 0; r < n; ++r) q[r] = Kp[r] / P[r];
     const double curvature = product(Kp, q);
     if (!(curvature > 0) || !(zKz > 0)) break;
     const double length = zKz / curvature;
     for (int r = 0; r < n; ++r) {
       x[r] += length * p[r];
-      r_[r] -= length * Kp[r];
+      left[r] -= length * Kp[r];
       z[r] -= length * q[r];
     }
     apply(z, Kz);
@@ -269,145 +339,129 @@ __device__ __noinline__ VertexMerit try_together(const VertexLaw& law, int from,
     }
     zKz = next;
   }
-  Triple trials[most_obstacles], force = {0, 0, 0};
-  for (int k = 0; k < count; ++k) {
+  for (int k = 0; k < c.count; ++k) {
     double change[3];
     for (int r = 0; r < 3; ++r) change[r] = scale[3 * k + r] * x[3 * k + r] + known[3 * k + r];
-    turn_tangents(rows[k], -1, change + 1);
-    trials[k] =
-        law.trial(law.contacts.multiplier(from, which[k], law.i), change, trial_length, rows[k], which[k]);
-    law.contacts.set_multiplier(to, which[k], law.i, trials[k]);
-    force = force + law.directions(which[k]).force(trials[k]);
+    turn_tangents(step.rows[k], -1, change + 1);
+    step.changes[k] = {change[0], change[1], change[2]};
   }
-  VertexMerit merit;
-  for (int k = 0; k < count; ++k)
-    merit.add(law.violation(law.contacts.get(ContactNumber::free_gap, which[k], law.i) +
-                                (h2 * law.inverse_mass) * law.directions(which[k]).along(force),
-                            trials[k], which[k]));
-  return merit;
 }
 
-/// Tries a step of a vertex's multipliers, from a set of them to another one.
-__device__ inline VertexMerit try_multipliers(const VertexLaw& law, int from, int to, double length) {
-  const int k = law.only_obstacle();
-  if (k == -1) return {};
-  if (k == -2) return try_together(law, from, to, length);
-  const double h2 = law.step.h * law.step.h;
-  const Triple free = law.contacts.get(ContactNumber::free_gap, k, law.i),
-               multiplier = law.contacts.multiplier(from, k, law.i);
-  const ContactRows rows = law.rows(free + (h2 * law.inverse_mass) * multiplier, multiplier, k);
-  double change[3];
-  for (int r = 0; r < 3; ++r) change[r] = lone_change(rows.rows[r], law.inverse_mass, law.step.h);
-  turn_tangents(rows, -1, change + 1);
-  const Triple trial = law.trial(multiplier, change, length, rows, k);
-  law.contacts.set_multiplier(to, k, law.i, trial);
-  VertexMerit merit;
-  merit.add(law.violation(free + (h2 * law.inverse_mass) * trial, trial, k));
-  return merit;
+/// The multipliers of a vertex that several obstacles touch, in double precision: their rows may repeat.
+__device__ __noinline__ MultipliersTogether solve_together(const ContactLaw<double>& law,
+                                                           const ContactsTogether& c, double tolerance,
+                                                           MultipliersTogether multipliers) {
+  for (int k = 0; k < c.count; ++k) multipliers.of[k] = law.projected(multipliers.of[k], c.friction[k]);
+  return iterate_multipliers(
+      law.settings, tolerance, multipliers,
+      [&](const MultipliersTogether& now) {
+        StepTogether step;
+        change_together(law, c, now, step);
+        return step;
+      },
+      [&](const MultipliersTogether& now, const StepTogether& step, double length) {
+        MultipliersTogether tried = now;
+        for (int k = 0; k < c.count; ++k)
+          tried.of[k] = law.trial(now.of[k], step.changes[k], length, step.rows[k], c.friction[k]);
+        return tried;
+      },
+      [&](const MultipliersTogether& m) {
+        const Triple force = force_of(c, m);
+        VertexMerit<double> merit;
+        for (int k = 0; k < c.count; ++k)
+          merit.add(law.violation(gap_under(law, c, k, force), m.of[k], c.friction[k]));
+        return merit;
+      });
 }
 
-/// Makes the first set of multipliers feasible, and the gaps without them from the free motion that they
-/// leave.
-__device__ inline VertexMerit begin_multipliers(const VertexLaw& law, const Triple& free_motion) {
-  VertexMerit merit;
-  const int only = law.only_obstacle();
-  if (only == -1) return merit;
-  const double h2 = law.step.h * law.step.h * law.inverse_mass;
-  const VertexContacts& contacts = law.contacts;
-  const Triple force = only == -2 ? law.force(0) : Triple{0, 0, 0};
+/// Solves for the multipliers of a vertex that several obstacles touch. Returns the worst of what is left of
+/// the laws at the gaps of the iterate [m].
+__device__ __noinline__ float meet_several(const StepProblem& step, const VertexContacts& contacts,
+                                           const MultiplierSettings& settings, int i, double inverse_mass,
+                                           double tolerance, const Vector3<float>& way) {
+  const ContactLaw<double> law = {settings, inverse_mass, step.h};
+  ContactsTogether c;
+  MultipliersTogether multipliers;
+  Triple at_iterate[most_obstacles];
   for (int k = 0; k < contacts.obstacles; ++k) {
-    if (contacts.touching(k, law.i) == 0) continue;
-    const ContactDirections directions = law.directions(k);
-    const Triple multiplier = contacts.multiplier(0, k, law.i), feasible = law.projected(multiplier, k);
-    const Triple gap = directions.along(free_motion) + contacts.get(ContactNumber::gap, k, law.i),
-                 free = gap - h2 * (only == -2 ? directions.along(force) : multiplier);
-    contacts.set(ContactNumber::free_gap, k, law.i, free);
-    contacts.set_multiplier(0, k, law.i, feasible);
-    if (only >= 0) merit.add(law.violation(free + h2 * feasible, feasible, k));
+    if (contacts.touching(k, i) == 0) continue;
+    const Four<float> surface = contacts.surface(k, i);
+    const float2 slip = contacts.slip(k, i);
+    const ContactDirections<double> directions({surface.x, surface.y, surface.z}, settings.tangent_angle);
+    const Vector3<float> force = vector_of(contacts.force(k, i));
+    for (int r = 0; r < 3; ++r) c.rows[c.count][r] = directions.rows[r];
+    c.obstacles[c.count] = k;
+    c.friction[c.count] = step.obstacles.obstacles[k].friction;
+    multipliers.of[c.count] = directions.along({force.x, force.y, force.z});
+    at_iterate[c.count] = {surface.w, slip.x, slip.y};
+    c.gaps[c.count] = at_iterate[c.count] + directions.along({way.x, way.y, way.z});
+    ++c.count;
   }
-  if (only >= 0) return merit;
-  const Triple now = law.force(0);
-  for (int k = 0; k < contacts.obstacles; ++k)
-    if (contacts.touching(k, law.i) != 0)
-      merit.add(
-          law.violation(contacts.get(ContactNumber::free_gap, k, law.i) + h2 * law.directions(k).along(now),
-                        contacts.multiplier(0, k, law.i), k));
-  return merit;
-}
-
-/// A sum and the largest of numbers that are not negative over the items below n, for all threads.
-template <typename Own>
-__device__ VertexMerit merit_over_team(int n, double* partial, const Own& own) {
-  double* largest = partial + seats;
-  VertexMerit all;
-  synchronize_team();
-  add_up<1>(n, partial, [&](int i, double(&added)[1]) {
-    const VertexMerit merit = own(i);
-    added[0] += merit.sum;
-    all.worst = worse_of(all.worst, merit.worst);
-  });
-  all.worst = worst_over_warp(all.worst);
-  if (lane() == 0) put_in_all(largest + team_warp(), all.worst);
-  synchronize_team();
-  all.sum = total(n, partial);
-  all.worst = 0;
-  for (int w = lane(); w < team_warps(); w += 32) all.worst = worse_of(all.worst, largest[w]);
-  all.worst = worst_over_warp(all.worst);
-  return all;
-}
-
-/// A set of multipliers that is none of these.
-__device__ inline int another_set(int a, int b, int c) {
-  int k = 0;
-  while (k == a || k == b || k == c) ++k;
-  return k;
-}
-
-/// Solves for the multipliers of all contacts, from those at hand, to `tolerance` [m]. free_motion: [m], of
-/// the forces with those multipliers. Returns what is left of the laws at the gaps of the iterate.
-__device__ __noinline__ double solve_multipliers(const SheetTables& tables, const StepProblem& step,
-                                                 VertexContacts contacts, const MultiplierSettings& settings,
-                                                 double tolerance, const float* free_motion,
-                                                 double* partial) {
-  const auto law = [&](int i) { return VertexLaw{step, contacts, settings, 1 / step.mass(tables, i), i}; };
-  VertexMerit merit = merit_over_team(
-      step.size, partial, [&](int i) { return begin_multipliers(law(i), way_at(free_motion, i)); });
-  double best_worst = merit.worst;
-  int now = 0, best = 0;
-  const double first = settings.damping > 0 ? settings.damping : 1.0,
-               last = settings.damping > 0 ? settings.damping : 0.125;
-  for (int iteration = 0; merit.worst > tolerance && iteration < settings.iterations; ++iteration) {
-    VertexMerit accepted;
-    int taken = -1;
-    for (double length = first; length >= last; length *= 0.5) {
-      const int tried = another_set(now, best, taken);
-      const VertexMerit trial = merit_over_team(
-          step.size, partial, [&](int i) { return try_multipliers(law(i), now, tried, length); });
-      if (taken < 0 || trial.sum < accepted.sum) {
-        accepted = trial;
-        taken = tried;
-      }
-      if (accepted.sum < merit.sum) break;
-    }
-    merit = accepted;
-    now = taken;
-    if (merit.worst < best_worst) {
-      best_worst = merit.worst;
-      best = now;
-    }
+  const Triple force = force_of(c, multipliers);
+  for (int k = 0; k < c.count; ++k) c.gaps[k] = gap_under(law, c, k, Triple{0, 0, 0} - force);
+  const MultipliersTogether solved = solve_together(law, c, tolerance, multipliers);
+  VertexMerit<double> left;
+  for (int k = 0; k < c.count; ++k) {
+    const Triple& m = solved.of[k];
+    const Vector3<float> own = single(m.x * c.rows[k][0] + m.y * c.rows[k][1] + m.z * c.rows[k][2]);
+    contacts.force(c.obstacles[k], i) = {own.x, own.y, own.z, 0};
+    left.add(law.violation(at_iterate[k], m, c.friction[k]));
   }
-  double left = 0;
+  return static_cast<float>(left.worst);
+}
+
+/// The same of a vertex that one obstacle touches.
+__device__ inline float meet_one(const StepProblem& step, const VertexContacts& contacts,
+                                 const MultiplierSettings& settings, int k, int i, float inverse_mass,
+                                 float tolerance, const Vector3<float>& way) {
+  const ContactLaw<float> law = {settings, inverse_mass, static_cast<float>(step.h)};
+  const Four<float> surface = contacts.surface(k, i);
+  const float2 slip = contacts.slip(k, i);
+  const auto friction = static_cast<float>(step.obstacles.obstacles[k].friction);
+  const ContactDirections<float> directions({surface.x, surface.y, surface.z}, settings.tangent_angle);
+  const Vector3<float> before = directions.along(vector_of(contacts.force(k, i))),
+                       gap = {surface.w, slip.x, slip.y},
+                       free_gap = gap + directions.along(way) - law.per_force() * before;
+  const Vector3<float> multiplier = solve_alone(law, free_gap, friction, tolerance, before);
+  const Vector3<float> force = directions.force(multiplier);
+  contacts.force(k, i) = {force.x, force.y, force.z, 0};
+  VertexMerit<float> left;
+  left.add(law.violation(gap, multiplier, friction));
+  return left.worst;
+}
+
+/// Solves for the multipliers of all contacts, from the free motion that those at hand leave: to a
+/// thousandth of a vertex's way, or to the tolerance where that is larger. Sets the reaction. Returns the
+/// worst that is left of the laws at the gaps of the iterate, of the thread's vertices [m].
+template <Keeping keeping>
+__device__ __noinline__ float solve_multipliers(const ProjectiveWork<keeping>& w, const StepProblem& step,
+                                                float back) {
+  constexpr float share = 1e-3f;
+  const MultiplierSettings& settings = w.numbers.multipliers;
+  const VertexContacts contacts(w.memory, step.size, step.obstacles.count);
+  const SolvedWay<keeping> way(w, back);
+  float left = 0;
   for (int i = team_rank(); i < step.size; i += team_size()) {
-    const VertexLaw own = law(i);
-    for (int k = 0; k < contacts.obstacles; ++k) {
-      if (contacts.touching(k, i) == 0) continue;
-      const Triple multiplier = contacts.multiplier(best, k, i);
-      const ContactViolation v = own.violation(contacts.get(ContactNumber::gap, k, i), multiplier, k);
-      left = worse_of(worse_of(left, v.normal), v.tangential);
-      contacts.set(ContactNumber::force, k, i, own.directions(k).force(multiplier));
+    const SolveVertex vertex = way.vertices[i];
+    if (vertex.scale == 0) continue;
+    int count = 0, last = 0;
+    for (int k = 0; k < contacts.obstacles; ++k)
+      if (contacts.touching(k, i) != 0) {
+        ++count;
+        last = k;
+      }
+    if (count > 0) {
+      const Vector3<float> free = way(vertex);
+      const float tolerance = std::fmax(static_cast<float>(settings.tolerance), share * norm(free));
+      const double inverse_mass = 1 / step.mass(w.tables(), i);
+      const float own = count == 1 ? meet_one(step, contacts, settings, last, i,
+                                              static_cast<float>(inverse_mass), tolerance, free)
+                                   : meet_several(step, contacts, settings, i, inverse_mass, tolerance, free);
+      left = worse_of(left, own);
     }
+    set_reaction(contacts, i);
   }
-  return worst_over_team(left, partial);
+  return left;
 }
 
 }  // namespace flash::sim::cuda

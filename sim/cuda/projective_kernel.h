@@ -12,7 +12,7 @@ void place_on_chip(ProjectiveNumbers& numbers, InversePrecision precision, int b
 /// Teams of so many blocks that the device works with at the same time.
 int resident_projective_teams(const ProjectiveNumbers& numbers, InversePrecision precision, int blocks);
 
-/// Blocks of a team: as many as leave each environment a team of its own.
+/// Blocks of a team: as many as are worth it while each environment has a team of its own.
 int projective_team_blocks(ProjectiveNumbers numbers, InversePrecision precision, int environments);
 
 /// Queues steps of the environments that wait, up to numbers.replay.waiting.end.

@@ -8,16 +8,6 @@ namespace flash::sim::cuda {
 
 // What the kernel of the projective method knows. Vertices by the places of the sheet's layout.
 
-/// An InverseTree in the memory of a device.
-struct InverseTables {
-  int size, slots, tiles, node_count, level_count, task_count, below_count, gathered_count;
-  const InverseNode* nodes;
-  const InverseLevel* levels;
-  const InverseTask* tasks;
-  const int *below, *gather_starts, *gathered;
-  const int *slot_of, *place_at;  ///< of each place, and of each slot, -1 for none
-};
-
 /// Settings of the contacts, as in ConstraintSettings.
 struct MultiplierSettings {
   ContactRowKind kind;
@@ -28,47 +18,49 @@ struct MultiplierSettings {
   double tangent_angle;
 };
 
-/// Numbers of a vertex against an obstacle, three each. Of the multipliers there are those at hand, the best
-/// ones, and two that are tried.
-enum class ContactNumber { normal, gap, free_gap, force, first_multiplier };
-inline constexpr int multiplier_sets = 4, contact_numbers = 3 * (4 + multiplier_sets);
-
-/// Memory of a team. Vectors have three numbers a vertex where nothing is said.
+/// Memory of a team: numbers of vertices, where nothing is said.
 struct ProjectiveMemory {
-  Point* positions;  ///< of the iterate
-  double* force;     ///< what each vertex needs from outside [N]
-  double* reaction;  ///< of the obstacles [N]
-  double *triangle_gradients, *hinge_gradients;
-  double *start_metrics, *start_angles;  ///< null where nothing is damped
+  Point* positions;  ///< of the prediction, and where forces need double precision of the iterate
+  double* force;     ///< three numbers each, in double precision [N]
+  int* held_axes;
+  Four<float>* forces;     ///< what each needs from outside [N]
+  Four<float>* reactions;  ///< of the obstacles [N]
+  Four<float>* pulls;      ///< begin_forces()
+  float* bending;          ///< three numbers each
+  Four<float>* shares;     ///< of the corners of triangles, three of each one after the other
+  Four<float>* places;     ///< VertexPlaces, null where they are on chip
+  char* solve;             ///< SolveLayout, likewise
+  double *triangle_gradients, *hinge_gradients;  ///< in double precision, null where it is not needed
+  double *start_metrics, *start_angles;          ///< null where nothing is damped
   Point* bent;
   double* damped;
-  int* held_axes;
-  float* motion;  ///< that a solve gives [m]
-  float* passed;  ///< three numbers a row below: in memory, where there is no room on chip
-  __half* right;  ///< vectors of a solve, likewise
-  __half* solved;
   MovingObstacle<double>* obstacles;
-  int* touching;     ///< of each vertex on each obstacle
-  double* contacts;  ///< ContactNumber, of each vertex on each obstacle
+  // Of each vertex on each obstacle (VertexContacts):
+  int* touching;
+  Four<float>* surfaces;
+  float2* slips;
+  Four<float>* contact_forces;
   long long* clocks;
 };
 
 struct ProjectiveNumbers {
   ReplayNumbers replay;  ///< what both methods have
-  InverseTables inverse;
-  const int* factor_of;  ///< each environment
-  const uint4* tiles;    ///< of each factor, 32 words of four a part of a tile
-  const float* scale;    ///< of each factor, by slot
+  SolveLayout solve;
+  const uint4* solve_tables;              ///< SolveImage
+  const int4* triangle_corners;           ///< its vertices, and the bits of its area
+  const Four<float>* triangle_gradients;  ///< w10, w11, w20 and w21 of SheetTables
+  const int* corner_shares;               ///< of SheetTables::corners, in ProjectiveMemory::shares
+  const int* factor_of;                   ///< each environment
+  const uint4* tiles;                     ///< of each factor, 32 words of four a part of a tile
+  const SolveVertex* vertices;            ///< of each factor, by place
   const ProjectiveMemory* teams;
   MultiplierSettings multipliers;
   int iterations;            ///< local-global ones a step
   double contact_tolerance;  ///< [m]
-  // Bytes from the start of the memory on chip, -1 where there is no room.
-  int places_at;  ///< of the vertices, behind what sums need
-  int right_at, solved_at, passed_at;
-  int tables_at;  ///< of the inverse
-  int scale_at;
-  int tiles_at, tiles_on_chip;
+  bool on_chip;              ///< whether there is room for places and solves
+  // Bytes from the start of the memory on chip.
+  int places_at, solve_at, tiles_at;
+  int near_tiles;  ///< tiles on chip
 };
 
 }  // namespace flash::sim::cuda

@@ -1,6 +1,7 @@
 #include "sim/cuda/projective_replay.h"
 
 #include <algorithm>
+#include <bit>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "data/parallel.h"
 #include "sim/cuda/device_arena.h"
 #include "sim/cuda/layout/inverse_factor.h"
+#include "sim/cuda/layout/solve_image.h"
 #include "sim/cuda/phase_clock.h"
 #include "sim/cuda/projective_kernel.h"
 #include "sim/oracle/projective_system.h"
@@ -61,24 +63,31 @@ ProjectiveMemory lay_out(const ProjectiveSizes& sizes, const ProjectiveNumbers& 
   ProjectiveMemory m{};
   m.positions = arena.take<Point>(size);
   m.force = arena.take<double>(3 * size);
-  m.reaction = arena.take<double>(3 * size);
-  m.triangle_gradients = arena.take<double>(9 * triangles);
-  m.hinge_gradients = arena.take<double>(12 * hinges);
+  m.held_axes = arena.take<int>(size);
+  m.forces = arena.take<Four<float>>(size);
+  m.reactions = arena.take<Four<float>>(size);
+  m.pulls = arena.take<Four<float>>(size);
+  m.bending = arena.take<float>(3 * size);
+  m.shares = arena.take<Four<float>>(3 * triangles);
+  if (!numbers.on_chip) {
+    m.places = arena.take<Four<float>>(2 * size);
+    m.solve = arena.take<char>(number(numbers.solve.bytes));
+  }
+  if (sizes.damped || hinges > 0) {
+    m.triangle_gradients = arena.take<double>(9 * triangles);
+    m.hinge_gradients = arena.take<double>(12 * hinges);
+  }
   if (sizes.damped) {
     m.start_metrics = arena.take<double>(3 * triangles);
     m.start_angles = arena.take<double>(hinges);
     m.bent = arena.take<Point>(size);
     m.damped = arena.take<double>(3 * size);
   }
-  m.held_axes = arena.take<int>(size);
-  m.motion = arena.take<float>(3 * size);
-  const std::size_t halves = 6 * number(numbers.inverse.slots + inverse_tile);
-  if (numbers.passed_at < 0) m.passed = arena.take<float>(3 * number(numbers.inverse.below_count));
-  if (numbers.right_at < 0) m.right = arena.take<__half>(halves);
-  if (numbers.solved_at < 0) m.solved = arena.take<__half>(halves);
   m.obstacles = arena.take<MovingObstacle<double>>(obstacles);
   m.touching = arena.take<int>(size * obstacles);
-  m.contacts = arena.take<double>(contact_numbers * size * obstacles);
+  m.surfaces = arena.take<Four<float>>(size * obstacles);
+  m.slips = arena.take<float2>(size * obstacles);
+  m.contact_forces = arena.take<Four<float>>(size * obstacles);
   m.clocks = arena.take<long long>(replay_phases + 1);
   return m;
 }
@@ -96,46 +105,46 @@ ProjectiveReplay::ProjectiveReplay(const ProjectiveSizes& sizes,
   numbers_.contact_tolerance = projective.contact_tolerance;
   const auto first = projective_matrix(sizes.plan, {environments.front().material}, settings.time_step);
   const InverseTree tree = plan_inverse(pattern_of(first.matrix), sizes.plan.sheet.rest.vertices);
-  upload_tree(tree, sizes.position);
+  numbers_.solve = make_solve_image(tree, block_warps).layout;
   blocks_ = settings.team_blocks > 0
                 ? settings.team_blocks
                 : projective_team_blocks(numbers_, precision_, static_cast<int>(environments.size()));
+  upload_tree(tree);
+  upload_triangles(sizes.layout);
   place_on_chip(numbers_, precision_, blocks_);
   lay_out_teams(sizes, static_cast<int>(environments.size()));
   upload_factors(sizes, tree, environments, settings);
 }
 
-void ProjectiveReplay::upload_tree(const InverseTree& tree, const std::vector<int>& position) {
-  std::vector<int> slot_of(position.size()), place_at(tree.vertex_at.size(), -1);
-  for (std::size_t vertex = 0; vertex < position.size(); ++vertex) {
-    slot_of[position[vertex]] = tree.slot_of[vertex];
-    place_at[tree.slot_of[vertex]] = position[vertex];
+void ProjectiveReplay::upload_tree(const InverseTree& tree) {
+  const SolveImage image = make_solve_image(tree, blocks_ * block_warps);
+  solve_tables_ = DeviceArray<char>(image.tables);
+  numbers_.solve = image.layout;
+  numbers_.solve_tables = reinterpret_cast<const uint4*>(solve_tables_.data());
+}
+
+void ProjectiveReplay::upload_triangles(const SheetLayout& layout) {
+  const auto count = static_cast<std::size_t>(layout.triangle_count);
+  std::vector<int4> corners(count);
+  std::vector<Four<float>> gradients(count);
+  for (std::size_t t = 0; t < count; ++t) {
+    const auto vertex = [&](std::size_t k) { return layout.triangle_vertices[k * count + t]; };
+    const auto gradient = [&](std::size_t k) { return static_cast<float>(layout.gradients[k * count + t]); };
+    corners[t] = {vertex(0), vertex(1), vertex(2), std::bit_cast<int>(static_cast<float>(layout.areas[t]))};
+    gradients[t] = {gradient(0), gradient(1), gradient(2), gradient(3)};
   }
-  nodes_ = DeviceArray<InverseNode>(tree.nodes);
-  levels_ = DeviceArray<InverseLevel>(tree.levels);
-  tasks_ = DeviceArray<InverseTask>(tree.tasks);
-  below_ = DeviceArray<int>(tree.below);
-  gather_starts_ = DeviceArray<int>(tree.gather_starts);
-  gathered_ = DeviceArray<int>(tree.gathered);
-  slot_of_ = DeviceArray<int>(slot_of);
-  place_at_ = DeviceArray<int>(place_at);
-  const auto count = [](const auto& list) { return static_cast<int>(list.size()); };
-  numbers_.inverse = {tree.size,
-                      tree.slots,
-                      tree.tiles,
-                      count(tree.nodes),
-                      count(tree.levels),
-                      count(tree.tasks),
-                      count(tree.below),
-                      count(tree.gathered),
-                      nodes_.data(),
-                      levels_.data(),
-                      tasks_.data(),
-                      below_.data(),
-                      gather_starts_.data(),
-                      gathered_.data(),
-                      slot_of_.data(),
-                      place_at_.data()};
+  // From corners of which each number stands by itself to those whose numbers stand together.
+  std::vector<int> shares;
+  for (const int corner : layout.corners) {
+    const int of_corner = 3 * layout.triangle_count;
+    shares.push_back(3 * (corner % of_corner) + corner / of_corner);
+  }
+  triangle_corners_ = DeviceArray<int4>(corners);
+  triangle_gradients_ = DeviceArray<Four<float>>(gradients);
+  corner_shares_ = DeviceArray<int>(shares);
+  numbers_.triangle_corners = triangle_corners_.data();
+  numbers_.triangle_gradients = triangle_gradients_.data();
+  numbers_.corner_shares = corner_shares_.data();
 }
 
 void ProjectiveReplay::upload_factors(const ProjectiveSizes& sizes, const InverseTree& tree,
@@ -153,7 +162,8 @@ void ProjectiveReplay::upload_factors(const ProjectiveSizes& sizes, const Invers
   const std::size_t tile_numbers =
       static_cast<std::size_t>(tree.tiles) * parts_of(precision_) * inverse_tile_numbers;
   tiles_ = DeviceArray<std::uint16_t>(keys.size() * tile_numbers);
-  scale_ = DeviceArray<float>(keys.size() * static_cast<std::size_t>(tree.slots));
+  const auto size = static_cast<std::size_t>(tree.size);
+  vertices_ = DeviceArray<SolveVertex>(keys.size() * size);
   const std::size_t at_once = 64;
   for (std::size_t begin = 0; begin < keys.size(); begin += at_once) {
     const std::size_t count = std::min(at_once, keys.size() - begin);
@@ -172,14 +182,19 @@ void ProjectiveReplay::upload_factors(const ProjectiveSizes& sizes, const Invers
     });
     for (std::size_t k = 0; k < count; ++k) {
       tiles_.write((begin + k) * tile_numbers, factors[k].tiles.data(), tile_numbers);
-      scale_.write((begin + k) * static_cast<std::size_t>(tree.slots), factors[k].scale.data(),
-                   factors[k].scale.size());
+      std::vector<SolveVertex> vertices(size);
+      for (std::size_t vertex = 0; vertex < size; ++vertex) {
+        const int slot = tree.slot_of[vertex];
+        vertices[static_cast<std::size_t>(sizes.position[vertex])] = {
+            slot, place_in_vector(slot), factors[k].scale[static_cast<std::size_t>(slot)]};
+      }
+      vertices_.write((begin + k) * size, vertices.data(), size);
     }
   }
   factor_of_ = DeviceArray<int>(factor_of);
   numbers_.factor_of = factor_of_.data();
   numbers_.tiles = reinterpret_cast<const uint4*>(tiles_.data());
-  numbers_.scale = scale_.data();
+  numbers_.vertices = vertices_.data();
 }
 
 void ProjectiveReplay::lay_out_teams(const ProjectiveSizes& sizes, int environments) {

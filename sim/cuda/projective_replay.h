@@ -37,7 +37,8 @@ class ProjectiveReplay {
   std::vector<double> phase_ticks() const;
 
  private:
-  void upload_tree(const InverseTree& tree, const std::vector<int>& position);
+  void upload_tree(const InverseTree& tree);
+  void upload_triangles(const SheetLayout& layout);
   void upload_factors(const ProjectiveSizes& sizes, const InverseTree& tree,
                       const std::vector<ReplayEnvironment>& environments, const ReplaySettings& settings);
   void lay_out_teams(const ProjectiveSizes& sizes, int environments);
@@ -46,12 +47,12 @@ class ProjectiveReplay {
 
   InversePrecision precision_;
   ProjectiveNumbers numbers_{};
-  DeviceArray<InverseNode> nodes_;
-  DeviceArray<InverseLevel> levels_;
-  DeviceArray<InverseTask> tasks_;
-  DeviceArray<int> below_, gather_starts_, gathered_, slot_of_, place_at_, factor_of_;
+  DeviceArray<char> solve_tables_;
+  DeviceArray<int> corner_shares_, factor_of_;
+  DeviceArray<int4> triangle_corners_;
+  DeviceArray<Four<float>> triangle_gradients_;
   DeviceArray<std::uint16_t> tiles_;
-  DeviceArray<float> scale_;
+  DeviceArray<SolveVertex> vertices_;
   DeviceArray<char> arena_;
   DeviceArray<ProjectiveMemory> team_memory_;
 };

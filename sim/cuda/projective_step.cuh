@@ -1,133 +1,86 @@
 #pragma once
-#include "sim/cuda/inverse_solve.cuh"
 #include "sim/cuda/multipliers.cuh"
 #include "sim/cuda/obstacle_motion.cuh"
+#include "sim/cuda/projective_forces.cuh"
+#include "sim/cuda/projective_work.cuh"
 
 namespace flash::sim::cuda {
 
 // One time step of an environment by the projective method, as sim/oracle/projective.h without acceleration
-// and with the inertia metric. Forces, contacts and positions are in double precision, solves as exact as
-// their tiles.
+// and with the inertia metric. Forces and contacts are in single precision but for distances to obstacles,
+// solves as exact as their tiles.
 
-/// What a team takes an environment through steps with.
-struct ProjectiveWork {
-  const ProjectiveNumbers& numbers;
-  const ProjectiveMemory& memory;
-  InverseWork inverse;
-  double* partial;  ///< on chip
-  int environment;
-
-  __device__ const SheetTables& tables() const { return numbers.replay.sheet; }
+/// The right-hand side of a solve, and what it is the right-hand side of.
+struct RightSide {
+  double residual;  ///< norm [N]
+  float back;       ///< SolveScale of what is solved
 };
 
-/// Counts the time since the last call to a phase. All threads have just been synchronized.
-__device__ inline void count_phase(const ProjectiveWork& w, ProjectivePhase phase) {
-  PhaseClock{w.memory.clocks}.count(static_cast<ReplayPhase>(phase));
-}
+/// Sets the right-hand side of -h^2 A^-1 (force - reaction). Barriers of the team.
+template <Keeping keeping>
+__device__ __noinline__ RightSide set_right_side(const ProjectiveWork<keeping>& work,
+                                                 const StepProblem& step) {
+  struct Loaded {
+    SolveVertex vertex;
+    Four<float> force, reaction;
 
-/// What each vertex needs from outside at the iterate, to `force` [N].
-__device__ __noinline__ void find_forces(const ProjectiveWork& w, const StepProblem& step) {
-  const ProjectiveMemory& m = w.memory;
-  const SheetTables& tables = w.tables();
-  synchronize_team();
-  const GradientShares shares = {m.triangle_gradients, m.hinge_gradients};
-  if (w.numbers.places_at >= 0)
-    elastic_gradient<true>(tables, step.numbers, step.damped_since, m.positions, m.force, shares, w.partial);
-  else
-    elastic_gradient<false>(tables, step.numbers, step.damped_since, m.positions, m.force, shares, w.partial);
-  if (step.damped_since.metrics != nullptr && tables.bundle_count > 0) {
-    TeamMemory turned = {};
-    turned.bent = m.bent;
-    turned.damped = m.damped;
-    add_turned_damping(tables, step, turned, m.positions, m.force, w.partial);
-  }
-  const double per_step = 1 / (step.h * step.h), drag = step.material->air_drag / step.h;
-  for (int i = team_rank(); i < step.size; i += team_size()) {
-    const double mass = step.mass(tables, i);
-    const Triple moved = triple(m.positions[i]) - triple(step.start[i]);
-    const Triple own =
-        force_at(m.force, i) + mass * (per_step * step.inertial(i, moved) + drag * moved) - step.load(i);
-    m.force[3 * i] = own.x;
-    m.force[3 * i + 1] = own.y;
-    m.force[3 * i + 2] = own.z;
-  }
-  synchronize_team();
-  count_phase(w, ProjectivePhase::forces);
-}
-
-/// The residual of a free vertex, zero of one that is held [N].
-__device__ inline Triple residual_of(const ProjectiveWork& w, const StepProblem& step, int i) {
-  if (step.held_axes[i] != 0) return {0, 0, 0};
-  return force_at(w.memory.force, i) - force_at(w.memory.reaction, i);
-}
-
-/// motion = -h^2 A^-1 (force - reaction). Returns the norm of the residual [N].
-template <int parts>
-__device__ __noinline__ double solve_residual(const ProjectiveWork& w, const StepProblem& step) {
-  const double h2 = step.h * step.h;
-  const auto scaled = [&](int i) {
-    const Triple r = residual_of(w, step, i);
-    const auto s = static_cast<float>(-h2 * w.inverse.scale[w.inverse.tables.slot_of[i]]);
-    return Vector3<float>{s * static_cast<float>(r.x), s * static_cast<float>(r.y),
-                          s * static_cast<float>(r.z)};
+    /// Of what moves; what is held has none [N].
+    __device__ Vector3<float> residual() const {
+      if (vertex.scale == 0) return {0, 0, 0};
+      return vector_of(force) - vector_of(reaction);
+    }
   };
-  const VertexMerit size = merit_over_team(step.size, w.partial, [&](int i) {
-    const Triple r = residual_of(w, step, i);
-    const Vector3<float> b = scaled(i);
-    return VertexMerit{dot(r, r), worse_of(worse_of(fabsf(b.x), fabsf(b.y)), fabsf(b.z))};
+  const InverseWork<keeping> inverse = work.inverse;
+  const SolveVertex* vertices = kept_whole(work.vertices);
+  const Four<float>*forces = kept_whole(work.memory.forces), *reactions = kept_whole(work.memory.reactions);
+  double* partial = work.partial;
+  const int size = step.size;
+  const auto load = [&](int i) { return Loaded{vertices[i], forces[i], reactions[i]}; };
+  const auto minus_h2 = static_cast<float>(-step.h * step.h);
+  float largest = 0;
+  double* largest_of_warps = partial + seats;
+  synchronize_team();
+  add_up<1, 2>(size, partial, load, [&](int, const Loaded& own, double(&sums)[1]) {
+    const Vector3<float> r = own.residual(), b = (minus_h2 * own.vertex.scale) * r;
+    sums[0] += static_cast<double>(dot(r, r));
+    largest = worse_of(largest, std::fmax(std::fmax(std::fabs(b.x), std::fabs(b.y)), std::fabs(b.z)));
   });
-  solve_inverse<parts>(w.inverse, static_cast<float>(size.worst), scaled, step.size, w.memory.motion);
-  count_phase(w, ProjectivePhase::solves);
-  return sqrt(size.sum);
-}
-
-__device__ __noinline__ double norm_of_residual(const ProjectiveWork& w, const StepProblem& step) {
-  double sums[1];
-  sum_over_team(step.size, sums, w.partial, [&](int i, double(&own)[1]) {
-    const Triple r = residual_of(w, step, i);
-    own[0] += dot(r, r);
+  largest = largest_of_warp(largest);
+  if (lane() == 0) put_in_all(largest_of_warps + team_warp(), static_cast<double>(largest));
+  synchronize_team();
+  const double sum = total(size, partial);
+  largest = 0;
+  for (int k = lane(); k < team_warps(); k += 32)
+    largest = worse_of(largest, static_cast<float>(largest_of_warps[k]));
+  const SolveScale scale(largest_of_warp(largest));
+  for_own_vertices(size, load, [&](int, const Loaded& own) {
+    inverse.set_right(own.vertex.place, (scale.to * minus_h2 * own.vertex.scale) * own.residual());
   });
-  return sqrt(sums[0]);
-}
-
-/// Sets the reaction to the forces of the contacts.
-__device__ inline void set_reaction(const ProjectiveWork& w, const StepProblem& step,
-                                    const VertexContacts& contacts) {
-  for (int i = team_rank(); i < step.size; i += team_size()) {
-    Triple reaction = {0, 0, 0};
-    if (step.held_axes[i] == 0) reaction = contact_force(contacts, i);
-    w.memory.reaction[3 * i] = reaction.x;
-    w.memory.reaction[3 * i + 1] = reaction.y;
-    w.memory.reaction[3 * i + 2] = reaction.z;
-  }
+  return {sqrt(sum), scale.back};
 }
 
 /// Finds the contacts at the iterate and their multipliers, from the free motion that a solve has given.
-/// Returns what is left of the laws of contact [m]; `moved`: whether the reaction is another one.
-template <int parts>
-__device__ double meet_obstacles(const ProjectiveWork& w, const StepProblem& step, bool& moved) {
-  const MultiplierSettings& settings = w.numbers.multipliers;
-  const VertexContacts contacts = {w.memory, step.size, step.obstacles.count};
-  const FoundContacts found =
-      find_contacts(step, contacts, settings.tangent_angle, w.memory.positions, w.memory.motion);
-  const double largest = worst_over_team(found.largest, w.partial);
+/// `right`: of that solve, and of one more where contacts are lost. Returns what is left of the laws of
+/// contact [m]; `moved`: whether the reaction is another one.
+template <int parts, Keeping keeping>
+__device__ double meet_obstacles(const ProjectiveWork<keeping>& w, const StepProblem& step, RightSide& right,
+                                 bool& moved) {
+  const FoundContacts found = find_contacts(w, step, right.back);
   const bool lost = any_of_team(found.lost), any = any_of_team(found.any);
   moved = lost || any;
   count_phase(w, ProjectivePhase::contacts);
   if (lost) {
     // The free motion was that with forces of contacts that are none any more.
-    set_reaction(w, step, contacts);
-    synchronize_team();
-    solve_residual<parts>(w, step);
+    set_reactions(w, step);
+    right = set_right_side(w, step);
+    solve_inverse<parts>(w.inverse);
+    count_phase(w, ProjectivePhase::solves);
   }
   if (!any) return 0;
-  const double tolerance = settings.tolerance > 1e-3 * largest ? settings.tolerance : 1e-3 * largest;
-  const double left =
-      solve_multipliers(w.tables(), step, contacts, settings, tolerance, w.memory.motion, w.partial);
-  set_reaction(w, step, contacts);
-  synchronize_team();
+  const float left = solve_multipliers(w, step, right.back);
+  const double worst = worst_over_team(left, w.partial);
   count_phase(w, ProjectivePhase::multipliers);
-  return left;
+  return worst;
 }
 
 /// What moves by itself in a step.
@@ -142,7 +95,8 @@ struct ProjectiveMotion {
 };
 
 /// Fills in a step, which the threads of a block have in common, and the iterate that the prediction is.
-__device__ __noinline__ void begin_step(const ProjectiveWork& w, StepProblem& step,
+template <Keeping keeping>
+__device__ __noinline__ void begin_step(const ProjectiveWork<keeping>& w, StepProblem& step,
                                         const ProjectiveMotion& motion) {
   const ProjectiveMemory& m = w.memory;
   const ReplayMaterial& material = *step.material;
@@ -171,16 +125,16 @@ __device__ __noinline__ void begin_step(const ProjectiveWork& w, StepProblem& st
     const Triple x = triple(step.start[i]) + step.h * triple(step.velocities[i]);
     m.positions[i] = {x.x, x.y, x.z, 0};
     m.held_axes[i] = 0;
-    for (int c = 0; c < 3; ++c) m.reaction[3 * i + c] = 0;
+    m.reactions[i] = {0, 0, 0, 0};
   }
   if (motion.obstacle_count > 0)
     place_obstacles(team_rank(), motion.obstacles, motion.obstacle_count, motion.poses,
                     w.numbers.replay.frames, 0, 1, m.obstacles);
-  const VertexContacts contacts = {m, step.size, motion.obstacle_count};
+  const VertexContacts contacts(m, step.size, motion.obstacle_count);
   for (int i = team_rank(); i < step.size; i += team_size())
     for (int k = 0; k < motion.obstacle_count; ++k) {
       contacts.touching(k, i) = 0;
-      contacts.set(ContactNumber::force, k, i, {0, 0, 0});
+      contacts.force(k, i) = {0, 0, 0, 0};
     }
   synchronize_team();
   for (int k = team_rank(); k < motion.held_count; k += team_size()) {
@@ -190,70 +144,97 @@ __device__ __noinline__ void begin_step(const ProjectiveWork& w, StepProblem& st
   }
   synchronize_team();
   project_to_feasible(w.tables(), step, nullptr, m.positions);
+  set_places(w.places, step.start, m.positions);
+  begin_forces(w.tables(), m, step, w.places);
 }
 
 /// Forces of the holds, and the deepest vertex [m].
-__device__ __noinline__ double report_forces(const ProjectiveWork& w, const StepProblem& step,
+template <Keeping keeping>
+__device__ __noinline__ double report_forces(const ProjectiveWork<keeping>& w, const StepProblem& step,
                                              const ProjectiveMotion& motion) {
   for (int hold = 0; hold < w.numbers.replay.hold_count; ++hold) {
     double sums[3];
     sum_over_team(motion.held_count, sums, w.partial, [&](int k, double(&own)[3]) {
       const HeldPlace& held = motion.held[k];
+      const Vector3<float> force = vector_of(w.memory.forces[held.place]);
       for (int axis = 0; axis < 3; ++axis)
-        if (held.holds[axis] == hold) own[axis] += w.memory.force[3 * held.place + axis];
+        if (held.holds[axis] == hold) own[axis] += force[axis];
     });
     if (team_rank() == 0)
       for (int axis = 0; axis < 3; ++axis) motion.hold_forces[3 * hold + axis] = sums[axis];
   }
   double deepest = 0;
-  const VertexContacts contacts = {w.memory, step.size, step.obstacles.count};
+  const VertexContacts contacts(w.memory, step.size, step.obstacles.count);
   for (int i = team_rank(); i < step.size; i += team_size())
     for (int k = 0; k < contacts.obstacles && step.held_axes[i] == 0; ++k)
       if (contacts.touching(k, i) != 0)
-        deepest = worse_of(deepest, fmax(0.0, -contacts.get(ContactNumber::gap, k, i).x));
+        deepest = worse_of(deepest, fmax(0.0, -static_cast<double>(contacts.surface(k, i).w)));
   return worst_over_team(deepest, w.partial);
 }
 
+/// Writes the end of a step to the state, held vertices as they are told.
+template <Keeping keeping>
+__device__ void end_step(const ProjectiveWork<keeping>& w, const StepProblem& step,
+                         const ProjectiveMotion& motion, const SheetState& state) {
+  const auto arrive = [&](int i, const Triple& x) {
+    const Triple speed = (1 / step.h) * (x - triple(state.positions[i]));
+    state.velocities[i] = {speed.x, speed.y, speed.z, 0};
+    state.positions[i] = {x.x, x.y, x.z, 0};
+  };
+  for (int i = team_rank(); i < step.size; i += team_size())
+    if (step.held_axes[i] == 0) arrive(i, w.places.place(i));
+  for (int k = team_rank(); k < motion.held_count; k += team_size()) {
+    const HeldPlace& held = motion.held[k];
+    arrive(held.place, {held.target[0], held.target[1], held.target[2]});
+  }
+  synchronize_team();
+}
+
 /// Advances the state by a step.
-template <int parts>
-__device__ ReplayStats advance_step(const ProjectiveWork& w, StepProblem& step,
+template <int parts, Keeping keeping>
+__device__ ReplayStats advance_step(const ProjectiveWork<keeping>& w, StepProblem& step,
                                     const ProjectiveMotion& motion, const SheetState& state) {
   const ProjectiveNumbers& numbers = w.numbers;
-  const ProjectiveMemory& m = w.memory;
   begin_step(w, step, motion);
   count_phase(w, ProjectivePhase::rest);
   ReplayStats stats = {};
   stats.substeps = 1;
   for (;; ++stats.iterations) {
     const bool last = stats.iterations == numbers.iterations;
-    find_forces(w, step);
-    double residual, left = 0;
-    bool moved = false;
-    if (step.obstacles.count > 0 || !last) {
-      residual = solve_residual<parts>(w, step);
-      if (step.obstacles.count > 0) left = meet_obstacles<parts>(w, step, moved);
-      if (moved) residual = norm_of_residual(w, step);
-    } else {
-      residual = norm_of_residual(w, step);
+    find_forces(numbers, w.memory, step, w.places, w.partial);
+    RightSide right = set_right_side(w, step);
+    count_phase(w, ProjectivePhase::forces);
+    double left = 0;
+    bool moved = false, solved = false;
+    if (step.obstacles.count > 0) {
+      solve_inverse<parts>(w.inverse);
+      count_phase(w, ProjectivePhase::solves);
+      left = meet_obstacles<parts>(w, step, right, moved);
+      solved = !moved;
+      if (moved) right = set_right_side(w, step);
     }
-    stats.residual = residual / step.material->force_scale;
+    stats.residual = right.residual / step.material->force_scale;
     stats.converged = stats.residual <= numbers.replay.tolerance && left <= numbers.contact_tolerance;
     stats.solves += 1;
     if (stats.converged || last) break;
     // Without contacts the free motion is the motion.
-    if (moved) solve_residual<parts>(w, step);
-    for (int i = team_rank(); i < step.size; i += team_size()) {
-      const Triple x = triple(m.positions[i]) + way_at(m.motion, i);
-      m.positions[i] = {x.x, x.y, x.z, 0};
-    }
+    if (!solved) solve_inverse<parts>(w.inverse);
+    const SolvedWay<keeping> way(w, right.back);
+    const VertexPlaces<keeping> places = w.places;
+    for_own_vertices(
+        step.size, [&](int i) { return way.vertices[i]; },
+        [&](int i, const SolveVertex& vertex) {
+          places.set_rest(i, vector_of(places.rests()[i]) + way(vertex));
+        });
+    if (needs_double(w.tables(), step))
+      for (int i = team_rank(); i < step.size; i += team_size()) {
+        const Triple x = w.places.place(i);
+        w.memory.positions[i] = {x.x, x.y, x.z, 0};
+      }
+    count_phase(w, ProjectivePhase::solves);
   }
   stats.penetration = report_forces(w, step, motion);
-  for (int i = team_rank(); i < step.size; i += team_size()) {
-    const Triple speed = (1 / step.h) * (triple(m.positions[i]) - triple(state.positions[i]));
-    state.velocities[i] = {speed.x, speed.y, speed.z, 0};
-    state.positions[i] = m.positions[i];
-  }
-  synchronize_team();
+  end_step(w, step, motion, state);
   return stats;
 }
 

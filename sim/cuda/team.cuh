@@ -82,6 +82,20 @@ __device__ void put_in_all(Number* on_chip, const Number& value) {
   for (int k = 1; k < team_blocks(); ++k) *in_block(on_chip, other_block(k)) = value;
 }
 
+/// Where a team keeps what all of its threads read and write: on chip of its only block, in a copy on chip of
+/// each block, or once in the device's memory.
+enum class Keeping { one_block, each_block, memory };
+
+/// Writes a number for the whole team: to `on_chip` of this block and those others that keep a copy, or to
+/// memory.
+template <Keeping keeping, typename Number>
+__device__ void put(Number* to, const Number& value) {
+  if constexpr (keeping == Keeping::each_block)
+    put_in_all(to, value);
+  else
+    *to = value;
+}
+
 /// Whether any thread of the team has found what it looked for, to all. A barrier.
 __device__ inline bool any_of_team(bool found) {
   const int in_own_block = __syncthreads_or(found);

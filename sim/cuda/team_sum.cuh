@@ -81,7 +81,8 @@ __device__ void sum_over_team(int n, Number (&sums)[count], Number* partial, con
 }
 
 /// The larger of two numbers, of which what is not a number counts as the largest.
-__device__ inline double worse_of(double worst, double other) {
+template <typename Number>
+__device__ Number worse_of(Number worst, Number other) {
   return other <= worst || worst != worst ? worst : other;
 }
 

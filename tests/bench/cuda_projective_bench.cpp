@@ -1,7 +1,8 @@
 // The projective method on a fixed budget, five local-global iterations and up to ten of contact with the
 // inertia metric, as it is published: corner lifts of a sheet of 0.4 m from a plane, each environment with E
 // t from 10 to 300 N/m and D from 1e-5 to 1e-4 N m of its own, isometric bending. Usage:
-// flash_cuda_projective_bench [SIDE[,...] [ENVIRONMENTS[,...] [STEPS [single]]]], SIDE in vertices.
+// flash_cuda_projective_bench [SIDE[,...] [ENVIRONMENTS[,...] [STEPS [half|single [BLOCKS]]]]], SIDE in
+// vertices, BLOCKS of a team.
 // The time is that of the steps alone, the best of three runs; the residual says what five iterations leave.
 #include <chrono>
 #include <cmath>
@@ -44,7 +45,7 @@ std::vector<ReplayEnvironment> lifts(const SheetPlan& plan, int count, int steps
   return all;
 }
 
-void run(int side, int environments, int steps, InversePrecision precision) {
+void run(int side, int environments, int steps, InversePrecision precision, int team_blocks) {
   data::RectangleMesh rectangle;
   rectangle.width = rectangle.height = 0.4;
   rectangle.cells_x = rectangle.cells_y = side - 1;
@@ -52,6 +53,7 @@ void run(int side, int environments, int steps, InversePrecision precision) {
   ReplaySettings settings;
   settings.steps = steps;
   settings.precision = precision;
+  settings.team_blocks = team_blocks;
   settings.threads = 0;
   settings.restart_interval = 50;
   settings.projective.emplace();
@@ -107,5 +109,6 @@ int main(int count, char** arguments) {
   std::printf("%8s %6s %6s %7s %10s %9s %6s %10s  %s\n", "vertices", "envs", "blocks", "factor", "ms a step",
               "ms before", "iters", "residual", "time by phase");
   for (const int side : sides)
-    for (const int batch : environments) run(side, batch, steps, precision);
+    for (const int batch : environments)
+      run(side, batch, steps, precision, count > 5 ? std::stoi(arguments[5]) : 0);
 }

@@ -81,18 +81,17 @@ InverseFactor factorize_inverse(const InverseTree& tree, const Eigen::SparseMatr
     const Eigen::LLT<MatrixXd> llt(front.topLeftCorner(columns, columns));
     if (llt.info() != Eigen::Success) throw std::domain_error("the matrix is not positive definite");
     MatrixXd inverse = llt.solve(MatrixXd::Identity(columns, columns));
-    const MatrixXd coupling = front.bottomLeftCorner(below, columns), W = coupling * inverse;
-    updates[k] = front.bottomRightCorner(below, below) - W * coupling.transpose();
+    const MatrixXd coupling = front.bottomLeftCorner(below, columns), W = -coupling * inverse;
+    updates[k] = front.bottomRightCorner(below, below) + W * coupling.transpose();
     for (int c = 0; c < columns; ++c) {
       const int vertex = tree.vertex_at[first + c];
       if (vertex < 0 || held[vertex] != 0) inverse(c, c) = 0;
     }
-    std::uint16_t* tiles =
-        factor.tiles.data() + static_cast<std::size_t>(node.first_tile) * parts * inverse_tile_numbers;
-    write_tiles(inverse, node.column_tiles, parts, tiles);
-    write_tiles(W, node.column_tiles, parts,
-                tiles + static_cast<std::size_t>(node.column_tiles) * node.column_tiles * parts *
-                            inverse_tile_numbers);
+    const auto tiles_from = [&](int tile) {
+      return factor.tiles.data() + static_cast<std::size_t>(tile) * parts * inverse_tile_numbers;
+    };
+    write_tiles(inverse, node.column_tiles, parts, tiles_from(node.first_D));
+    write_tiles(W, node.column_tiles, parts, tiles_from(node.first_W));
     for (int c = 0; c < columns; ++c) row_of[first + c] = -1;
     for (int r = 0; r < below; ++r) row_of[tree.below[node.first_below + r]] = -1;
   }
@@ -119,42 +118,35 @@ data::Points apply_inverse(const InverseTree& tree, const InverseFactor& factor,
       for (int slot = inverse_tile * node.first_block;
            slot < inverse_tile * (node.first_block + node.column_tiles); ++slot)
         for (int g = tree.gather_starts[slot]; g < tree.gather_starts[slot + 1]; ++g)
-          right.row(slot) -= passed.row(tree.gathered[g]);
+          right.row(slot) += passed.row(tree.gathered[g]);
     }
-    for (int t = level.first_down; t < level.first_down + level.down_count; ++t) {
-      const InverseTask& task = tree.tasks[t];
-      const InverseNode& node = tree.nodes[task.node];
-      const int first_W = node.first_tile + node.column_tiles * node.column_tiles;
-      for (int r = 0; r < inverse_tile * task.count; ++r)
-        for (int c = 0; c < inverse_tile * node.column_tiles; ++c) {
-          const int row = inverse_tile * task.first + r;
+    for (int k = level.first_node; k < level.first_node + level.node_count; ++k) {
+      const InverseNode& node = tree.nodes[k];
+      for (int row = 0; row < inverse_tile * node.below_tiles; ++row)
+        for (int c = 0; c < inverse_tile * node.column_tiles; ++c)
           passed.row(node.first_below + row) +=
-              number(first_W + row / inverse_tile * node.column_tiles + c / inverse_tile, row % inverse_tile,
-                     c % inverse_tile) *
+              number(node.first_W + row / inverse_tile * node.column_tiles + c / inverse_tile,
+                     row % inverse_tile, c % inverse_tile) *
               right.row(inverse_tile * node.first_block + c);
-        }
     }
   }
-  for (std::size_t l = tree.levels.size(); l-- > 0;)
-    for (int t = tree.levels[l].first_up; t < tree.levels[l].first_up + tree.levels[l].up_count; ++t) {
-      const InverseTask& task = tree.tasks[t];
-      const InverseNode& node = tree.nodes[task.node];
-      const int columns = inverse_tile * node.column_tiles,
-                first_W = node.first_tile + node.column_tiles * node.column_tiles;
-      for (int r = 0; r < inverse_tile * task.count; ++r) {
-        const int own = inverse_tile * task.first + r, tile = own / inverse_tile;
-        Eigen::RowVector3f sum = Eigen::RowVector3f::Zero();
-        for (int c = 0; c < columns; ++c)
-          sum += number(node.first_tile + tile * node.column_tiles + c / inverse_tile, own % inverse_tile,
-                        c % inverse_tile) *
-                 right.row(inverse_tile * node.first_block + c);
-        for (int row = 0; row < inverse_tile * node.below_tiles; ++row)
-          sum -= number(first_W + row / inverse_tile * node.column_tiles + tile, row % inverse_tile,
-                        own % inverse_tile) *
-                 x.row(tree.below[node.first_below + row]);
-        x.row(inverse_tile * node.first_block + own) = sum;
-      }
+  for (std::size_t k = tree.nodes.size(); k-- > 0;) {
+    const InverseNode& node = tree.nodes[k];
+    const int columns = inverse_tile * node.column_tiles;
+    for (int own = 0; own < columns; ++own) {
+      const int tile = own / inverse_tile;
+      Eigen::RowVector3f sum = Eigen::RowVector3f::Zero();
+      for (int c = 0; c < columns; ++c)
+        sum += number(node.first_D + tile * node.column_tiles + c / inverse_tile, own % inverse_tile,
+                      c % inverse_tile) *
+               right.row(inverse_tile * node.first_block + c);
+      for (int row = 0; row < inverse_tile * node.below_tiles; ++row)
+        sum += number(node.first_W + row / inverse_tile * node.column_tiles + tile, row % inverse_tile,
+                      own % inverse_tile) *
+               x.row(tree.below[node.first_below + row]);
+      x.row(inverse_tile * node.first_block + own) = sum;
     }
+  }
   data::Points result(tree.size, 3);
   for (int i = 0; i < tree.size; ++i)
     result.row(i) = (factor.scale[tree.slot_of[i]] * x.row(tree.slot_of[i])).cast<double>();

@@ -95,8 +95,12 @@ InverseTree plan_inverse(const BlockPattern& pattern, const data::Points& places
   tree.size = pattern.size;
   tree.slot_of.resize(pattern.size);
   for (const Merged& node : merged) {
-    InverseNode plan{tree.slots / inverse_tile, tiles_of(node.own.size()),
-                     static_cast<int>(tree.below.size()), tiles_of(node.below.size()), tree.tiles};
+    InverseNode plan{tree.slots / inverse_tile,
+                     tiles_of(node.own.size()),
+                     static_cast<int>(tree.below.size()),
+                     tiles_of(node.below.size()),
+                     0,
+                     tree.tiles};
     for (const int vertex : node.own) {
       tree.slot_of[vertex] = static_cast<int>(tree.vertex_at.size());
       tree.vertex_at.push_back(vertex);
@@ -104,10 +108,14 @@ InverseTree plan_inverse(const BlockPattern& pattern, const data::Points& places
     tree.slots += inverse_tile * plan.column_tiles;
     tree.vertex_at.resize(tree.slots, -1);
     tree.below.resize(tree.below.size() + inverse_tile * plan.below_tiles, -1);
-    tree.tiles += plan.column_tiles * (plan.column_tiles + plan.below_tiles);
+    tree.tiles += plan.column_tiles * plan.below_tiles;
     tree.products += plan.column_tiles * (plan.column_tiles + 2L * plan.below_tiles);
     tree.nodes.push_back(plan);
     tree.parents.push_back(node.parent);
+  }
+  for (InverseNode& node : tree.nodes) {
+    node.first_D = tree.tiles;
+    tree.tiles += node.column_tiles * node.column_tiles;
   }
   std::vector<std::vector<int>> gathered(tree.slots);
   for (std::size_t k = 0; k < merged.size(); ++k) {
@@ -126,21 +134,10 @@ InverseTree plan_inverse(const BlockPattern& pattern, const data::Points& places
     tree.gathered.insert(tree.gathered.end(), of_slot.begin(), of_slot.end());
     tree.gather_starts.push_back(static_cast<int>(tree.gathered.size()));
   }
-  const auto add_tasks = [&](int node, int rows) {
-    for (int first = 0; first < rows; first += 2)
-      tree.tasks.push_back({node, first, std::min(2, rows - first)});
-  };
-  for (int node = 0; node < static_cast<int>(merged.size());) {
-    InverseLevel level{node, 0, static_cast<int>(tree.tasks.size()), 0, 0, 0};
-    const int height = merged[node].height;
-    while (node < static_cast<int>(merged.size()) && merged[node].height == height) ++node;
-    level.node_count = node - level.first_node;
-    for (int k = level.first_node; k < node; ++k) add_tasks(k, tree.nodes[k].below_tiles);
-    level.down_count = static_cast<int>(tree.tasks.size()) - level.first_down;
-    level.first_up = static_cast<int>(tree.tasks.size());
-    for (int k = level.first_node; k < node; ++k) add_tasks(k, tree.nodes[k].column_tiles);
-    level.up_count = static_cast<int>(tree.tasks.size()) - level.first_up;
-    tree.levels.push_back(level);
+  for (std::size_t node = 0; node < merged.size(); ++node) {
+    if (node == 0 || merged[node].height != merged[node - 1].height)
+      tree.levels.push_back({static_cast<int>(node), 0});
+    ++tree.levels.back().node_count;
   }
   return tree;
 }

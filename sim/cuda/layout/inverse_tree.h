@@ -22,7 +22,6 @@ struct InverseTree {
   std::vector<int> below;                    ///< slots; that of the zeros where there is none
   std::vector<int> gather_starts, gathered;  ///< of each slot: places in `below` that are it
   std::vector<InverseLevel> levels;
-  std::vector<InverseTask> tasks;
 
   int nothing() const { return slots; }
   long products = 0;  ///< of tiles with blocks of a vector, in one application
