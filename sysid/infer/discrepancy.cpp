@@ -44,12 +44,18 @@ int most_rows_together(const ObservedRows& rows) {
   return most;
 }
 
-/// -2 log likelihood at one size from coordinates in which all is diagonal.
-double diagonal_deviance(double squares, const Eigen::VectorXd& gains, const Eigen::VectorXd& coordinates,
-                         double tau) {
-  const double variance = tau * tau;
-  const Eigen::ArrayXd scale = 1 + variance * gains.array();
-  return squares + scale.log().sum() - (variance * coordinates.array().square() / scale).sum();
+/// log |I + v T| - v x^T (I + v T)^-1 x for a tridiagonal T without negative eigenvalues.
+double tridiagonal_deviance(const Eigen::VectorXd& diagonal, const Eigen::VectorXd& beside,
+                            const Eigen::VectorXd& x, double v) {
+  double logarithm = 0, squares = 0, pivot = 1, last = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    const double off = i > 0 ? v * beside[i - 1] : 0;
+    last = x[i] - off / pivot * last;
+    pivot = std::max(1 + v * diagonal[i] - off * off / pivot, 1.0);  // rounding alone takes it below
+    logarithm += std::log(pivot);
+    squares += last * last / pivot;
+  }
+  return logarithm - v * squares;
 }
 
 }  // namespace
@@ -68,25 +74,31 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
   along_ = sheet_modes(rows_.places);
   modes_ = static_cast<int>(along_.wave_numbers.size());
 
-  const Eigen::Index stacked = block(keyframes_, 0, channels_, modes_);
-  modes_modes_ = Eigen::MatrixXd::Zero(modes_, stacked);
-  for (Eigen::Index i = 0; i < residuals.size(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    modes_modes_.middleCols(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_) +=
-        rows_.weights[i] * along_.values.row(i).transpose() * along_.values.row(i);
+  rows_of_.resize(static_cast<std::size_t>(keyframes_ * channels_));
+  for (std::size_t i = 0; i < rows_.keyframe.size(); ++i)
+    rows_of_[static_cast<std::size_t>(rows_.keyframe[i] * channels_ + rows_.channel[i])].push_back(
+        static_cast<Eigen::Index>(i));
+  modes_modes_.assign(static_cast<std::size_t>(channels_), Eigen::MatrixXd(keyframes_, modes_ * modes_));
+  for (std::size_t b = 0; b < rows_of_.size(); ++b) {
+    const Eigen::MatrixXd modes = along_.values(rows_of_[b], Eigen::all),
+                          squares = modes.transpose() * rows_.weights(rows_of_[b]).asDiagonal() * modes;
+    modes_modes_[b % modes_modes_.size()].row(static_cast<Eigen::Index>(b / modes_modes_.size())) =
+        squares.reshaped().transpose();
   }
-  modes_known_ = sums(known_).modes;
+  Sums of_known = sums(known_);
+  modes_known_ = std::move(of_known.modes);
+  known_known_ = std::move(of_known.known);
   estimate_noise(residuals);
   const double between = noise_is_told_ ? noise_between_neighbours(rows_, residuals) : 0;
+  misfit_.rough = noise_;
+  misfit_.keyframes = keyframes_;
   misfit_.noise = between > 0 ? std::clamp(between, 1e-9, noise_) : noise_;
   if (repeatability)
     explained_ = std::sqrt(
         std::max(0.0, M_PI / 4 * *repeatability * *repeatability - 0.5 * misfit_.noise * misfit_.noise));
-  const std::vector<Shape> all = shapes();
-  fields_.resize(all.size());
-  data::for_each_in_parallel(all.size(), threads, [&](std::size_t f) { fields_[f] = field(all[f]); });
   sizes_ = {explained_};
   priors_ = {0};
+  misfit_.explained = explained_;
   const double first = kFirstSize * noise_, last = std::max(left_, 2 * first);
   double sum = 0;
   for (int i = 0; i < kSizes; ++i) {
@@ -97,7 +109,11 @@ DiscrepancyModel::DiscrepancyModel(ObservedRows rows, const Eigen::VectorXd& res
   }
   for (double& prior : priors_) prior /= 2 * sum;
   priors_.front() = 0.5;
-  weigh(residuals);
+  if (noise_is_told_)
+    weigh(residuals, threads);
+  else
+    assume();
+  between_keyframes_ = between_keyframes();
 }
 
 std::vector<DiscrepancyModel::Shape> DiscrepancyModel::shapes() const {
@@ -137,17 +153,19 @@ Eigen::MatrixXd DiscrepancyModel::covariance(std::size_t shape) const {
   return covariance;
 }
 
-DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals) const {
-  Sums sums;
-  sums.modes = Eigen::MatrixXd::Zero(block(keyframes_, 0, channels_, modes_), residuals.cols());
-  for (Eigen::Index i = 0; i < residuals.rows(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    sums.modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_)
-        .noalias() += rows_.weights[i] * along_.values.row(i).transpose() * residuals.row(i);
-  }
-  sums.known = known_.transpose() * rows_.weights.asDiagonal() * residuals;
-  sums.squares = (rows_.weights.asDiagonal() * residuals).cwiseProduct(residuals).colwise().sum().transpose();
+Eigen::MatrixXd DiscrepancyModel::by_modes(const Eigen::MatrixXd& columns) const {
+  Eigen::MatrixXd sums(block(keyframes_, 0, channels_, modes_), columns.cols());
+  for (std::size_t b = 0; b < rows_of_.size(); ++b)
+    sums.middleRows(static_cast<Eigen::Index>(b) * modes_, modes_) =
+        Eigen::MatrixXd(along_.values(rows_of_[b], Eigen::all)).transpose() *
+        Eigen::MatrixXd(columns(rows_of_[b], Eigen::all));
   return sums;
+}
+
+DiscrepancyModel::Sums DiscrepancyModel::sums(const Eigen::MatrixXd& residuals) const {
+  const Eigen::MatrixXd weighed = rows_.weights.asDiagonal() * residuals;
+  return {by_modes(weighed), known_.transpose() * weighed,
+          weighed.cwiseProduct(residuals).colwise().sum().transpose()};
 }
 
 DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
@@ -171,57 +189,63 @@ DiscrepancyModel::Field DiscrepancyModel::field(const Shape& shape) const {
   chosen.resize(std::min<std::size_t>(static_cast<std::size_t>(enough - chosen.begin()),
                                       static_cast<std::size_t>(kCoordinates / channels_)));
 
-  // Coordinate c acts on the one mode of each keyframe that it is made of, by shares(k, c).
   const auto per_channel = static_cast<Eigen::Index>(chosen.size()), all = per_channel * channels_;
-  std::vector<Eigen::Index> mode_of;
-  Eigen::MatrixXd shares(keyframes_, per_channel);
+  Field field{{},
+              Eigen::MatrixXd(keyframes_, per_channel),
+              Eigen::MatrixXd::Zero(all, all),
+              Eigen::MatrixXd(all, known_.cols())};
   for (const Coordinate& at : chosen) {
-    shares.col(static_cast<Eigen::Index>(mode_of.size())) =
+    field.shares.col(static_cast<Eigen::Index>(field.modes.size())) =
         std::sqrt(at.variance) * times.eigenvectors().col(at.time);
-    mode_of.push_back(at.mode);
+    field.modes.push_back(at.mode);
   }
-  // Information of the coordinates, in units of 1 / sigma^2; what errors of known shape explain taken out.
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(all, all), to_known(all, known_.cols());
-  for (int channel = 0; channel < channels_; ++channel) {
-    const Eigen::Index first = channel * per_channel;
-    auto own = information.block(first, first, per_channel, per_channel);
-    to_known.middleRows(first, per_channel).setZero();
-    for (int k = 0; k < keyframes_; ++k) {
-      const Eigen::Index at = block(k, channel, channels_, modes_);
-      const Eigen::MatrixXd of_keyframe = modes_modes_.middleCols(at, modes_)(mode_of, mode_of);
-      const auto share = shares.row(k).transpose();
-      own += (share * share.transpose()).cwiseProduct(of_keyframe);
-      to_known.middleRows(first, per_channel) +=
-          share.asDiagonal() * modes_known_.middleRows(at, modes_)(mode_of, Eigen::all);
-    }
-  }
-  const double precision = 1 / (noise_ * noise_);
-  information -= to_known * inverse_known_ * to_known.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(precision * information);
-  const Eigen::MatrixXd turned = eigen.eigenvectors().transpose();
-  Field field{shape,
-              Eigen::MatrixXd::Zero(all, block(keyframes_, 0, channels_, modes_)),
-              {},
-              eigen.eigenvalues().cwiseMax(0.0)};
+  Eigen::MatrixXd with_modes;
   for (int channel = 0; channel < channels_; ++channel)
-    for (int k = 0; k < keyframes_; ++k)
-      for (Eigen::Index c = 0; c < per_channel; ++c)
-        field.modes.col(block(k, channel, channels_, modes_) + mode_of[static_cast<std::size_t>(c)]) +=
-            shares(k, c) * turned.col(channel * per_channel + c);
-  field.known = -precision * (turned * to_known * inverse_known_);
+    for (Eigen::Index c = 0; c < per_channel; ++c) {
+      const Eigen::Index mode = field.modes[static_cast<std::size_t>(c)], first = channel * per_channel;
+      const auto share = field.shares.col(c);
+      with_modes = share.asDiagonal() *
+                   modes_modes_[static_cast<std::size_t>(channel)].middleCols(mode * modes_, modes_);
+      for (Eigen::Index d = c; d < per_channel; ++d)
+        field.squares(first + d, first + c) =
+            field.shares.col(d).dot(with_modes.col(field.modes[static_cast<std::size_t>(d)]));
+      const Eigen::MatrixXd mode_known = modes_known_(of_mode(channel, mode), Eigen::all);
+      field.known.row(first + c) = share.transpose() * mode_known;
+    }
   return field;
 }
 
-DiscrepancyModel::Reduced DiscrepancyModel::reduce(const Eigen::MatrixXd& residuals) const {
-  const Sums sums = this->sums(residuals);
-  Reduced reduced;
-  reduced.squares =
-      (sums.squares -
-       sums.known.cwiseProduct(inverse_known_ * sums.known).colwise().sum().transpose().eval()) /
-      (noise_ * noise_);
-  for (const Field& field : fields_)
-    reduced.coordinates.emplace_back(field.modes * sums.modes / (noise_ * noise_) + field.known * sums.known);
-  return reduced;
+double DiscrepancyModel::squares_of(const Sums& sums) const {
+  return (sums.squares[0] - sums.known.col(0).dot(inverse_known_ * sums.known.col(0))) / (noise_ * noise_);
+}
+
+Eigen::VectorXd DiscrepancyModel::products_with(const Field& field, const Sums& sums) const {
+  Eigen::VectorXd products = -(field.known * (inverse_known_ * sums.known.col(0)));
+  for (int channel = 0; channel < channels_; ++channel)
+    for (Eigen::Index c = 0; c < field.shares.cols(); ++c)
+      products[channel * field.shares.cols() + c] += field.shares.col(c).dot(
+          sums.modes.col(0)(of_mode(channel, field.modes[static_cast<std::size_t>(c)])));
+  return products / (noise_ * noise_);
+}
+
+Eigen::MatrixXd DiscrepancyModel::information_of(const Field& field) const {
+  Eigen::MatrixXd information = field.squares;
+  information.noalias() -= field.known * inverse_known_ * field.known.transpose();
+  return information / (noise_ * noise_);
+}
+
+std::vector<double> DiscrepancyModel::deviances(const Shape& shape, const Sums& sums,
+                                                const std::vector<double>& sizes) const {
+  const Field field = this->field(shape);
+  // Turned so that the information is tridiagonal: then each size costs as many operations as coordinates.
+  const Eigen::Tridiagonalization<Eigen::MatrixXd> turned(information_of(field));
+  const Eigen::VectorXd diagonal = turned.diagonal(), beside = turned.subDiagonal(),
+                        products = turned.matrixQ().adjoint() * products_with(field, sums);
+  const double squares = squares_of(sums);
+  std::vector<double> all;
+  for (const double tau : sizes)
+    all.push_back(squares + tridiagonal_deviance(diagonal, beside, products, tau * tau));
+  return all;
 }
 
 /// The fixed point of sigma^2 = squares of what is left / (rows - what was fitted), under a discrepancy that
@@ -231,29 +255,30 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
   const double rows = rows_.weights.sum();
   const double all = std::sqrt(residuals.cwiseAbs2().dot(rows_.weights) / rows);
   noise_ = std::max(all, 1e-9);
-  const Shape flexible{kTimes[0] * duration_, kSheets[0] * along_.length};
+  const Field flexible = field({kTimes[0] * duration_, kSheets[0] * along_.length});
+  const Sums sums = this->sums(residuals);
   const double variance = 100 * noise_ * noise_;
+  const auto count = static_cast<double>(known_.cols()),
+             coordinates = static_cast<double>(flexible.squares.cols());
   for (int round = 0; round < 8; ++round) {
-    const Eigen::Index count = known_.cols();
-    const Eigen::MatrixXd known = known_.transpose() * rows_.weights.asDiagonal() * known_;
-    inverse_known_ = (known + noise_ * noise_ * Eigen::MatrixXd::Identity(count, count))
-                         .ldlt()
-                         .solve(Eigen::MatrixXd::Identity(count, count));
+    Eigen::MatrixXd normal = known_known_;
+    normal.diagonal().array() += noise_ * noise_;
+    inverse_known_ = normal.ldlt().solve(Eigen::MatrixXd::Identity(normal.rows(), normal.cols()));
     if (round == 0) {
-      const Eigen::VectorXd left =
-          residuals -
-          known_ * (inverse_known_ * (known_.transpose() * (rows_.weights.asDiagonal() * residuals)));
+      const Eigen::VectorXd left = residuals - known_ * (inverse_known_ * sums.known);
       left_ = std::sqrt(left.cwiseAbs2().dot(rows_.weights) / rows);
     }
-    fields_ = {field(flexible)};
-    const Reduced reduced = reduce(residuals);
-    const Eigen::ArrayXd gains = fields_[0].gains.array(), x = reduced.coordinates[0].col(0).array();
-    const Eigen::ArrayXd fitted = variance * x / (1 + variance * gains);
-    const double left = reduced.squares[0] - 2 * (fitted * x).sum() + (fitted * fitted * gains).sum();
-    const double freedom =
-        rows - (variance * gains / (1 + variance * gains)).sum() - static_cast<double>(count);
+    // With V the variance of the coordinates, G their information and B = 1 + V G, V B^-1 x is fitted.
+    Eigen::MatrixXd matrix = variance * information_of(flexible);
+    matrix.diagonal().array() += 1;
+    const Eigen::LLT<Eigen::MatrixXd> factor(matrix);
+    const Eigen::VectorXd x = products_with(flexible, sums), fitted = variance * factor.solve(x);
+    const double left = squares_of(sums) - fitted.dot(x) - fitted.squaredNorm() / variance;
+    matrix.setIdentity();
+    factor.matrixL().solveInPlace(matrix);
+    const double freedom = rows - (coordinates - matrix.squaredNorm()) - count;
     if (round == 0 && freedom < 1 && most_rows_together(rows_) <= kFew) {
-      const double of_known = (inverse_known_ * known).trace();
+      const double of_known = (inverse_known_ * known_known_).trace();
       noise_ = std::max(left_ * std::sqrt(0.5 * rows / std::max(rows - of_known, 1.0)), 1e-9);
       noise_is_told_ = false;
       break;
@@ -263,60 +288,53 @@ void DiscrepancyModel::estimate_noise(const Eigen::VectorXd& residuals) {
         std::max(noise_ * std::sqrt(std::max(left, 0.0) / std::max(freedom, kLeastFreedom * rows)), 1e-9);
     if (std::abs(noise_ - before) < 1e-3 * before) break;
   }
-  fields_.clear();
 }
 
 double DiscrepancyModel::deviance_at(const Eigen::VectorXd& residuals, std::size_t shape, double tau) const {
-  const Reduced reduced = reduce(residuals);
-  return diagonal_deviance(reduced.squares[0], fields_[shape].gains, reduced.coordinates[shape].col(0), tau);
+  return deviances(shapes()[shape], sums(residuals), {tau}).front();
 }
 
-void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
-  const Reduced reduced = reduce(residuals);
-  misfit_.rough = noise_;
-  misfit_.explained = explained_;
-  misfit_.keyframes = keyframes_;
-  if (!noise_is_told_) {
-    // As long as the recording, so that keyframes alike do not count as many, and short along the sheet.
-    const std::size_t longest = (std::size(kTimes) - 1) * std::size(kSheets);
-    const Eigen::VectorXd at_rows =
-        along_.values.cwiseAbs2() * variances_along(along_, fields_[longest].shape.reach_sheet);
-    variances_.assign(fields_.size(), 0);
-    variances_[longest] = noise_ * noise_ / at_rows.mean();
-    misfit_.size = misfit_.rms = noise_;
-    misfit_.reach_time = fields_[longest].shape.reach_time;
-    misfit_.reach_sheet = fields_[longest].shape.reach_sheet;
-    misfit_.draws = {{misfit_.size, misfit_.reach_time, misfit_.reach_sheet}};
-    return;
-  }
-  std::vector<double> deviances;
+void DiscrepancyModel::assume() {
+  // As long as the recording, so that keyframes alike do not count as many, and short along the sheet.
+  const std::size_t longest = (std::size(kTimes) - 1) * std::size(kSheets);
+  const std::vector<Shape> all = shapes();
+  const Eigen::VectorXd at_rows =
+      along_.values.cwiseAbs2() * variances_along(along_, all[longest].reach_sheet);
+  variances_.assign(all.size(), 0);
+  variances_[longest] = noise_ * noise_ / at_rows.mean();
+  misfit_.size = misfit_.rms = noise_;
+  misfit_.reach_time = all[longest].reach_time;
+  misfit_.reach_sheet = all[longest].reach_sheet;
+  misfit_.draws = {{misfit_.size, misfit_.reach_time, misfit_.reach_sheet}};
+}
+
+void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals, int threads) {
+  const std::vector<Shape> all = shapes();
+  const Sums sums = this->sums(residuals);
+  std::vector<std::vector<double>> of_shapes(all.size());  // at each size
+  data::for_each_in_parallel(all.size(), threads,
+                             [&](std::size_t f) { of_shapes[f] = deviances(all[f], sums, sizes_); });
   double least = std::numeric_limits<double>::infinity(), without = least;
-  for (std::size_t f = 0; f < fields_.size(); ++f) {
-    const auto at = [&](double tau) {
-      return diagonal_deviance(reduced.squares[0], fields_[f].gains, reduced.coordinates[f].col(0), tau);
-    };
-    without = std::min(without, at(explained_));
-    for (const double tau : sizes_) {
-      deviances.push_back(at(tau));
-      least = std::min(least, deviances.back());
-    }
+  for (const std::vector<double>& of_sizes : of_shapes) {
+    without = std::min(without, of_sizes.front());
+    least = std::min(least, *std::min_element(of_sizes.begin(), of_sizes.end()));
   }
   misfit_.gain = std::max(0.0, without - least);
   misfit_.found = misfit_.gain > kOnceInTwenty;
-  variances_.assign(fields_.size(), 0);
+  variances_.assign(all.size(), 0);
   double total = 0, squares = 0;
-  std::vector<double> weights;  // in order of fields, then sizes
-  for (std::size_t f = 0, i = 0; f < fields_.size(); ++f)
-    for (std::size_t s = 0; s < sizes_.size(); ++s, ++i) {
-      const double weight = priors_[s] * std::exp(-0.5 * (deviances[i] - least)),
+  std::vector<double> weights;  // in order of shapes, then sizes
+  for (std::size_t f = 0; f < all.size(); ++f)
+    for (std::size_t s = 0; s < sizes_.size(); ++s) {
+      const double weight = priors_[s] * std::exp(-0.5 * (of_shapes[f][s] - least)),
                    square = std::max(weight * sizes_[s] * sizes_[s], std::numeric_limits<double>::min());
       weights.push_back(weight);
       total += weight;
       squares += square;
       variances_[f] += square;
       misfit_.size += weight * sizes_[s];
-      misfit_.reach_time += square * fields_[f].shape.reach_time;
-      misfit_.reach_sheet += square * fields_[f].shape.reach_sheet;
+      misfit_.reach_time += square * all[f].reach_time;
+      misfit_.reach_sheet += square * all[f].reach_sheet;
     }
   for (double& variance : variances_) variance /= total;
   misfit_.size /= total;
@@ -329,9 +347,23 @@ void DiscrepancyModel::weigh(const Eigen::VectorXd& residuals) {
   for (std::size_t draw = 0; draw < kDraws; ++draw) {
     const double share = (static_cast<double>(draw) + 0.5) / kDraws * total;
     while (at + 1 < weights.size() && below + weights[at] < share) below += weights[at++];
-    const Shape& shape = fields_[at / sizes_.size()].shape;
+    const Shape& shape = all[at / sizes_.size()];
     misfit_.draws.push_back({sizes_[at % sizes_.size()], shape.reach_time, shape.reach_sheet});
   }
+}
+
+std::vector<Eigen::MatrixXd> DiscrepancyModel::between_keyframes() const {
+  std::vector<Eigen::MatrixXd> between(static_cast<std::size_t>(modes_),
+                                       Eigen::MatrixXd::Zero(keyframes_, keyframes_));
+  const std::vector<Shape> all = shapes();
+  for (std::size_t f = 0; f < all.size(); ++f) {
+    if (variances_[f] == 0) continue;
+    const Eigen::VectorXd sheet = variances_[f] * variances_along(along_, all[f].reach_sheet);
+    const Eigen::MatrixXd times = in_time(all[f]);
+    for (std::size_t mode = 0; mode < between.size(); ++mode)
+      between[mode] += sheet[static_cast<Eigen::Index>(mode)] * times;
+  }
+  return between;
 }
 
 Eigen::MatrixXd DiscrepancyModel::covariance_of(const Eigen::MatrixXd& combinations, bool independent) const {
@@ -341,25 +373,16 @@ Eigen::MatrixXd DiscrepancyModel::covariance_of(const Eigen::MatrixXd& combinati
   Eigen::MatrixXd covariance =
       noise_ * noise_ * combinations.transpose() * spreads.asDiagonal() * combinations +
       known * known.transpose();
-  // Of each keyframe and channel, how much of each mode the combinations have.
-  Eigen::MatrixXd modes = Eigen::MatrixXd::Zero(block(keyframes_, 0, channels_, modes_), combinations.cols());
-  for (Eigen::Index i = 0; i < combinations.rows(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    modes.middleRows(block(rows_.keyframe[at], rows_.channel[at], channels_, modes_), modes_).noalias() +=
-        along_.values.row(i).transpose() * combinations.row(i);
-  }
-  for (std::size_t f = 0; f < fields_.size(); ++f) {
-    const Eigen::VectorXd sheet = variances_[f] * variances_along(along_, fields_[f].shape.reach_sheet);
-    const Eigen::MatrixXd times = in_time(fields_[f].shape);
-    for (int channel = 0; channel < channels_; ++channel)
-      for (int k = 0; k < keyframes_; ++k)
-        for (int l = 0; l < keyframes_; ++l) {
-          if (independent && k != l) continue;
-          covariance.noalias() +=
-              times(k, l) * modes.middleRows(block(k, channel, channels_, modes_), modes_).transpose() *
-              sheet.asDiagonal() * modes.middleRows(block(l, channel, channels_, modes_), modes_);
-        }
-  }
+  const Eigen::MatrixXd by_modes = this->by_modes(combinations);
+  for (int channel = 0; channel < channels_; ++channel)
+    for (int mode = 0; mode < modes_; ++mode) {
+      const Eigen::MatrixXd at_keyframes = by_modes(of_mode(channel, mode), Eigen::all);
+      const Eigen::MatrixXd& between = between_keyframes_[static_cast<std::size_t>(mode)];
+      if (independent)
+        covariance.noalias() += at_keyframes.transpose() * between.diagonal().asDiagonal() * at_keyframes;
+      else
+        covariance.noalias() += at_keyframes.transpose() * between * at_keyframes;
+    }
   return covariance;
 }
 

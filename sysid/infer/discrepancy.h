@@ -93,22 +93,35 @@ class DiscrepancyModel {
     Eigen::MatrixXd known;    ///< known columns by column of residuals
     Eigen::VectorXd squares;  ///< of each column
   };
-  /// One pair of reaches, in the coordinates in which the discrepancy's information is diagonal.
+  /// One pair of reaches. Each coordinate of a channel is one mode in time times one along the sheet, of unit
+  /// variance at tau = 1 m.
   struct Field {
-    Shape shape;
-    Eigen::MatrixXd modes;  ///< rows: coordinates; columns: (keyframe, channel, mode)
-    Eigen::MatrixXd known;  ///< from Sums::known
-    Eigen::VectorXd gains;  ///< information of each coordinate over its prior at tau = 1 m
-  };
-  struct Reduced {
-    Eigen::VectorXd squares;                   ///< of what errors of known shape leave
-    std::vector<Eigen::MatrixXd> coordinates;  ///< of each field, by column of residuals
+    std::vector<Eigen::Index> modes;  ///< along the sheet, of each coordinate
+    Eigen::MatrixXd shares;           ///< of each coordinate (column) in each keyframe
+    Eigen::MatrixXd squares;          ///< lower half of their products with each other, over the rows
+    Eigen::MatrixXd known;            ///< their products with the errors of known shape
   };
   Sums sums(const Eigen::MatrixXd& residuals) const;
+  /// Of columns, a row a row: their products with the modes, stacked as in Sums.
+  Eigen::MatrixXd by_modes(const Eigen::MatrixXd& columns) const;
+  /// Where the keyframes have a mode along the sheet of a channel, in what is stacked as in Sums.
+  auto of_mode(int channel, Eigen::Index mode) const {
+    return Eigen::seqN(channel * modes_ + mode, keyframes_, channels_ * modes_);
+  }
   Field field(const Shape& shape) const;
-  Reduced reduce(const Eigen::MatrixXd& residuals) const;
+  /// Of what errors of known shape leave, over sigma^2: the residuals' squares, their products with the
+  /// coordinates of a field, and the lower half of the information of these.
+  double squares_of(const Sums& sums) const;
+  Eigen::VectorXd products_with(const Field& field, const Sums& sums) const;
+  Eigen::MatrixXd information_of(const Field& field) const;
+  /// -2 log restricted likelihood at each size tau.
+  std::vector<double> deviances(const Shape& shape, const Sums& sums, const std::vector<double>& sizes) const;
   void estimate_noise(const Eigen::VectorXd& residuals);
-  void weigh(const Eigen::VectorXd& residuals);
+  void weigh(const Eigen::VectorXd& residuals, int threads);
+  /// Sets the variances where nothing tells them: half of that of the residuals.
+  void assume();
+  /// Covariances between keyframes of what each mode along the sheet has of the discrepancy [m^2].
+  std::vector<Eigen::MatrixXd> between_keyframes() const;
   Eigen::MatrixXd in_time(const Shape& shape) const;       ///< correlation between keyframes
   Eigen::MatrixXd scaled_modes(const Shape& shape) const;  ///< along the sheet, a row each
 
@@ -116,14 +129,15 @@ class DiscrepancyModel {
   Eigen::MatrixXd known_;  ///< errors of known shape and, of no known size, free ones and the parameters
   int channels_ = 1, keyframes_ = 0, modes_ = 0;
   double noise_ = 0, left_ = 0, explained_ = 0, duration_ = 0;
-  bool noise_is_told_ = true;    ///< from the discrepancy
-  SheetModes along_;             ///< of each row
-  Eigen::MatrixXd modes_modes_;  ///< (keyframe, channel) blocks of sum w phi phi^T, side by side
-  Eigen::MatrixXd modes_known_;  ///< (keyframe, channel, mode) by known
-  Eigen::MatrixXd inverse_known_;
-  std::vector<Field> fields_;
+  bool noise_is_told_ = true;                       ///< from the discrepancy
+  SheetModes along_;                                ///< of each row
+  std::vector<std::vector<Eigen::Index>> rows_of_;  ///< of each keyframe and channel
+  std::vector<Eigen::MatrixXd> modes_modes_;  ///< of each channel: a keyframe a row, sum w phi phi^T along it
+  Eigen::MatrixXd modes_known_;               ///< (keyframe, channel, mode) by known
+  Eigen::MatrixXd known_known_, inverse_known_;
   std::vector<double> sizes_, priors_;  ///< tau [m] and the prior of each
   std::vector<double> variances_;       ///< of each shape: tau^2 times how likely both are, summed over tau
+  std::vector<Eigen::MatrixXd> between_keyframes_;  ///< see between_keyframes()
   Misfit misfit_;
 };
 
