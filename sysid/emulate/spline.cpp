@@ -39,33 +39,27 @@ Eigen::MatrixXd second_derivatives(const Eigen::VectorXd& x) {
 
 Spline::Spline(Eigen::VectorXd knots) : knots_(std::move(knots)), second_(second_derivatives(knots_)) {}
 
-Eigen::RowVectorXd Spline::weights(double t, int derivative) const {
-  Eigen::RowVectorXd weights(knots_.size());
-  this->weights(t, derivative, weights);
-  return weights;
-}
-
-void Spline::weights(double t, int derivative, Eigen::Ref<Eigen::RowVectorXd> weights) const {
+Spline::Local Spline::local(double t, int derivative) const {
   const Eigen::Index n = knots_.size();
-  weights.setZero();
-  if (n == 1) {
-    weights[0] = derivative == 0 ? 1 : 0;
-    return;
-  }
+  if (n == 1) return {{0, 0}, {derivative == 0 ? 1.0 : 0.0, 0}, {0, 0}};
   const Eigen::Index i = std::clamp<Eigen::Index>(
       std::upper_bound(knots_.data(), knots_.data() + n, t) - knots_.data() - 1, 0, n - 2);
   const double h = knots_[i + 1] - knots_[i], b = (t - knots_[i]) / h, a = 1 - b;
-  if (derivative == 0) {
-    weights[i] = a;
-    weights[i + 1] = b;
-    weights += h * h / 6 * ((a * a * a - a) * second_.row(i) + (b * b * b - b) * second_.row(i + 1));
-  } else if (derivative == 1) {
-    weights[i] = -1 / h;
-    weights[i + 1] = 1 / h;
-    weights += h / 6 * ((1 - 3 * a * a) * second_.row(i) + (3 * b * b - 1) * second_.row(i + 1));
-  } else {
-    weights = a * second_.row(i) + b * second_.row(i + 1);
+  if (derivative == 0)
+    return {{i, i + 1}, {a, b}, {h * h / 6 * (a * a * a - a), h * h / 6 * (b * b * b - b)}};
+  if (derivative == 1)
+    return {{i, i + 1}, {-1 / h, 1 / h}, {h / 6 * (1 - 3 * a * a), h / 6 * (3 * b * b - 1)}};
+  return {{i, i + 1}, {0, 0}, {a, b}};
+}
+
+Eigen::RowVectorXd Spline::weights(double t, int derivative) const {
+  const Local local = this->local(t, derivative);
+  Eigen::RowVectorXd weights = Eigen::RowVectorXd::Zero(knots_.size());
+  for (const std::size_t side : {0, 1}) {
+    weights[local.knots[side]] += local.values[side];
+    weights += local.curvatures[side] * second_.row(local.knots[side]);
   }
+  return weights;
 }
 
 }  // namespace flash::sysid

@@ -1,5 +1,6 @@
 #pragma once
 #include <Eigen/Core>
+#include <array>
 
 namespace flash::sysid {
 
@@ -12,14 +13,24 @@ class Spline {
 
   const Eigen::VectorXd& knots() const { return knots_; }
 
+  /// What value (derivative 0), slope (1) or curvature (2) at t are made of: values and curvatures at the
+  /// knots below and above, which are one where there is one knot only.
+  struct Local {
+    std::array<Eigen::Index, 2> knots;
+    std::array<double, 2> values, curvatures;  ///< weights
+  };
+  Local local(double t, int derivative = 0) const;
+
+  /// Maps values at the knots to curvatures there.
+  const Eigen::MatrixXd& curvatures() const { return second_; }
+
   /// Weights of the values at the knots in the spline's value (derivative 0), slope (1) or curvature (2) at
   /// t.
   Eigen::RowVectorXd weights(double t, int derivative = 0) const;
-  void weights(double t, int derivative, Eigen::Ref<Eigen::RowVectorXd> weights) const;
 
  private:
   Eigen::VectorXd knots_;
-  Eigen::MatrixXd second_;  // maps values at the knots to second derivatives there
+  Eigen::MatrixXd second_;
 };
 
 }  // namespace flash::sysid

@@ -8,47 +8,64 @@ namespace flash::sysid {
 TensorSpline::TensorSpline(const std::vector<Eigen::VectorXd>& knots, Eigen::VectorXd values)
     : values_(std::move(values)) {
   for (const Eigen::VectorXd& each : knots) splines_.emplace_back(each);
-}
-
-double TensorSpline::contract(const Eigen::VectorXd& x, const std::vector<int>& derivatives) const {
-  // A sampler asks hundreds of thousands of times: what it takes is kept by the thread.
-  thread_local Eigen::VectorXd tensor, next;
-  thread_local Eigen::RowVectorXd weights;
-  tensor = values_;
-  Eigen::Index count = values_.size();
-  for (std::size_t k = 0; k < splines_.size(); ++k) {
-    const Eigen::Index size = splines_[k].knots().size();
-    count /= size;
-    weights.resize(size);
-    splines_[k].weights(x[static_cast<Eigen::Index>(k)], derivatives[k], weights);
-    next.setZero(count);
-    for (Eigen::Index i = 0; i < size; ++i) next += weights[i] * tensor.segment(i * count, count);
-    tensor.swap(next);
+  std::vector<Eigen::VectorXd> along = {values_};  // each set of axes
+  Eigen::Index stride = values_.size();
+  for (const Spline& spline : splines_) {
+    const Eigen::Index size = spline.knots().size(), before = values_.size() / stride;
+    stride /= size;
+    for (std::size_t s = 0, count = along.size(); s < count; ++s) {
+      Eigen::VectorXd& curved = along.emplace_back(values_.size());
+      for (Eigen::Index i = 0; i < before; ++i) {
+        const Eigen::Map<const Eigen::MatrixXd> from(along[s].data() + i * size * stride, stride, size);
+        Eigen::Map<Eigen::MatrixXd>(curved.data() + i * size * stride, stride, size).noalias() =
+            from * spline.curvatures().transpose();
+      }
+    }
   }
-  return tensor[0];
+  curvatures_.resize(static_cast<Eigen::Index>(along.size()), values_.size());
+  for (std::size_t s = 0; s < along.size(); ++s)
+    curvatures_.row(static_cast<Eigen::Index>(s)) = along[s].transpose();
 }
 
-double TensorSpline::operator()(const Eigen::VectorXd& x) const {
-  return contract(x, std::vector<int>(splines_.size(), 0));
+double TensorSpline::sum(const std::vector<Spline::Local>& at, std::size_t k, Eigen::Index node,
+                         Eigen::Index along) const {
+  const Spline::Local& here = at[k];
+  const Eigen::Index with_k = along | Eigen::Index{1} << k;
+  double sum = 0;
+  for (const std::size_t side : {0, 1}) {
+    const Eigen::Index there = node * splines_[k].knots().size() + here.knots[side];
+    if (k + 1 == at.size()) {
+      sum +=
+          here.values[side] * curvatures_(along, there) + here.curvatures[side] * curvatures_(with_k, there);
+      continue;
+    }
+    if (here.values[side] != 0) sum += here.values[side] * this->sum(at, k + 1, there, along);
+    if (here.curvatures[side] != 0) sum += here.curvatures[side] * this->sum(at, k + 1, there, with_k);
+  }
+  return sum;
 }
+
+double TensorSpline::contract(const Eigen::VectorXd& x, Eigen::Index i, Eigen::Index j) const {
+  // A sampler asks hundreds of thousands of times: what it takes is kept by the thread.
+  thread_local std::vector<Spline::Local> at;
+  at.clear();
+  for (Eigen::Index k = 0; k < dimensions(); ++k)
+    at.push_back(splines_[static_cast<std::size_t>(k)].local(x[k], (k == i ? 1 : 0) + (k == j ? 1 : 0)));
+  return sum(at, 0, 0, 0);
+}
+
+double TensorSpline::operator()(const Eigen::VectorXd& x) const { return contract(x); }
 
 double TensorSpline::derivatives(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
                                  Eigen::MatrixXd& hessian) const {
   const Eigen::Index n = dimensions();
-  std::vector<int> orders(splines_.size(), 0);
   gradient.resize(n);
   hessian.resize(n, n);
   for (Eigen::Index i = 0; i < n; ++i) {
-    orders[static_cast<std::size_t>(i)] = 1;
-    gradient[i] = contract(x, orders);
-    for (Eigen::Index j = 0; j <= i; ++j) {
-      ++orders[static_cast<std::size_t>(j)];
-      hessian(i, j) = hessian(j, i) = contract(x, orders);
-      --orders[static_cast<std::size_t>(j)];
-    }
-    orders[static_cast<std::size_t>(i)] = 0;
+    gradient[i] = contract(x, i);
+    for (Eigen::Index j = 0; j <= i; ++j) hessian(i, j) = hessian(j, i) = contract(x, i, j);
   }
-  return contract(x, orders);
+  return contract(x);
 }
 
 double TensorSpline::minimize(Eigen::VectorXd& x) const {

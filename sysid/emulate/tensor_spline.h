@@ -23,10 +23,18 @@ class TensorSpline {
   double minimize(Eigen::VectorXd& x) const;
 
  private:
-  double contract(const Eigen::VectorXd& x, const std::vector<int>& derivatives) const;
+  /// Derivative along axes i and j, none where they are negative.
+  double contract(const Eigen::VectorXd& x, Eigen::Index i = -1, Eigen::Index j = -1) const;
+  /// The part of axis k and those behind it, at a node of those before; `along`: axes before k of which the
+  /// curvature is asked for, a bit each.
+  double sum(const std::vector<Spline::Local>& at, std::size_t k, Eigen::Index node,
+             Eigen::Index along) const;
 
   std::vector<Spline> splines_;
   Eigen::VectorXd values_;
+  /// Of each point, a column, the curvatures along any set of axes, of which each has a bit: few are read for
+  /// a value.
+  Eigen::MatrixXd curvatures_;
 };
 
 }  // namespace flash::sysid

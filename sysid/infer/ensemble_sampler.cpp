@@ -13,7 +13,7 @@ Eigen::MatrixXd sample_ensemble(const std::function<double(const Eigen::VectorXd
   // The distributions of the standard library differ between libraries.
   const auto uniform = [&] { return static_cast<double>(random() >> 11U) * 0x1p-53; };
   Eigen::MatrixXd places = start;
-  Eigen::VectorXd logs(walkers);
+  Eigen::VectorXd logs(walkers), trial(start.cols());
   for (Eigen::Index i = 0; i < walkers; ++i) logs[i] = log_density(places.row(i).transpose());
   Eigen::MatrixXd draws(walkers * (settings.sweeps / settings.keep_every), start.cols());
   Eigen::Index kept = 0;
@@ -26,8 +26,7 @@ Eigen::MatrixXd sample_ensemble(const std::function<double(const Eigen::VectorXd
           (first ? half : 0) + static_cast<Eigen::Index>(uniform() * static_cast<double>(others));
       const double root = 1 + (kStretch - 1) * uniform();
       const double z = root * root / kStretch;
-      const Eigen::VectorXd trial =
-          (places.row(partner) + z * (places.row(i) - places.row(partner))).transpose();
+      trial = (places.row(partner) + z * (places.row(i) - places.row(partner))).transpose();
       const double log = log_density(trial);
       const double accept = static_cast<double>(start.cols() - 1) * std::log(z) + log - logs[i];
       if (std::log(1 - uniform()) >= accept) continue;
