@@ -214,18 +214,23 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
   Eigen::VectorXd deviance(static_cast<Eigen::Index>(points));
   const std::atomic<bool>* const stop = emulator.models.front().replay.settings.solver.stop;
   // Points that share their first values share the slices there. A thread takes all points of one value of
-  // the first two axes; of the first, the slices are shared.
+  // the first two axes; of the first, the slices are shared. Who needs a slice waits while another works it
+  // out: as many first values are under way as there are threads.
   struct Shared {
     std::once_flag made;
     Slices slices;
     std::atomic<std::size_t> left = 0;  // of the second axis
   };
   const std::size_t seconds = axes.size() > 1 ? axes[1].values.size() : 1, part = others / seconds;
+  const std::size_t together = std::clamp<std::size_t>(firsts, 1, std::max(grid.threads, 1));
   std::vector<Shared> shared(firsts);
   for (Shared& each : shared) each.left = seconds;
-  data::for_each_in_parallel(firsts * seconds, grid.threads, [&](std::size_t pair) {
-    Shared& each = shared[pair / seconds];
-    std::call_once(each.made, [&] { hold(all, axes[0].values[pair / seconds], each.slices); });
+  data::for_each_in_parallel(firsts * seconds, grid.threads, [&](std::size_t place) {
+    const std::size_t begun = place / (together * seconds) * together,
+                      under_way = std::min(together, firsts - begun), within = place - begun * seconds,
+                      first_value = begun + within % under_way, second_value = within / under_way;
+    Shared& each = shared[first_value];
+    std::call_once(each.made, [&] { hold(all, axes[0].values[first_value], each.slices); });
     std::vector<Slices> held(axes.size());  // one an axis
     ReadMotions motions(emulator);
     std::vector<std::size_t> counts;
@@ -252,10 +257,10 @@ Eigen::VectorXd deviance_over(const Emulator& emulator, const std::vector<Axis>&
       }
     };
     if (axes.size() == 1) {
-      visit(visit, each.slices, 1, pair, 1);
+      visit(visit, each.slices, 1, first_value, 1);
     } else {
-      hold(each.slices, axes[1].values[pair % seconds], held[1]);
-      visit(visit, held[1], 2, pair * part, part);
+      hold(each.slices, axes[1].values[second_value], held[1]);
+      visit(visit, held[1], 2, (first_value * seconds + second_value) * part, part);
     }
     if (--each.left == 0) each.slices.clear();
   });
